@@ -4,6 +4,6 @@ import sys
 
 from codebotler.core.terminal import note
 
-if sys.flags.optimize > 1:  # the import of the commands would fail
+if sys.flags.optimize > 1:  # importing the commands would fail
     note("Skills need docstrings: leave out -OO, or set PYTHONOPTIMIZE to 0 or 1.")
     raise SystemExit(2)

@@ -1,4 +1,4 @@
-"""The commands about programs, and the list of all commands."""
+"""The commands that work with programs, and the list of all commands."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def generate(
     skills: options.SkillsOption = None,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
-    """Have a model write a program, and print it.
+    """Have a model write a program, check it, and print it.
 
     The exit status is 1 if the check finds problems.
     """
@@ -70,7 +70,7 @@ def generate(
 
 def check(
     program: Annotated[
-        str, typer.Argument(help="A file, or - for standard input, which may be a model's reply.")
+        str, typer.Argument(help="A program file, or - for standard input, which may be a model's reply.")
     ],
     world: options.WorldOption = None,
     connect: options.ConnectOption = None,
@@ -82,7 +82,7 @@ def check(
         bool,
         typer.Option(
             "--strict",
-            help="Do not assume that people and objects are there unless the program has looked for them.",
+            help="Do not assume that people and objects are present unless the program looked for them.",
         ),
     ] = False,
     shows_all: options.AllOption = False,
@@ -93,7 +93,7 @@ def check(
 ) -> None:
     """Look for problems in a program before a robot runs it.
 
-    This runs the program in imagined worlds. The exit status is 1 if there are problems.
+    The check runs the program in imagined worlds. The exit status is 1 if there are problems.
     """
     from codebotler.checking import check
     from codebotler.cli.check import check_view, read_program
@@ -136,7 +136,7 @@ def rules(
 ) -> None:
     """Show house rules with examples, and likely mistakes.
 
-    For each rule, this finds a short example that keeps it and one that breaks it.
+    For each rule, it shows a short example that keeps the rule and one that breaks it.
     """
     from codebotler.checking.rule_review import review_rules
     from codebotler.checking.rules import read_rules
@@ -161,10 +161,10 @@ def rules(
 
 def skills(
     file: Annotated[
-        Path | None, typer.Argument(help="A Python file of your own skills; it is executed.")
+        Path | None, typer.Argument(help="A Python file with your own skills; it is executed.")
     ] = None,
     new: Annotated[
-        Path | None, typer.Option("--new", help="Write a template for such a file.", metavar="FILE")
+        Path | None, typer.Option("--new", help="Write a template for a skills file.", metavar="FILE")
     ] = None,
     ros_package: Annotated[
         Path | None,
@@ -176,9 +176,9 @@ def skills(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """Show skills as models see them, and try them.
+    """Show skills as models see them, and try them out.
 
-    This calls each example in 40 imagined worlds.
+    The example of each skill is called in 40 imagined worlds.
     """
     from codebotler.cli.skills import SKILLS_TEMPLATE, skills_data, skills_view, write_new
     from codebotler.core.skills.files import skills_from
@@ -204,7 +204,7 @@ def models(
 ) -> None:
     """List the models that you can use now.
 
-    This looks for keys in the environment, and for model servers on this machine.
+    The list depends on API keys in the environment and on model servers on this machine.
     """
     from dataclasses import asdict
 
@@ -230,7 +230,7 @@ app.command("virtual-robot")(virtual_robot)
 
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line of CodeBotler."""
     with report_problems():
         obey(app, "codebotler")
 

@@ -1,4 +1,4 @@
-"""`codebotler check`: read a program, and show the result of the check."""
+"""`codebotler check`: read a program and show the result of the check."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from codebotler.prompts.extract import program_in
 
 STANDARD_INPUT = "standard input"
 CONTEXT_LINES = 1
-"""Lines shown before and after a line with a problem."""
+"""The number of lines to show before and after a line with a problem."""
 MAX_ROOMS_SHOWN = 12
 
 
 def read_program(name: str) -> str:
-    """Read a program from a file; or from standard input (`-`), also out of a model's reply."""
+    """Read a program from a file or standard input (`-`), where it may be part of a model's reply."""
     if name != "-":
         if not name:
             raise UserError("the file name is empty; name a file, or - for standard input")
         text = read_text(Path(name))
         if not text.strip():
-            raise UserError("it contains no program", file=name)
+            raise UserError("the file contains no program", file=name)
         return text
     text = decode_text(sys.stdin.buffer.read(MAX_FILE_BYTES + 1), STANDARD_INPUT)
     if not text.strip():
@@ -40,7 +40,7 @@ def read_program(name: str) -> str:
 
 
 def check_view(found: CheckResult, program: str, name: str, *, shows_all: bool = False) -> RenderableType:
-    """Show the verdict, the problems, and the actions in one sampled world, or in one of each kind."""
+    """Show the verdict, the problems, and a run in one sampled world, or all different runs."""
     parts: list[RenderableType] = [_verdict(found, name)]
     lines = program.rstrip("\n").split("\n")
     for problem in found.problems:
@@ -62,9 +62,9 @@ def _verdict(found: CheckResult, name: str) -> Text:
         problems = "1 problem" if count == 1 else f"{count} problems"
         verdict = Text.assemble(("rejected", "bold red"), f": {problems} in {visible(name)}")
     if not found.samples:
-        run = "it was not run"
+        run = "the program was not run"
     elif not any(sample.draws for sample in found.samples):
-        run = "it does the same in every world"
+        run = "the program behaves the same in every world"
     else:
         worlds = f"{len(found.samples)} imagined world{'s'[: len(found.samples) > 1]}"
         run = f"run in {worlds} with random people and objects"
@@ -95,24 +95,16 @@ def _rooms(found: CheckResult) -> Text:
 def _vain_searches(found: CheckResult) -> Iterator[Text]:
     count = sum(sample.in_vain for sample in found.samples)
     if 0 < count < len(found.samples):
-        often = f"{count} of {len(found.samples)} worlds"
-        yield Text(
-            f"in {often} the robot waits or searches without success; that is no problem",
-            "dim",
-        )
+        where = f"in {count} of {len(found.samples)} worlds"
+        yield Text(f"{where}, the robot waits or searches without success; this is not a problem", "dim")
 
 
 def _distinct_samples(found: CheckResult) -> list[Sample]:
-    """Return one sample for each different behaviour: problems first, then long successful runs."""
+    """Return one sample of each different behaviour: first those with problems, then long successful runs."""
 
     def rank(sample: Sample) -> tuple[bool, bool, bool, int]:
-        outcome = sample.outcome
-        return (
-            sample.number not in found.evidence,
-            outcome.error is not None,
-            sample.in_vain,
-            -len(outcome.trace),
-        )
+        error, trace = sample.outcome.error, sample.outcome.trace
+        return sample.number not in found.evidence, error is not None, sample.in_vain, -len(trace)
 
     different: dict[tuple[str, RunError | None], Sample] = {}
     for sample in found.samples:

@@ -1,4 +1,4 @@
-"""Runs a command line, and turns its errors into one sentence and an exit status."""
+"""Run a command line, and convert errors to one sentence and an exit status."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ if TYPE_CHECKING:
     from codebotler.models.recorded import UnknownInstructionError
 
 IS_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
-STOPPED = 130  # the status after Ctrl-C, as shells have it
-USAGE: Any = typer.BadParameter.__mro__[1]  # click's UsageError, wherever this version of typer keeps click
-ENVIRONMENT = (*DISK_FULL, errno.EIO)  # of all that can go wrong in writing, what no other path would mend
+STOPPED = 130  # the exit status after Ctrl-C, by the convention of shells
+USAGE: Any = typer.BadParameter.__mro__[1]  # click's UsageError, wherever this version of typer keeps it
+ENVIRONMENT = (*DISK_FULL, errno.EIO)  # errors in writing that a different path would not fix
 
 _command = cache(get_command)
 
 
 def obey(app: typer.Typer, name: str) -> NoReturn:
-    """Run a command line and end the process; what a user can cause ends in one sentence.
+    """Run a command line and end the process; errors that a user can cause are printed as one sentence.
 
-    The status is 2 for what was asked wrongly, 1 for what the machine could not do.
+    The exit status is 2 for incorrect input and 1 for failures of the machine, a model or a robot.
     """
     if sys.platform == "win32":
         note(f"{name}: {IS_WINDOWS}")
         raise SystemExit(1)
-    atexit.register(gc.freeze)  # to look for garbage at the end takes a tenth of the time of a long command
+    atexit.register(gc.freeze)  # the final garbage collection would take a tenth of a long command's time
     open_streams()
-    if not os.environ.get("COLUMNS", "1").strip("0"):  # no columns at all: what asked does not know how many
+    if not os.environ.get("COLUMNS", "1").strip("0"):  # empty or 0 means that the width is unknown
         del os.environ["COLUMNS"]
     try:
         with installed():
@@ -53,7 +53,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
         flush_output()
     except KeyboardInterrupt:
         status = STOPPED
-    except BrokenPipeError:  # whoever read the results has read enough
+    except BrokenPipeError:  # the reader of the output, such as `head`, has exited
         drop_output()
         status = 1
     except Exception as error:
@@ -62,7 +62,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
             raise
         status, sentence = ending
         note(f"{name}: {sentence}")
-        if isinstance(error, OSError) and error.filename is None:  # what is left of the output
+        if isinstance(error, OSError) and error.filename is None:  # the output itself cannot be written
             drop_output()
     if status == STOPPED:
         note(f"{name}: stopped")
@@ -70,7 +70,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
 
 
 def _ending(error: Exception) -> tuple[int, str] | None:
-    """The status and the sentence for an error; None for a fault of ours."""
+    """Return the exit status and the sentence for an error, or None if the error is a bug."""
     from codebotler.models.base import BudgetSpentError, ModelError
     from codebotler.models.recorded import UnknownInstructionError
     from codebotler.robots.base import NotReadyError, RobotLostError
@@ -90,22 +90,17 @@ def _ending(error: Exception) -> tuple[int, str] | None:
 
 
 def _unknown_instruction(error: UnknownInstructionError) -> str:
-    """The closest instructions are whole, to be copied."""
+    """Return the message for an unknown instruction; similar ones are shown in full, ready to copy."""
     from codebotler.models.usable import suggest_model
 
-    told = f'{error.model} has no program for "{shortened(error.instruction, 200)}"'
+    sentence = f'{error.model} has no program for "{shortened(error.instruction, 200)}"'
     if error.closest:
-        told += "; the closest that it knows here:"
-    return "\n".join(
-        [
-            told,
-            *(f"  {closest}" for closest in error.closest),
-            f"for other instructions, {suggest_model()}",
-        ]
-    )
+        sentence += "; the closest known instructions are:"
+    closest = (f"  {instruction}" for instruction in error.closest)
+    return "\n".join([sentence, *closest, f"for other instructions, {suggest_model()}"])
 
 
-def _usage_sentence(error: Any) -> str:  # noqa: ANN401 - one of two libraries' own
+def _usage_sentence(error: Any) -> str:  # noqa: ANN401 - the class may be typer's or click's
     message = " ".join(error.format_message().split()).rstrip(".")
     message = message[:1].lower() + message[1:]
     if error.ctx is None:

@@ -1,4 +1,4 @@
-"""`codebotler generate`: ask a model for a program, and again while it has problems."""
+"""`codebotler generate`: ask a model for a program, and ask again as long as the program has problems."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from codebotler.prompts import Prompt
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
-MAX_REPLY_SHOWN = 300  # characters of a reply without a program
+MAX_REPLY_SHOWN = 300  # how many characters to show of a reply without a program
 
 
 def write(
@@ -37,7 +37,7 @@ def write(
     repair: bool,
     record: Path | None,
 ) -> bool:
-    """Have a model write a program, and print it; return whether the check accepts it."""
+    """Have a model write a program, print it, and return whether the check accepts it."""
     with ExitStack() as recording:
         with busy(f"asking {model}"):
             opened = open_model(model, settings)
@@ -70,7 +70,7 @@ def write(
 
 @contextmanager
 def open_recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None]]:
-    """Yield a function that appends attempts to a file, if given; raise its OSError only at the end."""
+    """Yield a function that appends attempts to a file, if given; an OSError is raised only at the end."""
     if path is None:
         yield ignore_attempt
         return
@@ -104,15 +104,15 @@ def _note_attempt(attempt: Attempt, most: int) -> None:
 
 
 def note_programless(none: ProgramlessReply, which: str = "") -> None:
-    """Note why there is no program, and quote the reply."""
-    hint = "" if none.higher_limit is None else f" --max-tokens {none.higher_limit} sets a higher limit."
+    """Print a note about why a reply contains no program, and quote the reply."""
+    hint = "" if none.higher_limit is None else f" --max-tokens {none.higher_limit} raises the limit."
     note(f"{which}{visible(none.sentence)}{hint}")
     if none.kind != "refusal" and none.text.strip():
-        note(f"  it says: {shortened(brief(none.text, MAX_REPLY_SHOWN))}")
+        note(f"  the reply: {shortened(brief(none.text, MAX_REPLY_SHOWN))}")
 
 
 def print_prompt(prompt: Prompt, model: str) -> None:
-    """Print the prompt: the messages of a chat, or the text that base models continue."""
+    """Print a prompt as the model receives it: as chat messages, or as text for a base model to continue."""
     kind = kind_of(model)
     if kind == "completions":
         print_source(prompt.text)
@@ -120,6 +120,6 @@ def print_prompt(prompt: Prompt, model: str) -> None:
         print_source("\n\n".join(f"--- {message.role}\n{message.text}" for message in prompt.messages))
     if kind == "hf":
         note(
-            f"these are the messages that {model} gets if its tokenizer has a chat template; "
-            "without one it gets the text that --model completions:NAME shows"
+            f"{model} gets these messages if its tokenizer has a chat template, or else the text "
+            "that --model completions:NAME shows"
         )

@@ -1,4 +1,4 @@
-"""`codebotler missions`: list missions, show one, write one as MCAP."""
+"""`codebotler missions`: list missions, show one, or write one as an MCAP file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def show_missions(home: Path, *, json: bool) -> None:
-    """Print all missions, the last one last."""
+    """Print all missions, the most recent one last."""
     recover_missions(home)
     known = read_missions(home)
     if json:
@@ -27,7 +27,7 @@ def show_missions(home: Path, *, json: bool) -> None:
 
 
 def show_mission(home: Path, name: str, *, json: bool) -> None:
-    """Print the events of a mission; `last` names the last one."""
+    """Print the events of a mission; the name `last` means the most recent mission."""
     recover_missions(home)
     folder = find_mission(home, name)
     summary, events = MissionSummary.read(folder), read_events(folder)
@@ -36,7 +36,7 @@ def show_mission(home: Path, name: str, *, json: bool) -> None:
     else:
         print_rich(mission_view(summary, events))
         if any(read_picture(folder, line) for line in events):
-            note(f"its pictures are in {folder / PICTURE_FOLDER}")
+            note(f"the pictures are in {folder / PICTURE_FOLDER}")
 
 
 def write_mission(home: Path, name: str, path: Path, *, clock: TimeSource) -> None:

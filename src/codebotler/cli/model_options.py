@@ -1,4 +1,4 @@
-"""Options for the settings of a model."""
+"""Command-line options for the settings of a model."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NoTemperatureOption = Annotated[bool, typer.Option("--no-temperature", help="Sen
 TopPOption = Annotated[
     float | None,
     typer.Option(
-        help="Sample only from the likeliest tokens whose probabilities add up to this (top-p).",
+        help="Sample from the most likely tokens whose probabilities add up to this value (top-p).",
         show_default=str(SamplingSettings.top_p),
     ),
 ]
@@ -39,27 +39,27 @@ MaxTokensOption = Annotated[
     int | None,
     typer.Option(
         min=1,
-        help="The limit for a reply, in tokens, reasoning included.",
+        help="The maximum length of a reply in tokens, including reasoning.",
         show_default=f"no limit; {PAPER_MAX_TOKENS} for base models",
     ),
 ]
 EffortOption = Annotated[
-    str | None, typer.Option(help="How much a reasoning model thinks, such as low, medium or high.")
+    str | None, typer.Option(help="The effort of a reasoning model, such as low, medium or high.")
 ]
 ExtraBodyOption = Annotated[
     str | None,
-    typer.Option(help="More fields for the JSON of each request, such as '{\"top_k\": 20}'.", metavar="JSON"),
+    typer.Option(help="Extra fields for each request, such as '{\"top_k\": 20}'.", metavar="JSON"),
 ]
 PresetOption = Annotated[
     str | None,
     typer.Option(
         "--settings",
-        help=f"paper: its temperature 0.2, top-p 0.95 and limit of {PAPER_MAX_TOKENS} tokens.",
+        help=f"`paper` sets temperature 0.2, top-p 0.95 and a limit of {PAPER_MAX_TOKENS} tokens.",
         metavar="NAME",
     ),
 ]
-ModelSeedOption = Annotated[int | None, typer.Option(help="The random seed, if the model takes one.")]
-TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may take.")]
+ModelSeedOption = Annotated[int | None, typer.Option(help="The random seed, if the model supports one.")]
+TimeoutOption = Annotated[float, typer.Option(help="The time limit for a request, in seconds.")]
 
 
 def model_settings(
@@ -75,15 +75,13 @@ def model_settings(
     seed: ModelSeedOption = None,
     timeout: TimeoutOption = SamplingSettings.timeout,
 ) -> SamplingSettings:
-    """Return the settings of the options; UserError if two options contradict each other."""
+    """Return the settings from the options; raise UserError if two options contradict each other."""
     if settings not in {None, "paper"}:
-        raise UserError(f'there are no settings "{settings}"; use --settings paper, or leave it out')
+        raise UserError(f'unknown settings "{settings}"; use --settings paper, or leave it out')
     if settings is not None and (
         no_temperature or no_top_p or (temperature, top_p, max_tokens) != (None,) * 3
     ):
-        raise UserError(
-            "--settings paper sets the temperature, top-p and the token limit; leave out your own"
-        )
+        raise UserError("--settings paper sets temperature, top-p and the token limit; leave out your own")
     if settings is not None:
         max_tokens = PAPER_MAX_TOKENS
     return SamplingSettings(
@@ -116,17 +114,17 @@ def _json_object(text: str) -> dict[str, Any]:
 
 
 def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
-    """Note the settings that a model does not support, and that are not sent."""
+    """Note which of the requested settings are not sent, because the model does not support them."""
     from codebotler.models.recorded import is_recorded
 
     names = ("temperature", "top_p", "seed")
     unsent = [name for name in names if getattr(model.settings, name) is None is not getattr(asked, name)]
     if unsent and not is_recorded(model.name):
-        note(f"{model.name} takes no {' or '.join(unsent).replace('_', '-')}; none is sent")
+        note(f"{model.name} does not support {' or '.join(unsent).replace('_', '-')}; not sent")
 
 
 def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], CommandT]:
-    """Add all options of a function to a command that passes them on as `**options`."""
+    """Return a decorator that adds all options of a function to a command with `**` arguments."""
 
     def extended(command: CommandT) -> CommandT:
         inherited, own = (signature(one, eval_str=True).parameters for one in (called, command))
@@ -141,5 +139,5 @@ def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], Comma
 
 
 def options_for(called: Callable[..., object], given: Mapping[str, Any]) -> dict[str, Any]:
-    """The options of a command that are those of a function."""
+    """Return the subset of the given options that a function accepts."""
     return {name: given[name] for name in signature(called).parameters}

@@ -1,4 +1,4 @@
-"""The commands that operate a robot: run, missions, robots, connect, serve, virtual-robot."""
+"""The commands for operating a robot: run, missions, robots, connect, serve and virtual-robot."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def run(
     base_url: options.BaseUrlOption = None,
     yes: Annotated[bool, typer.Option("--yes", help="Run the program without asking.")] = False,
     despite_problems: Annotated[
-        bool, typer.Option("--despite-problems", help="Run it even if the check finds problems.")
+        bool, typer.Option("--despite-problems", help="Run the program even if the check finds problems.")
     ] = False,
     shows_all: options.AllOption = False,
     **shared: Any,  # noqa: ANN401 - of several kinds
@@ -52,12 +52,14 @@ def run(
 
 def missions(
     mission: Annotated[
-        str | None, typer.Argument(metavar="ID", help="Show this one; `last` is the last one.")
+        str | None, typer.Argument(metavar="ID", help="The mission to show; `last` for the most recent.")
     ] = None,
     mcap: Annotated[
-        Path | None, typer.Option(help="Write the mission and its program to this MCAP file, for Foxglove.")
+        Path | None, typer.Option(help="Write the mission and its program to an MCAP file for Foxglove.")
     ] = None,
-    clock: Annotated[str, typer.Option(help="With --mcap: wall, or robot for simulated time.")] = "wall",
+    clock: Annotated[
+        str, typer.Option(help="The time for --mcap: wall, or robot for simulated time.")
+    ] = "wall",
     skills: options.SkillsOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
@@ -68,12 +70,12 @@ def missions(
     from codebotler.core.skills.files import skills_from
 
     if mcap is not None and mission is None:
-        raise UserError("--mcap writes one mission; name it, or `last`")
+        raise UserError("--mcap writes one mission; give its ID, or `last`")
     if mcap is not None and json:
-        raise UserError("--mcap and --json exclude each other; give one of them")
+        raise UserError("--mcap and --json exclude each other; use only one")
     if clock not in {"wall", "robot"}:
         raise UserError(f'unknown clock "{clock}"; use wall or robot')
-    skills_from(*(skills or ()))  # their verbs are known then
+    skills_from(*(skills or ()))  # registers the verbs that describe the skills
     if mission is None:
         show_missions(home(), json=json)
     elif mcap is None:
@@ -105,16 +107,16 @@ def robots(
 
 def connect(
     discover: Annotated[
-        bool, typer.Option("--discover", help="Look at what the robot's nodes offer.")
+        bool, typer.Option("--discover", help="Explore what the robot's nodes offer.")
     ] = False,
-    out: Annotated[Path | None, typer.Option(help="Write to this new file.", metavar="FILE")] = None,
-    robot: Annotated[str, typer.Option(help="The robot's ROS: ros2 or ros1.")] = "ros2",
+    out: Annotated[Path | None, typer.Option(help="Write the draft to a new file.", metavar="FILE")] = None,
+    robot: Annotated[str, typer.Option(help="The robot's version of ROS: ros2 or ros1.")] = "ros2",
     address: options.AddressOption = "",
     ros_python: options.RosPythonOption = options.DEFAULT_ROS_PYTHON,
 ) -> None:
-    """Write a first file for --connect, from what a robot offers.
+    """Draft a file for --connect from what a robot's nodes offer.
 
-    Comments in it say what is missing, and what else the robot offers.
+    Comments in the draft list what is missing, and what else the robot offers.
     """
     from codebotler.cli.skills import write_new
     from codebotler.core.errors import UserError
@@ -122,14 +124,14 @@ def connect(
     from codebotler.robots.ros.discovery import discover_offers, draft_connection
 
     if not discover:
-        raise UserError("add --discover: it looks at the robot, and writes a first file for --connect")
-    with busy("looking at the robot"):
+        raise UserError("add --discover, which explores the robot and drafts a file for --connect")
+    with busy("exploring the robot"):
         text = draft_connection(robot, discover_offers(robot, address, ros_python))
     if out is None:
         print_source(text)
     else:
         write_new(out, text)
-        note(f"{out} is written; read it, and add what its first lines say is missing")
+        note(f"wrote {out}; read it, and add what its first lines list as missing")
 
 
 @inherit_options(options.robot_settings)
@@ -144,22 +146,22 @@ def serve_page(
     model: options.ModelsOption = None,
     base_url: options.BaseUrlOption = None,
     face: Annotated[
-        bool, typer.Option("--face", help="Have the robot speak and ask on a page of its own, /face.")
+        bool, typer.Option("--face", help="Let the robot speak and ask questions on a separate page, /face.")
     ] = False,
     face_timeout: options.FaceTimeoutOption = 60.0,
     face_token: Annotated[
-        str | None, typer.Option(help="The token that opens the face; a new one by default.")
+        str | None, typer.Option(help="The access token for the face; a new one by default.")
     ] = None,
     stop_when_alone: Annotated[
         float | None,
         typer.Option(min=1, help="Stop the robot this many seconds after the last page is closed."),
     ] = None,
-    runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
+    runs: Annotated[Path, typer.Option(help="The folder that contains benchmark runs.")] = Path("runs"),
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Serve the web page for operating a robot.
 
-    Ctrl-C ends it, which also stops the robot.
+    Ctrl-C ends the server and stops the robot.
     """
     from codebotler.cli.run import tell_missing
     from codebotler.core.files import home
@@ -186,12 +188,12 @@ def serve_page(
 
 
 def virtual_robot(
-    world: Annotated[Path, typer.Option(help="The world file in which the robot lives.")],
+    world: Annotated[Path, typer.Option(help="The world file for the simulated robot.")],
     ros: Annotated[int, typer.Option(min=1, max=2, help="The version of ROS.")] = 1,
     port: Annotated[
         int | None,
         typer.Option(
-            min=1, max=65535, help="The port of the ROS master; by default from ROS_MASTER_URI, or 11311."
+            min=1, max=65535, help="The port of the ROS master; by default that of ROS_MASTER_URI, or 11311."
         ),
     ] = None,
     speed: Annotated[
@@ -213,7 +215,7 @@ def virtual_robot(
     from codebotler.robots.ros.virtual import VirtualRobot
 
     def show(line: str) -> None:
-        with suppress(OSError):  # the robot goes on where nobody reads any more
+        with suppress(OSError):  # the robot continues even if nobody reads its output any more
             print_text(line)
 
     table = skills_from(*(skills or ()))

@@ -1,4 +1,4 @@
-"""Options shared by several commands, and the start of both command lines."""
+"""Options that several commands share, and the basis of both command lines."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def robot_names(incomplete: str) -> list[str]:
-    """Complete the kinds of robots for a shell."""
+    """Return the kinds of robots that start with a text, for shell completion."""
     from codebotler.robots.open import ROBOT_MODULES
 
     return [name for name in ROBOT_MODULES if name.startswith(incomplete)]
@@ -34,31 +34,26 @@ RobotOption = Annotated[
     ),
 ]
 AllOption = Annotated[
-    bool,
-    typer.Option("--all", help="Show the robot's actions in each kind of world, not in one."),
+    bool, typer.Option("--all", help="Show all different outcomes in imagined worlds, not just one.")
 ]
 ModelOption = Annotated[
     str | None,
     typer.Option(
         help="recorded:careful, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, completions:NAME, "
-        "or hf:PATH; by default that of CODEBOTLER_MODEL or config.yaml, or else recorded. "
-        "`codebotler models` lists usable ones."
+        "or hf:PATH; by default from CODEBOTLER_MODEL or config.yaml, or else recorded. "
+        "`codebotler models` lists the usable models."
     ),
 ]
-WorldOption = Annotated[Path | None, typer.Option(help="The world file with the rooms.")]
+WorldOption = Annotated[Path | None, typer.Option(help="The world file that defines the rooms.")]
 RulesOption = Annotated[
     Path | None,
-    typer.Option(
-        envvar="CODEBOTLER_RULES",
-        help="A file of house rules for all programs.",
-        metavar="FILE",
-    ),
+    typer.Option(envvar="CODEBOTLER_RULES", help="A file of house rules for all programs.", metavar="FILE"),
 ]
 SkillsOption = Annotated[
     list[Path] | None,
     typer.Option(
         "--skills",
-        help="A Python file of your own skills, which is executed; may be repeated.",
+        help="A Python file with your own skills, which is executed; may be repeated.",
         metavar="FILE",
     ),
 ]
@@ -69,16 +64,17 @@ MapOption = Annotated[
 ModelsOption = Annotated[
     list[str] | None, typer.Option(help="A model that may write programs; may be repeated.")
 ]
-FaceTimeoutOption = Annotated[float, typer.Option(min=1, help="Seconds for an answer there.")]
+FaceTimeoutOption = Annotated[
+    float, typer.Option(min=1, help="The time limit for an answer on the face, in seconds.")
+]
 RetriesOption = Annotated[
-    int | None, typer.Option(min=0, help="How often to ask again if the check finds problems.")
+    int | None, typer.Option(min=0, help="How many times to ask again if the check finds problems.")
 ]
 RepairOption = Annotated[
-    bool,
-    typer.Option("--repair", help="Ask again with the program and its problems; once by default."),
+    bool, typer.Option("--repair", help="Ask again with the program and its problems; one retry by default.")
 ]
 RecordOption = Annotated[
-    Path | None, typer.Option(help="Append a line of JSON for each attempt to this file.")
+    Path | None, typer.Option(help="Append each attempt to this file, as a line of JSON.")
 ]
 ShowPromptOption = Annotated[
     bool, typer.Option("--show-prompt", help="Print the prompt without asking a model.")
@@ -86,7 +82,9 @@ ShowPromptOption = Annotated[
 BaseUrlOption = Annotated[
     str | None, typer.Option(help="The address of the model's server, such as http://localhost:8000/v1.")
 ]
-RosPythonOption = Annotated[Path, typer.Option(help="The Python of the robot's ROS installation.")]
+RosPythonOption = Annotated[
+    Path, typer.Option(help="The Python interpreter of the robot's ROS installation.")
+]
 DEFAULT_ROS_PYTHON = Path("/usr/bin/python3")
 SpeedOption = Annotated[
     float,
@@ -97,42 +95,36 @@ SpeedOption = Annotated[
 ConnectOption = Annotated[
     Path | None,
     typer.Option(
-        help="A file with the calls for a ROS robot's skills; it also determines --robot.",
-        metavar="FILE",
+        help="A file that maps skills to a robot's ROS calls; it also sets --robot.", metavar="FILE"
     ),
 ]
 AddressOption = Annotated[
-    str,
-    typer.Option(help="A ROS_DOMAIN_ID, the URI of a ROS master, or ws://HOST:PORT of a rosbridge."),
+    str, typer.Option(help="The robot: a ROS_DOMAIN_ID, a ROS master URI, or ws://HOST:PORT of a rosbridge.")
 ]
 HostOption = Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")]
 PortOption = Annotated[
     int | None,
     typer.Option(
-        min=0, max=65535, help="The port, by default the first free one from 8080; 0: any free one."
+        min=0, max=65535, help="The port; by default the first free port from 8080; 0 for any free port."
     ),
 ]
 NameOption = Annotated[list[str] | None, typer.Option(help="An additional host name for the page.")]
 BehindProxyOption = Annotated[
     list[str] | None,
     typer.Option(
-        help="The address at a reverse proxy, such as https://HOST:PORT/PATH; may be repeated. "
-        "By default the list behind_proxy of config.yaml.",
+        help="The page's address at a reverse proxy, such as https://HOST:PORT/PATH; may be repeated. "
+        "By default from behind_proxy in config.yaml.",
         metavar="ADDRESS",
     ),
 ]
-TokenOption = Annotated[str | None, typer.Option(help="The token that opens the page; a new one by default.")]
+TokenOption = Annotated[str | None, typer.Option(help="The access token for the page; a new one by default.")]
 NoTokenOption = Annotated[
-    bool,
-    typer.Option(
-        "--no-token",
-        help="Let anyone on this machine in; not with --host or --behind-proxy.",
-    ),
+    bool, typer.Option("--no-token", help="Allow access without a token; not with --host or --behind-proxy.")
 ]
 
 
 class RobotSettings(NamedTuple):
-    """The robot that the options of a command describe."""
+    """The robot and the house rules that the options of a command describe."""
 
     kind: str
     options: Options
@@ -150,7 +142,7 @@ def robot_settings(
     rules: RulesOption = None,
     skills: SkillsOption = None,
 ) -> RobotSettings:
-    """Read the files that options name; UserError if one is wrong."""
+    """Read the files that the options name; raise UserError if a file is invalid."""
     from codebotler.checking.rules import read_rules
     from codebotler.core.skills.files import skills_from
     from codebotler.robots.base import Options
@@ -167,21 +159,21 @@ def robot_settings(
 def read_connect_option(
     file: Path | None, robot: str | None, skills: SkillTable
 ) -> tuple[str, Connection | None]:
-    """Return the kind of robot, and the connection in a file, if given."""
+    """Return the kind of robot, and the connection from a file or None if no file is given."""
     if file is None:
         return robot or "sim", None
     from codebotler.robots.ros.connection_file import read_connection
 
     connection = read_connection(file, skills)
     if robot not in {None, connection.robot}:
-        raise UserError(f"it connects {connection.robot}, not {robot}; leave out --robot", file=file)
+        raise UserError(f"the file is for {connection.robot}, not {robot}; leave out --robot", file=file)
     return connection.robot, connection
 
 
 def read_world(
     robot: str, file: Path | None, skills: SkillTable, connection: Connection | None = None
 ) -> World | None:
-    """Read the world file, if given; else return the robot's places, or an office for the simulated robot."""
+    """Read the world file, or else return the robot's places, the office for the simulated robot, or None."""
     from codebotler.core import world_file
     from codebotler.robots.simulated import OFFICE
 
@@ -192,13 +184,13 @@ def read_world(
 
 
 def note_office(robot: str, file: Path | None) -> None:
-    """Note that the simulated robot uses the example office, if there is no world file."""
+    """Print a note if the simulated robot uses the example office because no world file is given."""
     if file is None and robot == "sim":
-        note("the robot works in an example office; --world FILE names another world")
+        note("the robot works in an example office; --world FILE selects another world")
 
 
 def command_line(name: str, about: str) -> typer.Typer:
-    """Create a command line without commands, which shows its version or its help."""
+    """Create a command line that has no commands yet, and that prints its version or its help."""
     app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 
     @app.callback(invoke_without_command=True, help=about)

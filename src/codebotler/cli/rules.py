@@ -1,4 +1,4 @@
-"""`codebotler rules`: show each house rule with examples, and warn about likely mistakes."""
+"""`codebotler rules`: show house rules with examples, and warn about likely mistakes."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from codebotler.core.words import listed
 from codebotler.core.world import World
 from codebotler.simulator.house_rule import Rule
 
-ANY_ARGUMENT = ("", "x")  # in examples, these mean any text
+ANY_ARGUMENT = ("", "x")  # texts that mean any text when they occur in examples
 WHEN_WORDS = {"always": "at any time", "finally": "at the end"}
 
 
 def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
-    """Read the rules in a file, if given, and note how programs could evade them; UserError if invalid."""
+    """Read a rules file, if given, and print notes about likely evasions; raise UserError if invalid."""
     rules = () if path is None else read_rules(path, skills, rooms_of(world))
     note_evasions(rules, world, skills)
     return rules
 
 
 def rooms_of(world: World | None) -> list[str]:
-    """Return the names of the rooms of a world, if there is one."""
+    """Return the names of the rooms in a world, or an empty list without a world."""
     return [] if world is None else [room.name for room in world.rooms]
 
 
 def note_evasions(rules: Sequence[Rule], world: World | None, skills: SkillTable) -> None:
-    """Note how programs could evade rules; UserError if a rule cannot hold in the rooms of the world."""
+    """Print notes about likely evasions of rules; raise UserError if a rule does not fit the rooms."""
     for sentence in find_evasions(rules, rooms_of(world), skills):
         note(sentence)
 
@@ -55,7 +55,7 @@ def review_view(found: Sequence[Review]) -> RenderableType:
 
 def _rule(one: Review) -> Iterator[RenderableType]:
     rule = one.rule
-    refused = "; a program may catch the refusal" if rule.refuse else ""
+    refused = "; programs may catch the refusal" if rule.refuse else ""
     yield Text.assemble((rule.name, "bold"), f"  {visible(rule.says)}")
     yield Text(f"  {WHEN_WORDS[rule.when]}{refused}: {rule.formula}", "dim")
     for title, style, trace in (("keeps it", "green", one.keeps), ("breaks it", "red", one.breaks)):
@@ -67,7 +67,7 @@ def _rule(one: Review) -> Iterator[RenderableType]:
 
 
 def steps_view(trace: Trace) -> RenderableType:
-    """Show the numbered steps of an example."""
+    """Show the steps of an example, numbered from 1."""
     table = grid("right", "left")
     if not trace:
         table.add_row(Text(), Text("the robot does nothing", "dim"))
@@ -79,13 +79,13 @@ def steps_view(trace: Trace) -> RenderableType:
 
 
 def is_drive(event: Event) -> bool:
-    """Whether an event takes the robot to another room."""
+    """Return whether an event takes the robot to another room."""
     row = by_event(event.kind)
     return row is not None and row.is_drive
 
 
 def step_sentence(event: Event, room: str = "") -> str:
-    """Describe a step of an example, and the room of a drive if it is not that after the last step."""
+    """Describe a step of an example; a drive from `room`, where the last step ended, omits its start."""
     drives = is_drive(event)
     any_text = "another room" if drives else "something"
     quote = "" if verb(event.kind).object else '"'

@@ -1,4 +1,4 @@
-"""`codebotler run`: a program or an instruction, a check, a person's approval, and the robot's work."""
+"""`codebotler run`: get a program, check it, ask for approval, and run it on the robot."""
 
 from __future__ import annotations
 
@@ -35,26 +35,26 @@ SIGNALS = {
     signal.SIGHUP: "SIGHUP, since its terminal was closed",
 }
 SIGNAL_EXIT_BASE = 128
-"""Shells add this to the number of the signal that ended a process."""
+"""By the convention of shells, the exit status after a signal is this plus the signal's number."""
 
 CLEANUP_SECONDS = 2.0
-"""How long a mission may take to end after Ctrl-C while the robot has not moved yet."""
+"""The time limit for ending a mission after an error or Ctrl-C, if the robot has not moved yet."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """What a user asks for on the command line.
+    """A user's request on the command line to run a program or an instruction.
 
     Raises:
-        UserError: it names a missing program or nothing, or approval would be read from where the program is.
+        UserError: the request is empty, its file does not exist, or standard input is needed twice.
     """
 
     what: str  # a file, `-` for standard input, or an instruction
-    model: str = "recorded"  # writes the program for an instruction
+    model: str = "recorded"  # the model that writes the program for an instruction
     yes: bool = False  # whether to run the program without asking
-    despite_problems: bool = False
-    shows_all: bool = False  # of the kinds of imagined worlds in which it does something else
-    rules: tuple[Rule, ...] = ()  # of the house
+    despite_problems: bool = False  # whether to run the program even if the check finds problems
+    shows_all: bool = False  # whether to show all different outcomes in imagined worlds, not just one
+    rules: tuple[Rule, ...] = ()  # the house rules
 
     def __post_init__(self) -> None:
         if not self.what.strip():
@@ -62,14 +62,14 @@ class Request:
         if self.what.endswith(".py") and not self.is_program:
             raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
         if self.what == "-" and not self.yes:
-            raise UserError("the program comes from standard input, so you cannot be asked there; add --yes")
+            raise UserError("approval cannot be read from standard input, as the program is; add --yes")
 
     @property
     def is_program(self) -> bool:
-        """Whether it names a program."""
+        """Whether the request names a program rather than an instruction."""
         try:
             return self.what == "-" or Path(self.what).exists()
-        except (OSError, ValueError):  # too long for a name, or with a null character
+        except (OSError, ValueError):  # an instruction may be too long for a path or contain a null character
             return False
 
 
@@ -80,18 +80,17 @@ def run(
     open_model: Callable[[str], Model],
     world: World | None = None,
 ) -> int:
-    """Take a user's request to its end, and show all of it.
+    """Carry out a user's request from the program to the end of the mission, and show each step.
 
     Args:
-        robot: the robot.
-        request: what the user asks for.
-        home: the folder of missions.
-        open_model: opens a model by its name.
-        world: the map, if there is one.
+        robot: the robot that runs the program.
+        request: the user's request.
+        home: the folder that contains the missions.
+        open_model: a function that opens a model by its name.
+        world: the map for the check, or None.
 
     Returns:
-        the exit status: 0 if the mission is done, 1 if it is not, 128 plus the number of the signal that
-        stopped it.
+        the exit status: 0 if the mission is done, 128 plus the number of a signal that stopped it, or else 1.
     """
     program = read_program(request.what) if request.is_program else ""
     tell_missing(robot)
@@ -118,13 +117,13 @@ def run(
 
 
 def tell_missing(robot: Robot) -> None:
-    """Say what a robot lacks, as far as that is known before it is connected."""
+    """Print a note about missing skills, as far as they are known before the robot is connected."""
     if robot.missing:
-        note(f"{robot.name} has no {listed(list(robot.missing))}; models read of its other skills only")
+        note(f"{robot.name} has no {listed(list(robot.missing))}; models are offered its other skills only")
 
 
 def checker(skills: SkillTable) -> Callable[[str, RoomMap | None, tuple[Rule, ...]], CheckResult]:
-    """The check of programs for a robot that has these skills."""
+    """Return a function that checks programs for a robot with the given skills."""
 
     def checked(program: str, room_map: RoomMap | None, rules: tuple[Rule, ...]) -> CheckResult:
         return check(program, room_map=room_map, house_rules=rules, skills=skills)
@@ -133,7 +132,7 @@ def checker(skills: SkillTable) -> Callable[[str, RoomMap | None, tuple[Rule, ..
 
 
 def _prepared(session: MissionSession) -> SessionView:
-    """Wait for a checked program, and show what goes on meanwhile."""
+    """Wait until the session has a checked program or ends, and show the progress."""
     view = session.view
     while not (view.is_over or view.may_be_approved or view.waits_for_program):
         before = view.busy
@@ -159,7 +158,7 @@ def _show_check(view: SessionView, request: Request) -> None:
 
 
 def _is_approved(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> bool:
-    """Show the check, and have a person approve the program."""
+    """Show the result of the check, and return whether the user approves the program."""
     _show_check(view, request)
     if view.problems and not (request.despite_problems and view.can_run):
         session.reject(f"the check found {'a problem' if len(view.problems) == 1 else 'problems'}")
@@ -174,10 +173,10 @@ def _is_approved(session: MissionSession, view: SessionView, robot: Robot, reque
 
 
 def _watched(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> int:
-    """Run the program before the user's eyes."""
+    """Run the program, print its events, and return the exit status."""
     with _stopped_by_signals(session) as got, EventPrinter(robot.name) as watcher:
         session.on_event = watcher
-        with suppress(MissionError):  # it was stopped before it could run
+        with suppress(MissionError):  # the mission was stopped before it could start
             session.approve(view.digest, despite_problems=request.despite_problems)
         view = session.wait_until(lambda _: False)
     if session.error is not None:
@@ -190,9 +189,9 @@ def _watched(session: MissionSession, view: SessionView, robot: Robot, request: 
 
 @contextmanager
 def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
-    """Stop the session at a signal, and list those that came.
+    """Stop the session when a signal arrives; yield the list of the signals received.
 
-    A mission started with `nohup` outlives its terminal.
+    SIGHUP stays ignored if it was already, as with `nohup`, so that the mission outlives its terminal.
     """
     got: list[int] = []
 
@@ -208,5 +207,5 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
     try:
         yield got
     finally:
-        for number, handler in before.items():  # an impatient user must not break the tidying up
+        for number, handler in before.items():  # further signals must not interrupt the cleanup
             signal.signal(number, signal.SIG_IGN if got else handler)

@@ -1,4 +1,4 @@
-"""`codebotler skills`: show skills as models see them, try them, and write a template."""
+"""`codebotler skills`: show skills as models see them, try them out, and write a template."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from codebotler.prompts.rendering import stub
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.sampled_robot import RandomOutcome, RoomMap, SampledRobot
 
-WORLD_COUNT = 40  # for each skill
+WORLD_COUNT = 40  # the number of sampled worlds to try each skill in
 PROMPT_EXAMPLE_ROOMS = RoomMap(("room", "start_loc"), "start_loc", guessed=True)
 SKILLS_TEMPLATE = '''\
 """Further skills of this robot; `codebotler skills {name}` shows them as models see them."""
@@ -34,15 +34,15 @@ from codebotler import Simulation, skill
 
 
 @skill(
-    verb="open {{door}}",  # for people: opens, opened, opening ...
-    results=("it did not move", "it opened"),  # what False and True mean
-    fails={{"DoorLocked": "the door is locked"}},  # an exception in the program
-    ros="lab_msgs/OpenDoor:/open_door",  # package/Type:/topic, if a ROS robot has it
-    example='open_door("glass door")',  # a call that models are shown
+    verb="open {{door}}",  # describes the action to people: opens, opened, opening ...
+    results=("it did not move", "it opened"),  # the meanings of False and True
+    fails={{"DoorLocked": "the door is locked"}},  # errors that programs can catch
+    ros="lab_msgs/OpenDoor:/open_door",  # the action as package/Type:/topic, for robots on ROS
+    example='open_door("glass door")',  # an example call for models
 )
 def open_door(sim: Simulation, door: str) -> bool:  # str, int, float, bool, Literal, an Enum, lists
-    """Open a door of the room; False if it did not move."""
-    # The simulation. A world file lists facts under `truths`; all others are random.
+    """Open a door of the room; return False if it did not move."""
+    # The simulation: a world file can set facts under `truths`; all other facts are random.
     if sim.truth(f"{{door}} is locked"):
         sim.fail("DoorLocked")
     return sim.truth(f"{{door}} opens")
@@ -51,36 +51,36 @@ def open_door(sim: Simulation, door: str) -> bool:  # str, int, float, bool, Lit
 @skill(verb="measure the temperature")
 def temperature(sim: Simulation) -> float:
     """Measure the temperature in the room, in degrees Celsius."""
-    ...  # there is no simulation, so the result is random
+    ...  # without a simulation, the result is random
 '''
 
 
 @dataclass(frozen=True)
 class SkillTrial:
-    """The outcome of a skill in some of the sampled worlds."""
+    """An outcome of a skill that occurs in some of the sampled worlds."""
 
-    outcome: str  # as a phrase
-    facts: tuple[str, ...]  # of the first of these worlds
-    event: Event | None
+    outcome: str  # the outcome as a phrase, such as `returns True`
+    facts: tuple[str, ...]  # the facts in the first world with this outcome
+    event: Event | None  # the recorded event, if there is one
 
 
 def write_new(path: Path, text: str) -> None:
-    """Write a file; UserError if it exists."""
+    """Write a new file; raise UserError if it already exists."""
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        raise UserError("it exists already; choose another name", file=path) from None
+        raise UserError("the file already exists; choose another name", file=path) from None
 
 
 def try_skill(row: Skill, skills: SkillTable) -> list[SkillTrial]:
-    """Call the example of a skill in sampled worlds; return each different outcome once."""
+    """Call the example of a skill in sampled worlds, and return each different outcome once."""
     arguments = _example(row)
     found: dict[str, SkillTrial] = {}
     earlier = [one for one in skills.rows[: skills.rows.index(row)] if one not in SKILLS.rows]
     for number in range(WORLD_COUNT):
         robot = SampledRobot(PROMPT_EXAMPLE_ROOMS, FactSampler(0, number), skills=skills)
-        for one in earlier if number % 2 else ():  # the skill may depend on them
+        for one in earlier if number % 2 else ():  # the skill may depend on the effects of earlier skills
             with suppress(RobotError):
                 robot.perform(one.name, _example(one))
         try:
@@ -102,10 +102,10 @@ def try_skill(row: Skill, skills: SkillTable) -> list[SkillTrial]:
 
 
 def _example(row: Skill) -> list[Any]:
-    """Return the arguments of the example, by position; UserError if it is no call of the skill."""
+    """Return the arguments of a skill's example in order; raise UserError if the example is invalid."""
     node = parse_expression(row.call)
     if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == row.name):
-        row.wrong(f"the example of {row.name} is no call of it: {row.call}")
+        row.wrong(f"the example of {row.name} is not a call of {row.name}: {row.call}")
     named = {keyword.arg: keyword.value for keyword in node.keywords}
     given: list[Any] = []
     for number, parameter in enumerate(row.parameters):
@@ -123,7 +123,7 @@ def _example(row: Skill) -> list[Any]:
 
 
 def skills_view(skills: SkillTable) -> RenderableType:
-    """Show the user's skills, or else the paper's, as models see them, with their outcomes."""
+    """Show skills as models see them, with their outcomes: the user's own, or else all built-in skills."""
     own = [row for row in skills.rows if row not in SKILLS.rows]
     return Group(*_lines(own or SKILLS.rows, skills))
 
@@ -133,12 +133,12 @@ def _lines(rows: Sequence[Skill], skills: SkillTable) -> Iterator[RenderableType
         yield Text("\n" if number else "", end="")
         yield Syntax(stub(row), "python", theme="ansi_dark", background_color="default", word_wrap=True)
         trials = try_skill(row, skills)
-        by_lot = [one for one in trials if one.outcome.startswith("returns ") and not one.facts]
-        if len(by_lot) > 1:
-            values = listed([one.outcome.removeprefix("returns ") for one in by_lot], "or")
+        bandom_trials = [one for one in trials if one.outcome.startswith("returns ") and not one.facts]
+        if len(bandom_trials) > 1:
+            values = listed([one.outcome.removeprefix("returns ") for one in bandom_trials], "or")
             trials = [
-                replace(by_lot[0], outcome=f"returns {values}"),
-                *(t for t in trials if t not in by_lot),
+                replace(bandom_trials[0], outcome=f"returns {values}"),
+                *(t for t in trials if t not in bandom_trials),
             ]
         for trial in trials:
             where = f", where {listed(trial.facts)}" if trial.facts else ""

@@ -1,4 +1,4 @@
-"""Views of missions, models and robots for a terminal."""
+"""Show missions, models and robots in a terminal."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ EVENT_STYLES: Mapping[str, str] = {
     "late": "yellow",
     "log": "yellow",
 }
-MAX_PLAIN_SECONDS = 999_999.95  # longer times use an exponent, to fit ten characters
+MAX_PLAIN_SECONDS = 999_999.95  # longer times are shown with an exponent, to fit into ten characters
 CLEAR_LINE = "\r\x1b[2K"
 
 
 class EventPrinter:
-    """Prints events as they happen; on a terminal, feedback overwrites its line."""
+    """Prints events as they happen; on a terminal, each feedback line is overwritten by the next event."""
 
     def __init__(self, robot: str) -> None:
         self._console = console(highlight=False)
@@ -76,13 +76,13 @@ class EventPrinter:
 
 
 def _time_text(line: LogLine) -> str:
-    """Return the time of an event by the robot's clock."""
+    """Return the time of an event on the robot's clock, such as `12.5 s`."""
     clock = float(line["clock"])
     return f"{clock:.1f} s" if clock < MAX_PLAIN_SECONDS else f"{clock:.1e} s"
 
 
 def _event_line(line: LogLine) -> Text:
-    """Return an event as a styled line; empty if it has no text."""
+    """Return the styled text for an event, which may be empty."""
     text = Text(event_text(line), EVENT_STYLES.get(line["event"], ""))
     if line["event"] == "state":
         text.stylize("bold", 0, len(line["state"]))
@@ -92,7 +92,7 @@ def _event_line(line: LogLine) -> Text:
 
 
 def ending_view(ended: MissionSummary | SessionView) -> Group:
-    """Show the end of a mission, and the command that shows it again, on one line for copying."""
+    """Show how a mission ended, and the command that shows it again, in one line that can be copied."""
     state = ended.state
     assert state is not None, "the mission has begun"
     text = Text.assemble((state, STATE_STYLES.get(state, "bold")), _why(ended))
@@ -110,7 +110,7 @@ def _why(ended: MissionSummary | SessionView) -> str:
 
 
 def list_view(summaries: Sequence[MissionSummary]) -> RenderableType:
-    """Show all missions, a line each."""
+    """Show all missions in a table with one line each."""
     if not summaries:
         return Text("there are no missions yet", "dim")
     table = grid("left", "left", "left", "left")
@@ -140,7 +140,7 @@ def mission_view(summary: MissionSummary, events: Sequence[LogLine]) -> Renderab
     before: Text | None = None
     for line in events:
         text = _event_line(line)
-        if text and text != before:  # editing a draft repeats its state
+        if text and text != before:  # each edit of a draft records the same state again
             before = text if line["event"] == "state" else None
             at = datetime.fromtimestamp(line["time"]).astimezone()
             table.add_row(Text(f"{at:%H:%M:%S}", "dim"), Text(_time_text(line), "dim"), text)
@@ -152,13 +152,13 @@ def mission_view(summary: MissionSummary, events: Sequence[LogLine]) -> Renderab
 
 
 def source_view(program: str) -> Group:
-    """Show a program without line breaks, and an empty line."""
+    """Show a program without wrapping its lines, followed by an empty line."""
     lines = [f"    {visible(text.expandtabs(4))}\n" for text in program.splitlines()]
     return Group(Text("".join(lines), no_wrap=True, overflow="ignore"))
 
 
 def models_view(models: Sequence[UsableModel], chosen: ChosenModel) -> Group:
-    """Show the usable models with their options, and the default model."""
+    """Show the usable models with the options that select them, and the default model."""
     table = grid("left", "left")
     for model in models:
         table.add_row(Text(model.options, "bold"), Text(model.why, "dim"))
@@ -169,7 +169,7 @@ def models_view(models: Sequence[UsableModel], chosen: ChosenModel) -> Group:
 
 
 def robots_view(kinds: Sequence[Readiness]) -> Table:
-    """Show which robots work here, and what is missing for the others."""
+    """Show which kinds of robots work on this machine, and what is missing for the others."""
     table = grid("left", "left", "left")
     for kind in kinds:
         works = Text("works", "green") if kind.works else Text("unavailable", "red")

@@ -1,4 +1,4 @@
-"""The `Robot` protocol, its errors and its options."""
+"""Define the `Robot` protocol, the errors that robots raise, and the options for opening them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from codebotler.robots.ros.connection import Connection
 
 RobotArgument: TypeAlias = Scalar | tuple[Scalar, ...]
-"""An argument of a skill: a single value, a list of values, or the options of a question."""
+"""An argument of a skill: a single value, several values, or the options of a question."""
 
 RobotResult: TypeAlias = Scalar | list[str] | list[Scalar] | None
 """The result of a skill; for a question, the text of the chosen option."""
@@ -29,17 +29,17 @@ ROS_PYTHON = Path("/usr/bin/python3")
 
 @dataclass(frozen=True)
 class CameraPicture:
-    """A picture from the robot."""
+    """A camera picture that the robot sent."""
 
-    data: bytes  # a JPEG or PNG file, not yet validated
+    data: bytes  # the contents of a JPEG or PNG file, not yet validated
 
 
 Feedback: TypeAlias = Callable[[str | CameraPicture], None]
-"""Called from any thread with the progress of a skill, such as `at (3.1, 2.0)`, and with pictures."""
+"""A callback for progress reports such as `at (3.1, 2.0)` and for pictures; any thread may call it."""
 
 
 def ignore_feedback(_: str | CameraPicture) -> None:
-    """Ignore the feedback."""
+    """Discard a progress report or a picture."""
 
 
 class Robot(Protocol):
@@ -47,68 +47,68 @@ class Robot(Protocol):
 
     @property
     def name(self) -> str:
-        """The kind of robot: simulated, pyrobosim, ros1, rosbridge or ros2."""
+        """The kind of robot: simulated, pyrobosim, ros1, rosbridge, ros2, or the class in the user's file."""
 
     @property
     def address(self) -> str:
-        """The address, such as the URI of a ROS master; empty if no other tool can reach the robot."""
+        """The robot's address, such as a ROS master URI; empty if no other process can reach the robot."""
 
     @property
     def if_tool_dies(self) -> str:
-        """The effect of killing this process on a running skill, as a clause without a full stop."""
+        """A clause that says what happens to a running skill if this process is killed."""
 
     @property
     def rooms_are_regexes(self) -> bool:
-        """Whether its room names are regexes, as in world files, rather than plain names."""
+        """Whether room names are regular expressions, as in world files, rather than plain names."""
 
     @property
     def has_pose(self) -> bool:
-        """Whether its feedback reports its position in metres while it moves, as in `at (3.1, 2.0)`."""
+        """Whether the robot reports its position in metres while it moves, as in `at (3.1, 2.0)`."""
 
     @property
     def skills(self) -> SkillTable:
-        """The skills that it may be asked to perform."""
+        """The skills that programs may call."""
 
     @property
     def missing(self) -> Mapping[str, str]:
-        """The reasons why it cannot perform some skills, by name, as known after connecting."""
+        """Why some skills are unavailable, by skill name; complete only after connecting."""
 
     @property
     def clock(self) -> Clock:
-        """The clock for a program's sleeps."""
+        """The clock that times a program's sleeps."""
 
     def connect(self) -> None:
-        """Make the robot ready and at rest, with its clock at 0; also after a `cancel`.
+        """Prepare the robot at rest with its clock at 0, for the first time or again after `cancel`.
 
         Raises:
-            NotReadyError: the robot cannot be used; nothing stays open.
+            NotReadyError: the robot cannot be used; all resources have been released.
         """
 
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback, /
     ) -> RobotResult:
-        """Execute a skill to its end; call it from one thread at a time.
+        """Perform a skill and wait until it ends; only one thread at a time may call this method.
 
         Args:
-            skill: its name in the table.
-            arguments: in the order of its parameters.
-            feedback: called with the progress.
+            skill: the name of the skill in the table.
+            arguments: the skill's arguments, in the order of its parameters.
+            feedback: a callback for progress reports and pictures.
 
         Raises:
-            RobotError: the robot cannot do it; programs can catch this.
+            RobotError: the skill failed; programs can catch this error.
             CancelledError: `cancel` was called, or another client stopped the robot.
-            RobotLostError: the robot does not answer any more.
+            RobotLostError: the robot no longer responds.
         """
 
     def cancel(self) -> None:
-        """End the current skill, if any, and refuse all others until the next `connect`.
+        """Stop the current skill, if any, and refuse all others until the next `connect`.
 
-        Any thread may call it. It returns when the command is sent, and `perform` returns when the skill has
-        ended. It never raises.
+        This method is thread-safe and never raises. It returns once the stop command has been sent; a running
+        `perform` returns once the skill has ended.
         """
 
     def disconnect(self) -> None:
-        """End the current skill and release all resources; may be called repeatedly."""
+        """Stop the current skill and release all resources; further calls have no effect."""
 
 
 class _SentenceError(Exception):
@@ -118,39 +118,39 @@ class _SentenceError(Exception):
 
 
 class NotReadyError(_SentenceError):
-    """A robot cannot be used; the sentence says why, and how to fix it."""
+    """Raised when a robot cannot be used; the sentence says why and how to fix it."""
 
 
 class RobotLostError(_SentenceError):
-    """A connected robot does not answer any more; the sentence says why."""
+    """Raised when a connected robot no longer responds; the sentence says why."""
 
 
 class AnswerError(_SentenceError):
-    """An answer to a robot's question is too late or invalid."""
+    """Raised when a person's answer to the robot's question is too late or invalid."""
 
 
 class CancelledError(Exception):
-    """A skill was cancelled."""
+    """Raised by a skill that was cancelled."""
 
 
 @dataclass(frozen=True)
 class Readiness:
-    """Whether robots of one kind can be used on this machine."""
+    """Says whether one kind of robot can be used on this machine."""
 
     name: str  # the kind: sim, pyrobosim, ros1, rosbridge or ros2
-    works: bool  # whether they can be used, as far as is known without connecting
-    missing: str = ""  # the missing part, as a phrase; empty if nothing is missing
-    mend: str = ""  # the command that installs the missing part, if there is one
-    note: str = ""  # a remark for users, such as how to choose the address
+    works: bool  # whether all requirements are installed; the robot itself is not contacted
+    missing: str = ""  # a clause that names the missing requirement; empty if there is none
+    mend: str = ""  # a command that installs the missing requirement; empty if there is none
+    note: str = ""  # further advice for the user, such as how to choose the address
 
 
 @dataclass(frozen=True)
 class Options:
-    """Options for opening a robot; each kind uses some of them."""
+    """Options for opening a robot; each kind ignores the options it does not need."""
 
     world: World | None = None  # the world of a simulated robot
-    speed: float | None = 1.0  # clock seconds per real second; None if waiting takes no real time
-    address: str = ""  # the address, such as the URI of a ROS master or rosbridge; empty for the default
-    ros_python: Path = ROS_PYTHON  # the Python of the robot's ROS installation
-    skills: SkillTable = SKILLS  # the skills that the robot may be asked to perform
-    connection: Connection | None = None  # the calls of a robot on ROS; None for an action per skill
+    speed: float | None = 1.0  # clock seconds per real second; None to wait for nothing
+    address: str = ""  # the robot's address, such as a ROS master URI; empty for the default
+    ros_python: Path = ROS_PYTHON  # the Python interpreter of the robot's ROS installation
+    skills: SkillTable = SKILLS  # the skills that programs may call
+    connection: Connection | None = None  # the ROS interface; None if each skill has its own action

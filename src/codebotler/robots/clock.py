@@ -1,4 +1,4 @@
-"""A robot's clock: real time, scaled time, or time that only advances by waiting."""
+"""A robot's clock, which follows real time, scaled time, or only the requested waits."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ MAX_SPEED, MIN_SPEED = 1e6, 1e-6
 
 
 class Clock:
-    """A clock that starts at 0, with interruptible waiting.
+    """A clock that starts at 0 and whose waits can be interrupted from another thread.
 
     Args:
-        speed: clock seconds per real second, from 0.000001 to 1,000,000; None if time only advances by
-            waiting, which takes no real time.
+        speed: clock seconds per real second, from 0.000001 to 1,000,000. With None, each wait returns
+            immediately and advances the clock, which otherwise stands still.
 
     Raises:
         UserError: the speed is out of range.
@@ -31,13 +31,13 @@ class Clock:
 
     @property
     def now(self) -> float:
-        """Seconds since the start."""
+        """The clock seconds since the start or the last restart."""
         if self.speed is None:
             return self._waited
         return (time.monotonic() - self._start) * self.speed
 
     def wait(self, seconds: float) -> bool:
-        """Wait for at least 0 seconds of this clock; return False if the clock was stopped."""
+        """Wait for a number of clock seconds, 0 or more; return False if the clock was stopped."""
         if self.speed is not None:
             self._stopped.wait(min(seconds / self.speed, threading.TIMEOUT_MAX))
         elif not self._stopped.is_set():
@@ -45,10 +45,10 @@ class Clock:
         return not self._stopped.is_set()
 
     def stop(self) -> None:
-        """End all waiting, now and until the next restart; any thread may call it."""
+        """Interrupt current waits, and make later ones return immediately until `restart`; thread-safe."""
         self._stopped.set()
 
     def restart(self) -> None:
-        """Start again from 0."""
+        """Reset the clock to 0 and let it run again after a stop."""
         self._start, self._waited = time.monotonic(), 0.0
         self._stopped.clear()

@@ -1,4 +1,4 @@
-"""A face on any number of screens, on which a robot speaks and asks questions."""
+"""The robot's face, which shows its sentences and questions on any number of screens."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from codebotler.robots.base import (
 )
 from codebotler.robots.clock import Clock
 
-ANSWER_SECONDS = 60.0  # real seconds for an answer by default
-ASK_TIMEOUT = "AskTimeout"  # the kind of the error
+ANSWER_SECONDS = 60.0  # the default time limit for an answer, in real seconds
+ASK_TIMEOUT = "AskTimeout"  # the kind of error that programs see when nobody answers
 MAX_SENTENCES = 3
 MIN_SPEECH, MAX_SPEECH, CHARACTERS_PER_SECOND = 1.0, 10.0, 20.0  # the duration of speech, in robot seconds
 
 
 @dataclass(frozen=True)
 class FaceSentence:
-    """A sentence of the robot; sentences and questions share their numbers, from 1."""
+    """A sentence that the robot said; sentences and questions are numbered together, from 1."""
 
     number: int
     text: str
@@ -41,20 +41,20 @@ class FaceSentence:
 
 @dataclass(frozen=True)
 class FaceQuestion:
-    """A question of the robot; an answer refers to its number."""
+    """A question that the robot asked; an answer must give the question's number."""
 
     number: int
     person: str
     text: str
     options: tuple[str, ...]
-    until: float = math.inf  # the deadline by the monotonic clock
-    how: str = ""  # the question ended: answered, withdrawn or unanswered
-    answer: int | None = None  # the position of the chosen option
+    until: float = math.inf  # the deadline for an answer, on the monotonic clock
+    how: str = ""  # answered, withdrawn or unanswered; empty while the question is open
+    answer: int | None = None  # the index of the chosen option; None if there is no answer
 
 
 @dataclass(frozen=True)
 class FaceState:
-    """The contents of all screens: the last sentences, the open question, and the previous question."""
+    """What every screen shows: the last sentences, the open question, and the question that ended last."""
 
     said: tuple[FaceSentence, ...] = ()
     question: FaceQuestion | None = None
@@ -62,13 +62,13 @@ class FaceState:
 
 
 class Face:
-    """The robot's sentences and questions; thread-safe, and only `ask` blocks.
+    """Keeps the robot's sentences and questions; thread-safe, and only `ask` blocks.
 
     Args:
-        seconds: the real seconds for an answer.
+        seconds: the time limit for an answer, in real seconds.
 
     Attributes:
-        changed: called after each change.
+        changed: a callback that runs after each change.
     """
 
     def __init__(self, seconds: float = ANSWER_SECONDS) -> None:
@@ -82,7 +82,7 @@ class Face:
 
     @contextmanager
     def count_screen(self) -> Iterator[None]:
-        """Count a screen as open inside the context."""
+        """Count one more open screen until the context ends."""
         self._add_screens(1)
         try:
             yield
@@ -96,19 +96,19 @@ class Face:
             self._show(FaceState())
 
     def withdraw(self) -> None:
-        """Withdraw the question, and refuse to say or ask anything until the next `open`."""
+        """Withdraw the open question, and refuse to say or ask anything until the next `open`."""
         with self._lock:
             self._is_open = False
             self._end("withdrawn")
 
     def say(self, text: str) -> None:
-        """Show a sentence; CancelledError if the face is withdrawn."""
+        """Show a sentence; raise CancelledError if the mission has been stopped."""
         with self._lock:
             said = FaceSentence(self._next(), text)
             self._show(replace(self.shown, said=(*self.shown.said, said)[-MAX_SENTENCES:]))
 
     def ask(self, person: str, text: str, options: Sequence[str]) -> int:
-        """Ask a question, and wait for the position of the chosen option.
+        """Ask a question, wait for an answer, and return the index of the chosen option.
 
         Raises:
             RobotError: nobody answered in time.
@@ -133,13 +133,13 @@ class Face:
         return ended.answer
 
     def answer(self, number: int, option: int) -> None:
-        """Answer the question with this number; later answers raise AnswerError."""
+        """Answer a question by its number; raise AnswerError if it is closed or the option does not exist."""
         with self._lock:
             question = self.shown.question
             if question is None or question.number != number:
                 raise AnswerError(self._too_late(number))
             if not 0 <= option < len(question.options):
-                raise AnswerError("that is not one of the options; choose one of them")
+                raise AnswerError("that is not one of the options; choose one from the list")
             self._end("answered", option)
 
     def _too_late(self, number: int) -> str:
@@ -174,17 +174,17 @@ class Face:
 
 
 def without_speech(skills: SkillTable = SKILLS) -> SkillTable:
-    """Return the skills that the robot behind a face must perform itself."""
+    """Return the skills that are not spoken, which a robot with a face must still perform itself."""
     return SkillTable(tuple(skill for skill in skills.rows if _speech_of(skill) is None))
 
 
 def _speech_of(skill: Skill) -> Recording | None:
-    """Return the recording of a skill, if the skill is spoken."""
+    """Return how a skill is recorded if it is a spoken skill, else None."""
     return skill.recording if skill.recording and skill.recording.is_spoken else None
 
 
 class RobotWithFace:
-    """Speaks and asks on a face, and passes all other skills to another robot."""
+    """Wraps a robot: a face performs the spoken skills, and the robot performs all others."""
 
     def __init__(self, robot: Robot, face: Face, skills: SkillTable = SKILLS) -> None:
         self._robot, self._face, self.skills = robot, face, skills
@@ -193,25 +193,25 @@ class RobotWithFace:
 
     @property
     def missing(self) -> Mapping[str, str]:
-        """The reasons why the other robot cannot perform some skills, apart from speech."""
+        """Why the wrapped robot cannot perform some skills, without the spoken ones, by skill name."""
         return {
             skill: why for skill, why in self._robot.missing.items() if _speech_of(self.skills[skill]) is None
         }
 
     @property
     def clock(self) -> Clock:
-        """The clock of the other robot."""
+        """The clock of the wrapped robot."""
         return self._robot.clock
 
     def connect(self) -> None:
-        """Connect the other robot, and clear the face."""
+        """Connect the wrapped robot and clear the face."""
         self._robot.connect()
         self._face.open()
 
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Speak, or have the other robot perform the skill."""
+        """Perform a spoken skill on the face, or pass the skill to the wrapped robot."""
         spoken = _speech_of(self.skills[skill])
         if spoken is None:
             return self._robot.perform(skill, arguments, feedback)
@@ -231,23 +231,23 @@ class RobotWithFace:
 
     @property
     def failed_stop(self) -> str:
-        """The reason why the other robot did not stop; empty if it stopped, or does not report that."""
+        """Why the wrapped robot did not stop; empty if it stopped or cannot report failed stops."""
         return str(getattr(self._robot, "failed_stop", ""))
 
     def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
-        """Report the poses of the other robot; return whether it has poses."""
+        """Report the wrapped robot's position to a callback; return False if its position is never known."""
         watch = getattr(self._robot, "watch", None)
         return watch is not None and bool(watch(on_pose))
 
     def cancel(self) -> None:
-        """Withdraw the question, and stop the other robot."""
+        """Withdraw the open question and stop the wrapped robot."""
         try:
             self._face.withdraw()
         finally:
             self._robot.cancel()
 
     def disconnect(self) -> None:
-        """Withdraw the question, and disconnect the other robot."""
+        """Withdraw the open question and disconnect the wrapped robot."""
         self._face.withdraw()
         self._robot.disconnect()
 

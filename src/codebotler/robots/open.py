@@ -1,4 +1,4 @@
-"""Open a robot by its kind, and find out which kinds work on this machine."""
+"""Open a robot by its kind, and check which kinds work on this machine."""
 
 from __future__ import annotations
 
@@ -21,40 +21,38 @@ ROBOT_MODULES = {
     "rosbridge": "ros.rosbridge",
     "ros2": "ros.ros2",
 }
-"""The module of each kind of robot.
+"""The module of each kind of robot, which must import quickly.
 
-It imports fast, and has `readiness(ros_python)` and `robot(options)`, which returns an unconnected robot.
+Each module has the functions `readiness(ros_python)` and `robot(options)`; `robot` does not connect yet.
 """
 
 
 def open_robot(name: str, options: Options | None = None) -> Robot:
-    """Open a robot by its kind (sim, pyrobosim, ros1, rosbridge or ros2) or class, without connecting.
+    """Open a robot without connecting it.
+
+    `name` is a kind (sim, pyrobosim, ros1, rosbridge or ros2) or a class in a file, as in lab_robot.py:Spot.
 
     Raises:
         UserError: the kind or class does not exist, or an option is missing or invalid.
     """
     if is_own(name):
-        return _with_spelling(OwnRobot(name, options or Options()))
+        return cast("Robot", SpellingRobot(OwnRobot(name, options or Options())))
     if name not in ROBOT_MODULES:
         own = "or your own class, such as lab_robot.py:Spot"
-        raise UserError(f'there is no robot "{name}"; choose one of {", ".join(ROBOT_MODULES)}, {own}')
+        raise UserError(f'unknown robot "{name}"; choose one of {", ".join(ROBOT_MODULES)}, {own}')
     robot: Robot = _import_kind(name).robot(options or Options())
-    return robot if name == "sim" else _with_spelling(robot)
-
-
-def _with_spelling(robot: Robot) -> Robot:
-    return cast("Robot", SpellingRobot(robot))
+    return robot if name == "sim" else cast("Robot", SpellingRobot(robot))
 
 
 def open_with_face(name: str, options: Options, face: Face) -> Robot:
-    """Open a robot with a face, which performs `say` and `ask`."""
+    """Open a robot whose spoken skills, such as `say` and `ask`, use a face instead of the robot."""
     silent = open_robot(name, replace(options, skills=without_speech(options.skills)))
     lacking = without_speech(options.skills).without(silent.skills)
     return RobotWithFace(silent, face, options.skills.without(lacking))
 
 
 def check_readiness(ros_python: Path = ROS_PYTHON) -> list[Readiness]:
-    """Return whether each kind of robot can be used here, and what is missing if not."""
+    """Check for each kind of robot whether it can be used on this machine, and what is missing if not."""
     return [_readiness(name, ros_python) for name in ROBOT_MODULES]
 
 

@@ -1,4 +1,4 @@
-"""A robot defined by a class in a user's file, with a method for each skill, async or not."""
+"""A robot defined by a class in the user's file, with a plain or async method for each skill."""
 
 from __future__ import annotations
 
@@ -31,33 +31,33 @@ from codebotler.robots.base import (
 )
 from codebotler.robots.clock import Clock
 
-STOP_SECONDS = 5.0  # for an async `stop`
+STOP_SECONDS = 5.0  # the time limit for `stop`
 
 
 def is_own(name: str) -> bool:
-    """Whether a robot's name is a class in a file, such as `lab_robot.py:Spot`."""
+    """Return whether a robot's name refers to a class in a file, such as `lab_robot.py:Spot`."""
     return ".py:" in name
 
 
 class OwnRobot:
-    """A robot whose skills are the methods of an object.
+    """Performs skills by calling the methods of a user's object.
 
-    `rooms()` lists the rooms. `stop()` stops the robot at once, and may be called from any thread while
-    another method runs. A method reports a failure by RobotError, or by an exception with the name of an
+    Its `rooms()` must list the rooms. Its `stop()` must stop the robot at once; any thread may call it while
+    another method runs. To report a failure, a method raises RobotError or an exception with the name of an
     error that the skill declares. Any other exception ends the mission.
 
     Args:
-        name: the file and the class.
-        options: the user's options.
+        name: the file and the class, such as `lab_robot.py:Spot`.
+        options: the options for opening the robot.
 
     Attributes:
-        failed_stop: why the robot could not be stopped; empty if it could.
+        failed_stop: why the robot could not be stopped; empty if it was stopped.
 
     Raises:
         UserError: the file or class does not exist, or a required method is missing.
     """
 
-    if_tool_dies = "nothing stops the robot unless its class sees to that"
+    if_tool_dies = "nothing stops the robot unless its class does so"
     rooms_are_regexes = has_pose = False
 
     def __init__(self, name: str, options: Options) -> None:
@@ -81,7 +81,7 @@ class OwnRobot:
         self._running: Future[Any] | None = None
 
     def _method(self, skill: str) -> Callable[..., Any] | None:
-        """Return the method for a skill; `rooms` also serves as `get_all_rooms`."""
+        """Return the method for a skill, or None; `rooms` is used for `get_all_rooms` if that is missing."""
         try:
             method = getattr(self._body, skill, None)
         except Exception as error:
@@ -91,7 +91,7 @@ class OwnRobot:
         return method if callable(method) else None
 
     def connect(self) -> None:
-        """Connect the robot, if its class has `connect`, and set the clock to 0."""
+        """Call the object's `connect` if it has one, and set the clock to 0."""
         if self._loop is None:
             self._loop = asyncio.new_event_loop()
             self._thread = threading.Thread(target=_run, args=(self._loop,), daemon=True)
@@ -108,10 +108,10 @@ class OwnRobot:
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], _: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Call the method of a skill.
+        """Perform a skill by calling its method.
 
         Raises:
-            RobotError: the robot cannot do it.
+            RobotError: the skill failed.
             CancelledError: the robot was stopped.
             RobotLostError: the method failed unexpectedly, or the robot could not be stopped.
         """
@@ -140,7 +140,7 @@ class OwnRobot:
         return result
 
     def _expect_no_stop(self) -> None:
-        """If the robot was stopped, wait until `stop` has returned, and raise the error for its result."""
+        """If the robot was stopped, wait for `stop` and raise an error that says whether it succeeded."""
         if not self._stopped:
             return
         if not self._stop_returned.wait(STOP_SECONDS):
@@ -152,14 +152,14 @@ class OwnRobot:
         raise CancelledError
 
     def cancel(self) -> None:
-        """Call `stop`, and cancel the running method."""
+        """Call the object's `stop`, and cancel the running method if it is async."""
         with self._stop_lock:
             was_stopped, self._stopped = self._stopped, True
             if not was_stopped:
                 self._stop_returned.clear()
         self.clock.stop()
         if was_stopped:
-            self._stop_returned.wait(STOP_SECONDS)  # another thread calls it
+            self._stop_returned.wait(STOP_SECONDS)  # another thread is already calling `stop`
             return
         try:
             self._finish(self._body.stop(), STOP_SECONDS)
@@ -172,7 +172,7 @@ class OwnRobot:
             running.cancel()
 
     def disconnect(self) -> None:
-        """End the running method, call `disconnect` if the class has it, and end the event loop."""
+        """Stop a running method, call the object's `disconnect` if it has one, and end the event loop."""
         if self._is_busy:
             self.cancel()
         self._stopped = True
@@ -180,7 +180,7 @@ class OwnRobot:
         disconnect = getattr(self._body, "disconnect", None)
         if self._loop is None:
             return
-        with suppress(Exception):  # the connection is given up in any case
+        with suppress(Exception):  # the robot counts as disconnected in any case
             if disconnect is not None:
                 self._finish(disconnect(), STOP_SECONDS)
         self._loop.call_soon_threadsafe(self._loop.stop)
@@ -188,7 +188,7 @@ class OwnRobot:
         self._thread.join(STOP_SECONDS)
 
     def _finish(self, result: Any, patience: float | None = None) -> Any:  # noqa: ANN401 - of a user's method
-        """Return the result of a method; wait for it if the method is async."""
+        """Return the result of a method call; if the method is async, run it and wait for the result."""
         if not inspect.iscoroutine(result):
             return result
         assert self._loop is not None, "the robot is connected"
@@ -208,7 +208,7 @@ class OwnRobot:
 
 
 def _expect_fit(kind: str, method: Callable[..., Any], skill: Skill) -> None:
-    """Raise UserError if a method does not take the arguments of its skill."""
+    """Raise UserError if a method does not accept the arguments of its skill."""
     code = getattr(method, "__code__", None)
     try:
         inspect.signature(method).bind(*(parameter.name for parameter in skill.parameters))
@@ -217,12 +217,11 @@ def _expect_fit(kind: str, method: Callable[..., Any], skill: Skill) -> None:
         file, line = (None, None) if code is None else (code.co_filename, code.co_firstlineno)
         sentence = f"{kind}.{skill.name} has the wrong parameters; write def {skill.name}({takes})"
         raise UserError(sentence, file=file, line=line) from None
-    except ValueError:  # Python cannot find its signature
+    except ValueError:  # some built-in methods have no signature
         return
 
 
 def _run(loop: asyncio.AbstractEventLoop) -> None:
-    """Run an event loop until it is stopped."""
     try:
         loop.run_forever()
         loop.run_until_complete(loop.shutdown_asyncgens())
@@ -231,14 +230,14 @@ def _run(loop: asyncio.AbstractEventLoop) -> None:
 
 
 def _make_body(path: Path, kind: str) -> Any:  # noqa: ANN401 - of a user's class
-    """Create an object of a class in a file; UserError if it cannot be a robot."""
+    """Create an object of a class in a file; raise UserError if it cannot serve as a robot."""
     module = load_skill_module(path)
     classes = [
         n for n, one in vars(module).items() if inspect.isclass(one) and one.__module__ == module.__name__
     ]
     if kind not in classes:
         hint = f"; its classes are {listed(classes)}" if classes else ""
-        raise UserError(f"it has no class {kind}{hint}", file=path)
+        raise UserError(f"the file has no class {kind}{hint}", file=path)
     body = getattr(module, kind)
     line = inspect.getsourcelines(body)[1]
     for method, why in REQUIRED_METHODS.items():
@@ -257,7 +256,7 @@ REQUIRED_METHODS = {"stop": "which stops the robot at once", "rooms": "which lis
 
 
 def _describe(error: Exception) -> str:
-    """Describe an error, with the last line outside CodeBotler in its traceback."""
+    """Describe an error with its type, its message, and the last line of the user's code in its traceback."""
     own = [frame for frame in extract_tb(error.__traceback__) if not frame.filename.startswith(OWN_CODE)]
     where = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
     return f"{type(error).__name__}: {error}{where}"

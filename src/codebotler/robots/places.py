@@ -1,4 +1,4 @@
-"""Read a robot's places from a plain file, or from any other file by a mapping."""
+"""Read a robot's places from our own file format, or from any YAML or JSON file with a mapping."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from codebotler.core.world import Point, Room, World, is_within
 from codebotler.core.world_file import Corner, Metres, Name, YamlValue
 from codebotler.core.yaml_files import YamlFile
 
-WILDCARD = "*"  # in a path: every entry
-COORDINATE_COUNTS = (2, 3, 7)  # of points, of poses with a yaw, and of poses with a quaternion
+WILDCARD = "*"  # a path step that matches every entry
+COORDINATE_COUNTS = (2, 3, 7)  # the lengths of points, poses with a yaw, and poses with a quaternion
 
 Steps: TypeAlias = tuple[str | int, ...]
 Match: TypeAlias = tuple[Steps, Steps, Any]
@@ -27,36 +27,36 @@ Match: TypeAlias = tuple[Steps, Steps, Any]
 class NamedPlace:
     """A place that the robot can drive to."""
 
-    name: str  # unique, ignoring case
-    x: float  # metres; the robot stops here
+    name: str  # the name, which must be unique regardless of case
+    x: float  # the position in metres where the robot stops
     y: float
-    yaw: float = 0.0  # radians, counterclockwise from the x axis
-    polygon: tuple[Point, ...] | None = None  # at least three corners in metres; None if unknown
+    yaw: float = 0.0  # the angle in radians, counterclockwise from the x axis
+    polygon: tuple[Point, ...] | None = None  # three or more corners in metres; None if unknown
 
 
 @dataclass(frozen=True)
 class Places:
-    """All places of a robot, at least one, and their coordinate frame, such as `map`."""
+    """The places of a robot (at least one) and the coordinate frame they are in, such as `map`."""
 
     frame: str
     places: tuple[NamedPlace, ...]
 
     def world(self, robot: str = "") -> World:
-        """Return a world with these places as rooms, and the robot in one of them."""
+        """Return a world that has these places as rooms and the robot in the given room."""
         rooms = (Room(one.name, footprint=one.polygon, stand_at=(one.x, one.y)) for one in self.places)
         return World(tuple(rooms), robot)
 
     def room_at(self, x: float, y: float) -> NamedPlace | None:
-        """Return the place with the smallest polygon around a point in metres, or None."""
+        """Return the place with the smallest polygon that contains a point in metres, or None."""
         around = (one for one in self.places if one.polygon and is_within((x, y), one.polygon))
         return min(around, key=lambda one: _area(one.polygon or ()), default=None)
 
     def nearest(self, x: float, y: float) -> NamedPlace:
-        """Return the place whose stop is nearest to a point in metres."""
+        """Return the place whose stopping position is nearest to a point in metres."""
         return min(self.places, key=lambda one: math.dist((one.x, one.y), (x, y)))
 
     def named(self, text: str) -> NamedPlace | None:
-        """Return the place with a name, ignoring case and surrounding spaces, or None."""
+        """Return the place with the given name, ignoring case and surrounding spaces, or None."""
         return next((one for one in self.places if one.name.casefold() == text.strip().casefold()), None)
 
 
@@ -70,14 +70,14 @@ class _PlacesForm(BaseModel):
 
 
 class PlacesFile(_PlacesForm):
-    """A plain file of places."""
+    """The structure of a places file in our own format."""
 
     frame: Name = "map"
     places: dict[Name, dict[Literal["x", "y", "yaw", "polygon"], Any]]
 
 
 class PlacesMapping(_PlacesForm):
-    """A mapping from a file to places; paths are keys and positions joined by dots."""
+    """Describes how to find places in a file; a path is a list of keys and indices joined by dots."""
 
     file: Name
     frame: Name = "map"
@@ -87,19 +87,16 @@ class PlacesMapping(_PlacesForm):
     pose: str | list[str] = ""
     polygon: str = "polygon"
     yaw: Literal["radians", "degrees"] = "radians"
-    resolution: Metres | None = None  # metres per pixel, if places are pixels of an image, from its top left
-    origin: Corner | tuple[Metres, Metres, Metres] = (
-        0.0,
-        0.0,
-    )  # the lower left corner of the image in metres
-    height: Metres = 0.0  # of the image in pixels
+    resolution: Metres | None = None  # metres per pixel if positions are pixels from the image's top left
+    origin: Corner | tuple[Metres, Metres, Metres] = (0.0, 0.0)  # the image's lower left corner in metres
+    height: Metres = 0.0  # the height of the image in pixels
     skip: list[str] = []
 
 
 def read_places(source: object, at: YamlFile) -> Places:
-    """Read the places of a robot; UserError if a file is invalid.
+    """Read the places of a robot; raise UserError if a file is invalid.
 
-    The source, from `places` in the file `at`, is the name of a file, a mapping, or a list of these.
+    `source` is the value of `places` in the file `at`: a file name, a mapping, or a list of these.
     """
     found: dict[str, NamedPlace] = {}
     frames: list[str] = []
@@ -109,10 +106,10 @@ def read_places(source: object, at: YamlFile) -> Places:
         file = YamlFile.read(Path(at.name).parent / mapping.file)
         frames.append(file.validate(PlacesFile).frame if isinstance(one, str) else mapping.frame)
         if frames[-1] != frames[0]:
-            raise at.wrong(f'these places are in "{frames[-1]}", others in "{frames[0]}"; use one', *here)
+            raise at.wrong(f'frame "{frames[-1]}" differs from "{frames[0]}" of other places; use one', *here)
         entries = [*_find_entries(mapping, file.data)]
         if not entries:
-            sentence = f'"{mapping.each}" leads to no place with a name in {file.name}'
+            sentence = f'"{mapping.each}" matches no named place in {file.name}'
             raise at.wrong(f'{sentence}; correct "each" or "name"', *here, "each")
         for name, where, entry in entries:
             try:
@@ -124,7 +121,7 @@ def read_places(source: object, at: YamlFile) -> Places:
 
 
 def _matches(data: object, path: str, at: Steps = (), stars: Steps = ()) -> Iterator[Match]:
-    """Yield each match of a path: its location, the keys for the wildcards, and the value."""
+    """Yield each match of a path: its location, the keys that matched wildcards, and its value."""
     step, _, rest = path.partition(".")
     if not step:
         yield at, stars, data
@@ -141,7 +138,7 @@ def _find(data: object, path: str) -> Any:  # noqa: ANN401 - of any file
 
 
 def _find_entries(mapping: PlacesMapping, data: object) -> Iterator[tuple[str, Steps, Any]]:
-    """Yield the selected entries that have a name: the name, the location, and the entry."""
+    """Yield the name, location and value of each entry that the mapping selects and that has a name."""
     for where, stars, entry in _matches(data, mapping.each):
         name = mapping.name or " ".join(WILDCARD for _ in stars)
         if WILDCARD not in name:
@@ -157,9 +154,9 @@ def _find_entries(mapping: PlacesMapping, data: object) -> Iterator[tuple[str, S
 def _make_place(
     name: str, entry: object, mapping: PlacesMapping, others: Mapping[str, NamedPlace]
 ) -> NamedPlace:
-    """Convert an entry to a place; ValueError if it is invalid."""
+    """Convert an entry to a place; raise ValueError if it is invalid."""
     if other := others.get(name.casefold()):
-        raise ValueError(f'another one is called "{other.name}", and case is ignored')
+        raise ValueError(f'the name is already taken by "{other.name}" (names are case-insensitive)')
     corners, paths, size = _find(entry, mapping.polygon), mapping.pose, mapping.resolution
     polygon = [(x, y) for x, y, *_ in map(_numbers, corners)] if isinstance(corners, list) else []
     if corners is not None and not polygon[2:]:
@@ -168,7 +165,7 @@ def _make_place(
     if polygon and (pose is None or (pose is entry and _find(entry, "x") is None)):
         pose = [sum(parts) / len(polygon) for parts in zip(*polygon, strict=True)]
         if not is_within((pose[0], pose[1]), polygon):
-            raise ValueError("it has no x and y, and the middle of its polygon is outside")
+            raise ValueError("it has no x and y, and the middle of its corners is outside its polygon")
     x, y, *turn = _numbers(pose)
     points = [(x, y), *polygon]
     if size is not None:
@@ -182,7 +179,7 @@ def _make_place(
 
 
 def _numbers(value: Any) -> list[float]:  # noqa: ANN401 - of any file
-    """Return x and y of a corner or a pose, and its yaw, or its z and quaternion, if present."""
+    """Return the numbers of a corner or a pose: x and y, then a yaw, or z and a quaternion, if given."""
     match value:
         case {"position": point, "orientation": {"x": x, "y": y, "z": z, "w": w}}:
             value = [*_numbers(point)[:2], 0.0, x, y, z, w]
@@ -192,4 +189,4 @@ def _numbers(value: Any) -> list[float]:  # noqa: ANN401 - of any file
         numbers = [float(one) for one in value] if isinstance(value, list) else []
         if len(numbers) in COORDINATE_COUNTS and all(map(math.isfinite, numbers)):
             return numbers
-    raise ValueError(f"{brief(str(value))} is no point or pose of finite numbers")
+    raise ValueError(f"{brief(str(value))} is not a point or pose of finite numbers")

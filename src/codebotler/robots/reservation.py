@@ -1,4 +1,4 @@
-"""Lock a robot, so that only one tool on this machine uses it at a time."""
+"""Lock a robot so that only one process on this machine uses it at a time."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ LOOPBACK_ADDRESS = "127.0.0.1"
 
 
 class Reservation:
-    """Locks a robot and connects it, as a context manager.
+    """A context manager that locks and connects a robot.
 
-    The lock ends with this process. It holds for all tools of this user on this machine if the robot has an
-    address, otherwise for the missions in one folder.
+    For a robot with an address, the lock excludes all other processes of this user on this machine; without
+    an address, it excludes missions in the same folder. It is released when this process ends.
 
     Args:
-        robot: an unconnected robot.
-        home: the folder of missions.
+        robot: the robot, not yet connected.
+        home: the folder that contains the missions.
 
     Raises:
-        NotReadyError: another tool uses the robot, it cannot be connected, or others can write locks.
-        OSError: the lock cannot be written.
+        NotReadyError: another process uses the robot, connecting fails, or other users can change the locks.
+        OSError: the lock file cannot be written.
     """
 
     def __init__(self, robot: Robot, home: Path) -> None:
@@ -68,7 +68,7 @@ class Reservation:
             os.close(self._lock)
 
     def use(self) -> None:
-        """Use the robot for a mission; NotReadyError if this connection has already served one."""
+        """Claim this connection for a mission; raise NotReadyError if a mission has already used it."""
         if not self._is_used.acquire(blocking=False):
             raise NotReadyError(f"the robot {self.robot.name} has already run a mission; connect it again")
 
@@ -95,37 +95,37 @@ class Reservation:
         try:
             holder = json.loads(os.pread(self._lock, 1_000, 0))
             return f"another tool (process {holder['process']}, since {holder['since']})"
-        except ValueError:  # another process is writing it
+        except ValueError:  # the other process is still writing its name
             return "another tool"
 
 
 def robot_file(robot: str, address: str, kind: str) -> Path:
-    """Return the path of this user's file about the robot at an address, inside `lock_folder`."""
+    """Return the path of this user's file (of a kind such as lock) for the robot at an address."""
     digest = sha256(normalize_address(address).encode(errors="surrogatepass")).hexdigest()
     return lock_folder() / f"{robot} {digest}.{kind}"
 
 
 def lock_folder() -> Path:
-    """Return the folder of this user's locks on this machine, and create it if necessary.
+    """Return the folder of this user's locks on this machine, creating it if necessary.
 
     Raises:
-        NotReadyError: others can write there.
+        NotReadyError: other users can write to the folder.
         OSError: the folder cannot be created.
     """
     runtime = Path(os.environ.get("XDG_RUNTIME_DIR", ""))
-    is_usable = runtime.is_absolute() and _is_ours(runtime)  # under `sudo` it may belong to the caller
+    is_usable = runtime.is_absolute() and _is_ours(runtime)  # with `sudo`, it may belong to another user
     folder = runtime / "codebotler" if is_usable else Path(gettempdir()) / f"codebotler-{os.getuid()}"
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
     if not _is_ours(folder):
         raise NotReadyError(
-            f"{folder} holds locks of robots, but others can write to it, or it is no folder; remove it"
+            f"{folder}, which holds robot locks, is not a folder or is writable by others; remove it"
         )
     return folder
 
 
 def _is_ours(folder: Path) -> bool:
-    """Whether this is a real folder of this user that nobody else can write to."""
+    """Return whether a path is a folder (not a link) of this user that nobody else can write to."""
     try:
         found = folder.lstat()
     except OSError:
@@ -135,15 +135,15 @@ def _is_ours(folder: Path) -> bool:
 
 
 def normalize_address(address: str) -> str:
-    """Return one spelling for an address: with a port, without user, capitals and trailing slashes.
+    """Return the canonical form of an address: with a port, without user, capitals and trailing slashes.
 
-    All names of this machine become one; invalid addresses stay unchanged. Connect to the original spelling,
-    since a server may listen at only one name of its machine.
+    All names of this machine map to one, and invalid addresses stay unchanged. Use the result only to compare
+    addresses, and connect to the original, since a server may listen on only one of its machine's names.
     """
     try:
         parts = urlsplit(address.strip())
         host, port = parts.hostname, parts.port
-    except ValueError:  # an invalid port, or an unmatched bracket
+    except ValueError:  # for an invalid port or an unmatched bracket
         return address
     if not host or parts.scheme not in DEFAULT_PORTS:
         return address
@@ -156,7 +156,7 @@ def normalize_address(address: str) -> str:
 def _normalize_host(host: str) -> str:
     if host in {"localhost", socket.gethostname().lower()}:
         return LOOPBACK_ADDRESS
-    with suppress(ValueError):  # a name, not a number
+    with suppress(ValueError):  # a host name is not an IP address
         number = ip_address(host)
         number = getattr(number, "ipv4_mapped", None) or number
         return LOOPBACK_ADDRESS if number.is_loopback or number.is_unspecified else number.compressed

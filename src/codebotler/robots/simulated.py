@@ -1,4 +1,4 @@
-"""A simulated robot that drives at walking pace."""
+"""A simulated robot that drives at a walking pace."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ SIMULATION = SimulationSettings(
     literals="as-written", people="own-name-or-word", words_for_people=WORDS_FOR_PEOPLE, limits=ENDLESS
 )
 METRES_PER_SECOND = 0.5
-FEEDBACK_SECONDS = 0.25  # real seconds
+FEEDBACK_SECONDS = 0.25  # the real time between two position reports
 
 OFFICE = Path(__file__).with_name("office.yaml")
-"""The world of an example: printer rooms, a supply room and an office."""
+"""An example world with printer rooms, a supply room and an office."""
 
 
 class Simulated:
     """A simulated robot whose skills take time.
 
     Args:
-        world: its world.
-        speed: seconds of its clock per real second; None if nothing takes real time.
-        skills: the skills that it may be asked to perform.
-        metres_per_second: its driving speed, above 0; infinite if driving takes no time.
+        world: the world that the robot works in.
+        speed: the robot's clock seconds per real second; None to wait for nothing.
+        skills: the skills that programs may call.
+        metres_per_second: the driving speed, above 0; infinity makes drives instantaneous.
 
     Raises:
         UserError: the speed is out of range.
@@ -68,7 +68,7 @@ class Simulated:
         self._place = self._stands_at[world.robot]
 
     def connect(self) -> None:
-        """Put the robot and all objects at their places in the world."""
+        """Reset the robot and all objects to the initial state of the world."""
         self._robot = SimulatedRobot(self._world, SIMULATION, self.skills)
         self._place = self._stands_at[self._world.robot]
         self.clock.restart()
@@ -76,10 +76,10 @@ class Simulated:
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Execute a skill; it takes time.
+        """Perform a skill, including the time it takes.
 
         Raises:
-            RobotError: the robot cannot do it.
+            RobotError: the skill failed.
             CancelledError: the robot was stopped.
         """
         self._wait(0.0)
@@ -92,11 +92,11 @@ class Simulated:
         return perform_at_once(self._robot, skill, arguments)
 
     def cancel(self) -> None:
-        """Stop at once."""
+        """Stop the robot immediately."""
         self.clock.stop()
 
     def disconnect(self) -> None:
-        """Stop."""
+        """Stop the robot; there is no connection to close."""
         self.cancel()
 
     def _drive(self, room: str, feedback: Feedback) -> None:
@@ -121,7 +121,7 @@ class Simulated:
 
 
 def perform_at_once(robot: SimulatedRobot, skill: str, arguments: Sequence[RobotArgument]) -> RobotResult:
-    """Perform a skill in the simulator, with texts for options."""
+    """Perform a skill in the simulator without delays; options and the answer are plain strings."""
     taken = robot.skills[skill].parameters
     given = [
         tuple(Option(str(text)) for text in a) if parameter.is_options and isinstance(a, tuple) else a
@@ -135,12 +135,12 @@ def perform_at_once(robot: SimulatedRobot, skill: str, arguments: Sequence[Robot
 
 
 def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
-    """Return that the simulator works."""
+    """Report the simulator as available, since it has no requirements."""
     return Readiness("sim", works=True, note="simulates the rooms and people of --world FILE")
 
 
 def robot(options: Options) -> Simulated:
-    """Open the simulated robot; UserError if the options name no world."""
+    """Create a simulated robot; raise UserError if the options contain no world."""
     if options.world is None:
         raise UserError("the simulated robot needs a world; name one with --world FILE")
     return Simulated(options.world, speed=options.speed, skills=options.skills)

@@ -1,4 +1,4 @@
-"""Translate names between the robot's form of Unicode and the composed form of programs."""
+"""Translate names between the robot's Unicode form and the composed form (NFC) that programs use."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from codebotler.robots.base import Feedback, Robot, RobotArgument, RobotResult, 
 
 
 class SpellingRobot:
-    """Answers in composed Unicode, and passes names to the robot in its own spelling."""
+    """Wraps a robot so that programs see composed names, while the robot gets names in its own spelling."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._spellings: dict[str, str] = {}  # by composed names
+        self._spellings: dict[str, str] = {}  # the robot's spelling of each composed name
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute of the robot
         return getattr(self._robot, name)
@@ -22,7 +22,7 @@ class SpellingRobot:
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Execute a skill."""
+        """Perform a skill with names in the robot's own spelling."""
         given = [self._spellings.get(one, one) if isinstance(one, str) else one for one in arguments]
         result = self._robot.perform(skill, given, feedback)
         for text in result if isinstance(result, list) else [result]:

@@ -71,5 +71,5 @@ def test_settings_that_a_model_does_not_take_are_noted(tmp_path: Path) -> None:
     variables = {"OPENAI_API_KEY": "a key of nobody", "OPENAI_BASE_URL": "http://127.0.0.1:9/v1"}
     ended = roboeval("generate", "--model", "openai-chat:o3-mini", cwd=tmp_path, environment=variables)
     assert ended.status == 1
-    assert "takes no temperature or top-p" in ended.err
+    assert "does not support temperature or top-p" in ended.err
     assert "Warning" not in ended.err

@@ -234,9 +234,9 @@ def test_a_robot_that_does_not_connect_is_not_ready(write: Write) -> None:
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        ("", r"it has no class Spot"),
-        ("class Sport: pass\n", r"it has no class Spot; its classes are Sport"),
-        ("from pathlib import Path as Spot\n", r"it has no class Spot"),
+        ("", r"the file has no class Spot"),
+        ("class Sport: pass\n", r"the file has no class Spot; its classes are Sport"),
+        ("from pathlib import Path as Spot\n", r"the file has no class Spot"),
         (
             "class Spot:\n    stop = rooms = print\n    def say(self): pass\n",
             r"line 3: Spot\.say has the wrong parameters; write def say\(self, message\)",

@@ -1,1 +1,1 @@
-"""The robot in pyrobosim; start with `robot.py`. Importing `world.py` and `floorplan.py` takes a second."""
+"""A robot simulated in pyrobosim; start with `robot.py`. `world.py` and `floorplan.py` import slowly."""

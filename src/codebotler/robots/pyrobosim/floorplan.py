@@ -1,4 +1,4 @@
-"""Plan a floor with walls, doors and tables for a world file. This module imports slowly."""
+"""Plan a floor with walls, doors and tables for a world. This module imports slowly."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from codebotler.robots.base import NotReadyError
 
 XY = tuple[float, float]
 
-# All in metres.
-ROBOT_RADIUS = 0.15  # of the robot
-WALL_THICKNESS = 0.1  # half on each side of a footprint's edge
-PASSAGE_WIDTHS = (0.8, 0.5)  # the first that fits is used
-PASSAGE_DEPTH = 0.25  # of the ends of passages, from all walls
-PASSAGE_OVERLAP = 0.1  # beyond that, so that the free spaces of rooms and passages overlap
-PASSAGE_STEP = 0.2  # between two possible starts of a passage
-TABLE_SIZES = ((1.2, 0.6), (0.8, 0.5), (0.4, 0.4), (0.2, 0.2), (0.1, 0.1))  # the first that fits is used
-SLACK = 0.02  # between separate objects
+# All lengths are in metres.
+ROBOT_RADIUS = 0.15
+WALL_THICKNESS = 0.1  # half of it on each side of a footprint's edge
+PASSAGE_WIDTHS = (0.8, 0.5)  # the planner uses the first width that fits
+PASSAGE_DEPTH = 0.25  # the distance from a passage's end to the nearest wall of the room
+PASSAGE_OVERLAP = 0.1  # extra length at each end, so that the free spaces of rooms and passages overlap
+PASSAGE_STEP = 0.2  # the distance between two starting points to try for a passage
+TABLE_SIZES = ((1.2, 0.6), (0.8, 0.5), (0.4, 0.4), (0.2, 0.2), (0.1, 0.1))  # the first size that fits is used
+SLACK = 0.02  # the minimum gap between two objects
 
-MAX_LINES = 300  # possible passages between two rooms
-TABLE_POSITIONS = 12  # in each direction
+MAX_LINES = 300  # the most passages to try between two rooms
+TABLE_POSITIONS = 12  # the number of positions to try along each axis of a room
 
 
 @dataclass(frozen=True)
 class Passage:
-    """A door, or a passage between two rooms that do not touch."""
+    """A door between adjacent rooms, or a passage between rooms that do not touch."""
 
-    ends: tuple[int, int]  # the numbers of two floors
-    line: LineString  # the centre line, from inside one floor to inside the other
+    ends: tuple[int, int]  # the indices of the two floors it connects
+    line: LineString  # the centre line, which starts inside one floor and ends inside the other
     width: float
 
     @property
     def area(self) -> Polygon:
-        """The ground it takes."""
+        """The area it covers on the floor."""
         return self.line.buffer(self.width / 2, cap_style="flat")
 
 
@@ -54,13 +54,13 @@ class Table:
 
     @property
     def area(self) -> Polygon:
-        """The ground it takes."""
+        """The area it covers on the floor."""
         (x, y), (width, depth) = self.centre, self.size
         return box(x - width / 2, y - depth / 2, x + width / 2, y + depth / 2)
 
     @property
     def stands(self) -> list[tuple[float, float, float]]:
-        """The robot's positions at each side: x and y from the centre, and the angle to face the table."""
+        """The robot's pose at each side: x and y relative to the centre, and the yaw that faces the table."""
         along, across = (side / 2 + ROBOT_RADIUS + SLACK for side in self.size)
         return [
             (-along, 0.0, 0.0),
@@ -70,7 +70,7 @@ class Table:
         ]
 
     def cells(self, count: int) -> tuple[list[XY], float]:
-        """Return the centres of at least `count` cells of its top, and the narrower side of a cell."""
+        """Divide the top into at least `count` cells; return their centres and a cell's shorter side."""
         columns = math.ceil(math.sqrt(count))
         rows = math.ceil(count / columns)
         left, low, _, _ = self.area.bounds
@@ -81,15 +81,15 @@ class Table:
 
 @dataclass(frozen=True)
 class Floorplan:
-    """The rooms of a world, with stops, passages and tables."""
+    """The rooms of a world with their stopping positions, passages and tables."""
 
-    floors: tuple[Polygon, ...]  # rooms inside their walls, in the order of the world; perhaps a corridor
-    stands: tuple[Point, ...]  # the robot's stop on each floor
+    floors: tuple[Polygon, ...]  # the floor of each room in the order of the world, then that of a corridor
+    stands: tuple[Point, ...]  # the robot's stopping position on each floor
     passages: tuple[Passage, ...]
-    tables: tuple[Table | None, ...]  # one for each room
+    tables: tuple[Table | None, ...]  # the table in each room, or None
 
     def corners(self, number: int) -> list[XY]:
-        """Return the corners of a floor's free space that paths go around."""
+        """Return the corners of a floor's free space that a shortest path may turn at."""
         table = self.tables[number] if number < len(self.tables) else None
         space = orient(_without(_free(self.floors[number]), table))
         rings = (space.exterior, *space.interiors)
@@ -99,7 +99,7 @@ class Floorplan:
 def plan_floor(world: World) -> Floorplan:
     """Plan the floor of a world.
 
-    Rooms without a footprint are on both sides of a corridor, with a door each. Passages connect the others,
+    Rooms without a footprint line both sides of a corridor, with one door each. Passages connect the others,
     nearest first, until all can be reached. If the world has objects, each room gets a table if one fits.
 
     Raises:
@@ -109,7 +109,7 @@ def plan_floor(world: World) -> Floorplan:
     floors = [_floor(room.name, room.footprint or ()) for room in rooms]
     for (room, floor), (other, other_floor) in itertools.combinations(zip(rooms, floors, strict=True), 2):
         if floor.distance(other_floor) < WALL_THICKNESS / 2:
-            raise NotReadyError(f'the rooms "{room.name}" and "{other.name}" overlap; move one of them')
+            raise NotReadyError(f'the rooms "{room.name}" and "{other.name}" overlap; move one of the two')
     stops = [Point(room.stand_at or (0.0, 0.0)) for room in rooms]
     along = [floor for room, floor in zip(world.rooms, floors, strict=True) if room.footprint is None]
     if along:
@@ -127,7 +127,7 @@ def plan_floor(world: World) -> Floorplan:
 
 
 def _floor(name: str, footprint: Sequence[XY]) -> Polygon:
-    """Return a room inside its walls."""
+    """Return the floor of a room, which is its footprint without the walls."""
     outer = Polygon(footprint)
     floor = _shrink(outer, WALL_THICKNESS / 2) if outer.is_valid else Polygon()
     passable = _shrink(floor, PASSAGE_DEPTH)
@@ -140,7 +140,7 @@ def _floor(name: str, footprint: Sequence[XY]) -> Polygon:
 
 
 def _corridor(along: Sequence[Polygon]) -> Polygon:
-    """Return the corridor between the two rows of rooms of the layout."""
+    """Return the floor of the corridor between the two rows of rooms."""
     left, _, right, _ = MultiPoint([corner for floor in along for corner in floor.exterior.coords]).bounds
     return _shrink(box(left, ROOM_DEPTH, right, ROOM_DEPTH + HALLWAY), WALL_THICKNESS / 2)
 
@@ -150,7 +150,7 @@ def _shrink(area: Polygon, by: float) -> Polygon:
 
 
 def _free(floor: Polygon, slack: float = 0.0) -> Polygon:
-    """Return the possible positions of the robot's centre."""
+    """Return the positions on a floor that the robot's centre can take."""
     return _shrink(floor, ROBOT_RADIUS + slack)
 
 
@@ -159,19 +159,19 @@ def _without(free: Polygon, table: Table | None) -> Polygon:
 
 
 def _right_turns(ring: Sequence[XY]) -> Iterator[XY]:
-    """Yield the corners that turn right, with the free space on the left."""
+    """Yield the corners at which a ring turns right, with the free space on its left."""
     for (ax, ay), (bx, by), (cx, cy) in zip(ring, [*ring[1:], ring[0]], [*ring[2:], *ring[:2]], strict=True):
         if (bx - ax) * (cy - by) - (by - ay) * (cx - bx) < 0:
             yield bx, by
 
 
 def _passages(floors: Sequence[Polygon], stands: Sequence[Point]) -> list[Passage]:
-    """Connect the nearest floors until all can be reached, or no more passage fits."""
+    """Connect floors, nearest first, until all can be reached or no further passage fits."""
     joined = list(range(len(floors)))
     found: list[Passage] = []
 
     def distance(pair: tuple[int, int]) -> tuple[float, int]:
-        """Sort by distance, and prefer the corridor, which is the last floor."""
+        """Return a sort key that prefers near floors, then the corridor, which is the last floor."""
         first, second = pair
         return round(floors[first].distance(floors[second]), 3), -second
 
@@ -186,7 +186,7 @@ def _passages(floors: Sequence[Polygon], stands: Sequence[Point]) -> list[Passag
 def _passage(
     ends: tuple[int, int], floors: Sequence[Polygon], stands: Sequence[Point], others: Sequence[Passage]
 ) -> Passage | None:
-    """Return the shortest passage between two floors that crosses nothing, preferably near both stops."""
+    """Return the shortest unobstructed passage between two floors, or None; prefer those near both stops."""
     first, second = (floors[end] for end in ends)
     obstacles = [floor.buffer(WALL_THICKNESS / 2) for n, floor in enumerate(floors) if n not in ends]
     obstacles += [passage.area.buffer(WALL_THICKNESS / 2) for passage in others]
@@ -205,7 +205,7 @@ def _passage(
 
 
 def _lines(first: Polygon, second: Polygon) -> Iterator[LineString]:
-    """Yield straight lines from inside one floor to inside the other."""
+    """Yield straight centre lines for passages from inside one floor to inside another."""
     edge, other = _shrink(first, PASSAGE_DEPTH).exterior, _shrink(second, PASSAGE_DEPTH)
     count = min(MAX_LINES, max(4, math.ceil(edge.length / PASSAGE_STEP)))
     for number in range(count):
@@ -216,7 +216,7 @@ def _lines(first: Polygon, second: Polygon) -> Iterator[LineString]:
 
 
 def _table(floor: Polygon, keep_clear: Sequence[shapely.Geometry]) -> Table | None:
-    """Return the largest table that fits, as far as possible from stops and passages."""
+    """Return the largest table that fits, as far from stops and passages as it can be, or None."""
     left, low, right, high = floor.bounds
     width, depth = (right - left) / TABLE_POSITIONS, (high - low) / TABLE_POSITIONS
     clear = shapely.union_all(keep_clear)
@@ -233,7 +233,7 @@ def _table(floor: Polygon, keep_clear: Sequence[shapely.Geometry]) -> Table | No
 
 
 def _fits(table: Table, floor: Polygon, clear: shapely.Geometry) -> bool:
-    """Whether the robot can reach the table, and everything around it."""
+    """Return whether a table fits and leaves room for the robot to reach it and drive around it."""
     if not floor.contains(table.area) or table.area.distance(clear) <= ROBOT_RADIUS + SLACK:
         return False
     space = _without(_free(floor), table)

@@ -1,4 +1,4 @@
-"""The robot in pyrobosim: it plans paths around walls and drives along them."""
+"""A robot simulated in pyrobosim, which plans paths around walls and drives along them."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ NOT_INSTALLED, INSTALL_PYROBOSIM = "pyrobosim is not installed", install_command
 
 
 class Pyrobosim(Simulated):
-    """A robot whose position and objects are in pyrobosim; the rest is simulated as usual."""
+    """A simulated robot whose position and objects are kept in pyrobosim."""
 
     name = "pyrobosim"
     if_tool_dies, rooms_are_regexes = "the robot in pyrobosim ended with the tool", True
     _drivable: DrivableWorld
 
     def connect(self) -> None:
-        """Build the world in pyrobosim in its initial state."""
+        """Build the world in pyrobosim, in its initial state."""
         logger = logging.getLogger("pyrobosim")
-        if not logger.handlers:  # otherwise it logs to the terminal
+        if not logger.handlers:  # without a handler, pyrobosim adds one that prints to the terminal
             logger.addHandler(logging.NullHandler())
         from codebotler.robots.pyrobosim.world import DrivableWorld  # noqa: PLC0415 - slow, and optional
 
@@ -52,7 +52,7 @@ class Pyrobosim(Simulated):
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Execute a skill; it takes time."""
+        """Perform a skill; drives, picking and placing run in pyrobosim."""
         self._wait(0.0)
         self._update()
         if skill not in {"pick", "place"}:
@@ -69,7 +69,7 @@ class Pyrobosim(Simulated):
         return None
 
     def _update(self) -> None:
-        """Copy the robot's room, the held object and all objects from pyrobosim."""
+        """Copy the robot's room, the held object and all other objects from pyrobosim to the simulator."""
         world, robot = self._drivable, self._robot
         robot.room = world.room or robot.room
         robot.things = {room: [self._things[body] for body in world.objects_in(room)] for room in robot.rooms}
@@ -80,16 +80,16 @@ class Pyrobosim(Simulated):
 
 
 def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
-    """Return whether pyrobosim is installed."""
+    """Check whether pyrobosim is installed."""
     if importlib.util.find_spec("pyrobosim") is None:
         return Readiness("pyrobosim", works=False, missing=NOT_INSTALLED, mend=INSTALL_PYROBOSIM)
     return Readiness("pyrobosim", works=True, note="plans and drives through --world FILE, without a window")
 
 
 def robot(options: Options) -> Pyrobosim:
-    """Open the robot; UserError if the options name no world, or pyrobosim is not installed."""
+    """Create the robot; raise UserError without a world in the options or without pyrobosim."""
     if options.world is None:
         raise UserError("the robot in pyrobosim needs a world; name one with --world FILE")
     if importlib.util.find_spec("pyrobosim") is None:
-        raise UserError(f"{NOT_INSTALLED}; `{INSTALL_PYROBOSIM}` installs it")
+        raise UserError(f"{NOT_INSTALLED}; to install it, run `{INSTALL_PYROBOSIM}`")
     return Pyrobosim(options.world, speed=options.speed, skills=options.skills)

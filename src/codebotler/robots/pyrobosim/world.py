@@ -1,4 +1,4 @@
-"""Build a world file in pyrobosim, with a robot that plans paths and drives. This module imports slowly."""
+"""Build a world in pyrobosim with a robot that plans paths and drives. This module imports slowly."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from codebotler.robots.pyrobosim.floorplan import ROBOT_RADIUS, Floorplan, Table
 from codebotler.robots.simulated import FEEDBACK_SECONDS, METRES_PER_SECOND
 
 RADIANS_PER_SECOND = math.pi / 2
-STEP_SECONDS = 0.05  # real seconds between two positions of a drive
-WALL_WIDTH = 0.001  # metres around a floor; the floor plan leaves more space
-TOLERANCE = 1e-6  # metres between a computed point and its edge
+STEP_SECONDS = 0.05  # the real time between two positions of a drive
+WALL_WIDTH = 0.001  # the wall width in metres for pyrobosim, since the floor plan already subtracts walls
+TOLERANCE = 1e-6  # the rounding error in metres that is allowed between a point and an edge
 T = TypeVar("T")
 
 
 class DrivableWorld:
-    """A world of pyrobosim with a robot.
+    """A pyrobosim world with a robot that can drive, pick and place.
 
-    It uses nothing random: objects are in cells of tables, and paths are planned on a graph.
+    Everything is deterministic: objects lie in fixed cells of tables, and paths are planned on a graph.
     """
 
     def __init__(self, world: World, clock: Clock) -> None:
@@ -47,7 +47,7 @@ class DrivableWorld:
         self._clock, self._motor = clock, Motor(clock)
         self._world = Pyroworld(name="pyrobosim.world", inflation_radius=ROBOT_RADIUS, object_radius=0.0)
         self._floors = self._build(plan)
-        self._rooms = dict(zip(names, self._floors, strict=False))  # the corridor has no name
+        self._rooms = dict(zip(names, self._floors, strict=False))  # leaves out a corridor, which is nameless
         self._stands = dict(zip(names, plan.stands, strict=False))
         self._tables = {
             name: self._add_table(floor, table)
@@ -61,7 +61,7 @@ class DrivableWorld:
         self.objects = {
             room.name: self._add_objects(room.name, len(room.objects), size) for room in world.rooms
         }
-        """The initial objects of each room, in the order of the world."""
+        """The initial objects in each room, in the order of the world."""
 
         for number, floor in enumerate(self._floors):
             places = [*plan.stands[number].coords, *plan.corners(number)]
@@ -73,32 +73,32 @@ class DrivableWorld:
 
     @property
     def room(self) -> str | None:
-        """The robot's room; None between rooms."""
+        """The room the robot is in, or None if it is between rooms."""
         pose = self.robot.get_pose()
         return next((name for name, floor in self._rooms.items() if floor.is_inside(pose)), None)
 
     @property
     def held(self) -> Object | None:
-        """The object that the robot holds."""
+        """The object that the robot holds, or None."""
         return self.robot.manipulated_object
 
     def objects_in(self, room: str) -> list[Object]:
-        """Return the objects in a room, in the order of their arrival."""
+        """Return the objects in a room, in the order in which they were put there."""
         return list(self._tables[room].children) if room in self._tables else []
 
     def drive(self, room: str, feedback: Feedback) -> None:
-        """Drive to the robot's stop in a room."""
+        """Drive to the robot's stopping position in a room."""
         self._navigate(self._pose(room), feedback, "GoToInvalidLocation", f'drive to "{room}"')
 
     def pick(self, thing: Object, name: str, feedback: Feedback) -> None:
-        """Drive to the table with an object of this room, and pick it up; programs call it `name`."""
+        """Drive to the table with the object and pick it up; `name` is the program's name for the object."""
         action = f'pick up "{name}"'
         self._navigate(thing.parent, feedback, "PickFailed", action)
         self._wait(SKILLS["pick"].seconds)
         _succeed(self.robot.pick_object(thing), "PickFailed", action)
 
     def place(self, room: str, name: str, feedback: Feedback) -> None:
-        """Drive to the table in this room, and put the held object there."""
+        """Drive to the table in a room and put the held object there."""
         action, table = f'place "{name}"', self._tables.get(room)
         if table is None:
             raise RobotError("PlaceFailed", f'the robot cannot {action}: no table fits into "{room}"')
@@ -120,7 +120,7 @@ class DrivableWorld:
         return Pose(self._stands[room].x, self._stands[room].y)
 
     def _build(self, plan: Floorplan) -> list[Room]:
-        """Add the rooms, with passages between them."""
+        """Add all floors and passages to the pyrobosim world; return the floors."""
         floors = []
         for number, floor in enumerate(plan.floors):
             corners = list(floor.exterior.coords)
@@ -140,7 +140,7 @@ class DrivableWorld:
         return floors
 
     def _add_table(self, floor: Room, table: Table) -> ObjectSpawn:
-        """Add a table, and return its top."""
+        """Add a table to a floor, and return the surface that objects are placed on."""
         kind = f"table on {floor.name}"
         self._world.get_location_metadata().data[kind] = {
             "footprint": {"type": "box", "dims": list(table.size)},
@@ -152,7 +152,6 @@ class DrivableWorld:
         return top
 
     def _add_objects(self, room: str, count: int, size: float) -> list[Object]:
-        """Add objects to the table in a room."""
         metadata = self._world.get_object_metadata().data
         metadata["thing"] = {"footprint": {"type": "box", "dims": [size, size]}}
         return [
@@ -164,7 +163,7 @@ class DrivableWorld:
 
 
 class Roadmap(WorldGraphPlanner):
-    """pyrobosim's planner on a graph, but with exact instead of sampled visibility between places."""
+    """A graph planner like pyrobosim's own, except that it tests visibility exactly, not by sampling."""
 
     plugin_name = "codebotler"
 
@@ -177,7 +176,7 @@ class Roadmap(WorldGraphPlanner):
         super().reset()
 
     def connect_neighbors(self, node: Node) -> None:
-        """Connect a place with all visible places."""
+        """Connect a node with all nodes that are visible from it."""
         start = (node.pose.x, node.pose.y)
         for other in self.graph.nodes:
             if other is not node and self._space.covers(LineString([start, (other.pose.x, other.pose.y)])):
@@ -185,9 +184,9 @@ class Roadmap(WorldGraphPlanner):
 
 
 class Motor(PathExecutor):
-    """Drives along a path by a clock, and stops with the clock.
+    """Moves the robot along a path in the time of a clock, until the clock is stopped.
 
-    pyrobosim's own executor notices a cancel only after a delay, and ignores an early one.
+    pyrobosim's own executor reacts to a cancel with a delay, and ignores one that comes too early.
     """
 
     def __init__(self, clock: Clock) -> None:
@@ -196,7 +195,7 @@ class Motor(PathExecutor):
         self.feedback: Feedback = ignore_feedback
 
     def execute(self, path: Path, *_: float, **__: float) -> ExecutionResult:
-        """Drive along a path to its end, or until the clock is stopped."""
+        """Follow a path to its end, or until the clock is stopped."""
         way = get_constant_speed_trajectory(path, METRES_PER_SECOND, RADIANS_PER_SECOND)
         corners = [float(corner) for corner in way.t_pts]
         moment, last, due = -1.0, "", 0.0
@@ -216,7 +215,7 @@ class Motor(PathExecutor):
         return ExecutionResult(ExecutionStatus.SUCCESS if arrived else ExecutionStatus.CANCELED)
 
     def _moments(self, corners: list[float]) -> Iterator[float]:
-        """Yield the seconds since the start of a drive, in real time, until its end or a stop."""
+        """Yield the elapsed seconds of a drive as they pass, until its end or a stop."""
         speed, began, moment = self.clock.speed, self.clock.now, 0.0
         if speed is None:
             for corner in corners:
@@ -231,7 +230,7 @@ class Motor(PathExecutor):
 
 
 def _pose_at(way: Trajectory, moment: float) -> Pose:
-    """Interpolate the pose at a moment of a drive."""
+    """Interpolate the pose at a time, in seconds since the start of a drive."""
     number = min(bisect.bisect_right(way.t_pts, moment), len(way.t_pts) - 1)
     start, end = way.poses[number - 1], way.poses[number]
     begins, ends = way.t_pts[number - 1], way.t_pts[number]
@@ -250,7 +249,7 @@ def _expect_added(part: T | None) -> T:
 
 
 def _succeed(result: ExecutionResult, kind: str, action: str) -> None:
-    """Raise an error if an action failed or was stopped."""
+    """Raise CancelledError if an action was stopped, and RobotError if it failed."""
     if result.status == ExecutionStatus.CANCELED:
         raise CancelledError
     if not result.is_success():

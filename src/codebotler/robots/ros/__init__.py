@@ -1,1 +1,1 @@
-"""Robots on ROS: `robot` has what they share; each kind, and its readiness, has a module of its own."""
+"""Robots on ROS; `robot` contains what all kinds share, and each kind has its own module."""

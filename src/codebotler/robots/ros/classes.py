@@ -1,4 +1,4 @@
-"""Chooses the class of a robot that is reached over ROS."""
+"""Choose the class for a robot on ROS."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from codebotler.robots.ros.robot import RosRobot
 
 
 def class_for(options: Options) -> type[RosRobot]:
-    """The class of a robot that offers an action for each skill, or what the options' connection says."""
+    """Return ConnectedRobot if the options contain a connection; otherwise RosRobot, with default actions."""
     if options.connection is None:
         return RosRobot
-    from codebotler.robots.ros.connected import ConnectedRobot  # noqa: PLC0415 - needs much more
+    from codebotler.robots.ros.connected import ConnectedRobot  # noqa: PLC0415 - imports slowly
 
     return ConnectedRobot

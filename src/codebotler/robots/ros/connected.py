@@ -1,4 +1,4 @@
-"""A robot on ROS with a connection file: its own calls, places, poses and cameras."""
+"""A robot on ROS whose calls, places, poses and cameras are defined by a connection file."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ from codebotler.robots.ros.motion import Pose
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.simulator.house_rule import Rule
 
-POLL_SECONDS = 0.05
-CLOSE_SECONDS = 1.0  # for detectors; a busy one closes later
+POLL_SECONDS = 0.05  # the interval for checking conditions while waiting
+CLOSE_SECONDS = 1.0  # how long to wait for detectors to close; a busy detector closes later
 
 
 class ConnectedRobot(RosRobot):
-    """A robot on ROS with the calls of `options.connection`.
+    """Performs skills with the calls, places and cameras of `options.connection`.
 
-    After a stop, its pose or velocity shows whether it stands still; the answer to a cancel does not.
+    After a stop, the robot's pose or velocity shows whether it really stands still.
     """
 
     def _prepare(self) -> None:
         self.has_pose = self.connection.pose is not None
         self._detectors: dict[str, Detector] = {}
-        self._looking = threading.Lock()  # one detector at a time
+        self._looking = threading.Lock()  # held while a detector runs
 
     def connect(self) -> None:
-        """Open the detectors, and connect; NotReadyError also for poses in another frame than the places."""
+        """Open the detectors and connect; raise NotReadyError if poses are missing or in the wrong frame."""
         self.disconnect()
         for _, model in self.connection.cameras.values():
             if model not in self._detectors:
@@ -67,7 +67,7 @@ class ConnectedRobot(RosRobot):
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Answer from places and pose, look at a picture, or have the robot perform the skill."""
+        """Perform a skill: look at a camera picture, answer from places and pose, or call the robot."""
         connection = self.connection
         if skill in connection.cameras:
             topic, model = connection.cameras[skill]
@@ -83,7 +83,7 @@ class ConnectedRobot(RosRobot):
 
     @property
     def failed_stop(self) -> str:
-        """After a stop: the fault that the robot still moves; empty if it stands still, or if unknown."""
+        """A message if the robot still moves after a stop; empty if it stands still or this is unknown."""
         worker, until = self._worker, time.monotonic() + self._waits.patience * 0.8
         if worker is None or (self.connection.pose is None and self.connection.velocity is None):
             return ""
@@ -93,7 +93,7 @@ class ConnectedRobot(RosRobot):
         return f"it was told to stop but is still moving: {STOP_BY_HAND}" if motion.is_moving else ""
 
     def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
-        """Report poses until the connection ends, None for an unknown one; return whether there are any."""
+        """Report positions (None if unknown) to a callback until disconnected; return False without poses."""
         worker = self._worker
 
         def watch() -> None:
@@ -112,7 +112,7 @@ class ConnectedRobot(RosRobot):
         return self.has_pose
 
     def disconnect(self) -> None:
-        """Have the worker cancel the goal, and end it; close the detectors."""
+        """Have the worker cancel its goal and exit, and close the detectors."""
         was_connected = self._worker is not None
         super().disconnect()
         if was_connected:
@@ -127,7 +127,7 @@ class ConnectedRobot(RosRobot):
                 detector.close()
 
     def keep_out(self, rules: Sequence[Rule]) -> None:
-        """Make the robot's planner avoid forbidden rooms, if its connection has a keepout filter."""
+        """Make the robot's planner avoid the rooms that rules forbid, if there is a keepout filter."""
         places, topics = self.connection.places, self.connection.keepout
         if places is None or topics is None:
             return
@@ -140,7 +140,7 @@ class ConnectedRobot(RosRobot):
         return "" if self.connection.pose is None else self.connection.pose.topic
 
     def _pose(self) -> Pose | None:
-        """Return the last pose; wait for the first one."""
+        """Return the last pose, or wait for the first; return None if no pose arrives in time."""
         worker, until = self._worker, time.monotonic() + self._waits.patience
         while worker is not None and worker.motion.pose is None and time.monotonic() < until:
             if self._stopped:
@@ -149,10 +149,10 @@ class ConnectedRobot(RosRobot):
         return None if worker is None else worker.motion.pose
 
     def _place(self, places: Places, feedback: Feedback) -> NamedPlace:
-        """Return the place around the robot, or else the nearest place, and report that."""
+        """Return the place the robot is in, or else the nearest place, after reporting the distance to it."""
         pose = self._pose()
         if pose is None or (self._worker is not None and self._worker.motion.is_unseen):
-            raise RobotError("UnknownPose", f"no pose arrived on {self._topic} since the robot moved")
+            raise RobotError("UnknownPose", f"no pose has arrived on {self._topic} since the robot moved")
         within = places.room_at(pose.x, pose.y)
         if within is not None:
             return within
@@ -162,7 +162,7 @@ class ConnectedRobot(RosRobot):
         return nearest
 
     def _look(self, topic: str, model: str, label: str, feedback: Feedback) -> bool:
-        """Look for something in a camera's next picture, unless the robot is stopped."""
+        """Return whether a detector finds something in a camera's next picture."""
         call = SkillCall("topic", topic, "", failure="IsInRoomFailed")
         image = self._request(call, {"do": "look", "topic": topic}, ignore_feedback)
         found, detector = Future[tuple[bool, bytes]](), self._detectors[model]
@@ -171,7 +171,7 @@ class ConnectedRobot(RosRobot):
             try:
                 with self._looking:
                     found.set_result(_detect(detector, image, label, topic))
-            except Exception as error:  # noqa: BLE001 - it is raised again below
+            except Exception as error:  # noqa: BLE001 - `result` raises it again below
                 found.set_exception(error)
 
         threading.Thread(target=look, daemon=True).start()
@@ -188,18 +188,18 @@ class ConnectedRobot(RosRobot):
 
 
 def _detect(detector: Detector, message: Mapping[str, Any], label: str, topic: str) -> tuple[bool, bytes]:
-    """Return whether something is in a picture, and the picture with a frame around it."""
+    """Return whether something is in a picture, and the picture with a box around what was found."""
     image = image_from_ros(message, f"the picture on {topic}")
     sighting = detector.look(image, label)
     return sighting.found, jpeg_of(boxed(image, sighting))
 
 
 def _place_values(places: Places, text: str) -> dict[str, Any]:
-    """Return the values of the place variables for a place."""
+    """Return the values of the variables, such as `$place.x`, for a place; RobotError if it is unknown."""
     place = places.named(text)
     if place is None:
         known = ", ".join(one.name for one in places.places)
-        raise RobotError("GoToInvalidLocation", f'there is no place "{text}"; there are: {known}')
+        raise RobotError("GoToInvalidLocation", f'unknown place "{text}"; the known places are: {known}')
     half = place.yaw / 2
     turn = {"x": 0.0, "y": 0.0, "z": math.sin(half), "w": math.cos(half)}
     pose = {"position": {"x": place.x, "y": place.y, "z": 0.0}, "orientation": turn}

@@ -1,4 +1,4 @@
-"""The action, service or topic for each skill, from the skill table or from a file."""
+"""The action, service or topic for each skill, as defined by the skill table or a connection file."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ CallKind: TypeAlias = Literal["action", "service", "topic"]
 CALL_VARIABLE = re.compile(r"\$([a-z_]+(?:\.[a-z]+)?)")
 PLACE_VARIABLES = ("place", "place.pose", "place.x", "place.y", "place.yaw")
 REASON_FIELDS = ("error_msg", "error_string", "message", "status_message", "reason")
-"""The usual fields for the reason of a failure."""
+"""Common names of message fields that give the reason for a failure."""
 PLACE_SKILLS = {"get_all_rooms": False, "get_current_location": True}
-"""Skills that the places answer, and whether they also need the robot's pose."""
+"""Skills that can be answered from a list of places, and whether they also need the robot's pose."""
 
 
 @dataclass(frozen=True)
 class SkillCall:
     """The action, service or topic that performs a skill."""
 
-    kind: CallKind  # action, service or topic
-    name: str  # its name
-    type: str  # the message type, such as `nav2_msgs/action/NavigateToPose`
-    request: Values = field(default_factory=dict)  # fields; `$NAME` is an argument
-    definition: str = ""  # the text of the .action file; empty if the robot's ROS has the type
-    result: str = ""  # the path of the field that the skill returns; empty for no result
-    success: str = ""  # the path of a field that must be true; empty for none
-    reason: str = ""  # the path of the field with the reason of a failure; empty for the usual names
-    failure: str = ""  # the kind of error for failures without a kind
+    kind: CallKind
+    name: str  # the name of the action, service or topic
+    type: str  # the ROS type, such as `nav2_msgs/action/NavigateToPose`
+    request: Values = field(default_factory=dict)  # the fields to send, in which `$NAME` is a variable
+    definition: str = ""  # the text of the .action file; empty if the type must be installed
+    result: str = ""  # the path of the field that the skill returns; empty if it returns nothing
+    success: str = ""  # the path of a field that is false if the skill failed; empty if there is none
+    reason: str = ""  # the path of the field with the reason for a failure; empty to try common names
+    failure: str = ""  # the kind of error for failures that do not specify one
 
     def fields(self, values: Values) -> Any:  # noqa: ANN401 - a message
-        """Fill in the variables of the request."""
+        """Return the request with its variables replaced by values."""
         return _fill(self.request, values)
 
     def answer(self, received: Values) -> Any:  # noqa: ANN401 - a mission checks its type
-        """Return a skill's result from the received message; RobotError if the skill failed."""
+        """Return the skill's result from the received message; raise RobotError if the skill failed."""
         try:
             if self.success and not _get(received, self.success):
                 raise RobotError(self.failure, self.why(received) or f"{self.name} reports a failure")
@@ -53,7 +53,7 @@ class SkillCall:
             raise RobotError(self.failure, str(error.args[0])) from None
 
     def why(self, received: Values) -> str:
-        """Return the reason and the error code in a message, if it has them."""
+        """Return the reason and the error code that a message contains, or an empty string."""
         if self.reason:
             with suppress(LookupError):
                 return str(_get(received, self.reason))
@@ -66,25 +66,25 @@ class SkillCall:
 
 @dataclass(frozen=True)
 class MotionTopic:
-    """A topic with poses or velocities of a robot."""
+    """A topic on which a robot publishes its poses or velocities."""
 
     topic: str
-    frames: tuple[str, str] | None = None  # for poses from tf: the frames of the map and of the robot
+    frames: tuple[str, str] | None = None  # the frames of the map and of the robot, for poses from tf
 
 
 @dataclass(frozen=True)
 class Connection:
-    """The interface of a robot.
+    """A robot's ROS interface.
 
     Args:
-        calls: the call for each skill.
+        calls: the action, service or topic for each skill.
         robot: the kind of robot: ros1, rosbridge or ros2.
-        places: the places that it can drive to, if known.
-        pose: the topic of its poses.
-        velocity: the topic of its velocities.
-        packages: folders of packages with messages that its ROS may lack.
-        cameras: topics and detector models by skill.
-        keepout: the topics of Nav2's keepout mask and of its description.
+        places: the places that the robot can drive to, or None if unknown.
+        pose: the topic with the robot's poses.
+        velocity: the topic with the robot's velocities.
+        packages: folders of message packages to build if they are not installed.
+        cameras: the camera topic and the detector model for each skill that looks at pictures.
+        keepout: the topics of Nav2's keepout mask and its CostmapFilterInfo.
     """
 
     calls: Mapping[str, SkillCall]
@@ -97,7 +97,7 @@ class Connection:
     keepout: tuple[str, str] | None = None
 
     def skills(self, known: SkillTable) -> SkillTable:
-        """Return the known skills that the robot has."""
+        """Return the part of a skill table that this connection supports."""
         has = {*self.calls, *self.cameras}
         if self.places is not None:
             has |= {skill for skill, needs_pose in PLACE_SKILLS.items() if self.pose or not needs_pose}
@@ -105,7 +105,7 @@ class Connection:
 
 
 def default_connection(skills: SkillTable) -> Connection:
-    """Return the connection with the skills' own actions."""
+    """Return the connection that uses the actions from the skills' own declarations."""
     return Connection({row.name: _action_of(row) for row in skills.rows if row.ros is not None})
 
 
@@ -116,15 +116,8 @@ def _action_of(skill: Skill) -> SkillCall:
     request = {name: f"${p.name}" for name, p in zip(names, skill.parameters, strict=True)}
     result = "" if ros.result is None else "result"
     failure = ros.failure or f"{ros.type}Failed"
-    return SkillCall(
-        "action",
-        ros.server,
-        f"{ros.package}/action/{ros.type}",
-        request,
-        ros.definition,
-        result,
-        failure=failure,
-    )
+    type_name = f"{ros.package}/action/{ros.type}"
+    return SkillCall("action", ros.server, type_name, request, ros.definition, result, failure=failure)
 
 
 def _fill(request: Any, values: Values) -> Any:  # noqa: ANN401 - a message
@@ -144,7 +137,7 @@ def _fill(request: Any, values: Values) -> Any:  # noqa: ANN401 - a message
 
 
 def _put(fields: dict[str, Any], path: str, value: Any) -> None:  # noqa: ANN401 - a message
-    """Set the field at a path such as `pose.position.x`."""
+    """Set the field at a path such as `pose.position.x`, creating the fields that contain it."""
     first, _, rest = path.partition(".")
     if rest:
         _put(fields.setdefault(first, {}), rest, value)
@@ -158,10 +151,10 @@ def find_variables(request: Values) -> set[str]:
 
 
 def _get(received: Any, path: str) -> Any:  # noqa: ANN401 - a message
-    """Return the value at a path of fields such as `result.found`, or positions such as `poses.0`."""
+    """Return the value at a path of field names and list indices, such as `poses.0.position`."""
     for step in path.split("."):
         try:
             received = received[int(step) if isinstance(received, list) else step]
         except (LookupError, TypeError, ValueError):
-            raise LookupError(f'the answer of the robot has no field "{path}"') from None
+            raise LookupError(f'the robot\'s answer has no field "{path}"') from None
     return received

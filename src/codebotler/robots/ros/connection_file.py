@@ -1,4 +1,4 @@
-"""Read files of `--connect`: the calls for a robot's skills, and its places."""
+"""Read a connection file (`--connect`), which maps skills to ROS calls and names the robot's places."""
 
 from __future__ import annotations
 
@@ -41,40 +41,40 @@ class _ConnectionPart(BaseModel):
 
 
 class FramesForm(_ConnectionPart):
-    """The frames for a pose from tf."""
+    """The coordinate frames for poses from tf."""
 
     from_: Annotated[str, Field(alias="from")] = "map"
     to: str = "base_link"
 
 
 class PoseForm(_ConnectionPart):
-    """The source of poses."""
+    """The topic or the transforms that give the robot's pose."""
 
     topic: Topic | None = None
     tf: FramesForm | None = None
 
     def motion_topic(self) -> MotionTopic:
-        """Return the topic of the poses."""
+        """Return the topic with the poses, /amcl_pose by default."""
         if self.tf is not None:
             return MotionTopic(self.topic or "/tf", (self.tf.from_, self.tf.to))
         return MotionTopic(self.topic or "/amcl_pose")
 
 
 class VelocityForm(_ConnectionPart):
-    """The source of velocities."""
+    """The topic with the robot's velocities."""
 
     topic: Topic
 
 
 class KeepoutForm(_ConnectionPart):
-    """The topics of Nav2's keepout filter."""
+    """The topics for Nav2's keepout filter."""
 
     mask: Topic
     info: Topic
 
 
 class SkillForm(_ConnectionPart):
-    """The call or the camera for a skill."""
+    """The ROS call for a skill, or the camera and detector."""
 
     action: Topic | None = None
     service: Topic | None = None
@@ -91,7 +91,7 @@ class SkillForm(_ConnectionPart):
 
 
 class ConnectionForm(_ConnectionPart):
-    """The contents of a connection file."""
+    """The structure of a connection file."""
 
     robot: Literal["ros1", "rosbridge", "ros2"] = "ros2"
     places: Any = None
@@ -103,20 +103,20 @@ class ConnectionForm(_ConnectionPart):
 
 
 MESSAGE_KEYS = {"action": "goal", "service": "request", "topic": "message"}
-"""The key of the message to send, for each kind."""
+"""The key in a connection file that contains the fields to send, for each kind of call."""
 TYPE_FOLDERS = {"action": "action", "service": "srv", "topic": "msg"}
-"""The middle part of a type, for each kind."""
+"""The middle part of a full ROS 2 type name, for each kind of call."""
 
 
 def read_connection(path: Path, skills: SkillTable) -> Connection:
-    """Read a connection file for some of these skills; UserError if it is invalid."""
+    """Read a connection file with calls for some of the given skills; raise UserError if it is invalid."""
     file = YamlFile.read(path)
     form = file.validate(ConnectionForm)
     places = None if form.places is None else read_places(form.places, file)
     calls, cameras = {}, {}
     for name, skill in form.skills.items():
         if name not in skills:
-            raise file.wrong(f"there is no skill {name}; declare it in a file for --skills", "skills", name)
+            raise file.wrong(f"unknown skill {name}; declare it in a file for --skills", "skills", name)
         if skill.detector is not None:
             cameras[name] = _camera(file, name, skill, skills[name])
         else:
@@ -126,7 +126,7 @@ def read_connection(path: Path, skills: SkillTable) -> Connection:
         if not Path(folder).is_dir():
             raise file.wrong(f"there is no folder {folder}", "packages", number)
     if form.keepout is not None and (form.robot != "ros2" or places is None):
-        raise file.wrong("keepout needs places and Nav2, so robot: ros2", "keepout")
+        raise file.wrong("keepout needs places and Nav2; add places, and use robot: ros2", "keepout")
     return Connection(
         calls,
         form.robot,
@@ -141,7 +141,7 @@ def read_connection(path: Path, skills: SkillTable) -> Connection:
 
 def _camera(file: YamlFile, name: str, form: SkillForm, skill: Skill) -> tuple[str, str]:
     if form.image is None or form.detector is None:
-        raise file.wrong('a detector needs "image", the topic of a camera', "skills", name)
+        raise file.wrong('a detector also needs "image", a camera topic; add it', "skills", name)
     if skill.returns.annotation != "bool" or len(skill.parameters) != 1:
         raise file.wrong(f"a detector cannot perform {skill.signature}", "skills", name, "detector")
     return form.image, form.detector
@@ -151,13 +151,13 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     at = ("skills", skill.name)
     named = [(kind, name) for kind in MESSAGE_KEYS if (name := getattr(form, kind)) is not None]
     if len(named) != 1 or form.type is None:
-        raise file.wrong('write one of "action", "service" and "topic", and its "type"', *at)
+        raise file.wrong('give one of "action", "service" and "topic", and its "type"', *at)
     kind, name = named[0]
     for other in {*MESSAGE_KEYS.values()} - {MESSAGE_KEYS[kind]}:
         if getattr(form, other):
             raise file.wrong(f'for {kind}s, use "{MESSAGE_KEYS[kind]}" instead', *at, other)
     if skill.returns.annotation != "None" and not form.result:
-        raise file.wrong(f'name in "result" the field that {skill.signature} returns', *at)
+        raise file.wrong(f'add "result", the field of the answer that {skill.signature} returns', *at)
     request = getattr(form, MESSAGE_KEYS[kind])
     known = {parameter.name for parameter in skill.parameters}
     known |= {*PLACE_VARIABLES} if places and skill.is_drive else set()
@@ -167,13 +167,12 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
         if variable not in known:
             lacks = "; name a file under places" if variable in PLACE_VARIABLES and skill.is_drive else ""
             given = ", ".join(f"${one}" for one in sorted(known)) or "none"
-            raise file.wrong(
-                f"${variable} is unknown here{lacks}; known are: {given}", *at, MESSAGE_KEYS[kind]
-            )
+            sentence = f"unknown variable ${variable}{lacks}; the known variables are: {given}"
+            raise file.wrong(sentence, *at, MESSAGE_KEYS[kind])
     try:
         SkillCall("topic", "", "", request).fields(dict.fromkeys(known, ""))
     except (AttributeError, TypeError):
-        raise file.wrong("a field is both a value and the start of a path", *at, MESSAGE_KEYS[kind]) from None
+        raise file.wrong("a path gives both a value and subfields", *at, MESSAGE_KEYS[kind]) from None
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
     whole, ros = _full_type(kind, form.type), skill.ros
     is_ours = ros is not None and whole == f"{ros.package}/action/{ros.type}"
@@ -182,7 +181,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
 
 
 def _full_type(kind: str, text: str) -> str:
-    """Convert a type to the form of ROS 2, such as std_srvs/srv/Trigger."""
+    """Return the full ROS 2 name of a type, such as std_srvs/srv/Trigger for std_srvs/Trigger."""
     package, *middle, name = text.split("/")
     if kind == "action" and middle != ["action"]:
         name = name.removesuffix("Action")

@@ -1,4 +1,4 @@
-"""List the offers of a robot's nodes, and draft a file for `--connect` from them."""
+"""List what a robot's nodes offer, and draft a file for `--connect` from that list."""
 
 from __future__ import annotations
 
@@ -22,11 +22,8 @@ def _own_actions() -> Iterator[tuple[str, str, str, str]]:
 
 ACTION_LINE, SERVICE_LINE = "action: NAME, type: TYPE, goal: ", "service: NAME, type: TYPE, request: "
 SAY_LINE = "topic: NAME, type: TYPE, message: {data: $message}"
-PLACES_FIRST, DETECTOR_FIRST, SKILL_FIRST = (
-    "name places first",
-    "choose a detector first",
-    "declare this skill of yours first",
-)
+PLACES_FIRST, DETECTOR_FIRST = "name places first", "choose a detector first"
+SKILL_FIRST = "declare this skill of yours first"
 CHECK_FRAME = "only if the places are in its frame"
 MAPPINGS = (
     *_own_actions(),
@@ -46,8 +43,8 @@ MAPPINGS = (
     (r"sends \S+ nav_msgs/Odometry", "pose", "topic: NAME", CHECK_FRAME),
     (r"sends \S+ nav_msgs/Odometry", "velocity", "topic: NAME", ""),
 )
-"""Rows of: a regex for offers; the key in the draft, empty to derive it from the offer; its value; and a task
-for the user, which makes the line a comment.
+"""For each regex for offers: the key in the draft (empty to derive it from the offer's name), the value, and
+a task for the user; a line with a task is written as a comment.
 """
 
 INTERNAL_OFFERS = re.compile(
@@ -55,10 +52,10 @@ INTERNAL_OFFERS = re.compile(
     r"|.* (rcl_interfaces|lifecycle_msgs|\w+_interfaces|rosgraph_msgs|actionlib_msgs|bond|dynamic_reconfigure"
     r"|diagnostic_msgs)/\w+|.*Action(Goal|Result|Feedback)"
 )
-"""Offers that are never mapped, such as each node's services for parameters."""
+"""Matches offers that no skill can use, such as the parameter services of every node."""
 
 COMMON_PACKAGES = ("geometry_msgs", "nav_msgs", "robot_actions_pkg", "sensor_msgs", "std_msgs", "std_srvs")
-"""Packages that come with CodeBotler's ROS 2, or that it builds itself."""
+"""Packages that CodeBotler's ROS 2 includes or builds, so that the draft need not list them."""
 
 NOT_SKILLS = ("pose", "velocity")
 EXPECTED_KEYS = {
@@ -69,19 +66,19 @@ EXPECTED_KEYS = {
 
 
 def discover_offers(robot: str, address: str, python: Path) -> list[str]:
-    """List the offers of a robot's nodes, each as kind (action, service, hears or sends), name and type.
+    """List what a robot's nodes offer as strings "KIND NAME TYPE" (KIND: action, service, hears or sends).
 
     Args:
-        robot: ros1 or ros2.
-        address: the URI of the master, or a domain; empty for the default.
-        python: the Python of the robot's ROS installation.
+        robot: the version of ROS, ros1 or ros2.
+        address: the URI of a ROS 1 master or a ROS 2 domain number; empty for the default.
+        python: the Python interpreter of the robot's ROS installation.
 
     Raises:
-        UserError: the kind or the address is invalid.
-        NotReadyError: ROS, the master or all nodes are missing.
+        UserError: the kind of robot or the address is invalid.
+        NotReadyError: ROS is not installed, or no master or no node was found.
     """
     if robot not in {"ros1", "ros2"}:
-        raise UserError(f'"{robot}" cannot be explored; use ros1 or ros2, on a machine with its ROS')
+        raise UserError(f'"{robot}" cannot be explored; use ros1 or ros2, on a machine with that ROS')
     if robot == "ros1":
         environment = {"ROS_MASTER_URI": ros1.master_uri(address)}
     else:
@@ -95,7 +92,7 @@ def discover_offers(robot: str, address: str, python: Path) -> list[str]:
 
 
 def draft_connection(robot: str, offers: Iterable[str]) -> str:
-    """Return a draft for `--connect`, from `discover_offers`; incomplete and unmapped offers are comments."""
+    """Draft a file for `--connect`; lines that need completion and unused offers become comments."""
     by_form = {re.sub("/(action|srv|msg)/", "/", offer): offer for offer in sorted(offers)}
     forms = [
         form
@@ -105,14 +102,14 @@ def draft_connection(robot: str, offers: Iterable[str]) -> str:
     rest = {by_form[form].partition(" ")[2] for form in forms}
     ready: set[str] = set()
     packages: set[str] = set()
-    lines: list[tuple[bool, str]] = []  # each with whether it is about a skill
+    lines: list[tuple[bool, str]] = []  # the lines of the draft, each with whether it defines a skill
     for pattern, use, text, first in MAPPINGS:
         for form in (form for form in forms if re.fullmatch(pattern, form)):
             _, name, kind = by_form[form].split()
             key = use or "_".join(reversed(name.strip("/").lower().split("/")))
             packages.add(kind.partition("/")[0])
             line = f"{key}: {{{text.replace('TYPE', kind).replace('NAME', name)}}}"
-            why = first or "another one" * (key in ready)
+            why = first or "already defined above" * (key in ready)
             ready |= set() if why else {key}
             lines.append((key not in NOT_SKILLS, f"# {line}  # {why}" if why else line))
             rest.discard(f"{name} {kind}")

@@ -1,4 +1,4 @@
-"""Convert forbidden rooms of house rules to messages for the keepout filter of Nav2."""
+"""Convert the rooms that house rules forbid to messages for Nav2's keepout filter."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from codebotler.core.world import Room, crossings
 from codebotler.rtl import And, EventPattern, Exists, Formula, Not
 from codebotler.simulator.house_rule import Rule
 
-MASK_RESOLUTION = 0.05  # metres
-EMPTY_MASK = ((0.0, 0.0), (MASK_RESOLUTION, MASK_RESOLUTION))  # an empty mask replaces an earlier mask
+MASK_RESOLUTION = 0.05  # the side of a mask cell in metres
+EMPTY_MASK = ((0.0, 0.0), (MASK_RESOLUTION, MASK_RESOLUTION))  # one free cell, to replace an earlier mask
 
 
 def keepout_messages(
     rules: Sequence[Rule], rooms: Sequence[Room], frame: str = "map", topic: str = "/keepout_filter_mask"
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Build a nav_msgs/OccupancyGrid for a latched topic, and its nav2_msgs/CostmapFilterInfo.
+    """Build the keepout mask (a nav_msgs/OccupancyGrid) and its nav2_msgs/CostmapFilterInfo.
 
-    Only rules of the form `always: not tr.Exists(inside(...))` have an effect; `frame` is that of footprints.
+    Only rules of the form `always: not tr.Exists(inside(...))` have an effect; `frame` is that of the rooms.
     """
     patterns = [element for rule in rules if rule.when == "always" for element in _forbidden(rule.formula)]
     zones = [r.footprint for r in rooms if r.footprint and any(e.text.matches(r.name) for e in patterns)]
@@ -44,7 +44,7 @@ def keepout_messages(
 
 
 def _forbidden(formula: Formula) -> Iterator[EventPattern]:
-    """Yield the `inside` patterns that a formula forbids at all times, whatever the robot holds."""
+    """Yield the `inside` patterns that a formula forbids at all times and regardless of the held object."""
     match formula:
         case And(parts):
             for part in parts:

@@ -1,4 +1,4 @@
-"""Track a robot's pose, and whether it stands still, from its poses and velocities."""
+"""Track a robot's pose and whether the robot stands still, from reported poses and velocities."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-STILL_SECONDS = 0.5  # without movement
-MIN_METRES, MIN_RADIANS = 0.02, 0.05  # smaller changes are no movement
-MAX_UNSEEN = 1.0  # metres or radians without a pose, after which the pose is unknown
-MAX_INTERVAL = 0.5  # seconds between two velocities of one motion
-MIN_SPEED_MOVING = 0.02  # metres or radians per second
+STILL_SECONDS = 0.5  # how long a robot must not move to count as standing still
+MIN_METRES, MIN_RADIANS = 0.02, 0.05  # smaller changes of the pose count as noise
+MAX_UNSEEN = 1.0  # the metres or radians a robot may move without a pose before its pose is unknown
+MAX_INTERVAL = 0.5  # the longest time in seconds for which a reported velocity is assumed to last
+MIN_SPEED_MOVING = 0.02  # the speed, in metres or radians per second, above which a robot moves
 
 
 @dataclass(frozen=True)
 class Pose:
-    """A robot's pose, in metres and radians, in a frame."""
+    """A robot's position in metres and yaw in radians, relative to a coordinate frame."""
 
     x: float
     y: float
@@ -26,16 +26,16 @@ class Pose:
 
 
 class Motion:
-    """Collects a robot's poses and velocities; thread-safe."""
+    """Tracks a robot's motion from reported poses and velocities; thread-safe."""
 
     def __init__(self) -> None:
         self.pose: Pose | None = None
         self._rest: Pose | None = None  # the pose after the last movement
         self._last_report = self._last_move = self._last_velocity = -math.inf
-        self._unseen = 0.0  # metres or radians since the last pose
+        self._unseen = 0.0  # the metres or radians moved since the last pose
 
     def record(self, message: Mapping[str, Any]) -> None:
-        """Record a pose or a velocity."""
+        """Record a pose or velocity message from a worker."""
         self._last_report = now = time.monotonic()
         if message["is"] == "velocity":
             self._last_move = now if message["speed"] > MIN_SPEED_MOVING else self._last_move
@@ -49,23 +49,23 @@ class Motion:
 
     @property
     def is_still(self) -> bool:
-        """Whether the reports show that the robot stands still."""
+        """Whether recent reports show that the robot stands still."""
         now = time.monotonic()
         return self._last_report > now - STILL_SECONDS > self._last_move
 
     @property
     def is_unseen(self) -> bool:
-        """Whether the robot has moved without reporting poses, according to its velocity."""
+        """Whether the robot's pose is outdated, because its velocities show that it has moved since."""
         return self._unseen > MAX_UNSEEN
 
     @property
     def is_silent(self) -> bool:
-        """Whether there was no report for a while; AMCL is silent while a robot stands still."""
+        """Whether there were no recent reports; AMCL, for example, is silent while a robot stands still."""
         return self._last_report < time.monotonic() - 2 * STILL_SECONDS
 
     @property
     def is_moving(self) -> bool:
-        """Whether the reports show that the robot moves."""
+        """Whether recent reports show that the robot moves."""
         return self._last_move > time.monotonic() - STILL_SECONDS
 
 

@@ -1,4 +1,4 @@
-"""Robots on ROS: a worker sends goals to one action server per skill."""
+"""Robots on ROS, which perform skills through a worker process that talks to ROS."""
 
 from __future__ import annotations
 
@@ -31,30 +31,30 @@ from codebotler.robots.ros.worker import RosWorker, WorkerMessage, find_missing
 
 USE_OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
 NOT_CANCELLED = f"its goals could not be cancelled: {STOP_BY_HAND}"
-CANCEL_SECONDS = 1.0  # for the worker to send a cancel
+CANCEL_SECONDS = 1.0  # the time limit for the worker to send a cancel
 NAMED_ERROR = re.compile(r"([A-Z][A-Za-z]+): (.+)", re.DOTALL)
 
 
 @dataclass(frozen=True)
 class Timeouts:
-    """Time limits, in seconds above 0."""
+    """Time limits in seconds, above 0."""
 
-    patience: float = 5.0  # for a server to appear, accept a goal, confirm a stop, or send a result
-    silence: float = 3.0  # between two statuses of a server; after that it counts as dead
-    longest: float = 600.0  # for a skill
+    patience: float = 5.0  # the limit for a server to appear, accept a goal, confirm a stop, or send a result
+    silence: float = 3.0  # the time without a status message after which a server counts as dead
+    longest: float = 600.0  # the limit for a whole skill
 
 
 class RosRobot:
-    """A robot that offers an action server for each skill.
+    """Performs skills on ROS, by default with one action server per skill.
 
     Args:
-        name: the kind of robot.
-        address: the robot's address.
-        script: the worker's script, a file of `workers/` or a path.
-        options: the user's options; a speed other than 1 is for a virtual robot with that speed.
-        environment: variables for the worker.
-        waits: time limits.
-        node: the worker's unique name on the graph.
+        name: the kind of robot, such as ros2.
+        address: the robot's address, such as the URI of a ROS master.
+        script: the worker's script: the name of a file in `workers/`, or a path.
+        options: the options for opening the robot; a speed other than 1 must match that of a virtual robot.
+        environment: additional environment variables for the worker.
+        waits: the time limits.
+        node: the name of the worker's node, which must be unique on the ROS graph.
     """
 
     if_tool_dies = "the worker then cancels the robot's goal, unless it was killed as well"
@@ -80,20 +80,20 @@ class RosRobot:
         self._node = node
         self._waits = waits or Timeouts()
         self._worker: RosWorker | None = None
-        self._in_doubt = False  # whether a goal may run unobserved
+        self._in_doubt = False  # whether a goal may still be running without a worker that watches it
         self._stopped, self._number = True, 0
-        self._send_lock = threading.Lock()  # requests before a stop are sent before it
+        self._send_lock = threading.Lock()  # ensures that no request is sent after a stop
         self._rescue_lock = threading.RLock()
         self._prepare()
 
     def _prepare(self) -> None:
-        """Set further attributes of a subclass."""
+        """Set additional attributes in a subclass."""
 
     def connect(self) -> None:
         """Start a worker, wait for the action servers, and set the clock to 0.
 
         Raises:
-            NotReadyError: ROS, the master or all servers are missing, or another tool uses the robot.
+            NotReadyError: ROS, the master or all servers are missing, or another process uses the robot.
         """
         self.disconnect()
         worker = self._start(cancel_all=self._in_doubt)
@@ -107,18 +107,18 @@ class RosRobot:
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Send a goal and wait for its end.
+        """Perform a skill on the robot and wait until it ends.
 
         Raises:
             RobotError: the server rejected or aborted the goal.
             CancelledError: this or another client cancelled the goal.
-            RobotLostError: the server or the worker died, or does not answer.
+            RobotLostError: the server or the worker died, or does not respond.
         """
         names = (parameter.name for parameter in self.skills[skill].parameters)
         return self._call(skill, dict(zip(names, arguments, strict=True)), feedback)
 
     def _call(self, skill: str, values: Values, feedback: Feedback) -> RobotResult:
-        """Perform a skill by its call, with values for the call's variables."""
+        """Perform a skill through its ROS call, with values for the variables in the call."""
         call = self.connection.calls.get(skill)
         if call is None:
             raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
@@ -127,7 +127,7 @@ class RosRobot:
         return result
 
     def _request(self, call: SkillCall, request: WorkerMessage, feedback: Feedback) -> Values:
-        """Send a request to the worker, and return the robot's answer."""
+        """Send a request to the worker and return the robot's answer, or raise an error if it failed."""
         message = self._await_end(request, feedback)
         match message:
             case {"is": "result", "values": dict(values)}:
@@ -140,7 +140,7 @@ class RosRobot:
         raise RobotLostError(message["text"])
 
     def _await_end(self, request: WorkerMessage, feedback: Feedback) -> WorkerMessage:
-        """Send a request, and return the worker's last message about it."""
+        """Send a request, pass on feedback, and return the worker's final message for the request."""
         worker, number = self._send(request)
         at = ""
         while True:
@@ -167,7 +167,7 @@ class RosRobot:
                     return message
 
     def _send(self, request: WorkerMessage) -> tuple[RosWorker, int]:
-        """Send a request unless the robot was stopped; return the worker and the request's number."""
+        """Send a request; return the worker and the request's number; raise CancelledError after a stop."""
         with self._send_lock:
             if self._stopped:
                 raise CancelledError
@@ -177,8 +177,8 @@ class RosRobot:
             return self._worker, self._number
 
     def cancel(self) -> None:
-        """Have the worker cancel the goal; if it hangs, have a new worker cancel all goals."""
-        has_lock = self._send_lock.acquire(timeout=CANCEL_SECONDS)  # a worker that hangs can block a sender
+        """Have the worker cancel the goal; if the worker hangs, start a new one that cancels all goals."""
+        has_lock = self._send_lock.acquire(timeout=CANCEL_SECONDS)  # a hanging worker can block its owner
         try:
             self._stopped = True
             worker = self._worker
@@ -191,7 +191,7 @@ class RosRobot:
         self._rescue(worker)
 
     def disconnect(self) -> None:
-        """Have the worker cancel the goal, and end the worker."""
+        """Have the worker cancel its goal and exit."""
         with self._send_lock:
             self._stopped = True
             worker, self._worker = self._worker, None
@@ -215,7 +215,7 @@ class RosRobot:
         return RosWorker(self._python, self._script, start, self._environment)
 
     def _rescue(self, worker: RosWorker) -> str:
-        """Replace a lost worker by one that cancels all goals; return the outcome as a clause."""
+        """Replace a lost worker with one that cancels all goals; return a clause that says if this worked."""
         with self._rescue_lock:
             if self._worker is not worker:
                 return NOT_CANCELLED if self._in_doubt else "all goals were cancelled"
@@ -235,7 +235,7 @@ class RosRobot:
 def ros_readiness(
     name: str, python: Path, needs: Sequence[str], mend: Callable[[Sequence[str]], str], note: str
 ) -> Readiness:
-    """Return whether an interpreter has the modules of a worker; `mend` finds the command to install them."""
+    """Check whether an interpreter has the modules a worker needs; `mend` gets those it lacks."""
     missing = find_missing(python, needs)
     if missing is None:
         return Readiness(
@@ -248,7 +248,7 @@ def ros_readiness(
 
 
 def calls_data(connection: Connection) -> WorkerMessage:
-    """Return a connection's calls as data for a worker, by skill."""
+    """Return the calls of a connection by skill, as plain data for a worker."""
     return {
         skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
         for skill, call in connection.calls.items()
@@ -256,9 +256,9 @@ def calls_data(connection: Connection) -> WorkerMessage:
 
 
 def to_robot_error(call: SkillCall, text: str, state: str) -> RobotError:
-    """Convert a failed goal (`state` is rejected or aborted) to an error with the server's message.
+    """Return the exception for a rejected or aborted goal (see `state`), with the server's message.
 
-    The message may begin with the kind of error, such as `PickInvalidObject: there is no mug`.
+    The message may start with a kind of error, as in `PickInvalidObject: there is no mug`.
     """
     named = NAMED_ERROR.fullmatch(text)
     if named is not None:

@@ -1,4 +1,4 @@
-"""A robot on ROS 1; its worker uses actionlib in the robot's Python."""
+"""A robot on ROS 1; its worker runs actionlib under the robot's Python."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ INSTALL_ROS1 = (
 
 
 def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
-    """Open a robot on ROS 1; its address is the URI of a master, by default that of ROS_MASTER_URI."""
+    """Create a robot on ROS 1; its address is the URI of a master, by default ROS_MASTER_URI."""
     uri = master_uri(options.address)
     return class_for(options)("ros1", uri, "ros1_worker.py", options, {"ROS_MASTER_URI": uri}, waits=waits)
 
 
 def master_uri(address: str = "") -> str:
-    """Return the given URI of a master, that of ROS_MASTER_URI, or the default; UserError if invalid."""
+    """Return the given master URI, ROS_MASTER_URI, or the default; raise UserError if it is invalid."""
     uri = address or os.environ.get("ROS_MASTER_URI") or MASTER_URI
     try:
         parts = urlsplit(uri)
         is_valid = parts.scheme == "http" and bool(parts.hostname) and bool(parts.port)
-    except ValueError:  # an invalid port
+    except ValueError:  # for an invalid port
         is_valid = False
     if not is_valid:
         raise UserError(f'"{uri}" is not the URI of a ROS master; write one such as {MASTER_URI}')
@@ -39,7 +39,7 @@ def master_uri(address: str = "") -> str:
 
 
 def readiness(python: Path = ROS_PYTHON) -> Readiness:
-    """Return whether the interpreter has rospy and the other modules of ROS 1."""
+    """Check whether the interpreter has rospy and the other modules that the worker needs."""
     mend = INSTALL_ROS1 if python == ROS_PYTHON else USE_OTHER_PYTHON
     note = f"with {python}; needs a master, see ROS_MASTER_URI"
     return ros_readiness("ros1", python, ROS1_MODULES, lambda _: mend, note)

@@ -1,4 +1,4 @@
-"""A robot on ROS 2; its worker uses rclpy in the robot's Python, or in ours."""
+"""A robot on ROS 2; its worker runs rclpy under the system's Python or under CodeBotler's own."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ INSTALL_ROS2 = "pip install 'codebotler[ros2]'"
 
 
 def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
-    """Open a robot on ROS 2; its address is a domain, by default that of ROS_DOMAIN_ID, or 0."""
+    """Create a robot on ROS 2; its address is a domain number, by default ROS_DOMAIN_ID or else 0."""
     domain = domain_of(options.address)
     options = replace(options, ros_python=choose_python(options.ros_python))
     variables = {"ROS_DOMAIN_ID": domain}
@@ -28,7 +28,7 @@ def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
 
 
 def domain_of(address: str = "") -> str:
-    """Return the given domain, that of ROS_DOMAIN_ID, or 0; UserError if it is no number."""
+    """Return the given domain, or else ROS_DOMAIN_ID, or else 0; raise UserError if it is not a number."""
     domain = address or os.environ.get("ROS_DOMAIN_ID") or "0"
     if not domain.isdecimal():
         raise UserError(f'"{domain}" is not a ROS_DOMAIN_ID; write a number such as 0')
@@ -36,19 +36,19 @@ def domain_of(address: str = "") -> str:
 
 
 def choose_python(named: Path = ROS_PYTHON) -> Path:
-    """Choose the given interpreter; by default the system's if ROS 2 is sourced there, or else ours."""
+    """Return the interpreter the user named, the system's if it has ROS 2, or else CodeBotler's own."""
     if named != ROS_PYTHON or find_spec("rclpy") is None:
         return named
     return named if find_missing(named, ROS2_MODULES) == [] else Path(sys.executable)
 
 
 def readiness(python: Path = ROS_PYTHON) -> Readiness:
-    """Return whether the interpreter has rclpy; missing actions are built later."""
+    """Check whether the interpreter has rclpy; missing message types are built later."""
     python = choose_python(python)
     return ros_readiness("ros2", python, ROS2_MODULES, find_fix, f"with {python}; see ROS_DOMAIN_ID")
 
 
 def find_fix(_missing: Sequence[str], installed: Path = Path("/opt/ros")) -> str:
-    """Return the command that provides the missing modules of ROS 2."""
+    """Return the command that makes ROS 2 available: sourcing an installed ROS 2, or else installing it."""
     setups = sorted(path for path in installed.glob("*/setup.bash") if (path.parent / "share/rclpy").is_dir())
     return f"source {setups[-1]}" if setups else INSTALL_ROS2

@@ -1,4 +1,4 @@
-"""The virtual robot: a simulated robot that offers its skills on a real ROS graph."""
+"""The virtual robot, a simulated robot that offers its skills on a real ROS graph."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ from codebotler.robots.simulated import Simulated
 
 VIRTUAL_NODE = "virtual_robot"
 LOOPBACK_HOSTS = ("localhost", "127.0.0.1")
-LISTEN_SECONDS = 3600.0  # per wait for a message
+LISTEN_SECONDS = 3600.0  # the time limit of a single wait for a message
 
 
 class VirtualRobot:
-    """Executes goals one after the other.
+    """Offers skills as ROS actions and performs their goals in the simulator, one after the other.
 
-    On ROS 1, it starts a master for this machine if none answers. On ROS 2, only this machine can reach it,
+    On ROS 1, it starts a master on this machine if none answers. On ROS 2, only this machine can reach it,
     unless ROS_AUTOMATIC_DISCOVERY_RANGE is set.
 
     Args:
-        world: its world.
-        speed: seconds of its clock per real second; None if nothing takes real time.
-        ros: 1 or 2.
-        port: the port of the ROS 1 master; None for that of ROS_MASTER_URI.
-        python: an interpreter with rclpy, or with rospy, and rosmaster if a master must be started.
-        show: called with a line for each goal and for its end.
-        skills: the skills that it offers.
+        world: the world that the robot works in.
+        speed: the robot's clock seconds per real second; None to wait for nothing.
+        ros: the version of ROS, 1 or 2.
+        port: the port of the ROS 1 master; None for the port in ROS_MASTER_URI.
+        python: a Python interpreter with rclpy, or with rospy (and rosmaster to start a master).
+        show: a callback that receives a line of text when a goal starts and when it ends.
+        skills: the skills to offer.
 
     Raises:
         UserError: the speed is out of range, or ROS_MASTER_URI or ROS_DOMAIN_ID is invalid.
@@ -73,7 +73,7 @@ class VirtualRobot:
         self._ended = threading.Event()
 
     def start(self) -> bool:
-        """Offer the skills; return whether this has started a master; NotReadyError if there can be none."""
+        """Offer the skills; return whether a master was started; raise NotReadyError if ROS is missing."""
         worker = self._worker = self._ros1_servers() if self._ros == 1 else self._ros2_servers()
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)
@@ -83,13 +83,13 @@ class VirtualRobot:
         return bool(worker.about["has_master"])
 
     def wait(self) -> None:
-        """Serve until the worker dies; then raise RobotLostError."""
+        """Serve goals until the worker dies, then raise RobotLostError."""
         self._ended.wait()
         assert self._worker is not None, "the caller has started it"
         raise RobotLostError(f"the worker of the virtual robot has died ({self._worker.describe_end()})")
 
     def stop(self) -> None:
-        """End the current skill, and leave the graph."""
+        """Stop the current skill and leave the ROS graph."""
         self._body.cancel()
         if self._worker is not None:
             self._worker.leave()

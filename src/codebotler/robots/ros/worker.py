@@ -1,4 +1,4 @@
-"""Control a worker process that runs under the robot's Python; both exchange lines of JSON."""
+"""Start and control a worker process under the robot's Python, exchanging lines of JSON with it."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ from codebotler.robots.ros.motion import Motion
 
 WorkerMessage: TypeAlias = dict[str, Any]
 
-WHEELS_MARK = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"  # ROS from wheels sets it when it restarts Python
+WHEELS_MARK = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"  # a variable that ROS from wheels sets when it restarts Python
 WORKERS_FOLDER = Path(__file__).with_name("workers")
-READY_SECONDS = 30.0
-BUILD_SECONDS = 600.0  # to become ready, while it reports progress
-EXIT_SECONDS = 4.0  # to exit by itself
-HEARTBEAT_SECONDS = 0.1  # the worker stops the robot without them
+READY_SECONDS = 30.0  # the time limit for a worker to become ready
+BUILD_SECONDS = 600.0  # the time limit after a progress report, such as about building messages
+EXIT_SECONDS = 4.0  # the time limit for a worker to exit by itself before it is killed
+HEARTBEAT_SECONDS = 0.1  # the heartbeat interval; without heartbeats, the worker stops the robot
 MOTION_MESSAGES = ("pose", "velocity")
-ERROR_LINES = 5  # of error output, kept for messages
+ERROR_LINES = 5  # the number of lines of error output to keep for error messages
 
 
 class RosWorker:
-    """A process that runs a script of `workers/`; its last message is `{"is": "ended"}`.
+    """A process that runs a script of `workers/`; `{"is": "ended"}` is always the last message received.
 
-    It runs in its own session, so that Ctrl-C does not reach it before the robot has stopped. It cancels the
-    goal when this process sends no heartbeat, since a suspended process reacts to neither Ctrl-C nor a stop.
+    It runs in its own session so that Ctrl-C does not end it before it has stopped the robot. If heartbeats
+    from this process stop, the worker cancels the goal, since a suspended process cannot react to Ctrl-C.
 
     Args:
-        python: the interpreter.
-        script: a file of `workers/`, or a path.
+        python: the Python interpreter that runs the script.
+        script: the name of a file in `workers/`, or a path.
         start: the first message to the worker.
-        environment: variables in addition to those of this process.
+        environment: additional environment variables.
 
     Raises:
         NotReadyError: the worker does not start, or reports that it cannot work.
@@ -83,20 +83,20 @@ class RosWorker:
         self.about = self._wait_until_ready(python)
 
     def send(self, message: WorkerMessage) -> None:
-        """Send a message; a dead process shows in the next `receive`."""
+        """Send a message; if the worker has died, a later `receive` says so."""
         with self._writing, suppress(OSError, ValueError):
             self._stdin.write(json.dumps(message) + "\n")
             self._stdin.flush()
 
     def receive(self, seconds: float) -> WorkerMessage | None:
-        """Return the next message; None if none comes within `seconds`."""
+        """Return the next message, or None if no message arrives within the given seconds."""
         try:
             return self._messages.get(timeout=seconds)
         except queue.Empty:
             return None
 
     def cancel(self, seconds: float) -> bool:
-        """Have the worker cancel the goal; return whether it sent the cancel within `seconds`."""
+        """Have the worker cancel the goal; return whether it did so within the given seconds."""
         self._cancel_sent.clear()
         self.send({"do": "cancel"})
         return self._cancel_sent.wait(seconds)
@@ -115,7 +115,7 @@ class RosWorker:
         return self._process.returncode == 0
 
     def kill(self) -> None:
-        """Kill the worker and all its children."""
+        """Kill the worker and all its child processes."""
         self._leaves.set()
         if self._process.poll() is None:
             os.killpg(self._process.pid, signal.SIGKILL)
@@ -123,7 +123,7 @@ class RosWorker:
         self._close()
 
     def describe_end(self) -> str:
-        """Return the exit status or signal, and the last line of output."""
+        """Return the exit status or signal of the worker, and the last line of its error output."""
         self._process.wait(EXIT_SECONDS)
         status = self._process.returncode
         how = f"signal {-status}" if status < 0 else f"status {status}"
@@ -159,16 +159,15 @@ class RosWorker:
                 continue
             if message["is"] in MOTION_MESSAGES:
                 self.motion.record(message)
-            if (
-                message["is"] not in {"alive", *MOTION_MESSAGES} or self._messages.empty()
-            ):  # do not pile up signs of life
+            is_repeated = message["is"] in {"alive", *MOTION_MESSAGES}  # one of these in the queue is enough
+            if not is_repeated or self._messages.empty():
                 self._messages.put(message)
         self._messages.put({"is": "ended"})
 
     def _send_heartbeats(self) -> None:
         while not self._leaves.wait(HEARTBEAT_SECONDS):
-            with suppress(OSError, ValueError):  # writing to a worker that hangs would block this thread
-                if select.select([], [self._stdin], [], 0)[1]:
+            with suppress(OSError, ValueError):
+                if select.select([], [self._stdin], [], 0)[1]:  # otherwise, a hanging worker would block us
                     self.send({"do": "alive"})
 
     def _keep_errors(self) -> None:
@@ -178,17 +177,17 @@ class RosWorker:
         for thread in self._threads:
             thread.join(EXIT_SECONDS)
         for pipe in (self._stdin, self._stdout, self._stderr):
-            with suppress(OSError):  # flushing may fail
+            with suppress(OSError):  # closing flushes the pipe, which can fail
                 pipe.close()
 
 
 def executable(python: Path) -> str:
-    """Return an interpreter as a command; look for a bare name in this folder first, then in PATH."""
+    """Return the command for an interpreter; a bare name is sought in the current folder, then in PATH."""
     return str(python.absolute() if python.exists() else python)
 
 
 def outer_environment() -> dict[str, str]:
-    """Return the environment without the variables that ROS from wheels sets for this interpreter alone."""
+    """Return the environment without the changes that ROS from wheels makes for this interpreter."""
     environment = dict(os.environ)
     if environment.pop(WHEELS_MARK, None) is not None:
         folders = environment.get("LD_LIBRARY_PATH", "").split(os.pathsep)
@@ -198,7 +197,7 @@ def outer_environment() -> dict[str, str]:
 
 
 def find_missing(python: Path, modules: Sequence[str]) -> list[str] | None:
-    """Return the modules that an interpreter lacks, without importing any; None if it does not run."""
+    """Return the modules that an interpreter lacks, or None if it cannot run; nothing is imported."""
     code = "import sys, importlib.util as u; print(*(m for m in sys.argv[1:] if u.find_spec(m) is None))"
     try:
         done = subprocess.run(  # noqa: S603 - the interpreter that the user names

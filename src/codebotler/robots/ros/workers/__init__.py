@@ -1,4 +1,4 @@
-"""Scripts for the robot's own Python, which must not import codebotler.
+"""Scripts that run under the robot's own Python (3.8 or later), and must therefore not import codebotler.
 
-All of them run on Python 3.8, except those for a rosbridge.
+Only the scripts for rosbridge always run under CodeBotler's Python.
 """

@@ -1,4 +1,4 @@
-"""Exchange lines of JSON with CodeBotler, and run a worker's main loop."""
+"""Exchange lines of JSON with CodeBotler, and run the main loop of a worker."""
 
 from __future__ import annotations
 
@@ -15,37 +15,37 @@ from contextlib import suppress
 from typing import IO, Any, Dict
 
 Fields = Dict[str, Any]
-WRITE_SECONDS = 1.0  # for the last lines
+WRITE_SECONDS = 1.0  # the time limit for writing the last lines
 
 
 class SetupError(Exception):
-    """The robot cannot be used; the text says why, and how to fix it."""
+    """Raised when the robot cannot be used; the text says why and how to fix it."""
 
 
 class Channel:
-    """Lines of JSON on standard input and output; other output of rospy goes to standard error."""
+    """Exchanges lines of JSON on standard input and output; all other output goes to standard error."""
 
     def __init__(self) -> None:
         self._out = os.fdopen(os.dup(1), "w", encoding="utf-8")
         os.dup2(2, 1)
         self._in: IO[str] = os.fdopen(os.dup(0), "r", encoding="utf-8")
-        # Write in a thread, since a suspended tool does not read, and stopping the robot must not wait.
+        # Write in a thread, because a suspended CodeBotler does not read, and a stop must not block.
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._writer = threading.Thread(target=self._write, daemon=True)
         self._writer.start()
-        self.last_sign = float("inf")  # the time of the last input; infinite while the worker handles it
+        self.last_sign = float("inf")  # when the last line arrived; infinite while the worker handles it
 
     def send(self, kind: str, **more: Any) -> None:
-        """Queue a message; a dead tool shows at the end of the input."""
+        """Queue a message to CodeBotler; if CodeBotler has died, `lines` ends."""
         self._lines.put(json.dumps({"is": kind, **more}, default=str) + "\n")
 
     def finish(self) -> None:
-        """Wait briefly until all lines are written."""
+        """Wait, for a short time only, until all queued lines are written."""
         self._lines.put(None)
         self._writer.join(WRITE_SECONDS)
 
     def lines(self) -> Iterator[Fields]:
-        """Yield incoming messages except signs of life, until the tool closes its end or dies."""
+        """Yield incoming messages, except heartbeats, until CodeBotler closes its end or dies."""
         for line in iter(self._in.readline, ""):
             message = json.loads(line)
             if message.get("do") != "alive":
@@ -61,7 +61,7 @@ class Channel:
 
 
 def serve(make_worker: Callable[[Channel, Fields], Any]) -> None:
-    """Make a worker from the first line, and let it obey the others; stop the robot in any case."""
+    """Create a worker from the first message, pass it all others, and stop the robot in the end."""
     channel = Channel()
     worker, status = None, 1
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
@@ -82,11 +82,11 @@ def serve(make_worker: Callable[[Channel, Fields], Any]) -> None:
         for line in lines:
             worker.obey(line)
         status = 0
-    except Exception:  # noqa: BLE001 - after any error, the robot must stop
+    except Exception:  # noqa: BLE001 - the robot must stop after any error
         traceback.print_exc()
     finally:
         if worker is not None:
             worker.leave()
         channel.finish()
         sys.stderr.flush()
-        os._exit(status)  # rospy's threads would keep the process alive
+        os._exit(status)  # a normal exit would wait for rospy's threads

@@ -1,4 +1,4 @@
-"""List the offers of a robot's nodes, in a Python that has rclpy or rospy."""
+"""List what a robot's nodes offer; run by a Python that has rclpy or rospy."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from typing import Any, Iterator, Tuple
 
 from channel import Channel, Fields, SetupError, serve
 
-QUIET_SECONDS = 2.0  # without new offers, until discovery ends
+QUIET_SECONDS = 2.0  # discovery ends after this many seconds without new offers
 MAX_DISCOVERY_SECONDS = 10.0
-Offer = Tuple[str, str, str]  # the kind (action, service, sends or hears), a name and a type
+Offer = Tuple[str, str, str]  # the kind (action, service, sends or hears), the name and the type
 
 
 class DiscoveryWorker:
-    """Sends all offers in its first message; the first line has the `robot`, ros1 or ros2."""
+    """Sends all offers in its first message; the message it receives says whether `robot` is ros1 or ros2."""
 
     def __init__(self, channel: Channel, start: Fields) -> None:
         offers = set(offers_on_ros1()) if start["robot"] == "ros1" else offers_on_ros2()
         channel.send("ready", offers=sorted(offers))
 
     def leave(self) -> None:
-        """Do nothing, since nodes end with the process."""
+        """Do nothing, because the node ends with the process."""
 
 
 def offers_on_ros2() -> set[Offer]:
-    """Discover offers until no new ones appear."""
+    """Collect the offers of all nodes until no new offers appear."""
     import rclpy
 
     rclpy.init(args=None)
@@ -52,17 +52,17 @@ def _offers_of_others(node: Any) -> Iterator[Offer]:
     }
     for other in node.get_node_names_and_namespaces():
         for kind, ask in questions.items() if other[0] != node.get_name() else ():
-            with suppress(Exception):  # rclpy has several errors for a node that has just left
+            with suppress(Exception):  # rclpy raises various errors for a node that has just left
                 yield from ((kind, name, types[0]) for name, types in ask(*other))
 
 
 def offers_on_ros1() -> Iterator[Offer]:
-    """Yield the offers that the master knows; it does not know the types of services."""
+    """Yield the offers registered at the master, which does not know the types of services."""
     import rosgraph
 
     from graph import Ros1Graph, no_master
 
-    graph = Ros1Graph("codebotler_discovers")  # a request to the master needs no node
+    graph = Ros1Graph("codebotler_discovers")  # asking the master does not require a registered node
     if not graph.is_online():
         raise SetupError(no_master(graph.uri))
     master = rosgraph.Master(graph.node)

@@ -1,4 +1,4 @@
-"""The base class of workers: perform one skill at a time as a goal, and supervise it."""
+"""The base class of workers, which perform one skill at a time as a goal and supervise it."""
 
 from __future__ import annotations
 
@@ -11,38 +11,38 @@ from typing import Any
 from channel import Channel, Fields, SetupError
 from reports import MotionReports
 
-WATCH_SECONDS = 0.1  # between two rounds of the watchdog
-ALIVE_SECONDS = 1.0  # between two signs of life
-TOOL_SILENCE = 0.7  # seconds without a sign of life of the tool; then the robot is stopped
-FEEDBACK_INTERVAL = 0.5  # seconds between two feedbacks to the tool
-END_SECONDS = 1.0  # for a cancelled goal, when the worker ends
-PICTURE_SECONDS = 0.5  # for a picture after the result, since it has its own connection
+WATCH_SECONDS = 0.1  # the interval between two checks of the current goal
+ALIVE_SECONDS = 1.0  # the interval between two heartbeats to CodeBotler
+TOOL_SILENCE = 0.7  # the robot is stopped after this many seconds without a heartbeat from CodeBotler
+FEEDBACK_INTERVAL = 0.5  # the minimum time in seconds between two feedback messages to CodeBotler
+END_SECONDS = 1.0  # how long an ending worker waits for its cancelled goal to end
+PICTURE_SECONDS = 0.5  # how long to wait after a result for its picture, which has its own connection
 MAX_PICTURE_BYTES = 2_000_000
 
 ROS1_ENDS = {2: "cancelled", 3: "succeeded", 4: "aborted", 5: "rejected", 8: "cancelled", 9: "lost"}
-"""The end of a goal, by the status of actionlib_msgs/GoalStatus."""
+"""How a goal has ended, by its status in actionlib_msgs/GoalStatus."""
 
 ROS2_ENDS = {4: "succeeded", 5: "cancelled", 6: "aborted"}
-"""The end of a goal, by the status of action_msgs/msg/GoalStatus."""
+"""How a goal has ended, by its status in action_msgs/msg/GoalStatus."""
 
 
 class Goal:
-    """The current goal, with times of the monotonic clock."""
+    """A goal and its progress; all times are those of the monotonic clock."""
 
     def __init__(self, number: int, server: Any) -> None:
         self.number, self.server = number, server
         self.lock = threading.RLock()
-        self.stop: Callable[[], object] | None = None  # sends a cancel; set when the goal is sent
-        self.handle: Any = None  # actionlib forgets goals without a handle
+        self.stop: Callable[[], object] | None = None  # a function that sends a cancel, once the goal is sent
+        self.handle: Any = None  # the ROS handle, which keeps actionlib from forgetting the goal
         self.sent: float | None = None
         self.is_acknowledged = self.is_over = False
-        self.status_ended: float | None = None  # from then on, only the result is missing
+        self.status_ended: float | None = None  # when the status showed the end; the result may arrive later
         self.cancelled: float | None = None
         self.last_feedback = 0.0
         self.end_event, self.picture_event = threading.Event(), threading.Event()
 
     def cancel(self) -> None:
-        """Cancel the goal; if it has not been sent, it never will be."""
+        """Cancel the goal; a goal that has not been sent yet is never sent."""
         with self.lock:
             self.cancelled = self.cancelled or time.monotonic()
             if self.stop is not None:
@@ -50,20 +50,20 @@ class Goal:
 
 
 class Server:
-    """The server for one skill, seen from a client."""
+    """A client for the action server, service or topic of one skill."""
 
-    has_cancelled = True  # unless it must confirm that
+    has_cancelled = True  # False while a cancel still has to be confirmed
 
     def __init__(self, call: Fields) -> None:
         self.name: str = call["server"]
         self.type: str = call["type"]
 
     def last_sign(self) -> float:
-        """Return the time of its last sign of life; now, if its death shows in another way."""
+        """Return when the server last showed that it is alive, or the current time if this is not tracked."""
         return time.monotonic()
 
     def has_pictures(self) -> bool:
-        """Whether it publishes pictures."""
+        """Return whether the server publishes pictures."""
         return False
 
     def cancel(self) -> None:
@@ -71,17 +71,17 @@ class Server:
 
 
 class SkillWorker:
-    """Performs skills, one at a time; subclasses implement `connect` and `send`.
+    """Performs skills, one at a time; subclasses implement at least `connect`, `send` and `listen`.
 
-    The first line has the `address`, the `node`, the `calls` by skill, folders of `packages`, the topics of
-    the `pose`, the `velocity` and `keepout`, whether to `cancel_all` goals, the `sign`, a file that names the
-    server with a running goal, and the time limits `patience`, `silence` and `longest`.
+    The first message has the `address`, the `node` name, the `calls` by skill, folders of `packages`, topics
+    for `pose`, `velocity` and `keepout`, whether to `cancel_all` goals, the path `sign` of a file that names
+    the server of a running goal, and the time limits `patience`, `silence` and `longest`.
     """
 
     graph: Any
     servers: dict[str, Any]
-    settles = 0.0  # seconds for the connection with a server, in addition to the patience
-    silence_says = ""  # how a dead server shows, if not by its silence
+    settles = 0.0  # the seconds in addition to the patience that connecting to a server may take
+    silence_says = ""  # the reason to give for a dead server, if it is not missing status messages
 
     def __init__(self, channel: Channel, start: Fields) -> None:
         self.channel = channel
@@ -94,8 +94,8 @@ class SkillWorker:
         has_dead_twin = self.connect(start) or bool(running)
         if running and running not in {server.name for server in self.servers.values()}:
             raise SetupError(
-                f"an earlier tool was killed while {running} went on, which this connection cannot cancel; "
-                f"connect as then, or stop the robot by hand and delete {self._sign}"
+                f"CodeBotler was killed while {running} had a goal, which this connection cannot cancel; "
+                f"connect as before, or stop the robot by hand and delete {self._sign}"
             )
         self._listen(start)
         missing = self.missing()
@@ -108,28 +108,28 @@ class SkillWorker:
         self.channel.send("ready", missing=missing, cancelled_all=cancelled_all)
 
     def connect(self, start: Fields) -> bool:
-        """Set `graph` and `servers`; return whether an earlier worker died and left its node behind."""
+        """Set `graph` and `servers`; return whether a dead worker has left its node behind."""
         raise NotImplementedError
 
     def send(self, goal: Goal, fields: Fields) -> None:
-        """Send a goal; the caller holds its lock."""
+        """Send a goal; the caller must hold the goal's lock."""
         raise NotImplementedError
 
     def listen(
         self, topic: str, hear: Callable[[Fields], object], *, is_needed: bool = True
     ) -> Callable[[], object] | None:
-        """Subscribe to a topic, with messages as plain data; return the function that unsubscribes.
+        """Subscribe to a topic with messages as plain data; return a function that unsubscribes.
 
-        If the topic is missing, raise SetupError where it `is_needed`, else return None.
+        If nothing publishes the topic, raise SetupError if `is_needed`, else return None.
         """
         raise NotImplementedError
 
     def publish(self, topic: str, fields: Fields) -> None:
-        """Publish a latched message on a topic of `keepout`."""
+        """Publish a latched message on one of the keepout topics."""
         raise NotImplementedError
 
     def start(self, goal: Goal, fields: Fields) -> None:
-        """Send a goal, unless it was cancelled."""
+        """Send a goal, or report its end if it was already cancelled."""
         with goal.lock:
             if goal.cancelled is not None:
                 self.end(goal, "cancelled")
@@ -138,7 +138,7 @@ class SkillWorker:
                 self.send(goal, fields)
 
     def obey(self, line: Fields) -> None:
-        """Perform or cancel a skill."""
+        """Handle a message from CodeBotler: perform, look, publish or cancel."""
         if line["do"] == "perform":
             server = self.servers[line["skill"]]
             self.goal = goal = Goal(line["id"], server)
@@ -158,21 +158,21 @@ class SkillWorker:
             self.channel.send("cancel-sent")
 
     def leave(self) -> None:
-        """Cancel the goal, and leave the graph."""
+        """Cancel the current goal and leave the ROS graph."""
         self.stop()
         self.graph.leave()
 
     def stop(self) -> None:
-        """Cancel the goal, and wait briefly for its end."""
+        """Cancel the current goal, and wait for its end for a short time."""
         goal = self.goal
         if goal is not None and not goal.is_over:
             goal.cancel()
             goal.end_event.wait(END_SECONDS)
         if goal is not None and goal.cancelled is not None:
-            time.sleep(WATCH_SECONDS)  # ROS sends in threads of its own
+            time.sleep(WATCH_SECONDS)  # ROS sends messages in its own threads
 
     def missing(self) -> dict[str, str]:
-        """Return why servers cannot be reached, by skill."""
+        """Return messages that explain which servers cannot be reached, by skill."""
         self.wait_for_servers()
         return {
             skill: self.graph.explain_missing(server.name, server.type)
@@ -181,10 +181,10 @@ class SkillWorker:
         }
 
     def wait_for_servers(self) -> None:
-        """Wait for connections with the servers on the graph."""
+        """Wait until all servers on the graph are connected, or the patience is exceeded."""
         deadline = time.monotonic() + self.patience
         present = [server for server in self.servers.values() if self.graph.nodes_of(server.name)]
-        # Ask all servers in each round, since the first call starts the time that a connection needs.
+        # Ask all servers in each round, because a server's first call starts the timer for its connection.
         while (
             sum(s.is_connected(self.silence) for s in present) < len(present) and time.monotonic() < deadline
         ):
@@ -193,20 +193,20 @@ class SkillWorker:
             time.sleep(0.005)
 
     def cancel_all(self) -> bool:
-        """Cancel all goals of all clients; return whether that is possible."""
+        """Cancel all goals of all clients; return whether this was possible."""
         for server in self.servers.values():
             server.cancel()
-        time.sleep(WATCH_SECONDS)  # ROS sends in threads of its own
+        time.sleep(WATCH_SECONDS)  # ROS sends messages in its own threads
         return True
 
     def look_after(self, goal: Goal, sent: float, now: float) -> None:
-        """End a goal that has failed."""
+        """End a goal as lost if its server has died or exceeded a time limit."""
         fault = self._find_fault(goal, sent, now)
         if fault is not None:
             self.end(goal, "lost", text=fault)
 
     def end(self, goal: Goal, kind: str, **more: Any) -> None:
-        """Report the end of a goal, once."""
+        """Report the end of a goal, but only the first time."""
         with goal.lock:
             if goal.is_over:
                 return
@@ -219,7 +219,7 @@ class SkillWorker:
         goal.end_event.set()
 
     def pass_on(self, goal: Goal, feedback: dict[str, Any]) -> None:
-        """Report the text and number fields of a feedback, at a limited rate."""
+        """Report the text and number fields of a feedback message, at a limited rate."""
         plain = {name: value for name, value in feedback.items() if not isinstance(value, (dict, list))}
         text = ", ".join(
             f"{name}: {value:.4g}" if isinstance(value, float) else f"{name}: {value}"
@@ -231,7 +231,7 @@ class SkillWorker:
             self.channel.send("feedback", id=goal.number, text=text)
 
     def finish(self, goal: Goal, state: str, values: Fields, text: str = "") -> None:
-        """End a goal with the state of its server: succeeded, aborted, rejected, cancelled or lost."""
+        """End a goal with its final state: succeeded, aborted, rejected, cancelled or lost."""
         if state == "lost":
             self.end(goal, "lost", text=text)
         elif state == "cancelled" or goal.cancelled is not None:
@@ -244,7 +244,7 @@ class SkillWorker:
             threading.Thread(target=self._end_with_picture, args=(goal, values), daemon=True).start()
 
     def pass_picture(self, server: Any, data: str) -> None:
-        """Pass on a picture, in base64, from the server of the current goal."""
+        """Pass on a picture in base64 if it comes from the server of the current goal."""
         goal = self.goal
         if goal is None or goal.server is not server or goal.sent is None or goal.is_over:
             return
@@ -257,12 +257,11 @@ class SkillWorker:
         goal.picture_event.set()
 
     def _end_with_picture(self, goal: Goal, values: Fields) -> None:
-        """Wait briefly for the picture of a goal, and end the goal."""
         goal.picture_event.wait(PICTURE_SECONDS)
         self.end(goal, "result", values=values)
 
     def _look(self, goal: Goal, topic: str) -> None:
-        """Send the next picture of a topic; subscribe only for that time, since pictures are large."""
+        """Send the next picture on a topic; because pictures are large, subscribe only until it arrives."""
         pictures: list[Fields] = []
         unsubscribe, deadline = None, time.monotonic() + self.patience
         text = f"no picture arrived on {topic}; is the camera's node running?"
@@ -280,7 +279,6 @@ class SkillWorker:
             self.end(goal, "error", state="aborted", text=text)
 
     def _listen(self, start: Fields) -> None:
-        """Subscribe to the topics of poses and velocities."""
         pose, velocity = start["pose"], start["velocity"]
         reports = MotionReports(self.channel, pose and pose["frames"])
         if pose is not None:
@@ -301,7 +299,7 @@ class SkillWorker:
         self.end(goal, "unsent", text=why)
 
     def _watch(self) -> None:
-        """Send signs of life, and supervise the current goal."""
+        """Send heartbeats and supervise the current goal, until our node leaves the graph."""
         last_sign = 0.0
         while True:
             time.sleep(WATCH_SECONDS)
@@ -322,7 +320,7 @@ class SkillWorker:
                 self.look_after(goal, goal.sent, now)
 
     def _find_fault(self, goal: Goal, sent: float, now: float) -> str | None:
-        """Return why a goal has failed, or None."""
+        """Return a message that explains why a goal has failed, or None if it has not."""
         server, late = goal.server.name, now - self.patience
         if max(goal.server.last_sign(), sent) < now - self.silence:
             why = self.silence_says or f"no status for {self.silence:g} s"

@@ -1,4 +1,4 @@
-"""Our node on the ROS 1 graph, and the master's view of other nodes."""
+"""Our node on the ROS 1 graph, and what the master knows about other nodes."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from typing import Any
 from channel import SetupError
 from message_types import OFFER_NAMES, offer_of, parts_of
 
-ROS1_EXIT_SECONDS = 3.0  # for another worker whose tool was just killed
-MASTER_SECONDS, NODE_SECONDS = 5.0, 2.0  # for answers
+ROS1_EXIT_SECONDS = 3.0  # the time limit for a worker to exit if its CodeBotler was just killed
+MASTER_SECONDS, NODE_SECONDS = 5.0, 2.0  # the time limits for answers from the master and from nodes
 
 
 class Ros1Graph:
-    """Our node, whose unique name reserves the robot, and the master's view of other nodes."""
+    """Our node, whose unique name reserves the robot; also asks the master about other nodes."""
 
     def __init__(self, name: str) -> None:
-        import netifaces  # noqa: F401 - fail here if it is missing, not later in a thread of rosgraph
+        import netifaces  # noqa: F401 - if it is missing, fail here rather than later in a thread of rosgraph
         import rosgraph
 
         self.node = rosgraph.names.resolve_name(name, rosgraph.names.get_ros_namespace())
@@ -27,7 +27,7 @@ class Ros1Graph:
         self._rosgraph = rosgraph
 
     def enter(self) -> bool:
-        """Register our node; return whether a dead worker has left a node with its name."""
+        """Register our node; return whether a dead worker has left a node with the same name behind."""
         import rospy
 
         if not self.is_online():
@@ -40,29 +40,24 @@ class Ros1Graph:
                     "stop it first"
                 )
             time.sleep(0.1)
-        rospy.init_node(
-            self.node.rpartition("/")[2],
-            argv=[],
-            disable_signals=True,
-            log_level=rospy.FATAL,
-            anonymous=False,
-        )
+        name = self.node.rpartition("/")[2]
+        rospy.init_node(name, argv=[], disable_signals=True, log_level=rospy.FATAL, anonymous=False)
         return address is not None
 
     def leave(self) -> None:
-        """Unregister our node."""
+        """Unregister our node at the master."""
         import rospy
 
         rospy.signal_shutdown("the end")
 
     def has_left(self) -> bool:
-        """Whether our node has ended; the master ends it when another node registers its name."""
+        """Return whether our node has ended, for example because another node registered the same name."""
         import rospy
 
         return bool(rospy.is_shutdown())
 
     def is_online(self) -> bool:
-        """Whether the master answers."""
+        """Return whether the master answers."""
         before = socket.getdefaulttimeout()
         socket.setdefaulttimeout(MASTER_SECONDS)
         try:
@@ -71,18 +66,18 @@ class Ros1Graph:
             socket.setdefaulttimeout(before)
 
     def address_of(self, node: str) -> str | None:
-        """Return the address of a node, or None if the master knows none."""
+        """Return the address of a node, or None if the master does not know the node."""
         try:
             return str(self._master.lookupNode(node))
         except self._rosgraph.MasterException:
             return None
 
     def explain_end(self) -> str:
-        """Return the message for `has_left`."""
+        """Return a message that explains why `has_left` is true."""
         return f"another node called {self.node} has taken over; stop it, and connect again"
 
     def nodes_of(self, server: str) -> list[str]:
-        """Return the nodes that serve an action, a topic or a service; some may be dead."""
+        """Return the nodes registered for an action, a topic or a service; they may be dead."""
         _, subscribers, services = self._master.getSystemState()
         name = self._rosgraph.names.resolve_name(server, self.node)
         return [
@@ -90,12 +85,12 @@ class Ros1Graph:
         ]
 
     def has_publisher(self, topic: str) -> bool:
-        """Whether a topic has a registered publisher."""
+        """Return whether a publisher is registered for a topic."""
         name = self._rosgraph.names.resolve_name(topic, self.node)
         return name in (one for one, _ in self._master.getSystemState()[0])
 
     def explain_missing(self, server: str, type_name: str) -> str:
-        """Return why a server cannot be reached."""
+        """Return a message that explains why a server cannot be reached."""
         if not self.is_online():
             return f"{server} is gone, and so is the ROS master at {self.uri}; start it again"
         if self.address_of(self.node) is None:
@@ -118,7 +113,7 @@ class Ros1Graph:
 
 
 def no_master(uri: str) -> str:
-    """Return the message for a missing master."""
+    """Return a message that no master answers, with advice."""
     return f"no ROS master answers at {uri}; start one (roscore), or set ROS_MASTER_URI"
 
 
@@ -130,7 +125,7 @@ class _ShortTimeout(xmlrpc.client.Transport):
 
 
 def is_alive(address: str) -> bool:
-    """Whether a node answers."""
+    """Return whether the node at an address answers."""
     try:
         xmlrpc.client.ServerProxy(address, transport=_ShortTimeout()).getPid("/codebotler")
     except (OSError, xmlrpc.client.Error):

@@ -1,4 +1,4 @@
-"""ROS 1 message types, generated if their packages are not installed, and messages as plain data."""
+"""Import or generate ROS 1 message types, and convert messages to plain data."""
 
 from __future__ import annotations
 
@@ -19,10 +19,12 @@ TYPE_SEPARATOR = "\n" + "=" * 80 + "\n"
 
 
 def action_types(actions: list[Fields]) -> dict[str, Any]:
-    """Return action types by name, from rows with the `type` and the `definition` of an .action file.
+    """Return the classes of actions by type name, generating those whose packages are not installed.
+
+    Each action has a `type` and a `definition`, the text of its .action file or an empty string.
 
     Raises:
-        SetupError: a package without a definition is not installed.
+        SetupError: a type is not installed and has no definition.
     """
     found = {}
     for action in actions:
@@ -37,7 +39,7 @@ def action_types(actions: list[Fields]) -> dict[str, Any]:
 
 
 def import_type(whole: str, kind: str) -> Any:
-    """Import a type by its name and kind, msg or srv; SetupError if its package is not installed."""
+    """Import a type by its name and kind (msg or srv); raise SetupError if it is not installed."""
     package, name = parts_of(whole)
     try:
         return getattr(importlib.import_module(f"{package}.{kind}"), name)
@@ -46,9 +48,10 @@ def import_type(whole: str, kind: str) -> Any:
 
 
 def as_data(value: Any) -> Any:
-    """Convert a message of ROS 1 or 2, or the value of a field, to plain data, with bytes in base64."""
+    """Convert a ROS 1 or ROS 2 message, or a field value, to plain data; bytes become base64."""
     if hasattr(value, "__slots__"):
-        fields = getattr(value, "get_fields_and_field_types", None)  # ROS 2 has other names for its slots
+        # In ROS 2, the names of slots differ from those of fields.
+        fields = getattr(value, "get_fields_and_field_types", None)
         names = value.__slots__ if fields is None else fields()
         return {name: as_data(getattr(value, name)) for name in names}
     if isinstance(value, bytes) or getattr(value, "typecode", "") == "B":
@@ -59,24 +62,23 @@ def as_data(value: Any) -> Any:
 
 
 def parts_of(kind: str) -> tuple[str, str]:
-    """Return the package, by default our own, and the name of a type, without its kind."""
+    """Split a type such as std_msgs/msg/String into its package, by default our own, and its name."""
     *package, name = kind.split("/")
     return package[0] if package else OWN_PACKAGE, name
 
 
 def offer_of(kind: str) -> str:
-    """Return the word for the server of a type, such as `service` for std_srvs/srv/Trigger."""
+    """Return what provides a type, in words: `service` for std_srvs/srv/Trigger, for example."""
     return OFFER_NAMES[kind.split("/")[1]]
 
 
 def generate_type(kind: str, text: str) -> Any:
-    """Generate a message type from its text, which includes all types that it uses."""
+    """Generate a message type from its full text, which includes the types of its fields."""
     from genpy.dynamic import generate_dynamic
 
     spec = generate_dynamic(kind, text)[kind]
-    shutil.rmtree(
-        Path(str(sys.modules[spec.__module__].__file__)).parent
-    )  # genpy's own cleanup would not run
+    # Delete genpy's temporary folder here, because its own cleanup would not run.
+    shutil.rmtree(Path(str(sys.modules[spec.__module__].__file__)).parent)
     return spec
 
 

@@ -1,4 +1,4 @@
-"""Report a robot's poses and velocities from ROS messages as plain data."""
+"""Extract a robot's poses and velocities from ROS messages and report them to CodeBotler."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ from typing import Any
 
 from channel import Channel, Fields
 
-REPORT_INTERVAL = 0.05  # seconds between two poses, or velocities, to the tool
-Turn = tuple[float, float, float]  # x, y and yaw of a frame in another
+REPORT_INTERVAL = 0.05  # the minimum time in seconds between two reports of the same kind
+Turn = tuple[float, float, float]  # the x, y and yaw of a coordinate frame relative to another
 
 
 class MotionReports:
-    """Sends a robot's poses and velocities to the tool.
+    """Reports a robot's poses and velocities to CodeBotler.
 
-    With `frames`, those of the map and of the robot, poses come from transforms; otherwise from messages
-    that contain a position and an orientation at any depth.
+    With `frames`, the names of the map's and the robot's frame, poses are computed from transforms. Otherwise
+    they are taken from messages of any type that contains a pose.
     """
 
     def __init__(self, channel: Channel, frames: list[str] | None) -> None:
         self._channel, self._frames = channel, frames
-        self._links: dict[str, tuple[str, Turn]] = {}  # for each frame: its parent, and its pose there
+        self._links: dict[str, tuple[str, Turn]] = {}  # the parent of each frame, and the pose relative to it
         self._last_sent = {"pose": 0.0, "velocity": 0.0}
 
     def report_pose(self, message: Fields) -> None:
-        """Send the pose in a message."""
+        """Report the pose in a message, if the message contains one or completes the transforms."""
         found = self._transform(message) if self._frames else _pose_in(message)
         if found is not None:
             frame, (x, y, yaw) = found
             self._send("pose", x=x, y=y, yaw=yaw, frame=frame)
 
     def report_velocity(self, message: Fields) -> None:
-        """Send the velocity in a message, in metres or radians per second, whichever is higher."""
+        """Report the speed in a message: the higher value of metres per second and radians per second."""
         while "linear" not in message and "twist" in message:
             message = message["twist"]
         if "linear" in message:
@@ -47,7 +47,7 @@ class MotionReports:
             parent = each["header"]["frame_id"].lstrip("/")
             self._links[each["child_frame_id"].lstrip("/")] = parent, turn
         frame, robot = self._frames
-        at, yaw = 0j, 0.0  # the position x + iy in the current frame of the loop
+        at, yaw = 0j, 0.0  # the robot's position x + iy and yaw in the frame that the loop has reached
         for _ in self._links:
             if robot not in self._links:
                 return None

@@ -1,4 +1,4 @@
-"""The worker for ROS 1, run by a Python (3.8 or later) that has rospy."""
+"""The worker for ROS 1, which runs under a Python (3.8 or later) that has rospy."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from goals import ROS1_ENDS, Goal, Server, SkillWorker
 from graph import Ros1Graph
 from message_types import action_types, as_data, generate_type, import_type
 
-RESULT_DELAY = 0.2  # seconds until a server sends results to a new client; ROS does not report that
+RESULT_DELAY = 0.2  # the seconds until a server sends results to a new client, which ROS does not report
 
 
 class Ros1Server(Server):
-    """The action server of one skill, seen from a client."""
+    """A client for the action server of one skill."""
 
     def __init__(self, worker: Ros1Worker, action: Fields) -> None:
         import actionlib
@@ -30,7 +30,7 @@ class Ros1Server(Server):
         self.message = type(spec().action_goal.goal)
         self._last_status = 0.0
         self._node: str | None = None
-        self._results: Any = None  # the connection for results
+        self._results: Any = None  # the connection that receives results
         self._since = 0.0
         topic = rospy.remap_name(self.name)
         self._status = rospy.Subscriber(f"{topic}/status", actionlib_msgs.msg.GoalStatusArray, self._hear)
@@ -39,15 +39,15 @@ class Ros1Server(Server):
         )
 
     def last_sign(self) -> float:
-        """Return the time of its last status."""
+        """Return when the server last sent its status."""
         return self._last_status
 
     def has_pictures(self) -> bool:
-        """Whether it publishes pictures."""
+        """Return whether the server publishes pictures."""
         return bool(self._pictures.get_num_connections())
 
     def is_connected(self, silence: float) -> bool:
-        """Whether goals reach the server and its results reach us."""
+        """Return whether our goals reach the server and its results reach us."""
         client, node = self.client, self._node
         if node is None or time.monotonic() - self._last_status > silence:
             return False
@@ -65,7 +65,7 @@ class Ros1Server(Server):
     def cancel(self, goal_id: str = "") -> None:
         """Cancel one goal, or all goals of all clients.
 
-        A handle's own `cancel` would count a goal as lost that has not reached the server yet.
+        The `cancel` method of actionlib would report a goal as lost if it has not reached the server yet.
         """
         import actionlib_msgs.msg
 
@@ -77,7 +77,7 @@ class Ros1Server(Server):
 
 
 class Ros1Service(Server):
-    """A service that performs a skill; it cannot be cancelled."""
+    """A client for a service that performs a skill; a call cannot be cancelled."""
 
     def __init__(self, worker: Ros1Worker, call: Fields) -> None:
         import rospy
@@ -89,17 +89,17 @@ class Ros1Service(Server):
         self.client = rospy.ServiceProxy(self.name, spec)
 
     def is_connected(self, _silence: float) -> bool:
-        """Whether the service is registered."""
+        """Return whether the service is registered at the master."""
         return bool(self.graph.nodes_of(self.name))
 
     def perform(self, message: Any) -> Fields:
-        """Call the service, and return its answer."""
+        """Call the service and return its answer."""
         answer: Fields = as_data(self.client(message))
         return answer
 
 
 class Ros1Topic(Server):
-    """A topic whose messages perform a skill; nobody confirms them."""
+    """A publisher for a topic whose messages make the robot perform a skill, without a confirmation."""
 
     def __init__(self, _worker: Ros1Worker, call: Fields) -> None:
         import rospy
@@ -109,17 +109,17 @@ class Ros1Topic(Server):
         self.publisher = rospy.Publisher(self.name, self.message, queue_size=10)
 
     def is_connected(self, _silence: float) -> bool:
-        """Whether the topic has subscribers."""
+        """Return whether the topic has subscribers."""
         return bool(self.publisher.get_num_connections())
 
     def perform(self, message: Any) -> Fields:
-        """Publish a message."""
+        """Publish a message and return an empty answer."""
         self.publisher.publish(message)
         return {}
 
 
 def subscribe(topic: str, hear: Callable[[Fields], object]) -> Any:
-    """Subscribe to a topic, with its publisher's type, and call `hear` with each message as plain data."""
+    """Subscribe to a topic with the type its publisher uses; call `hear` with each message as plain data."""
     import rospy
 
     known: dict[str, Any] = {}
@@ -143,7 +143,7 @@ class Ros1Worker(SkillWorker):
     graph: Ros1Graph
 
     def connect(self, start: Fields) -> bool:
-        """Register our node, and subscribe to all servers; return whether a dead worker left its node."""
+        """Register our node and connect to all servers; return whether a dead worker left its node behind."""
         import rospy
 
         self.graph = Ros1Graph(start["node"])
@@ -157,17 +157,17 @@ class Ros1Worker(SkillWorker):
     def listen(
         self, topic: str, hear: Callable[[Fields], object], *, is_needed: bool = True
     ) -> Callable[[], object]:
-        """Subscribe to a topic, as in `SkillWorker.listen`."""
+        """Subscribe to a topic; see `SkillWorker.listen`."""
         if is_needed and not self.graph.has_publisher(topic):
             raise SetupError(f"nothing publishes {topic}; start its publisher, or correct its name")
         unsubscribe: Callable[[], object] = subscribe(topic, hear).unregister
         return unsubscribe
 
     def send(self, goal: Goal, fields: Fields) -> None:
-        """Send a goal, unless no message can hold it."""
+        """Send a goal, or end it with a message if its fields do not fit its type."""
         import genpy
 
-        try:  # inside rospy, an error would leave half a message in the stream
+        try:  # serialize here first, because an error in rospy would leave half a message in the stream
             message = goal.server.message()
             genpy.message.fill_message_args(message, [fields])
             message.serialize(io.BytesIO())
@@ -188,7 +188,7 @@ class Ros1Worker(SkillWorker):
         goal.stop = lambda: goal.server.cancel(goal_id)
 
     def _follow(self, goal: Goal, handle: Any) -> None:
-        """Record a new state of a goal; runs in a thread of rospy."""
+        """Process a state change of a goal; rospy calls this in its own thread."""
         from actionlib import CommState, TerminalState
 
         state = handle.get_comm_state()
@@ -203,7 +203,7 @@ class Ros1Worker(SkillWorker):
         self.finish(goal, ROS1_ENDS[terminal], as_data(handle.get_result()), text)
 
     def _perform(self, goal: Goal, message: Any) -> None:
-        """Perform a skill by a service or a topic."""
+        """Perform a skill through a service or a topic."""
         import rospy
 
         try:

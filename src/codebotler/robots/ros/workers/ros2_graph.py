@@ -1,4 +1,4 @@
-"""Our node on the ROS 2 graph, where nodes discover each other without a master."""
+"""Our node on the ROS 2 graph, on which nodes discover each other without a master."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from channel import SetupError
 from message_types import as_data, offer_of
 from ros2_types import message_types
 
-DISCOVERY_SECONDS = 1.0  # a node then knows most others
-ANSWER_SECONDS_ROS2 = 2.0  # for another node with our name, if it is alive
-ROS2_EXIT_SECONDS = 3.0  # for another worker whose tool was just killed
+DISCOVERY_SECONDS = 1.0  # the time a new node needs to discover most other nodes
+ANSWER_SECONDS_ROS2 = 2.0  # the time limit for an answer from another node with our name
+ROS2_EXIT_SECONDS = 3.0  # the time limit for a worker to exit if its CodeBotler was just killed
 NODE_IN_USE = "another codebotler is using this robot (the node {}); stop it first"
 
 
 class Ros2Graph:
-    """Our node, with its executor in a thread; its unique name reserves the robot."""
+    """Our node on the graph, whose executor runs in a thread; its unique name reserves the robot."""
 
     def __init__(self, name: str, taken: str = NODE_IN_USE) -> None:
         import rclpy
@@ -32,15 +32,14 @@ class Ros2Graph:
 
         self._rclpy, self.node, self._taken = rclpy, name, taken
         self._is_left_behind = self._has_ended = False
-        rclpy.init(
-            args=None, signal_handler_options=SignalHandlerOptions.NO
-        )  # the worker must stop the robot first
+        # No signal handlers, because the worker must stop the robot before rclpy shuts down.
+        rclpy.init(args=None, signal_handler_options=SignalHandlerOptions.NO)
 
     def enter(self, *, is_rescue: bool = False) -> bool:
-        """Start our node; return whether a dead worker has left a node with its name.
+        """Start our node; return whether a dead worker has left a node with the same name behind.
 
-        Workers of two machines that start together notice each other and stop. A rescue does not wait, since
-        the tool has killed the other worker.
+        If workers on two machines start at the same time, both notice this and stop. A rescue does not look
+        for another worker, because CodeBotler has just killed it.
         """
         self._lock = self._take_lock()
         self._is_left_behind = is_rescue or self._has_dead_twin()
@@ -50,7 +49,7 @@ class Ros2Graph:
         return self._is_left_behind
 
     def _has_dead_twin(self) -> bool:
-        """Whether a dead node with our name is on the graph; SetupError if it is alive."""
+        """Return whether a dead node with our name is on the graph; raise SetupError if a live one is."""
         probe = self._rclpy.create_node(f"{self.node}_looks_{os.getpid()}")
         time.sleep(DISCOVERY_SECONDS)
         is_there = self.node in probe.get_node_names()
@@ -61,15 +60,15 @@ class Ros2Graph:
         return is_there
 
     def spin(self) -> None:
-        """Start the executor's thread; call it after creating all clients and servers.
+        """Start the executor's thread; call this only after creating all clients and servers.
 
-        rclpy shows incomplete ones to the executor, which would end the thread.
+        rclpy exposes partially constructed clients and servers to the executor, which would crash its thread.
         """
         self._spinning = threading.Thread(target=self._spin, daemon=True)
         self._spinning.start()
 
     def leave(self) -> None:
-        """Destroy our node; others would see a node that is only shut down until its lease ends."""
+        """Destroy our node; after a shutdown alone, other nodes would still see it until its lease ends."""
         self._rclpy.shutdown()
         self._spinning.join(ROS2_EXIT_SECONDS)
         for action in list(self.ours.waitables):
@@ -77,11 +76,11 @@ class Ros2Graph:
         self.ours.destroy_node()
 
     def has_left(self) -> bool:
-        """Whether our node has ended, or another node with its name has appeared."""
+        """Return whether our node has ended, or another node with the same name has appeared."""
         return not self._rclpy.ok() or self._has_ended or self._has_double()
 
     def explain_end(self) -> str:
-        """Return the message for `has_left`."""
+        """Return a message that explains why `has_left` is true."""
         if self._has_ended:
             return f"the node {self.node} has failed in rclpy; connect again"
         if self._rclpy.ok():
@@ -89,18 +88,18 @@ class Ros2Graph:
         return f"the node {self.node} was shut down; connect again"
 
     def explain_missing(self, server: str, type_name: str) -> str:
-        """Return why a server cannot be reached."""
+        """Return a message that explains why a server cannot be reached."""
         return (
             f"there is no {offer_of(type_name)} of {type_name} at {server}; start it, or compare "
             "ROS_DOMAIN_ID and the definitions on both sides"
         )
 
     def call_soon(self, function: Callable[..., object], *arguments: Any) -> None:
-        """Call a function in the executor's thread."""
+        """Schedule a function call in the executor's thread."""
         self.executor.create_task(function, *arguments)
 
     def resolve(self, future: Any, value: Any) -> None:
-        """Set a future's result, and wake the executor."""
+        """Set the result of a future and wake the executor."""
 
         def resolve() -> None:
             future.set_result(value)
@@ -111,9 +110,10 @@ class Ros2Graph:
     def listen(
         self, topic: str, hear: Callable[[Any], object], packages: list[str], patience: float | None
     ) -> Callable[[], object] | None:
-        """Subscribe to a topic, with its publishers' type; return the function that unsubscribes.
+        """Subscribe to a topic with the type that its publishers use; return a function that unsubscribes.
 
-        Wait up to `patience` seconds for a publisher; without `patience`, return None if there is none.
+        Wait up to `patience` seconds for a publisher, then raise SetupError. If `patience` is None, do not
+        wait, and return None if there is no publisher.
         """
         from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -126,7 +126,7 @@ class Ros2Graph:
             time.sleep(0.05)
         kind, offered = publishers[0].topic_type, publishers[0].qos_profile
         qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-        if offered.durability == DurabilityPolicy.TRANSIENT_LOCAL:  # to receive the last message
+        if offered.durability == DurabilityPolicy.TRANSIENT_LOCAL:  # receive the latched message as well
             qos = QoSProfile(depth=10, durability=offered.durability)
         spec = message_types([kind], map(Path, packages))[kind]
         subscriptions: list[Any] = []
@@ -138,7 +138,7 @@ class Ros2Graph:
         return lambda: self.call_soon(lambda: self.ours.destroy_subscription(subscriptions.pop()))
 
     def _take_lock(self) -> socket.socket:
-        """Bind a socket that only one process of this machine can have, until it ends."""
+        """Bind a socket whose name only one process on this machine can hold at a time."""
         lock = socket.socket(socket.AF_UNIX)
         deadline = time.monotonic() + ROS2_EXIT_SECONDS
         while sys.platform == "linux":
@@ -153,7 +153,7 @@ class Ros2Graph:
         return lock
 
     def _answers(self, probe: Any) -> bool:
-        """Whether the node with our name is alive; a dead one stays on the graph for a while."""
+        """Return whether the node with our name is alive; a dead node stays on the graph for a while."""
         from rcl_interfaces.srv import ListParameters
 
         client = probe.create_client(ListParameters, f"/{self.node}/list_parameters")
@@ -166,7 +166,7 @@ class Ros2Graph:
     def _has_double(self) -> bool:
         if self._is_left_behind:
             return False
-        with suppress(Exception):  # the node may be shut down at this moment
+        with suppress(Exception):  # the node may be shutting down
             return bool(self.ours.get_node_names().count(self.node) > 1)
         return False
 

@@ -1,4 +1,4 @@
-"""Action servers of a virtual robot, run by a Python that has rclpy; the tool decides how goals end."""
+"""Action servers of a virtual robot on ROS 2, run by a Python that has rclpy; CodeBotler performs goals."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ SERVERS_IN_USE = "there is another virtual robot (the node {}); stop it first"
 
 
 class Ros2ActionServers:
-    """One action server for each skill; the first line has the `node` and the `actions` by skill."""
+    """Offers an action server per skill; the first message has the `node` name and `actions` by skill."""
 
     def __init__(self, channel: Channel, start: Fields) -> None:
         import rclpy.action
 
         self.channel = channel
-        self.ends: dict[str, Any] = {}  # futures by goal
+        self.ends: dict[str, Any] = {}  # futures for the ends of goals, by goal id
         actions = start["actions"]
         texts = {action["type"]: action["definition"] for action in actions.values()}
         specs = message_types([*texts], [], lambda text: channel.send("progress", text=text), actions=texts)
@@ -40,11 +40,11 @@ class Ros2ActionServers:
         channel.send("ready", has_master=False)
 
     def obey(self, line: Fields) -> None:
-        """End a goal."""
+        """End a goal as a message from CodeBotler says."""
         self.graph.resolve(self.ends.pop(line["id"]), line)
 
     def leave(self) -> None:
-        """Leave the graph."""
+        """Leave the ROS graph."""
         self.graph.leave()
 
     def _make_callback(self, skill: str, spec: Any) -> Callable[[Any], Awaitable[Any]]:

@@ -1,4 +1,4 @@
-"""ROS 2 types, generated and compiled once if their packages are not installed; messages from plain data."""
+"""Import ROS 2 types, building them once if they are not installed, and fill messages from plain data."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from typing import Any, Callable, Dict, Sequence
 from channel import Fields, SetupError
 
 ACTION_PACKAGES = ("action_msgs", "builtin_interfaces", "service_msgs", "unique_identifier_msgs")
-"""The packages whose messages every action contains."""
+"""The packages with the message types that every action uses."""
 
 GENERATORS = (
     "generator_type_description",
@@ -41,7 +41,7 @@ for support in {supports}:  # ROS finds loaded libraries by name
 COMPILERS = {".c": "cc", ".cpp": "c++"}
 USED_TYPE = re.compile(r"^\s*(?:(\w+)/)?([A-Z]\w*)", re.MULTILINE)
 ProgressListener = Callable[[str], object]
-Definitions = Dict[str, str]  # by kind and name, such as action/GoTo
+Definitions = Dict[str, str]  # the texts of definitions by kind and name, such as action/GoTo
 
 
 def message_types(
@@ -54,13 +54,13 @@ def message_types(
     """Return the Python classes of messages, services and actions by names such as std_msgs/msg/String.
 
     Args:
-        names: all types that the process needs, since building a package includes no others.
+        names: all types that the process needs, since a package is built with these types only.
         folders: the folders of packages to build if they are not installed, with action/, msg/ or srv/.
-        tell: called with a sentence before a slow step.
-        actions: texts of .action files by name; installed types must have the same fields.
+        tell: a callback that receives a sentence before a slow step.
+        actions: the texts of .action files by type name; an installed type must have the same fields.
 
     Raises:
-        SetupError: a package or a definition is missing, different, or cannot be built.
+        SetupError: a package or definition is missing or cannot be built, or an action's fields differ.
     """
     sources, texts = {folder.name: folder for folder in folders}, actions or {}
     wanted: dict[str, Definitions] = {}
@@ -86,7 +86,7 @@ def message_types(
 
 
 def fields_of(definition: str) -> list[list[str]]:
-    """Return the names of the fields of goal, result and feedback."""
+    """Return the field names of the goal, the result and the feedback in the text of an .action file."""
     parts = (definition + "\n").split("---\n")
     return [[line.split()[1] for line in part.splitlines() if line.strip()] for part in parts]
 
@@ -95,20 +95,21 @@ def fill(message: Any, values: Fields, where: str = "") -> Any:
     """Set fields of a message from nested dictionaries, and return the message.
 
     Args:
-        message: the message; other fields stay unchanged.
-        values: by name; integers are allowed for floats.
-        where: the path of the message, with a dot at the end.
+        message: the message to modify.
+        values: the values by field name; a float field accepts an integer.
+        where: the path of the message for error messages, with a dot at the end.
 
     Raises:
         SetupError: a field does not exist, or a value does not fit.
     """
     kinds = message.get_fields_and_field_types()
     if hasattr(message, "_check_fields"):
-        message._check_fields = True  # rclpy may crash at a wrong value otherwise
+        message._check_fields = True  # without these checks, a wrong value can crash rclpy
     for name, value in values.items():
         path = where + name
         if name not in kinds:
-            raise SetupError(f"there is no field {path}, but {', '.join(where + kind for kind in kinds)}")
+            known = ", ".join(where + kind for kind in kinds)
+            raise SetupError(f"unknown field {path}; the fields are: {known}")
         try:
             setattr(message, name, _fit(getattr(message, name), kinds[name], value, path))
         except (AssertionError, TypeError, ValueError, OverflowError):
@@ -129,11 +130,11 @@ def _fit(default: Any, kind: str, value: Any, path: str) -> Any:
 
 def _is_installed(package: str) -> bool:
     spec = importlib.util.find_spec(package)
-    return spec is not None and spec.origin is not None  # a folder of definitions has none
+    return spec is not None and spec.origin is not None  # a plain folder of definitions has no origin
 
 
 def _definitions(folder: Path, wanted: list[str]) -> Definitions:
-    """Return the texts of definitions of a package, and of its messages that they use."""
+    """Return the texts of a package's wanted definitions, and of the package's messages that they use."""
     found: Definitions = {}
     while wanted:
         name, *wanted = wanted
@@ -173,10 +174,10 @@ def _check_action(name: str, definition: str) -> Any:
 
 
 def build_package(package: str, definitions: Definitions, tell: ProgressListener = lambda _: None) -> Path:
-    """Return a folder for sys.path with a package of these types; build the package the first time.
+    """Return a folder for sys.path that contains a package with these types, building it the first time.
 
     Raises:
-        SetupError: a used package or the C++ compiler is missing, or the build fails.
+        SetupError: a required package or a compiler is missing, or the build fails.
     """
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)  # the prefix of ROS from wheels
     from ament_index_python import PackageNotFoundError
@@ -216,12 +217,12 @@ def build_package(package: str, definitions: Definitions, tell: ProgressListener
 
 
 class _Build:
-    """Builds the part of a package that rclpy needs, like the CMake functions of ROS."""
+    """Builds the parts of a package that rclpy needs, as the CMake functions of ROS do."""
 
     def __init__(self, package: str, work: Path, shares: dict[str, Path], needed: list[str]) -> None:
         self.package, self.work, self.shares, self.needed = package, work, shares, needed
         self.made = work / "made" / package
-        self.introspection = work / "introspection" / package  # its files have the same names as others
+        self.introspection = work / "introspection" / package  # a separate folder, since file names collide
         self.prefixes = {shares[name].parents[1] for name in needed}
 
     def make(self, definitions: Definitions) -> None:
@@ -239,7 +240,7 @@ class _Build:
             *(f"-L{prefix / 'lib'}" for prefix in self.prefixes), *libraries, "-lstdc++"
         )  # fmt: skip
         libraries = [f"lib{self.package}__{support}.so" for support in TYPE_SUPPORTS]
-        for library in libraries:  # empty, but links to the module's symbols
+        for library in libraries:  # an empty library that links to the symbols of the module
             self._run(
                 "c++", "-shared", f"-Wl,-soname,{library}", "-Wl,--no-as-needed", "-Wl,-rpath,$ORIGIN",
                 "-Wl,--allow-shlib-undefined", str(self.made / module), "-o", str(self.made / library)
@@ -276,7 +277,7 @@ class _Build:
             generator.generate(self.package, files, includes, output_path=folder)
 
     def _units(self) -> Iterator[Path]:
-        """Yield the files to compile: one for each language, and the descriptions, whose names collide."""
+        """Yield the files to compile: one that includes all others, and descriptions, whose names collide."""
         for suffix in COMPILERS:
             files = sorted(self.work.rglob("*" + suffix))
             together = [path for path in files if not path.stem.endswith("__description")]

@@ -1,4 +1,4 @@
-"""The worker for ROS 2, run by a Python (3.8 or later) that has rclpy."""
+"""The worker for ROS 2, which runs under a Python (3.8 or later) that has rclpy."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from ros2_graph import Ros2Graph
 from ros2_types import fill, message_types
 
 KEEPOUT_TYPES = ("nav_msgs/msg/OccupancyGrid", "nav2_msgs/msg/CostmapFilterInfo")
-REJECTED = 1  # of action_msgs/srv/CancelGoal
-DISCOVERY_FACTOR = 3  # times the patience, for the first server
-PROGRESS_SECONDS = 2.0  # before a search for servers is reported
-RESULT_SECONDS = 1.0  # before a result is requested again
-ALL_GOALS = [0] * 16  # the id that means all goals in a cancel request
+REJECTED = 1  # a return code of action_msgs/srv/CancelGoal
+DISCOVERY_FACTOR = 3  # the time limit for finding the first server, as a multiple of the patience
+PROGRESS_SECONDS = 2.0  # how long a search for servers may take before it is reported
+RESULT_SECONDS = 1.0  # how long to wait for a result before requesting it again
+ALL_GOALS = [0] * 16  # the goal id that means all goals in a cancel request
 
 
 class Ros2Goal:
-    """The ROS 2 part of a goal; only the executor's thread changes it."""
+    """The ROS 2 state of a goal; only the executor's thread may change it."""
 
     def __init__(self) -> None:
-        self.uuid = list(uuid.uuid4().bytes)  # a known id allows a cancel before acceptance
+        self.uuid = list(uuid.uuid4().bytes)  # chosen by us, so that a goal can be cancelled early
         self.is_cancelling = False
-        self.result_request = 0.0  # the time of the last request for the result
+        self.result_request = 0.0  # when the result was last requested
 
 
 class Ros2Server(Server):
-    """The action server of one skill, seen from a client."""
+    """A client for the action server of one skill."""
 
     def __init__(self, worker: Ros2Worker, action: Fields, spec: Any) -> None:
         import rclpy.action
@@ -59,19 +59,19 @@ class Ros2Server(Server):
         self.has_cancelled = False
 
     def last_sign(self) -> float:
-        """Return now if the server is on the graph, since DDS keeps a dead one until its lease ends."""
+        """Return the current time if the server is on the graph, else 0; DDS removes dead servers late."""
         return time.monotonic() if self.client.server_is_ready() else 0.0
 
     def is_connected(self, _silence: float) -> bool:
-        """Whether the server is on the graph."""
+        """Return whether the server is on the graph."""
         return bool(self.client.server_is_ready())
 
     def has_pictures(self) -> bool:
-        """Whether it publishes pictures."""
+        """Return whether the server publishes pictures."""
         return bool(self._graph.ours.count_publishers(f"{self.name}/picture"))
 
     def cancel(self) -> None:
-        """Request to cancel all goals of all clients; `has_cancelled` shows the confirmation."""
+        """Request the cancellation of all goals of all clients; the answer sets `has_cancelled`."""
         self._graph.call_soon(lambda: self.request_cancel(ALL_GOALS).add_done_callback(self._confirm))
 
     def _confirm(self, done: Any) -> None:
@@ -79,14 +79,14 @@ class Ros2Server(Server):
             self.has_cancelled = True
 
     def request_cancel(self, number: list[int]) -> Any:
-        """Request to cancel a goal, or ALL_GOALS; return a future. Only for the executor's thread."""
+        """Request to cancel a goal, or ALL_GOALS, and return a future; call this in the executor's thread."""
         request = self._request()
         request.goal_info.goal_id.uuid = number
         return self._cancels.call_async(request)
 
 
 class Ros2Service(Server):
-    """A service that performs a skill; it cannot be cancelled."""
+    """A client for a service that performs a skill; a call cannot be cancelled."""
 
     def __init__(self, worker: Ros2Worker, call: Fields, spec: Any) -> None:
         super().__init__(call)
@@ -94,17 +94,17 @@ class Ros2Service(Server):
         self.client = worker.graph.ours.create_client(spec, self.name)
 
     def is_connected(self, _silence: float) -> bool:
-        """Whether the service is on the graph."""
+        """Return whether the service is on the graph."""
         return bool(self.client.service_is_ready())
 
     def perform(self, message: Any, end: Callable[[Fields], None]) -> None:
-        """Call the service, and end with its answer."""
+        """Call the service, and pass its answer to `end`."""
         answer = self.client.call_async(message)
         answer.add_done_callback(lambda done: end(as_data(done.result())))
 
 
 class Ros2Topic(Server):
-    """A topic whose messages perform a skill; nobody confirms them."""
+    """A publisher for a topic whose messages make the robot perform a skill, without a confirmation."""
 
     def __init__(self, worker: Ros2Worker, call: Fields, spec: Any) -> None:
         super().__init__(call)
@@ -112,11 +112,11 @@ class Ros2Topic(Server):
         self.publisher = worker.graph.ours.create_publisher(spec, self.name, 10)
 
     def is_connected(self, _silence: float) -> bool:
-        """Whether the topic has subscribers."""
+        """Return whether the topic has subscribers."""
         return bool(self.publisher.get_subscription_count())
 
     def perform(self, message: Any, end: Callable[[Fields], None]) -> None:
-        """Publish a message."""
+        """Publish a message, and pass an empty answer to `end`."""
         self.publisher.publish(message)
         end({})
 
@@ -131,7 +131,7 @@ class Ros2Worker(SkillWorker):
     silence_says = "it has left the graph; DDS reports a killed process only after its lease, by default 20 s"
 
     def connect(self, start: Fields) -> bool:
-        """Start our node, and a client for each server; return whether a dead worker left its node."""
+        """Start our node and a client for each server; return whether a dead worker left its node behind."""
         from rclpy.qos import DurabilityPolicy, QoSProfile
 
         calls, self._packages = start["calls"], start["packages"]
@@ -154,12 +154,12 @@ class Ros2Worker(SkillWorker):
         return has_dead_twin
 
     def publish(self, topic: str, fields: Fields) -> None:
-        """Publish a latched message."""
+        """Publish a latched message on one of the keepout topics."""
         publisher = self._latched[topic]
         self.graph.call_soon(publisher.publish, fill(publisher.msg_type(), fields))
 
     def cancel_all(self) -> bool:
-        """Cancel all goals of all clients; return whether all servers on the graph have confirmed it."""
+        """Cancel all goals of all clients; return whether every server on the graph has confirmed this."""
         waiting = [server for server in self.servers.values() if server.is_connected(self.silence)]
         deadline = time.monotonic() + self.patience
         while waiting and time.monotonic() < deadline:
@@ -170,7 +170,7 @@ class Ros2Worker(SkillWorker):
         return not waiting
 
     def wait_for_servers(self) -> None:
-        """Wait while new servers are discovered."""
+        """Wait as long as new servers keep appearing on the graph."""
         start = change = time.monotonic()
         found, has_reported = 0, False
         while found < len(self.servers) and not self.graph.has_left():
@@ -185,7 +185,7 @@ class Ros2Worker(SkillWorker):
             time.sleep(0.01)
 
     def send(self, goal: Goal, fields: Fields) -> None:
-        """Send a goal in the executor's thread, since rclpy can lose answers to other threads."""
+        """Send a goal in the executor's thread, because rclpy can lose answers to other threads."""
         try:
             message = fill(goal.server.message(), fields)
             _check_sendable(message, fields)
@@ -206,16 +206,16 @@ class Ros2Worker(SkillWorker):
     def listen(
         self, topic: str, hear: Callable[[Fields], object], *, is_needed: bool = True
     ) -> Callable[[], object] | None:
-        """Subscribe to a topic, as in `SkillWorker.listen`."""
+        """Subscribe to a topic; see `SkillWorker.listen`."""
         return self.graph.listen(topic, hear, self._packages, self.patience if is_needed else None)
 
     def _report(self, text: str) -> None:
         self.channel.send("progress", text=text)
 
     def look_after(self, goal: Goal, sent: float, now: float) -> None:
-        """Repeat requests: a cancel may overtake its goal, and an answer may be lost."""
+        """Repeat requests, because a cancel can arrive before its goal, and an answer can get lost."""
         super().look_after(goal, sent, now)
-        if goal.is_over or goal.handle is None:  # services and topics cannot be cancelled
+        if goal.is_over or goal.handle is None:  # calls of services and topics have no handle
             return
         if (
             goal.cancelled is not None
@@ -242,14 +242,14 @@ class Ros2Worker(SkillWorker):
         ).add_done_callback(lambda done: self._handle_response(goal, done.result()))
 
     def _handle_response(self, goal: Goal, handle: Any) -> None:
-        """Record whether the server accepts the goal."""
+        """Handle the server's answer, which accepts or rejects the goal."""
         if handle.accepted:
             self._accept(goal)
         else:
             self.end(goal, "cancelled" if goal.cancelled else "error", state="rejected", text="")
 
     def update_status(self, server: Ros2Server, statuses: Any) -> None:
-        """Record the published status of the current goal."""
+        """Process the status messages of a server, as far as they are about the current goal."""
         goal = self.goal
         if goal is None or goal.is_over or goal.handle is None or goal.server is not server:
             return
@@ -294,10 +294,10 @@ class Ros2Worker(SkillWorker):
 
 
 def _check_sendable(message: Any, fields: Fields) -> None:
-    """Raise an error if a message cannot be sent, since that would end the executor's thread later."""
+    """Raise an error if a message cannot be sent, before it can crash the executor's thread."""
     from rclpy.serialization import serialize_message
 
-    if r"\x00" in repr(fields).replace(r"\\", ""):  # ROS 2 cuts strings at NUL
+    if r"\x00" in repr(fields).replace(r"\\", ""):  # ROS 2 truncates strings at NUL
         raise ValueError("a text contains NUL")
     serialize_message(message)
 

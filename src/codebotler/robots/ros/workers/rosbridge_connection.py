@@ -1,4 +1,4 @@
-"""The websocket to a rosbridge."""
+"""The websocket connection to a rosbridge."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from channel import Fields
 from rosbridge_protocol import ActionProtocol, GoalUpdate, Ros1Protocol, Ros2Protocol, service_updates
 
 VERSION_REQUEST = {"op": "call_service", "id": "version", "service": "/rosapi/get_ros_version", "args": {}}
-VERSION_SECONDS = 2.0  # for the version of ROS; a rosbridge without rosapi does not answer
-SETTLE_SECONDS = 1.5  # from the first status of a server until its results arrive, on a busy machine
-INSIST_SECONDS, RESEND_PAUSE = 3.0, 0.1  # seconds; the first messages may arrive before the server listens
+VERSION_SECONDS = 2.0  # how long to wait for the ROS version; a rosbridge without rosapi does not answer
+SETTLE_SECONDS = 1.5  # the time from a server's first status until its results arrive, on a busy machine
+INSIST_SECONDS, RESEND_PAUSE = 3.0, 0.1  # how long and how often to repeat a message nobody may hear yet
 OPEN_SECONDS, SOCKET_CLOSE_SECONDS = 5.0, 1.0
 CONNECTION_FAULTS = (OSError, ValueError, WebSocketException)
 
 
 class RosbridgeConnection:
-    """Sends messages; a thread calls `hear` with updates of goals, and `lost` once."""
+    """Sends messages, and runs a thread that passes goal updates to `hear` and calls `lost` at the end."""
 
     def __init__(
         self,
@@ -41,14 +41,14 @@ class RosbridgeConnection:
         self._version: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._heard_first: dict[str, float] = {}
         self._listeners: dict[str, tuple[Callable[[Fields], object], ...]] = {}
-        self.heard: dict[str, float] = {}  # the time of each server's last status
-        self.settled: set[str] = set()  # servers whose results arrive
+        self.heard: dict[str, float] = {}  # when each server last sent its status
+        self.settled: set[str] = set()  # the servers whose results will arrive
         self.is_lost = self.has_ended = False
         self.complaint = ""
         self.protocol: ActionProtocol = Ros1Protocol()
         threading.Thread(target=self._read, daemon=True).start()
         self.send(VERSION_REQUEST)
-        with suppress(queue.Empty):  # there is no rosapi
+        with suppress(queue.Empty):  # without an answer, assume ROS 1
             if self._version.get(timeout=VERSION_SECONDS) == 2:  # noqa: PLR2004 - ROS 2
                 self.protocol = Ros2Protocol()
         self.opening = [m for a in actions for m in self.protocol.opening(a["server"], a["type"])]
@@ -56,12 +56,12 @@ class RosbridgeConnection:
             self.send(message)
 
     def send(self, message: Fields) -> None:
-        """Send a message; a lost connection shows in `is_lost`."""
+        """Send a message; if the connection is lost, `is_lost` becomes true."""
         with suppress(ConnectionClosed):
             self._socket.send(json.dumps(message))
 
     def listen(self, topic: str, hear: Callable[[Fields], object]) -> Callable[[], None]:
-        """Subscribe to a topic; return the function that ends all its subscriptions."""
+        """Subscribe to a topic; return a function that ends all subscriptions to this topic."""
         if topic not in self._listeners:
             self.send({"op": "subscribe", "topic": topic})
         self._listeners[topic] = (*self._listeners.get(topic, ()), hear)
@@ -73,7 +73,7 @@ class RosbridgeConnection:
         return unsubscribe
 
     def insist(self, message: Fields) -> bool:
-        """Send a message repeatedly over another connection; return whether that was possible."""
+        """Send a message repeatedly over a new connection; return whether this was possible."""
         deadline, is_sent = time.monotonic() + INSIST_SECONDS, False
         while time.monotonic() < deadline:
             with (
@@ -91,20 +91,20 @@ class RosbridgeConnection:
         return is_sent
 
     def leave(self) -> None:
-        """Disconnect."""
+        """Close the connection."""
         self._lost = lambda: None
         self._socket.close()
 
     def has_left(self) -> bool:
-        """Whether the connection is lost, and the reaction to that is complete."""
+        """Return whether the connection is lost and `lost` has been called."""
         return self.has_ended
 
     def explain_end(self) -> str:
-        """Return the message for a lost connection."""
-        return f"the connection with {self.address} was lost"
+        """Return a message that the connection was lost."""
+        return f"the connection to {self.address} was lost"
 
     def explain_missing(self, server: str, _type: str) -> str:
-        """Return why an action server cannot be reached."""
+        """Return a message that explains why an action server cannot be reached."""
         if self.is_lost:
             return self.explain_end()
         why = f" ({self.complaint})" if self.complaint else ""

@@ -1,4 +1,4 @@
-"""Messages of a rosbridge: topics for actions of ROS 1, operations for those of ROS 2."""
+"""The rosbridge messages for goals: ROS 1 actions use topics, and ROS 2 actions have their own operations."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from message_types import parts_of
 
 NO_STAMP = {"secs": 0, "nsecs": 0}
 RECALLED = 7
-"""The status of a goal that was cancelled before it began."""
+"""The status of a goal that was cancelled before it started."""
 
 
 @dataclass(frozen=True)
 class GoalUpdate:
-    """An update of a goal; without a `goal`, a sign of life of the server."""
+    """News about a goal, or, if `goal` is empty, a status message that only shows that a server is alive."""
 
-    goal: str
-    what: str  # status (the server has accepted the goal), feedback or ended
-    state: str = ""  # succeeded, aborted, rejected, cancelled or lost; a status may have it before the end
-    text: str = ""
-    values: Fields = field(default_factory=dict)
-    server: str = ""  # of a status
+    goal: str  # the goal id, or an empty string
+    what: str  # status (which implies that the server has accepted the goal), feedback or ended
+    state: str = ""  # the final state (succeeded, aborted, rejected, cancelled or lost) if it is known
+    text: str = ""  # the server's explanation of the state
+    values: Fields = field(default_factory=dict)  # the fields of the feedback or the result
+    server: str = ""  # the server that sent a status
 
 
 class Ros1Protocol:
-    """Actions of ROS 1, whose goals and results are topics."""
+    """ROS 1 actions, whose goals, results and statuses are messages on topics."""
 
-    has_status = True  # servers send a status all the time, so silence means death
+    has_status = True  # servers send their status regularly, so a silent server is dead
 
     def opening(self, server: str, action: str) -> Iterator[Fields]:
-        """Advertise goals and cancels, and subscribe to the rest."""
+        """Yield messages that advertise goals and cancels, and subscribe to the server's other topics."""
         kind = "/".join(parts_of(action)) + "Action"
         ours = {"goal": f"{kind}Goal", "cancel": "actionlib_msgs/GoalID"}
         theirs = {
             "result": f"{kind}Result",
             "feedback": f"{kind}Feedback",
-            "status": "actionlib_msgs/GoalStatusArray",  # last, so that it implies the others
+            "status": "actionlib_msgs/GoalStatusArray",  # last, because it shows that the others are set up
         }
         for name, of in ours.items():
             yield {"op": "advertise", "topic": f"{server}/{name}", "type": of}
@@ -47,16 +47,16 @@ class Ros1Protocol:
             yield {"op": "subscribe", "topic": f"{server}/{name}", "type": of}
 
     def goal(self, server: str, _action: str, goal: str, fields: Fields) -> Fields:
-        """Publish a goal; sending it again is harmless, since a server accepts each id only once."""
+        """Return the message for a goal, which may be sent again because servers accept an id only once."""
         msg = {"goal_id": {"id": goal, "stamp": NO_STAMP}, "goal": fields}
         return {"op": "publish", "topic": f"{server}/goal", "msg": msg}
 
     def cancel(self, server: str, goal: str) -> Fields:
-        """Publish the id of a goal; an empty one cancels all goals."""
+        """Return the message that cancels a goal, or all goals if the id is empty."""
         return {"op": "publish", "topic": f"{server}/cancel", "msg": {"id": goal, "stamp": NO_STAMP}}
 
     def updates(self, message: Fields) -> Iterator[GoalUpdate]:
-        """Yield the updates in a published message."""
+        """Yield the goal updates in a received message."""
         match message:
             case {"op": "publish", "topic": str(topic), "msg": {"status_list": list(statuses)}}:
                 server = topic.rpartition("/")[0]
@@ -75,16 +75,16 @@ class Ros1Protocol:
 
 
 class Ros2Protocol:
-    """Actions of ROS 2, for which rosbridge has operations; tested only against a simulated rosbridge."""
+    """ROS 2 actions, which rosbridge supports directly; tested only against a simulated rosbridge."""
 
     has_status = False
 
     def opening(self, _server: str, _action: str) -> Iterator[Fields]:
-        """Send nothing."""
+        """Yield nothing, because ROS 2 actions need no preparation."""
         yield from ()
 
     def goal(self, server: str, action: str, goal: str, fields: Fields) -> Fields:
-        """Send a goal, and request feedback."""
+        """Return the message for a goal, with a request for feedback."""
         return {
             "op": "send_action_goal",
             "id": goal,
@@ -95,24 +95,24 @@ class Ros2Protocol:
         }
 
     def cancel(self, server: str, goal: str) -> Fields:
-        """Cancel a goal."""
+        """Return the message that cancels a goal."""
         return {"op": "cancel_action_goal", "id": goal, "action": server}
 
     def updates(self, message: Fields) -> Iterator[GoalUpdate]:
-        """Yield the updates in an answer."""
+        """Yield the goal updates in a received message."""
         match message:
             case {"op": "action_feedback", "id": str(goal), "values": dict(values)}:
                 yield GoalUpdate(goal, "feedback", values=values)
             case {"op": "action_result", "id": str(goal), "status": int(status), "values": dict(values)}:
                 yield GoalUpdate(goal, "ended", ROS2_ENDS.get(status, "lost"), values=values)
-            case {"op": "action_result", "id": str(goal), "values": why}:  # it could not even be sent
+            case {"op": "action_result", "id": str(goal), "values": why}:  # rosbridge could not send the goal
                 yield GoalUpdate(goal, "ended", "lost", text=str(why))
 
 
 def service_updates(message: Fields) -> Iterator[GoalUpdate]:
-    """Yield the updates in a service's answer."""
+    """Yield the end of the call if a received message is the answer of a service."""
     match message:
-        case {"op": "service_response", "id": str(goal), "result": True, **more}:  # values may be left out
+        case {"op": "service_response", "id": str(goal), "result": True, **more}:  # `values` is optional
             yield GoalUpdate(goal, "ended", "succeeded", values=more.get("values") or {})
         case {"op": "service_response", "id": str(goal), **more}:
             yield GoalUpdate(goal, "ended", "aborted", text=str(more.get("values", "")))

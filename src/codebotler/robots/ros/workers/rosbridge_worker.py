@@ -1,4 +1,4 @@
-"""The worker for a robot behind a rosbridge, run by CodeBotler's own Python."""
+"""The worker for a robot behind a rosbridge, which runs under CodeBotler's own Python."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from message_types import parts_of
 from rosbridge_connection import CONNECTION_FAULTS, INSIST_SECONDS, SETTLE_SECONDS, RosbridgeConnection
 from rosbridge_protocol import GoalUpdate
 
-RESEND_SECONDS = 0.5  # before a message without effect is sent again
+RESEND_SECONDS = 0.5  # how long to wait before sending a message again that had no effect
 
 
 class RosbridgeServer(Server):
-    """The action server of one skill, seen through a rosbridge."""
+    """A client, through a rosbridge, for the action server, service or topic of one skill."""
 
     def __init__(self, connection: RosbridgeConnection, action: Fields) -> None:
         super().__init__(action)
@@ -27,13 +27,13 @@ class RosbridgeServer(Server):
             connection.send({"op": "advertise", "topic": self.name, "type": "/".join(parts_of(self.type))})
 
     def last_sign(self) -> float:
-        """Return the time of its last status; now, if the protocol has none."""
+        """Return when the server last sent its status, or the current time if it sends none."""
         if self._connection.protocol.has_status and self.kind == "action":
             return self._connection.heard.get(self.name, 0.0)
         return time.monotonic()
 
     def is_connected(self, _silence: float) -> bool:
-        """Whether goals, results and messages will arrive."""
+        """Return whether goals and messages will reach the server, and its results will reach us."""
         if self._connection.is_lost:
             return False
         if self.kind == "topic":
@@ -42,7 +42,7 @@ class RosbridgeServer(Server):
         return not has_status or self.name in self._connection.settled
 
     def cancel(self, goal: str = "") -> None:
-        """Cancel one goal, or all goals of all clients."""
+        """Cancel one goal, or all goals of all clients; services and topics ignore this."""
         if self.kind == "action":
             self._connection.send(self._connection.protocol.cancel(self.name, goal))
 
@@ -54,7 +54,7 @@ class RosbridgeWorker(SkillWorker):
     settles = SETTLE_SECONDS
 
     def connect(self, start: Fields) -> bool:
-        """Open the connection; return False, since dead workers leave no node."""
+        """Open the connection; return False, because dead workers leave no node behind."""
         calls = start["calls"]
         actions = [call for call in calls.values() if call["kind"] == "action"]
         try:
@@ -72,16 +72,16 @@ class RosbridgeWorker(SkillWorker):
     def listen(
         self, topic: str, hear: Callable[[Fields], object], *, is_needed: bool = True
     ) -> Callable[[], object]:
-        """Subscribe to a topic, as in `SkillWorker.listen`; a missing topic stays unnoticed."""
+        """Subscribe to a topic; see `SkillWorker.listen`, except that missing publishers go unnoticed."""
         del is_needed
         return self.graph.listen(topic, hear)
 
     def missing(self) -> dict[str, str]:
-        """Return nothing, since missing servers show only when their skills are performed."""
+        """Return no messages, because missing servers are noticed only when their skills are performed."""
         return {}
 
     def cancel_all(self) -> bool:
-        """Cancel all goals repeatedly for a while; return False on ROS 2, which only cancels single goals."""
+        """Cancel all goals repeatedly for a while; return False on ROS 2, where this is not possible."""
         if not self.graph.protocol.has_status:
             return False
         deadline = time.monotonic() + INSIST_SECONDS
@@ -90,7 +90,7 @@ class RosbridgeWorker(SkillWorker):
         return not self.graph.is_lost
 
     def send(self, goal: Goal, fields: Fields) -> None:
-        """Send a goal, call a service, or publish a message."""
+        """Send a goal, call a service, or publish a message, depending on the kind of server."""
         server, protocol = goal.server, self.graph.protocol
         number = goal.handle = str(uuid.uuid4())
         if server.kind == "action":
@@ -109,7 +109,7 @@ class RosbridgeWorker(SkillWorker):
             self.end(goal, "result", values={})
 
     def look_after(self, goal: Goal, sent: float, now: float) -> None:
-        """Send messages without effect again."""
+        """Check the goal, and send a goal or a cancel again if it had no effect."""
         if self.graph.is_lost:
             return
         super().look_after(goal, sent, now)
@@ -140,15 +140,15 @@ class RosbridgeWorker(SkillWorker):
             self.finish(goal, update.state, update.values, text)
 
     def _lost(self) -> None:
-        """Cancel the current goal over another connection."""
+        """After the connection is lost, cancel the current goal over a new connection."""
         goal = self.goal
         if goal is not None and goal.sent is not None and not goal.is_over:
             where = self.graph.address
             cancel = self.graph.protocol.cancel(goal.server.name, goal.handle)
             if goal.server.kind == "action" and self.graph.insist(cancel):
-                text = f"the connection with {where} was lost; its goal was cancelled over another one"
+                text = f"the connection to {where} was lost; its goal was cancelled over a new connection"
             else:
-                text = f"the connection with {where} was lost, and its goal goes on: STOP THE ROBOT BY HAND"
+                text = f"the connection to {where} was lost, but its goal continues: STOP THE ROBOT BY HAND"
             self.end(goal, "lost", text=text)
 
 

@@ -1,4 +1,4 @@
-"""Action servers of a virtual robot, run by a Python that has rospy; the tool decides how goals end."""
+"""Action servers of a virtual robot on ROS 1, run by a Python that has rospy; CodeBotler performs goals."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from message_types import action_types
 
 
 class ActionServers:
-    """One action server for each skill, and a master if none answers.
+    """Offers an action server for each skill, and starts a master if none answers.
 
-    The first line has the `node`, the `actions` by skill, and the `port` for a master, or null.
+    The first message contains the `node` name, the `actions` by skill, and the `port` for a master, or null.
     """
 
     def __init__(self, channel: Channel, start: Fields) -> None:
@@ -42,7 +42,7 @@ class ActionServers:
         channel.send("ready", has_master=self.master is not None)
 
     def obey(self, line: Fields) -> None:
-        """End a goal."""
+        """End a goal as a message from CodeBotler says."""
         with self.lock:
             handle = self.handles.pop(line["id"])
         result = handle.get_default_result()
@@ -56,7 +56,7 @@ class ActionServers:
             handle.set_canceled(result, "cancelled")
 
     def leave(self) -> None:
-        """Leave the graph, and stop our master."""
+        """Leave the ROS graph, and stop the master if we started it."""
         self.graph.leave()
         if self.master is not None:
             self.master.stop()
@@ -77,7 +77,7 @@ class ActionServers:
 
 
 def start_master(port: int | None, uri: str) -> Any:
-    """Start a master in this process at a port of this machine."""
+    """Start a master in this process, on a port of this machine."""
     if port is None:
         raise SetupError(no_master(uri))
     import rosmaster.master
