@@ -1,4 +1,4 @@
-"""Operators about order, conditions and loops."""
+"""Mutation operators that change the order of steps, conditions and loops."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def negate_a_condition(program: ProgramTree, _: Context) -> Edits:
 
 def drop_a_condition(program: ProgramTree, _: Context) -> Edits:
     """Replaces a condition by true, so that the program always acts."""
-    of_loops = {loop.test for loop in program.loops if isinstance(loop, ast.While)}  # would never end
+    of_loops = {loop.test for loop in program.loops if isinstance(loop, ast.While)}  # mutants would never end
     for test in _tests(program):
         if test not in of_loops and not isinstance(test, ast.Constant):
             yield {test: expression("True")}
@@ -103,7 +103,7 @@ def swap_steps(program: ProgramTree, _: Context) -> Edits:
             if idle & {first, second} or isinstance(first, ast.FunctionDef | ast.ClassDef):
                 continue
             kinds = skills_in(first), skills_in(second)
-            # Two sentences or two questions have no order.
+            # Instructions do not prescribe the order of two messages or two questions.
             if all(kinds) and (kinds[0] != kinds[1] or "go_to" in kinds[0]):
                 yield {first: second, second: first}
 
@@ -122,7 +122,6 @@ def stop_at_the_first(program: ProgramTree, _: Context) -> Edits:
 
 
 def _inside(block: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """The statements of a loop's body outside of inner loops."""
     for statement in block:
         yield statement
         if isinstance(statement, ast.If):

@@ -1,4 +1,4 @@
-"""Operators about numbers and about what the robot remembers."""
+"""Mutation operators that change numbers, counters and collections."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def off_by_one(program: ProgramTree, _: Context) -> Edits:
 
 
 def _is_exact(node: ast.AST) -> bool:
-    """Whether the numbers in a node count, compare or scale, rather than propose something."""
+    """Whether numbers in a node are used to count, compare or scale; other numbers may be arbitrary."""
     match node:
         case ast.Compare() | ast.Subscript() | ast.AugAssign():
             return True

@@ -1,4 +1,4 @@
-"""Operators about what the robot picks up and puts down."""
+"""Mutation operators that change which objects the robot picks up and puts down."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PUTTING_DOWN = re.compile(
 
 
 def _is_put_down(context: Context) -> bool:
-    """Whether every phrasing that has something brought here also has it put down."""
+    """Whether each prompt that asks to bring something here also asks to put it down."""
     return not any(BRINGING_HERE.search(one) and not PUTTING_DOWN.search(one) for one in context.prompts)
 
 

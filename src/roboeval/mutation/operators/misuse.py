@@ -1,4 +1,4 @@
-"""Operators about a user's own skills: wrong values, errors that nobody handles, steps left out."""
+"""Mutation operators for custom skills: wrong arguments, unhandled errors and missing steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Operators about where the robot drives and what it looks for there."""
+"""Mutation operators that change where the robot drives and what it looks for."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ STAYING_OUT = prompt_matches(
 
 
 def _sequences(program: ProgramTree) -> Iterator[ast.expr]:
-    """Sequences that a loop or a comprehension goes through, and all lists of rooms."""
+    """Yield the sequences that loops and comprehensions iterate over, and all lists of rooms."""
     found = [node.iter for node in program.nodes if isinstance(node, ast.For | ast.comprehension)]
     yield from found
     yield from (call for call in program.calls("get_all_rooms") if call not in found)
@@ -45,7 +45,7 @@ def skip_the_last(program: ProgramTree, _: Context) -> Edits:
 
 
 def _return_places(program: ProgramTree) -> dict[ast.Call, ast.expr]:
-    """The drives to a former location of the robot, and these places."""
+    """Find the calls that drive to a location stored earlier, and map each to its argument."""
     kept = set()
     for node in program.nodes:
         match node:
@@ -131,7 +131,7 @@ def plural_rooms(program: ProgramTree, _: Context) -> Edits:
 
 
 def _looks(program: ProgramTree) -> list[ast.Call]:
-    """The looks whose result decides, not those joined by `or`."""
+    """Find the looks whose result is used, except operands of `or`."""
     choices = (node for node in program.nodes if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.Or))
     idle = {value for choice in choices for value in choice.values}
     idle |= {call for _, call in program.steps("is_in_room")}

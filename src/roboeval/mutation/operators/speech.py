@@ -1,4 +1,4 @@
-"""Operators about what the robot asks and says, and when."""
+"""Mutation operators that change questions, answers and messages."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _answers(call: ast.Call) -> Iterator[ast.expr]:
 
 
 def _used(program: ProgramTree) -> Iterator[tuple[ast.Call, ast.expr]]:
-    """The questions whose answer is used, with each of its answers."""
+    """Yield each question whose answer is used, with its first and last option."""
     unused = {call for _, call in program.steps("ask")}
     for call in program.calls("ask"):
         if call not in unused:
@@ -148,7 +148,7 @@ def unknown_option(program: ProgramTree, _: Context) -> Edits:
 
 
 def _messages(program: ProgramTree) -> Iterator[ast.AST]:
-    """All nodes that may be part of a message: all but the calls of other skills."""
+    """Find all nodes that may be part of a message, which excludes calls of other skills."""
     other_calls = (node for node in program.nodes if skill_of(node) not in {None, "say"})
     elsewhere = {inner for call in other_calls for inner in ast.walk(call)}
     return (node for node in program.nodes if node not in elsewhere)
@@ -223,7 +223,7 @@ def leave_out_a_value(program: ProgramTree, _: Context) -> Edits:
 def swap_values(program: ProgramTree, _: Context) -> Edits:
     """Swaps two values in a message."""
     targets = (node.target for node in program.nodes if isinstance(node, ast.For | ast.comprehension))
-    gone_through = {name for target in targets for name in names_in(target, ast.Store)}  # has no place
+    gone_through = {name for target in targets for name in names_in(target, ast.Store)}  # loop variables
     for a, b in _neighbours(program):
         if not {_variable(a), _variable(b)} & gone_through:
             yield {a: b, b: a}
