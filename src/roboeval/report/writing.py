@@ -172,7 +172,6 @@ def expect_no_others(out: Path) -> None:
 
 
 def _remove_others(out: Path, names: AbstractSet[str]) -> None:
-    """Remove files of an earlier report that the new report does not contain."""
     for name in {*page_words()["figures"], *page_words()["tables"]} - names:
         for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FIGURE_FORMATS)):
             (out / file).unlink(missing_ok=True)

@@ -39,8 +39,6 @@ async def draw_comparison(store: RunStore, names: Sequence[str]) -> None:
 
 
 class _Comparison:
-    """Shows runs side by side, and keeps them up to date with their folders."""
-
     def __init__(self, store: RunStore, names: Sequence[str]) -> None:
         self._store, self._names = store, names
         self._versions: list[Hashable] = []

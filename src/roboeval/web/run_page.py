@@ -39,8 +39,6 @@ async def draw_run(store: RunStore, name: str, chosen: CompletionFilter, evaluat
 
 
 class _RunPage:
-    """Shows a run, and keeps it up to date with its folder."""
-
     timer: ui.timer
 
     def __init__(

@@ -50,8 +50,6 @@ async def draw_runs(folder: Path, runs: RunList) -> None:
 
 
 class _Table:
-    """Shows all runs as a table, and keeps it up to date."""
-
     def __init__(self, runs: RunList) -> None:
         self._runs = runs
         self._order = "Run"
@@ -108,8 +106,6 @@ class _Table:
 
 
 class _RunRow:
-    """Shows a run as a row of the table."""
-
     def __init__(self, name: str) -> None:
         self.name = name
         with html.tr():
@@ -140,7 +136,6 @@ class _RunRow:
                 self._date = PlainText("span")
 
     def show(self, run: Mapping[str, Any]) -> None:
-        """Show the data that `run_data` returns for a run."""
         by_hand = ", programs written by hand" if run.get("by_hand") else ""
         self._models.say(shortened(", ".join(run.get("models", ())), 160) + by_hand)
         self._settings.say(shortened(run.get("settings") or "", 160))
