@@ -107,7 +107,6 @@ def _json(data: object) -> Response:
 
 
 def _raise_http_errors() -> Iterator[None]:
-    """Convert errors for users to HTTP errors."""
     try:
         yield
     except MissingError as error:

@@ -38,9 +38,7 @@ from roboeval.web.widgets import ProgramView
 MAX_SENTENCE, MAX_INSTRUCTION, MAX_REPLY = 2_000, 5_000, 50_000
 FAILED_STEP_NOTE = "Red marks the step at which a check failed."
 NEIGHBOUR_LINKS = ("Previous completion", "Next completion")
-PROGRAM_CHANGED = (
-    "The program was changed or removed after it was judged. The verdicts refer to the earlier version."
-)
+PROGRAM_CHANGED = "The program was changed or removed after judging. Verdicts refer to the earlier version."
 
 
 async def draw_completion(
@@ -118,7 +116,7 @@ def _draw_program(data: Mapping[str, Any]) -> None:
         title = "Program" if _no_program_sentence(data) is None else "Extracted from the reply"
         PlainText("h2", title).props("id=h-program")
         if data["program"] is None:
-            PlainText("p", "The program is no longer in this run.", "quiet")
+            PlainText("p", "This run no longer contains the program.", "quiet")
             return
         ran = data["worlds"] if _no_program_sentence(data) is None else ()
         lines = (world["line"] for world in ran if not world["satisfied"])
@@ -133,7 +131,6 @@ def _no_program_sentence(data: Mapping[str, Any]) -> str | None:
 
 
 def _draw_reply(reply: Mapping[str, Any] | None) -> None:
-    """Draw how the reply ended, with its reasoning and full text in foldable sections."""
     if reply is None:
         return
     with ui.element("section").classes("pane reply").props("aria-labelledby=h-reply"):
