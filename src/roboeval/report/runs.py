@@ -130,7 +130,7 @@ def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
         found = [at for at, known in enumerate(names) if run.rstrip("/") in known]
         if len(found) != 1:
             which = "more than one run has that name" if found else "no such run is in the report"
-            raise UserError(f'--label names "{run}", but {which}; name one of {", ".join(map(str, paths))}')
+            raise UserError(f'--label is for "{run}", but {which}; use one of {", ".join(map(str, paths))}')
         labels[found[0]] = label.strip()
     return labels
 

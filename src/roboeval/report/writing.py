@@ -167,7 +167,7 @@ def expect_no_others(out: Path) -> None:
     start = page_file.read_bytes()[:GENERATOR_WITHIN] if page_file.is_file() else b""
     if others and GENERATOR.encode() not in start:
         raise UserError(
-            f'is not a report but contains other files such as "{others[0]}"; name a new folder', file=out
+            f'is not a report but contains other files such as "{others[0]}"; choose another folder', file=out
         )
 
 

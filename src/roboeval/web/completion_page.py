@@ -81,7 +81,7 @@ def _draw_head(
     run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: CompletionFilter, query: str
 ) -> None:
     key: CompletionKey = data["task"], data["prompt"], data["index"]
-    with ui.element("nav").classes("trail").props('aria-label="Where this is"'):
+    with ui.element("nav").classes("trail").props('aria-label="Breadcrumb"'):
         html.a(
             shortened(run.name, MAX_NAME), href=outside(f"{run_address(run.name)}{query}#completions")
         ).props("dir=auto")
