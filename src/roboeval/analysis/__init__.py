@@ -1,4 +1,4 @@
-"""Statistics of verdicts: pass@k, causes of failures, differences between models, similar failures.
+"""Statistics of verdicts: pass@k, causes of failures, differences between models, and similar failures.
 
-Start with `metrics.py`. Nothing here runs a program.
+Start with `metrics.py`. This package never runs a program.
 """

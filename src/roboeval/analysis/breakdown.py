@@ -1,4 +1,4 @@
-"""Pass rates by the abilities that a task needs, by whether the robot must report back, and by phrasing."""
+"""Breaks pass rates down by required ability, by whether the robot must report back, and by phrasing."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ NO_SUCH_ROOM_ERROR = "GoToInvalidLocation"
 
 
 def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Estimate, Mapping[str, float]]]:
-    """Break results down by the abilities that tasks need (paper, section V.B).
+    """Break results down by the abilities that tasks require (paper, section V.B).
 
-    Yields an ability, the number of judged tasks that need it, their pass@1 with its interval over tasks, and
-    the share of their completions that fail, by class.
+    Yields each ability, the number of judged tasks that require it, their pass@1 with its interval over
+    tasks, and the share of their completions that fail in each class.
     """
     scores = {one.task: [p.pass_at(1) for p in one.prompts] for one in task_scores(table, suite.tasks)}
     counted = completions_of(table).group_by("task", "failure_class").len()
@@ -40,11 +40,11 @@ def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Es
 
 
 def compare_report_back(results: Results) -> pl.DataFrame:
-    """Compare tasks with "come back and tell me" to the others (paper, section V.B).
+    """Compare tasks that end with a report to all other tasks (paper, section V.B).
 
-    Has a row for tasks whether or not they end with `reports`, and no row if none does: the number of
-    `completions`, their `pass@1`, how many `failed`, how many of these left their first room and
-    `never_returned`, and how many went to a room that does not exist (`lost`).
+    Returns one row for each value of `reports`, or no rows if no task ends with a report. Besides `pass@1`,
+    the columns count the `completions` and those that `failed`, and among the failures the robots that
+    `never_returned` to their first room and those sent to a room that does not exist (`lost`).
     """
     suite = results.known_suite
     reports = pl.col("task").is_in(
@@ -76,9 +76,9 @@ def _mean(lists: str) -> pl.Expr:
 
 
 def never_returned(row: Row) -> bool:
-    """Whether the robot left its first room for good, in the world in which the completion failed.
+    """Whether the robot left its first room and never returned, in the world where the completion failed.
 
-    False if the trace was too long to be stored.
+    Returns False if the trace was too long to be stored.
     """
     verdict = row["verdicts"][failure_of(row)["world"]]
     if "cut" in verdict:
@@ -91,10 +91,10 @@ def never_returned(row: Row) -> bool:
 
 
 def spread_by_task(table: pl.DataFrame) -> pl.DataFrame:
-    """Compute the spread of pass@1 over the prompts of each task that has several (paper, section V.A).
+    """Compute the spread of pass@1 over the prompts of each task with several prompts (paper, section V.A).
 
-    Columns: `task`, `spread`, `worst_prompt` with its pass@1 `worst`, `best_prompt` with its `best`; of equal
-    prompts the first.
+    Columns: `task`, `spread`, `worst_prompt` with its pass@1 `worst`, and `best_prompt` with its pass@1
+    `best`. Of several equal prompts, the first is reported.
     """
     prompt, score = pl.col("prompt"), pl.col("pass@1")
     return (
@@ -113,10 +113,10 @@ def spread_by_task(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def compare_phrasings(scores: pl.DataFrame) -> pl.DataFrame:
-    """Compare each prompt with the mean of its task, if that has several (paper, section V.A).
+    """Compare each prompt with the mean of its task, for tasks with several prompts (paper, section V.A).
 
-    Takes `model`, `task`, `prompt` and `pass@1`; returns by how much a prompt is `better` than its task on
-    average, and how many of the `models` it `hurts`.
+    `scores` has the columns `model`, `task`, `prompt` and `pass@1`. The result tells by how much a prompt is
+    `better` than its task, averaged over models, and how many of the `models` it `hurts`.
     """
     several = scores.filter(pl.col("prompt").n_unique().over("task") > 1)
     means = several.group_by("model", "task").agg("pass@1").with_columns(mean=_mean("pass@1"))

@@ -1,4 +1,4 @@
-"""How often programs break house rules, and by how much the rules lower pass@1."""
+"""Counts how often programs break house rules, and measures how much the rules lower pass@1."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from roboeval.analysis.counts import task_scores
 from roboeval.analysis.metrics import DIFFERENCE, Estimate, over_tasks, overall, pass_at_1
 from roboeval.evaluation.runs.completions import KEY
 
-RULE_NAME = r'^the rule "([^"]+)"'  # at the start of a message
+RULE_NAME = r'^the rule "([^"]+)"'  # messages start with this
 
 
 @dataclass(frozen=True)
 class BrokenRules:
-    """Statistics of an evaluation with house rules."""
+    """Tells how often programs break house rules, and what this costs in pass@1."""
 
-    broken: Estimate  # the share of programs that break a rule in some world
-    by_rule: Mapping[str, int]  # programs that each rule stops in some world, most first
-    cost: Estimate | None  # pass@1 with rules minus pass@1 without; None if only judged with rules
+    broken: Estimate  # share of programs that break a rule in at least one world
+    by_rule: Mapping[str, int]  # number of programs that each rule stops in some world, largest first
+    cost: Estimate | None  # pass@1 with rules minus pass@1 without, or None if not judged without
 
 
 def count_broken_rules(table: pl.DataFrame, without: pl.DataFrame | None = None) -> BrokenRules:
-    """Count broken rules.
+    """Count the programs that break house rules.
 
     Args:
-        table: the table of an evaluation with house rules, from `load_results`.
-        without: the table of the same run judged without them.
+        table: The results of an evaluation with house rules, from `load_results`.
+        without: The results of the same run, judged without house rules.
     """
     breaks = pl.col("error_kind").eq_missing(VIOLATION)
     marked = table.with_columns(passed=breaks.any().over(KEY))
@@ -50,7 +50,7 @@ def _cost(table: pl.DataFrame, without: pl.DataFrame) -> Estimate | None:
 
 
 def broken_rules_data(found: BrokenRules) -> dict[str, Any]:
-    """Statistics of broken rules as plain data."""
+    """Convert the statistics to plain data."""
     return {
         "broken": vars(found.broken),
         "programs_by_rule": dict(found.by_rule),

@@ -1,4 +1,4 @@
-"""Is one model better than another? Differences paired by prompt, their significance, and their sources."""
+"""Compares models by their differences on the same prompts: size, significance and contributing tasks."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from roboeval.evaluation.runs.scope import Coverage, CutOff
 
 SIGNIFICANCE = 0.05
 MIN_SHOWN_P = 0.001  # smaller values are shown as "p < 0.001"
-MAX_PAIRS = 10  # with more pairs, each run is compared with the best only
+MAX_PAIRS = 10  # if there are more pairs, each run is compared only with the best
 PromptScores = Mapping[tuple[str, int], float]  # pass@1 by task and prompt
 RunLike = TypeVar("RunLike")
 
 
 @dataclass(frozen=True)
 class TaskDifference:
-    """The difference between two models in one task."""
+    """The difference in pass@1 between two models on one task."""
 
     task: str
     first: float  # mean pass@1 over common prompts
@@ -38,29 +38,29 @@ class TaskDifference:
 
     @property
     def difference(self) -> float:
-        """By how much the second is better."""
+        """The pass@1 of the second model minus that of the first."""
         return self.second - self.first
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """The difference between two models, second minus first, over their common prompts."""
+    """The difference in pass@1 between two models, second minus first, over their common prompts."""
 
     first: float  # mean pass@1
     second: float
     prompts: int  # common prompts
-    left_out: int  # prompts that only one model has
+    left_out: int  # number of prompts that only one model has
     over_prompts: Estimate  # the difference, with its interval over prompts
-    over_tasks: Estimate  # with its interval over tasks
-    bootstrap: Estimate  # with a cluster bootstrap over tasks
-    p_prompts: float  # sign-flip permutation test over prompts
-    p_tasks: float  # over tasks
+    over_tasks: Estimate  # the difference, with its interval over tasks
+    bootstrap: Estimate  # the difference, with an interval from a cluster bootstrap over tasks
+    p_prompts: float  # p-value of the sign-flip permutation test over prompts
+    p_tasks: float  # p-value of the same test over tasks
     sample_sizes: SampleSizes
-    tasks: tuple[TaskDifference, ...]  # largest contributions first
+    tasks: tuple[TaskDifference, ...]  # sorted by contribution, largest first
 
 
 def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
-    """Compare two models prompt by prompt; raises UserError if they have no prompt in common."""
+    """Compare two models on their common prompts; raise UserError if there are none."""
     keys = [key for key in first if key in second]
     if not keys:
         raise UserError("the runs have no prompt in common, so they cannot be compared")
@@ -96,7 +96,7 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
 def pairs_to_compare(
     runs: Sequence[RunLike], pass_at_1: Callable[[RunLike], float]
 ) -> list[tuple[RunLike, RunLike]]:
-    """All pairs of runs; with many runs, each paired with the best."""
+    """Return all pairs of runs, or each run paired with the best if there are too many pairs."""
     pairs = list(combinations(runs, 2))
     if len(pairs) <= MAX_PAIRS:
         return pairs
@@ -105,12 +105,12 @@ def pairs_to_compare(
 
 
 def p_text(p: float) -> str:
-    """Format a p-value."""
+    """Format a p-value, such as "p = 0.042"."""
     return f"p = {p:.3f}" if p >= MIN_SHOWN_P else f"p < {MIN_SHOWN_P}"
 
 
 def comparison_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
-    """Say which run is better, with its significance, and how many prompts were left out."""
+    """Describe which run is better, how significant this is, and how many prompts were left out."""
     sentence = _better_sentence(comparison, names)
     if not comparison.left_out:
         return sentence
@@ -139,8 +139,8 @@ def _better_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
 
 
 def other_differences(first: Results, second: Results) -> list[str]:
-    """Differences between two runs, other than the model, that may explain their results."""
-    judged_with = ("python", "codebotler")  # run.json has the versions used for generation
+    """Describe differences other than the model that may explain why the results of two runs differ."""
+    judged_with = ("python", "codebotler")  # in run.json, these are the versions used for generation
     runs = [
         {**one.about, **{name: one.manifest.get(name) for name in judged_with}} for one in (first, second)
     ]
@@ -151,7 +151,7 @@ def other_differences(first: Results, second: Results) -> list[str]:
             found.append(f"{words} differ: {_short(a)} and {_short(b)}")
     settings = [value if isinstance(value := run.get("settings"), dict) else {} for run in runs]
     if bool(settings[0]) != bool(settings[1]):
-        found.append("the settings of one of them were not recorded")
+        found.append("the settings of one run were not recorded")
     for name in sorted({*settings[0], *settings[1]} if all(settings) else ()):
         a, b = (one.get(name) for one in settings)
         if a != b:
@@ -172,7 +172,7 @@ def _short(value: object) -> str:
 
 @dataclass(frozen=True)
 class ComparedRun:
-    """A run in a comparison, apart from pass@1."""
+    """Further results of a compared run besides its pass@1."""
 
     name: str
     coverage: Coverage
@@ -181,7 +181,7 @@ class ComparedRun:
 
     @classmethod
     def of(cls, name: str, results: Results) -> ComparedRun:
-        """Collect coverage, cut-off replies and causes of failures of a run."""
+        """Collect the coverage, cut-off replies and failure classes of a run."""
         tally = tally_of(results.table)
         found = failures(tally)
         shares = {one.name: one.share for one in found}
@@ -190,12 +190,12 @@ class ComparedRun:
 
     @property
     def data(self) -> dict[str, Any]:
-        """The run as plain data, without its name."""
+        """Convert the run to plain data, without its name."""
         return {**asdict(self.coverage), "cut_off": self.cut_off.replies, "failures": dict(self.classes)}
 
 
 def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:
-    """A comparison as plain data."""
+    """Convert a comparison to plain data."""
     return {
         "first": {"name": names[0], "pass@1": comparison.first},
         "second": {"name": names[1], "pass@1": comparison.second},
@@ -218,7 +218,7 @@ def _ends(estimate: Estimate) -> dict[str, float]:
 
 
 def sample_size_sentences(comparison: Comparison) -> list[str]:
-    """Say which sample sizes would make the difference significant."""
+    """Describe how many completions or prompts are needed to detect the difference."""
     sizes = comparison.sample_sizes
     if sizes.completions is None:
         return ["There is no difference, so no sample size can be computed."]

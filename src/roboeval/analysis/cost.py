@@ -1,4 +1,4 @@
-"""The cost per passing program in tokens, time and money, with and without rejection sampling."""
+"""Computes the cost per passing program in tokens, time and money, with and without rejection sampling."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from roboeval.evaluation.runs.table import MILLION, Price
 
 
 class RunCost(NamedTuple):
-    """The cost of completions, in total and per passing program; None where nothing is recorded."""
+    """The cost of completions in total and per passing program; values that were not recorded are None."""
 
     completions: int
     passed: int
@@ -30,7 +30,7 @@ class RunCost(NamedTuple):
 
 
 def cost_of(table: pl.DataFrame, price: Price | None = None) -> RunCost:
-    """Compute the cost of a run's completions."""
+    """Compute the cost of the completions of a run."""
     completions = completions_of(table)
     passed = passed_count(prompts_of(task_scores(table)))
     sent, received = _tokens(completions)
@@ -52,17 +52,17 @@ def _tokens(completions: pl.DataFrame) -> tuple[int, int] | tuple[None, None]:
 
 
 class Budget(NamedTuple):
-    """The yield of a budget with rejection sampling."""
+    """How many passing programs a budget yields with rejection sampling."""
 
     retries: int
-    requests: float  # mean per program
-    per_thousand_requests: float  # passing programs
-    per_million_tokens: float | None  # None if tokens were not recorded
-    per_money: float | None  # per unit of money
+    requests: float  # mean number per program
+    per_thousand_requests: float  # number of passing programs
+    per_million_tokens: float | None  # number of passing programs, or None if tokens were not recorded
+    per_money: float | None  # number of passing programs per unit of money, or None if unknown
 
 
 def budgets(table: pl.DataFrame, price: Price | None, limits: Sequence[int] = LIMITS) -> Iterator[Budget]:
-    """Compute the yield of a budget by limit of retries (paper, section VI); all programs must be checked."""
+    """Yield a budget for each limit of retries (paper, section VI); all programs must have been checked."""
     completions, prompts = completions_of(table), trials_by_prompt(table)
     counts = pl.col("input_tokens", "output_tokens").fill_null(0)
     means = completions.group_by("task", "prompt").agg(counts.mean())

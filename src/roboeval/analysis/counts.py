@@ -1,4 +1,4 @@
-"""Counts of passed and failed completions, from the table of a run."""
+"""Counts passed and failed completions in the table of a run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from roboeval.evaluation.runs.completions import KEY
 
 
 def completions_of(table: pl.DataFrame) -> pl.DataFrame:
-    """One row for each judged completion of a table from `load_results`."""
+    """Reduce a table from `load_results` to one row for each judged completion."""
     return table.filter(pl.col("world_number") == 0)
 
 
@@ -27,12 +27,12 @@ def prompt_scores(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-    """Scores by task and prompt (paper, section IV.C); tasks not in `order` come last."""
+    """Compute the scores of tasks and prompts (paper, section IV.C); tasks not in `order` come last."""
     return tally_of(table).scores(order)
 
 
 def tally_of(table: pl.DataFrame) -> Tally:
-    """Count the completions in a table."""
+    """Count the judged, passed and failed completions in a table."""
     tally = Tally()
     completions = completions_of(table)
     for task, prompt, n, c, _ in prompt_scores(table).iter_rows():

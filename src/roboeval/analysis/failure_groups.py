@@ -1,4 +1,4 @@
-"""Groups of programs that fail alike, each with the reason and the most similar program that passes."""
+"""Groups programs that fail in the same way, and finds the most similar passing program for each group."""
 
 from __future__ import annotations
 
@@ -19,34 +19,34 @@ from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import Row, failure_of, key_of
 
 ProgramLines: TypeAlias = tuple[str, ...]
-DiffLine: TypeAlias = tuple[str, str]  # `-`, `+` or a space, and a line of a diff
+DiffLine: TypeAlias = tuple[str, str]  # the prefix `-`, `+` or a space, and the text of the line
 Cause: TypeAlias = tuple[str, str, str, str | None]  # task, class, kind and failed check
 
-MIN_SIMILARITY = 0.6  # programs of a group share at least this part of their lines
-MAX_COMPARED_CHARACTERS = 20_000  # characters; the rest of a longer program is ignored
-DIFF_CONTEXT = 2  # lines shown around a change
+MIN_SIMILARITY = 0.6  # minimum similarity of a program to the first program of its group
+MAX_COMPARED_CHARACTERS = 20_000  # the rest of a longer program is ignored
+DIFF_CONTEXT = 2  # number of unchanged lines shown around a change
 
 
 @dataclass(frozen=True)
 class Fix:
-    """The difference between a failing program and one that passes."""
+    """The difference between a failing program and a passing program of the same task."""
 
-    name: str  # the completion that passes
-    changed: int  # lines removed or added
-    changes: tuple[DiffLine, ...]  # with context; a line of dots for each gap
+    name: str  # name of the passing completion
+    changed: int  # number of removed and added lines
+    changes: tuple[DiffLine, ...]  # changed lines with context; "..." marks omitted lines
 
 
 @dataclass(frozen=True)
 class FailureGroup:
-    """Completions of one task with similar programs that fail by the same check or error."""
+    """Completions of one task whose similar programs fail due to the same check or error."""
 
     task: str
-    failure: Mapping[str, Any]  # the failure of the representative
+    failure: Mapping[str, Any]  # class, kind and check of the representative's failure
     members: tuple[CompletionKey, ...]
-    representative: CompletionKey  # the first completion with the most frequent program
-    program: str | None  # the program of the representative; None if it was removed
-    reason: Mapping[str, Any]  # why the representative fails, in which world and line
-    fix: Fix | None  # None if there is no program, or none that passes
+    representative: CompletionKey  # first completion that contains the most frequent program
+    program: str | None  # program of the representative, or None if it was removed
+    reason: Mapping[str, Any]  # explanation of the representative's failure, with world and line
+    fix: Fix | None  # None if there is no program or no passing one
 
     @property
     def has_no_program(self) -> bool:
@@ -55,21 +55,21 @@ class FailureGroup:
 
     @property
     def why(self) -> str:
-        """Why the representative fails, in a sentence."""
+        """A sentence that explains why the representative fails."""
         if self.reason["explanation"] is not None:
             return str(self.reason["explanation"])
         return error_sentence(self.reason) if self.reason["error"] else ""
 
     @property
     def prompts(self) -> list[int]:
-        """The sorted prompts of its completions."""
+        """The sorted numbers of the prompts of its completions."""
         return sorted({prompt for _, prompt, _ in self.members})
 
 
 def group_failures(failed: Iterable[Row], programs: Mapping[CompletionKey, str]) -> list[list[Row]]:
-    """Group failing completions, the largest groups first; groups of one size take turns by task.
+    """Group failing completions, largest groups first; groups of equal size alternate between tasks.
 
-    Replies without a program form one group for each task and kind.
+    Replies without a program form one group for each task and kind of failure.
     """
     causes: defaultdict[Cause, list[Row]] = defaultdict(list)
     for row in failed:
@@ -84,7 +84,7 @@ def group_failures(failed: Iterable[Row], programs: Mapping[CompletionKey, str])
 
 
 def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[FailureGroup]:
-    """Find for each group why it fails, and the smallest fix."""
+    """Explain the failure of each group, and find the smallest fix."""
     programs = results.programs
     candidates = cache(partial(_passing_of_task, results))
     for rows in groups:
@@ -105,7 +105,7 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
 
 
 def nearest_fix(results: Results, key: CompletionKey) -> Fix | None:
-    """Find the smallest fix of a completion; None if its program was removed or none passes."""
+    """Find the smallest fix for a completion; return None if its program was removed or no program passes."""
     program = results.programs.get(key)
     return None if program is None else shortest_fix(program, _passing_of_task(results, key[0]))
 
@@ -139,7 +139,7 @@ def _group_similar(
 
 
 def group_data(group: FailureGroup) -> dict[str, Any]:
-    """A group as plain data."""
+    """Convert a group to plain data."""
     fix = group.fix
     return {
         "task": group.task,
@@ -160,7 +160,7 @@ def group_data(group: FailureGroup) -> dict[str, Any]:
 
 
 def normalised_lines(program: str) -> ProgramLines:
-    """Normalise a program to lines that do not depend on names, comments and layout."""
+    """Normalise a program to lines that are independent of names, comments and layout."""
     tree = parse_program(program) if len(program) <= MAX_COMPARED_CHARACTERS else None
     if not isinstance(tree, ast.Module):
         return _lines(program)
@@ -179,7 +179,7 @@ def _lines(text: str) -> ProgramLines:
     return tuple(line.rstrip() for line in text[:MAX_COMPARED_CHARACTERS].splitlines() if line.strip())
 
 
-# The field of each node that holds a name of the program's own choice.
+# The field of each node type that holds a name chosen by the program.
 NAMES_BOUND: Mapping[type[ast.AST], str] = {
     **dict.fromkeys((ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.ExceptHandler), "name"),
     ast.Name: "id",
@@ -189,14 +189,14 @@ NAMES_USED: Mapping[type[ast.AST], str] = {**NAMES_BOUND, ast.MatchAs: "name", a
 
 
 def _names_in_order(nodes: Iterable[ast.AST], bound: Container[str]) -> list[str]:
-    """The names that a program binds, except its entry point, in order of appearance."""
+    """Return the names that a program binds in order of appearance, except its entry point."""
     named = [(node, getattr(node, NAMES_BOUND[type(node)])) for node in nodes if type(node) in NAMES_BOUND]
     found = sorted((node.lineno, node.col_offset, name) for node, name in named if name in bound)  # type: ignore[attr-defined]  # nodes with names have positions
     return list(dict.fromkeys(name for _, _, name in found))
 
 
 def _rename(node: ast.AST, numbers: Mapping[str, str]) -> None:
-    """Replace the name of a node; turn strings that are statements, such as docstrings, into `pass`."""
+    """Replace the name in a node, and replace docstrings and other bare strings by `pass`."""
     if (field := NAMES_USED.get(type(node))) is not None:
         old = getattr(node, field)
         setattr(node, field, numbers.get(old, old))
@@ -205,22 +205,22 @@ def _rename(node: ast.AST, numbers: Mapping[str, str]) -> None:
 
 
 def similarity(one: Counter[str], other: Counter[str]) -> float:
-    """Dice coefficient of the lines of two programs, from 0 to 1."""
+    """Compute the Dice coefficient of the lines of two programs, from 0 to 1."""
     total = one.total() + other.total()
     return 2 * (one & other).total() / total if total else 1.0
 
 
 @dataclass(frozen=True)
 class PassingProgram:
-    """A program that passes, to compare others with."""
+    """A passing program that failing programs are compared with."""
 
     name: str
     lines: ProgramLines
-    counts: Counter[str]  # occurrences of each line
+    counts: Counter[str]  # number of occurrences of each line
 
 
 def passing_programs(named: Iterable[tuple[str, str]]) -> list[PassingProgram]:
-    """Distinct programs, each under the first of its names."""
+    """Return the distinct programs, each under the first of its names."""
     first: dict[ProgramLines, str] = {}
     for name, program in named:
         first.setdefault(_split(program), name)
@@ -232,7 +232,7 @@ def _split(program: str) -> ProgramLines:
 
 
 def shortest_fix(program: str, candidates: Sequence[PassingProgram]) -> Fix | None:
-    """Find the first candidate that differs in the fewest lines; None without candidates."""
+    """Return the fix that changes the fewest lines, or None if there are no candidates."""
     lines = _split(program)
     counts = Counter(lines)
     best: tuple[int, int] | None = None
@@ -250,7 +250,7 @@ def shortest_fix(program: str, candidates: Sequence[PassingProgram]) -> Fix | No
 
 
 def _least_changes(one: Counter[str], other: Counter[str]) -> int:
-    """A lower bound of the lines in which two programs differ, which ignores their order."""
+    """Return a lower bound on the number of differing lines, ignoring their order."""
     return ((one - other) + (other - one)).total()
 
 

@@ -1,4 +1,4 @@
-"""pass@k of prompts, and means over prompts with confidence intervals."""
+"""Computes pass@k of prompts, and means over prompts with confidence intervals."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ Clusters: TypeAlias = Sequence[Sequence[float]]
 """Values grouped by cluster: one value per prompt, or the values of all prompts of a task."""
 
 SamplingUnit: TypeAlias = Literal["prompts", "tasks"]
-"""The unit that an interval treats as sampled at random."""
+"""The unit that is assumed to be sampled at random."""
 
-SHARE, DIFFERENCE = (0.0, 1.0), (-1.0, 1.0)  # ranges of values
-CONFIDENCE = 0.95  # confidence level
+SHARE, DIFFERENCE = (0.0, 1.0), (-1.0, 1.0)  # lowest and highest values
+CONFIDENCE = 0.95  # level of all confidence intervals
 ROUNDING_ERROR = 1e-9
 
 
 def pass_at_k(n: int, c: int, k: int) -> float:
-    """Unbiased estimate of the probability that at least one of k completions passes.
+    """Estimate without bias the probability that at least one of k completions passes.
 
     Args:
-        n: the number of judged completions.
-        c: the number of those that passed.
-        k: the number of tries.
+        n: The number of judged completions.
+        c: The number of judged completions that passed.
+        k: The number of attempts.
 
     Raises:
-        ValueError: not 0 <= c <= n, or not 1 <= k <= n.
+        ValueError: If c is not in 0..n, or k is not in 1..n.
     """
     if not 0 <= c <= n:
         raise ValueError(f"{c} of {n} completions cannot have passed")
     if not 1 <= k <= n:
         raise ValueError(f"pass@{k} cannot be estimated from {n} completions")
-    # Integers until the division: in floating point, 1 - (a ratio near 1) would lose most digits.
+    # Use integers until the division, since 1 - (a ratio near 1) loses precision in floating point.
     draws = math.comb(n, k)
     return (draws - math.comb(n - c, k)) / draws
 
@@ -46,10 +46,10 @@ class Estimate:
     """A mean with its 95% confidence interval.
 
     Args:
-        mean: the mean of the values.
-        low: the lower end of the interval.
-        high: the upper end.
-        over: the unit that the interval treats as sampled at random.
+        mean: The mean of the values.
+        low: The lower end of the interval.
+        high: The upper end of the interval.
+        over: The unit that is assumed to be sampled at random.
     """
 
     mean: float
@@ -59,11 +59,11 @@ class Estimate:
 
     @property
     def is_known(self) -> bool:
-        """Whether the interval is informative: not of equal values, nor of a single one."""
+        """Whether the interval is informative, which requires at least two different values."""
         return self.high - self.low > ROUNDING_ERROR and (self.low, self.high) not in (SHARE, DIFFERENCE)
 
     def ends(self, form: str = ".3f") -> str:
-        """Format the interval."""
+        """Format the ends of the interval, or say why it is unknown."""
         if self.high - self.low <= ROUNDING_ERROR:
             return f"unknown: no variation between {self.over}"
         if not self.is_known:
@@ -72,13 +72,13 @@ class Estimate:
 
     @property
     def interval(self) -> str:
-        """Format the interval with its name."""
+        """The interval in words, such as "95% interval over tasks 0.310 to 0.540"."""
         return f"95% interval over {self.over} {self.ends()}"
 
 
 @dataclass(frozen=True)
 class PromptScore:
-    """The counts of one prompt: `n` judged completions, of which `c` passed; prompts count from 0."""
+    """Counts the `n` judged and `c` passed completions of a prompt; prompts are numbered from 0."""
 
     task: str
     prompt: int
@@ -86,7 +86,7 @@ class PromptScore:
     c: int
 
     def pass_at(self, k: int) -> float:
-        """The prompt's pass@k; raises ValueError if it has fewer than k completions."""
+        """Return pass@k of the prompt; raise ValueError if it has fewer than k completions."""
         if k > self.n:
             raise ValueError(
                 f"{self.task}, prompt {self.prompt}: pass@{k} cannot be estimated from {self.n} completions"
@@ -96,55 +96,55 @@ class PromptScore:
 
 @dataclass(frozen=True)
 class TaskScore:
-    """The scores of a task's prompts, at least one; all prompts have equal weight."""
+    """The scores of one or more prompts of a task, all weighted equally."""
 
     task: str
     prompts: tuple[PromptScore, ...]
 
     def pass_at(self, k: int) -> Estimate:
-        """The mean pass@k with its 95% interval over prompts; raises ValueError if a prompt has fewer."""
+        """Return the mean pass@k; raise ValueError if a prompt has fewer than k completions."""
         return by_formula([[prompt.pass_at(k)] for prompt in self.prompts])
 
     def lowest(self, k: int) -> float:
-        """pass@k of the worst prompt, the lower end of the paper's error bars; raises as `pass_at` does."""
+        """Return pass@k of the worst prompt, the lower end of the error bars in the paper."""
         return min(prompt.pass_at(k) for prompt in self.prompts)
 
     def highest(self, k: int) -> float:
-        """pass@k of the best prompt, the upper end of the paper's error bars; raises as `pass_at` does."""
+        """Return pass@k of the best prompt, the upper end of the error bars in the paper."""
         return max(prompt.pass_at(k) for prompt in self.prompts)
 
 
 def judged_count(prompts: Iterable[PromptScore]) -> int:
-    """The number of judged completions."""
+    """Count the judged completions."""
     return sum(prompt.n for prompt in prompts)
 
 
 def passed_count(prompts: Iterable[PromptScore]) -> int:
-    """The number of completions that passed."""
+    """Count the completions that passed."""
     return sum(prompt.c for prompt in prompts)
 
 
 def prompts_of(tasks: Iterable[TaskScore]) -> list[PromptScore]:
-    """The scores of all prompts of the tasks."""
+    """Collect the scores of all prompts of the given tasks."""
     return [prompt for task in tasks for prompt in task.prompts]
 
 
 def pass_at_1(tasks: Iterable[TaskScore]) -> dict[tuple[str, int], float]:
-    """pass@1 by task and prompt."""
+    """Map each task and prompt to its pass@1."""
     return {(p.task, p.prompt): p.pass_at(1) for p in prompts_of(tasks)}
 
 
 def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
-    """The mean pass@k over all prompts, with its 95% interval over tasks; every output shows this interval.
+    """Return the mean pass@k over all prompts, with its 95% interval over tasks.
 
     Raises:
-        ValueError: a prompt, which the message names, has fewer than k completions.
+        ValueError: If a prompt has fewer than k completions.
     """
     return over_tasks((prompt.task, prompt.pass_at(k)) for prompt in prompts_of(tasks))
 
 
 def over_tasks(values: Iterable[tuple[str, float]], *, within: tuple[float, float] = SHARE) -> Estimate:
-    """The mean of one value per prompt, each given with its task, and its 95% interval over tasks."""
+    """Return the mean of pairs of a task and a value, with its 95% interval over tasks."""
     by_task: dict[str, list[float]] = {}
     for task, value in values:
         by_task.setdefault(task, []).append(value)
@@ -152,19 +152,19 @@ def over_tasks(values: Iterable[tuple[str, float]], *, within: tuple[float, floa
 
 
 def share_at_least(values: Sequence[float], threshold: float) -> float:
-    """The share of values that reach a threshold above 0; at least one value is needed."""
+    """Return the share of values that are at least `threshold`, which must be above 0."""
     return sum(value >= threshold - ROUNDING_ERROR for value in values) / len(values)
 
 
 def percent(share: float) -> str:
-    """Format a share in whole percent; "<1" and ">99" avoid rounding to 0 and 100."""
+    """Format a share in whole percent, with "<1" and ">99" for shares that would round to 0 or 100."""
     if 0 < share < 0.01:  # noqa: PLR2004 - one percent
         return "<1"
     return ">99" if 0.99 < share < 1 else f"{100 * share:.0f}"  # noqa: PLR2004 - 99 percent
 
 
 def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
-    """The share of prompts by threshold of pass@1, where it changes, from 1 down (paper, section V.A)."""
+    """Return thresholds from 1 down, each with the share of prompts that reach it (paper, section V.A)."""
     thresholds = sorted({1.0, *(value for value in values if value > ROUNDING_ERROR)}, reverse=True)
     return [(threshold, share_at_least(values, threshold)) for threshold in thresholds]
 
@@ -172,11 +172,11 @@ def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
 def by_formula(
     clusters: Clusters, *, within: tuple[float, float] = SHARE, over: SamplingUnit = "prompts"
 ) -> Estimate:
-    """The mean of all values with a cluster-robust interval, clipped to `within`.
+    """Return the mean of all values with a cluster-robust interval, clipped to `within`.
 
     The variance of the mean is G / (G - 1) * sum over clusters of (sum of (value - mean))**2 / N**2, for G
     clusters with N values; the interval uses Student's t with G - 1 degrees of freedom. With one value per
-    cluster it is the usual interval of a mean. A single cluster gives the whole range.
+    cluster it is the usual interval of a mean. For a single cluster, the interval is the whole range.
     """
     mean, count = mean_of(clusters), len(clusters)
     if count == 1:
@@ -189,13 +189,13 @@ def by_formula(
 
 
 def mean_of(clusters: Clusters) -> float:
-    """The mean of all values; at least one is needed."""
+    """Return the mean of all values; there must be at least one."""
     return math.fsum(value for values in clusters for value in values) / sum(map(len, clusters))
 
 
 @lru_cache(maxsize=1024)
 def t_quantile(p: float, df: int) -> float:
-    """The quantile p >= 1/2 of Student's t with `df` degrees of freedom."""
+    """Return the quantile p >= 1/2 of Student's t distribution with `df` degrees of freedom."""
     # With angle = atan(t / sqrt(df)), the probability is a finite sum and the bisection has a bounded range.
     low, high = 0.0, math.pi / 2
     while low < (angle := (low + high) / 2) < high:
@@ -204,7 +204,7 @@ def t_quantile(p: float, df: int) -> float:
 
 
 def _within(angle: float, df: int) -> float:
-    """The probability of |t| < sqrt(df) * tan(angle) (Abramowitz and Stegun, 26.7.3 and 26.7.4)."""
+    """Return the probability that |t| < sqrt(df) * tan(angle) (Abramowitz and Stegun, 26.7.3 and 26.7.4)."""
     if df == 1:
         return 2 / math.pi * angle
     is_odd = df % 2

@@ -1,7 +1,7 @@
-"""Rejection sampling: the pass rate when programs that the check rejects are requested again (section VI).
+"""Rejection sampling: the pass rate if programs rejected by the check are requested again (section VI).
 
-For a run whose completions are checked and judged, the result is known exactly: completions of a prompt are
-sampled with replacement until one is accepted or the limit of retries is reached.
+If all completions of a run are checked and judged, the result is computed exactly: completions of a prompt
+are sampled with replacement until one of them is accepted or the limit of retries is reached.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ THRESHOLDS = (0.25, 0.5, 0.75, 1.0)
 
 @dataclass(frozen=True)
 class CheckedCompletion:
-    """A completion that was checked and judged."""
+    """The results of checking and judging a completion."""
 
-    accepted: bool  # the check found no problem
-    ran: bool  # without an error in every world of its task
+    accepted: bool  # whether the check found no problem
+    ran: bool  # whether it ran without an error in every world of its task
     passed: bool
 
 
@@ -39,10 +39,10 @@ class Chances:
 
 
 def final_chances(trials: Sequence[CheckedCompletion], retries: int) -> Chances:
-    """Compute the exact probabilities for a prompt, if each request returns any completion equally likely.
+    """Compute the exact probabilities for a prompt, assuming that all completions are equally likely.
 
-    A completion is final if it is accepted or if no retry is left. Without retries, the probability to pass
-    is exactly the prompt's pass@1.
+    A completion is final if it is accepted or if no retry is left. Without retries, the probability of
+    passing equals the prompt's pass@1.
     """
     rejected = rejected_share(trials)
     asked, is_last = mean_requests(rejected, retries), rejected**retries
@@ -60,18 +60,18 @@ def final_chances(trials: Sequence[CheckedCompletion], retries: int) -> Chances:
 
 
 def rejected_share(trials: Sequence[CheckedCompletion]) -> float:
-    """The share of completions that the check rejects."""
+    """Return the share of completions that the check rejects."""
     return sum(not trial.accepted for trial in trials) / len(trials)
 
 
 def mean_requests(rejected: float, retries: int) -> float:
-    """The mean number of requests per program, given the share of rejected ones and the limit of retries."""
+    """Return the mean number of requests per program for a share of rejected completions."""
     return sum(rejected**number for number in range(retries + 1))
 
 
 @dataclass(frozen=True)
 class CheckedPrompt:
-    """The checked completions of one prompt."""
+    """Groups the checked completions of one prompt."""
 
     task: str
     prompt: int
@@ -79,8 +79,8 @@ class CheckedPrompt:
 
 
 def trials_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
-    """Collect the checked completions of each prompt, sorted by task and prompt; all must be checked."""
-    # A timeout is no error in a world in which a program may wait for ever: its requirements were evaluated.
+    """Group completions by prompt, sorted by task and prompt; all of them must have been checked."""
+    # A timeout is not an error in a world where programs may wait forever, since it was judged there.
     judged = pl.col("satisfied") | pl.col("failed_checks").is_not_null()
     completions = table.group_by(KEY, maintain_order=True).agg(
         pl.col("accepted").first(),
@@ -95,18 +95,18 @@ def trials_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
 
 @dataclass(frozen=True)
 class RetryResult:
-    """The result of one limit of retries, over all prompts."""
+    """The result of rejection sampling over all prompts, for one limit of retries."""
 
     retries: int
     passed: Estimate  # pass@1
-    accepted: float  # share of final programs
-    ran: float  # share that runs without an error in every world of its task
-    prompts: Mapping[float, float]  # share of prompts by threshold of pass@1
+    accepted: float  # share of final programs that the check accepts
+    ran: float  # share of final programs that run without an error in every world
+    prompts: Mapping[float, float]  # share of prompts that reach each threshold of pass@1
     by_prompt: tuple[Chances, ...]
 
 
 def resample(prompts: Sequence[CheckedPrompt], retries: int) -> RetryResult:
-    """Compute the result of one limit of retries."""
+    """Compute the result of rejection sampling for one limit of retries."""
     each = tuple(final_chances(prompt.trials, retries) for prompt in prompts)
     return RetryResult(
         retries=retries,
@@ -119,13 +119,13 @@ def resample(prompts: Sequence[CheckedPrompt], retries: int) -> RetryResult:
 
 
 def accepted_after(prompts: Sequence[CheckedPrompt], most: int) -> list[float]:
-    """The share of programs that the check accepts after 0, 1, ... `most` retries."""
+    """Return the share of programs that the check accepts after 0, 1, ... `most` retries."""
     rejected = [rejected_share(prompt.trials) for prompt in prompts]
     return [mean_of([[1 - share ** (n + 1) for share in rejected]]) for n in range(most + 1)]
 
 
 def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[str, Any]:
-    """The data of the paper's two figures on rejection sampling (section VI)."""
+    """Compute the data of the paper's two figures on rejection sampling (section VI)."""
     of_limits = [resample(prompts, retries) for retries in limits]
     return {
         "limits": [

@@ -1,4 +1,4 @@
-"""Search the traces of a judged run for a formula, on all cores."""
+"""Searches the traces of a judged run for a formula, using all cores."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from roboeval.evaluation.runs.completions import KEY, CompletionKey
 from roboeval.evaluation.runs.rows import key_of
 from roboeval.evaluation.runs.traces import trace_of
 
-ROWS_FOR_PROCESSES = 2_000  # fewer do not justify starting processes
+ROWS_FOR_PROCESSES = 2_000  # with fewer rows, starting processes takes longer than it saves
 
 
 @dataclass(frozen=True)
 class TraceQuery:
-    """The traces to search for."""
+    """Describes which traces to search for."""
 
-    formula: str | None = None  # in RTL; None matches every trace
-    negated: bool = False  # find traces that do not satisfy the formula
-    task: str | None = None  # None: any
-    world: str | None = None  # its number from 1 or its `about`; None: any
+    formula: str | None = None  # an RTL formula; None matches every trace
+    negated: bool = False  # whether to find traces that do not satisfy the formula
+    task: str | None = None  # None matches any task
+    world: str | None = None  # number (from 1) or `about` of a world; None matches any world
 
 
 @dataclass(frozen=True)
 class TraceMatch:
-    """The worlds in which a completion matches a query, by number from 1 and name."""
+    """The worlds in which a completion matches a query, each with its number (from 1) and name."""
 
     key: CompletionKey
     worlds: tuple[tuple[int, str], ...]
-    cut: tuple[tuple[int, str], ...] = ()  # undecided: the trace was too long to be stored
+    cut: tuple[tuple[int, str], ...] = ()  # worlds whose trace was too long to be stored
 
 
 def search(lines: Sequence[bytes], query: TraceQuery, *, workers: int = 1) -> Iterator[TraceMatch]:
-    """Match rows against a query, in their order; uses `workers` processes for many rows."""
+    """Match rows against a query and yield the matches in order; use `workers` processes for many rows."""
     match = partial(match_rows, query=query)
     if workers == 1 or len(lines) < ROWS_FOR_PROCESSES:
         return iter(match(lines))
@@ -49,12 +49,12 @@ def search(lines: Sequence[bytes], query: TraceQuery, *, workers: int = 1) -> It
 
 
 def count_searched(table: pl.DataFrame, task: str | None) -> int:
-    """The number of judged completions, of one task or of all."""
+    """Count the judged completions of one task, or of all tasks if it is None."""
     return completions_of(table if task is None else table.filter(task=task)).height
 
 
 def matches_by_task(found: Sequence[TraceMatch], table: pl.DataFrame) -> pl.DataFrame:
-    """Count the completions of each `task` that were `found`, and how many of these `passed`."""
+    """Count for each `task` the completions that were `found`, and those among them that `passed`."""
     keys = pl.DataFrame(
         [one.key for one in found], schema={name: table.schema[name] for name in KEY}, orient="row"
     )
@@ -66,13 +66,13 @@ def matches_by_task(found: Sequence[TraceMatch], table: pl.DataFrame) -> pl.Data
 
 
 def match_rows(lines: Sequence[bytes], query: TraceQuery) -> list[TraceMatch]:
-    """Match a batch of rows; runs in a worker process."""
+    """Match a batch of rows in a worker process."""
     formula = None if query.formula is None else parse(query.formula)
     return [match_row(json.loads(line), query, formula) for line in lines]
 
 
 def match_row(row: Mapping[str, Any], query: TraceQuery, formula: Formula | None) -> TraceMatch:
-    """Match one row."""
+    """Match the traces of one completion."""
     worlds, cut = [], []
     for number, verdict in _verdicts_in_scope(row, query):
         if formula is not None and "cut" in verdict:

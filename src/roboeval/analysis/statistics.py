@@ -1,4 +1,4 @@
-"""Cluster bootstrap, sign-flip permutation test, and sample sizes for 80% power."""
+"""Computes cluster bootstraps, sign-flip permutation tests, and sample sizes for 80% power."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BOOTSTRAP_SEED = 0
 TEST_POWER = 0.8
 MIN_CLUSTERS = 8  # with fewer clusters, the bootstrap interval is too narrow
 MAX_EXACT_CLUSTERS = 20  # up to this many clusters, all 2**20 sign flips are enumerated
-RESAMPLES_AT_ONCE = 1_000  # resamples held in memory at a time
+RESAMPLES_AT_ONCE = 1_000  # number of resamples in memory at a time
 
 
 def by_bootstrap(
@@ -35,7 +35,7 @@ def by_bootstrap(
     seed: int = BOOTSTRAP_SEED,
     draws: int = 10_000,
 ) -> Estimate:
-    """The mean of all values with a percentile interval from a cluster bootstrap.
+    """Return the mean of all values with a percentile interval from a cluster bootstrap.
 
     Plain percentiles are too narrow for few clusters, so they are expanded by the ratio of Student's t to the
     normal distribution (Hesterberg's expanded percentile interval).
@@ -57,10 +57,10 @@ def by_bootstrap(
 
 
 def p_by_signs(clusters: Clusters, *, seed: int = BOOTSTRAP_SEED, draws: int = 100_000) -> float:
-    """The p-value of a two-sided permutation test that flips the signs of whole clusters of differences.
+    """Return the p-value of a two-sided permutation test that flips the signs of whole clusters.
 
-    It is exact for up to 20 clusters; for more, signs are sampled. With G clusters it is at least 2 / 2**G,
-    so a few clusters cannot reach significance.
+    The test is exact for up to 20 clusters; for more, signs are sampled. With G clusters, p is at least
+    2 / 2**G, so a difference between few clusters cannot be significant.
     """
     sums = np.array([math.fsum(values) for values in clusters])
     observed = abs(float(sums.sum())) - ROUNDING_ERROR
@@ -79,18 +79,18 @@ def p_by_signs(clusters: Clusters, *, seed: int = BOOTSTRAP_SEED, draws: int = 1
 
 @dataclass(frozen=True)
 class SampleSizes:
-    """The sample sizes for 80% power; None if the models do not differ."""
+    """The sample sizes for 80% power, or None if the models do not differ."""
 
-    completions: int | None  # per prompt and model, to generalise to these prompts
-    prompts: int | None  # with as many completions each, to generalise to similar prompts
+    completions: int | None  # number per prompt and model, if only these prompts matter
+    prompts: int | None  # number of similar prompts, with as many completions per prompt as now
 
 
 def sample_sizes(pairs: Sequence[tuple[float, float]]) -> SampleSizes:
-    """Compute the sample sizes that detect the mean difference between pairs of pass@1 with 80% power.
+    """Compute the sample sizes needed to detect the mean difference between pairs of pass@1 with 80% power.
 
     With n completions per prompt, the difference has the variance (w / n) / m on m given prompts, where w is
     the mean of a (1 - a) + b (1 - b); on m random prompts it has v / m, where v is the variance of the
-    differences. It is detected if it is at least (z(level) + z(power)) standard errors.
+    differences. A difference is detected if it is at least (z(level) + z(power)) standard errors.
     """
     m = len(pairs)
     differences = [b - a for a, b in pairs]

@@ -1,4 +1,4 @@
-"""The summary of an evaluation: pass rates, and counts of failures by class and kind."""
+"""Summarises an evaluation: pass rates, and counts of failures by class and kind."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from roboeval.suites.load import Suite
 
 @dataclass(frozen=True)
 class Failures:
-    """The completions that failed by a class, or by a kind of it."""
+    """Counts the failures of a class, or of a kind within a class."""
 
     name: str
     count: int
     share: float  # of all judged completions
-    kinds: tuple[Failures, ...] = ()  # of a class; known kinds come first, even with a count of 0
+    kinds: tuple[Failures, ...] = ()  # kinds of a class; known kinds come first, even if they did not occur
 
 
 @dataclass(frozen=True)
 class EvaluationSummary:
-    """An evaluation in numbers."""
+    """The results of an evaluation: scores, failures and coverage."""
 
     k: tuple[int, ...]
-    tasks: tuple[TaskScore, ...]  # with completions, in the suite's order
-    overall: tuple[Estimate, ...]  # pass@k for each k
+    tasks: tuple[TaskScore, ...]  # tasks with completions, in the order of the suite
+    overall: tuple[Estimate, ...]  # pass@k for each value of k
     failures: tuple[Failures, ...]
     scope: JudgingScope
     missing: Missing  # tasks of the suite without a score
@@ -49,12 +49,12 @@ class EvaluationSummary:
 
     @property
     def prompts(self) -> list[PromptScore]:
-        """The scores of all prompts of all tasks."""
+        """The scores of all prompts, across tasks."""
         return prompts_of(self.tasks)
 
     @property
     def coverage(self) -> Coverage:
-        """How many completions were judged, are there, and were requested."""
+        """The numbers of judged, existing and requested completions."""
         return self.scope.coverage(judged_count(self.prompts))
 
     @property
@@ -64,7 +64,7 @@ class EvaluationSummary:
 
 
 def cut_off_replies(failures: Iterable[Failures], scope: JudgingScope) -> CutOff:
-    """The replies of a run that were cut off, given its failures."""
+    """Count the replies of a run that were cut off, given its failures."""
     kinds = (kind for one in failures if one.name == NO_PROGRAM_CLASS for kind in one.kinds)
     without = sum(kind.count for kind in kinds if kind.name == "cut-off")
     return CutOff(max(scope.cut_off, without), without, scope.total, scope.limit)
@@ -72,7 +72,7 @@ def cut_off_replies(failures: Iterable[Failures], scope: JudgingScope) -> CutOff
 
 @dataclass(frozen=True)
 class Missing:
-    """Tasks of a suite without a score, by the reason."""
+    """The tasks of a suite that have no score, grouped by reason."""
 
     no_completions: tuple[str, ...] = ()
     not_judged: tuple[str, ...] = ()
@@ -82,7 +82,7 @@ class Missing:
 def summarise(
     tally: Tally, suite: Suite, scope: JudgingScope, *, k: Sequence[int] = (1,), ablated: bool = False
 ) -> EvaluationSummary:
-    """Summarise an evaluation; raises UserError if nothing was judged, or if k is too large for a prompt."""
+    """Summarise an evaluation; raise UserError if nothing was judged or if k is too large for a prompt."""
     tasks = tally.scores(suite.tasks)
     if not tasks:
         raise UserError(f"0 of {how_many(scope.total)} judged; there are no results yet")
@@ -128,11 +128,11 @@ PASSED, ALL = "passed", "all"
 
 @dataclass(frozen=True)
 class Causes:
-    """The outcomes of completions, as shares."""
+    """The outcomes of completions as shares of classes and kinds."""
 
-    classes: Mapping[str, float]  # of all completions, including PASSED
-    kinds: Mapping[str, Mapping[str, float]]  # of the failures of a class
-    counts: Mapping[tuple[str, str], int]  # by class and kind, ALL for the class; may be empty
+    classes: Mapping[str, float]  # shares of all completions, including PASSED
+    kinds: Mapping[str, Mapping[str, float]]  # shares of the failures in a class
+    counts: Mapping[tuple[str, str], int]  # by class and kind (ALL: the whole class); empty if unknown
 
 
 def causes(tally: Tally) -> Causes:
@@ -148,14 +148,14 @@ def causes(tally: Tally) -> Causes:
 
 
 def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
-    """The kinds of a class that occur, known kinds first."""
+    """Return the kinds of a class that occur, known kinds first."""
     occurring = {kind for one in found for kind in one.kinds.get(name, {})}
     known = [kind for kind in FAILURE_CLASSES[name].kinds if kind in occurring]
     return [*known, *sorted(occurring - {*known})]
 
 
 def summary_data(summary: EvaluationSummary) -> dict[str, Any]:
-    """A summary as plain data."""
+    """Convert a summary to plain data."""
     estimates = zip(summary.k, summary.overall, strict=True)
     return {
         "models": sorted(model for model in summary.scope.models if model is not None),

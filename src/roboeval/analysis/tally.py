@@ -1,4 +1,4 @@
-"""Running counts of completions while they are judged."""
+"""Counts completions while they are judged."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from roboeval.evaluation.runs.rows import Row, key_of
 
 
 class Tally:
-    """Counts of judged, passed and failed completions."""
+    """Counts judged, passed and failed completions."""
 
     def __init__(self) -> None:
         self.judged: Counter[tuple[str, int]] = Counter()  # by task and prompt
@@ -20,7 +20,7 @@ class Tally:
         self.first_failed: CompletionKey | None = None
 
     def add(self, row: Row) -> None:
-        """Count a completion."""
+        """Count a judged completion."""
         prompt = row["task"], row["prompt"]
         self.judged[prompt] += 1
         if (why := row["failure"]) is None:
@@ -31,7 +31,7 @@ class Tally:
             self.first_failed = key_of(row)
 
     def scores(self, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-        """Scores by task and prompt (paper, section IV.C); tasks not in `order` come last."""
+        """Compute the scores of tasks and prompts (paper, section IV.C); tasks not in `order` come last."""
         prompts: dict[str, list[PromptScore]] = {task: [] for task in order}
         for (task, prompt), n in self.judged.items():
             prompts.setdefault(task, []).append(PromptScore(task, prompt, n, self.passed[task, prompt]))

@@ -1,4 +1,4 @@
-"""The results of one task by prompt, and of one prompt by program."""
+"""Summarises the results of a task by prompt, and of a prompt by program."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from roboeval.evaluation.runs.scope import requested_of_prompts
 
 
 def task_data(results: Results, task: str) -> dict[str, Any]:
-    """The results of a task by prompt, as plain data: pass rates and kinds of failure."""
+    """Summarise a task as plain data: the pass rate and kinds of failure of each prompt."""
     suite = results.suite
     of_task = completions_of(results.table).filter(pl.col("task") == task).sort("prompt", maintain_order=True)
     return {
@@ -30,7 +30,7 @@ def task_data(results: Results, task: str) -> dict[str, Any]:
 
 
 def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
-    """The distinct programs of a judged prompt as plain data, with the reason why each fails."""
+    """Summarise a judged prompt as plain data: its distinct programs, and why each of them fails."""
     of_prompt = completions_of(results.table).filter(pl.col("task") == task, pl.col("prompt") == prompt)
     programs = results.programs
     groups: dict[object, list[CompletionKey]] = defaultdict(list)
@@ -52,10 +52,10 @@ def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
 
 
 def prompt_counts(completions: pl.DataFrame, condition: pl.Expr) -> pl.DataFrame:
-    """Count the completions of each prompt that are `written`, `judged`, and `counted` by a condition.
+    """Count for each prompt the completions that are `written`, `judged`, and `counted` (meet a condition).
 
-    The input has `written` and `passed` (null if not judged). `share` is the counted part of the judged
-    completions, null if there are none.
+    The input has the columns `written` and `passed` (null if not judged). `share` is the share of judged
+    completions that meet the condition, or null if none was judged.
     """
     judged = pl.col("judged")
     counts = completions.group_by("task", "prompt", maintain_order=True).agg(

@@ -1,4 +1,4 @@
-"""Comparison of verdicts under two suites: which completions change, and whether the ranking of runs does."""
+"""Compares verdicts under two suites: which completions and which ranks of runs change."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from roboeval.evaluation.runs.results import Results
 
 @dataclass(frozen=True)
 class TaskChanges:
-    """The completions of a task by the suites under which they pass."""
+    """Counts the completions of a task by the suites under which they pass."""
 
     task: str
     both: int
@@ -31,34 +31,34 @@ class TaskChanges:
 
 @dataclass(frozen=True)
 class VerdictChanges:
-    """The effect of a second suite on the verdicts of one run."""
+    """The effect of judging a run with a second suite."""
 
     name: str
     suites: tuple[str, str]
-    comparison: Comparison  # second suite minus first
+    comparison: Comparison  # difference in pass@1, second suite minus first
     tasks: tuple[TaskChanges, ...]
-    first_only: tuple[FailureGroup, ...]  # with the reasons why the second suite fails them
-    second_only: tuple[FailureGroup, ...]  # with the reasons why the first suite fails them
-    programs: int  # distinct ones whose verdict changes
-    left_out: int  # completions judged by one suite only
+    first_only: tuple[FailureGroup, ...]  # pass under the first suite only; failures under the second
+    second_only: tuple[FailureGroup, ...]  # pass under the second suite only; failures under the first
+    programs: int  # number of distinct programs whose verdict changes
+    left_out: int  # number of completions judged with one suite only
 
     @property
     def completions(self) -> int:
-        """The number of completions judged by both suites."""
+        """The number of completions judged with both suites."""
         return sum(task.both + task.first_only + task.second_only + task.neither for task in self.tasks)
 
     @property
     def pass_at_1(self) -> tuple[float, float]:
-        """pass@1 under the first suite, and under the second."""
+        """The pass@1 under the first suite and under the second."""
         return self.comparison.first, self.comparison.second
 
 
 def verdict_changes(name: str, first: Results, second: Results) -> VerdictChanges:
-    """Find the completions whose verdicts differ; raises UserError if none was judged by both."""
+    """Find the completions whose verdicts differ; raise UserError if none was judged with both suites."""
     one, other = completions_of(first.table), completions_of(second.table)
     both = one.select(*KEY, "passed").join(other.select(*KEY, then="passed"), on=KEY).sort(KEY)
     if both.is_empty():
-        raise UserError("no completion was judged by both suites; judge the run with both", file=name)
+        raise UserError("no completion was judged with both suites; judge the run with each", file=name)
     lost = [*both.filter("passed", ~pl.col("then")).select(KEY).iter_rows()]
     won = [*both.filter("then", ~pl.col("passed")).select(KEY).iter_rows()]
     programs = first.programs
@@ -75,7 +75,7 @@ def verdict_changes(name: str, first: Results, second: Results) -> VerdictChange
 
 
 def _pass_at_1(results: Results, other: Results) -> PromptScores:
-    """pass@1 of each prompt, from the completions that both results have judged."""
+    """Return pass@1 of each prompt, computed from the completions that both suites have judged."""
     return pass_at_1(task_scores(results.table.join(other.table.select(KEY).unique(), on=KEY, how="semi")))
 
 
@@ -95,22 +95,22 @@ def _by_task(both: pl.DataFrame, order: Iterable[str]) -> Iterator[TaskChanges]:
 
 
 def rank(name: str, scores: Mapping[str, float]) -> int:
-    """The rank of a run, from 1; equal scores share a rank."""
+    """Return the rank of a run, starting at 1; runs with equal scores share a rank."""
     return 1 + sum(score > scores[name] + ROUNDING_ERROR for score in scores.values())
 
 
 @dataclass(frozen=True)
 class RankChange:
-    """Two runs that two suites rank differently, or that tie under one suite only."""
+    """Two runs whose order changes between two suites, or that tie under only one of them."""
 
-    one: str  # the run that is better under the second suite, or else under the first
+    one: str  # the better run under the second suite, or under the first in case of a tie
     other: str
-    first: float  # the difference in pass@1 under the first suite
+    first: float  # difference in pass@1 under the first suite
     second: float
 
 
 def rank_changes(found: Sequence[VerdictChanges]) -> list[RankChange]:
-    """All pairs of runs that the suites rank differently, or that tie under one suite only."""
+    """Return all pairs of runs whose order changes between the suites."""
     pairs = (_compare_ranks(one, other) for one, other in combinations(found, 2))
     return [pair for pair in pairs if _sign(pair.first) != _sign(pair.second)]
 
@@ -130,12 +130,12 @@ def _sign(difference: float) -> int:
 
 
 def sentences(found: Sequence[VerdictChanges]) -> list[str]:
-    """Describe the changes of each run and of the ranking."""
+    """Describe how the verdicts of each run and the ranking of the runs change."""
     return [*map(describe_run, found), *describe_ranking(found), *warn_of_prompts(found)]
 
 
 def describe_run(found: VerdictChanges) -> str:
-    """Describe the changes of a run in a sentence."""
+    """Describe in a sentence how the verdicts of a run change."""
     first, second = found.suites
     lost, won = (sum(getattr(task, side) for task in found.tasks) for side in ("first_only", "second_only"))
     if not lost and not won:
@@ -151,8 +151,8 @@ def describe_run(found: VerdictChanges) -> str:
 
 
 def describe_ranking(found: Sequence[VerdictChanges]) -> list[str]:
-    """Describe changes of rank in sentences; none for a single run."""
-    if len(found) < 2:  # noqa: PLR2004 - a ranking needs two runs
+    """Describe changes in the ranking; return nothing for a single run."""
+    if len(found) < 2:  # noqa: PLR2004 - a ranking requires two runs
         return []
     first, second = found[0].suites
     changes = rank_changes(found)
@@ -169,7 +169,7 @@ FREQUENCY_WORDS = {1: "more often than", 0: "as often as", -1: "less often than"
 
 
 def warn_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
-    """Warn if the runs have different prompts."""
+    """Return a warning if the runs have different prompts."""
     asked = {frozenset((task.task, task.prompts) for task in one.comparison.tasks) for one in found}
     warning = "The runs have different prompts, which may affect their ranking."
     return [warning] if len(asked) > 1 else []
@@ -179,7 +179,7 @@ def warn_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
 
 
 def changes_data(found: Sequence[VerdictChanges]) -> dict[str, Any]:
-    """The changes of all runs as plain data."""
+    """Convert the changes of all runs to plain data."""
     first, second = found[0].suites
     return {
         "suites": [first, second],

@@ -1,5 +1,5 @@
-"""Mutation testing of a suite: which wrong programs survive its checks?
+"""Mutation testing of a suite: which wrong programs pass its checks?
 
-Operators turn the right solutions of a task into mutants; `trials.py` runs them in its worlds. Start with
-`operator.py`.
+Operators turn the right solutions of a task into mutants; `trials.py` runs these in the worlds of the task.
+Start with `operator.py`.
 """

@@ -1,4 +1,4 @@
-"""Right programs and their distinct mutants."""
+"""Collects the right programs of a task and creates their distinct mutants."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ class Original:
 
     name: str
     program: str
-    claimed: bool = True  # whether its author claims that it is right
+    claimed: bool = True  # whether the author declares it to be right
 
     @cached_property
     def tree(self) -> ProgramTree | None:
-        """The syntax tree; None if the program does not parse."""
+        """The syntax tree, or None if the program does not parse."""
         return parse_tree(self.program)
 
     @property
     def text(self) -> str:
-        """The normalised text, equal for programs with the same tree; the source if there is no tree."""
+        """The text generated from the syntax tree, or the source if it does not parse."""
         return self.program if self.tree is None else self.tree.text
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A program that an operator has changed."""
+    """A program that was changed by an operator."""
 
     operator: str
     original: Original
@@ -55,12 +55,12 @@ class Mutant:
 
     @property
     def key(self) -> tuple[str, str]:
-        """The key in the list of equivalent mutants."""
+        """The key that identifies the mutant in the list of equivalent mutants."""
         return self.operator, bare_diff(self.diff)
 
 
 def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, ...]:
-    """The right solutions of a task and further programs; only the first of those with the same tree."""
+    """Collect the right solutions of a task and further programs; equal syntax trees count once."""
     right = (Original(one.about, one.program) for one in solutions(task) if one.fails is None or one.right)
     distinct: dict[str, Original] = {}
     for original in chain(right, further):
@@ -71,7 +71,7 @@ def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, .
 def mutants(
     right: Sequence[Original], context: Context, operators: Iterable[Operator] = MUTATION_OPERATORS
 ) -> Iterator[Mutant]:
-    """All distinct mutants of right programs that are not themselves right programs."""
+    """Yield all distinct mutants of right programs, except mutants that equal a right program."""
     seen = {original.text for original in right}
     for original in right:
         if (tree := original.tree) is None:
@@ -85,7 +85,7 @@ def mutants(
 
 
 def sample_mutants(every: Iterable[Mutant], most: int, seed: int) -> tuple[Mutant, ...]:
-    """Sample at most `most` mutants, evenly over the operators; the order of `every` does not matter."""
+    """Sample up to `most` mutants evenly across operators, regardless of the order of `every`."""
 
     def random_key(mutant: Mutant) -> bytes:
         return hashlib.sha256(f"{seed}\n{mutant.program}".encode(errors="surrogatepass")).digest()

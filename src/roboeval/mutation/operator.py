@@ -1,4 +1,4 @@
-"""Mutation operators, and the context of a task that they use."""
+"""Defines mutation operators and the information about a task that they use."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from roboeval.mutation.program_tree import Edit, ProgramTree, text_of
 
 @dataclass(frozen=True)
 class Context:
-    """The names in the worlds of a task, and its prompts."""
+    """The prompts of a task and the names that occur in its worlds."""
 
-    rooms: tuple[str, ...]  # except starting rooms
-    people: tuple[str, ...]  # owners of rooms; instructions name no other people
+    rooms: tuple[str, ...]  # without the rooms where the robot starts
+    people: tuple[str, ...]  # owners of rooms, the only people named in instructions
     things: tuple[str, ...]
     prompts: tuple[str, ...]
 
     @classmethod
     def of(cls, worlds: Sequence[World], prompts: Sequence[str] = ()) -> Context:
-        """Collect the context of a task."""
+        """Collect the names from the worlds of a task."""
         starts = {world.robot for world in worlds}
         rooms = [room for world in worlds for room in world.rooms]
         owners = (re.fullmatch(r"(\w+)'s .+", room.name) for room in rooms)
@@ -37,7 +37,7 @@ class Context:
         )
 
     def idle_rooms(self, program: ProgramTree) -> tuple[str, ...]:
-        """The rooms whose names share no word with the strings of a program."""
+        """Return the rooms whose names share no word with any string in a program."""
         texts = filter(None, map(text_of, program.nodes))
         named = {word for text in texts for word in re.findall(r"\w+", text.lower())}
         return tuple(room for room in self.rooms if not named & set(re.findall(r"\w+", room.lower())))
@@ -50,22 +50,22 @@ Condition: TypeAlias = Callable[[Context], bool]
 
 @dataclass(frozen=True)
 class Operator:
-    """A mutation operator: a mistake that models make in programs."""
+    """A mutation operator, which introduces one kind of mistake that models make."""
 
     name: str  # such as `drop-the-return`
     about: str
-    edits: Mutate  # each edit makes one mutant
+    edits: Mutate  # yields one edit for each mutant
 
 
 def operators_in(module: ModuleType) -> Iterator[Operator]:
-    """The operators of a module: its public functions."""
+    """Yield an operator for each public function of a module."""
     for name, function in vars(module).items():
         if isfunction(function) and function.__module__ == module.__name__ and not name.startswith("_"):
             yield Operator(name.replace("_", "-"), function.__doc__ or "", function)
 
 
 def only_if(condition: Condition) -> Callable[[Mutate], Mutate]:
-    """Restrict an operator to tasks that meet a condition, since others do not require what it changes."""
+    """Apply an operator only to tasks that meet a condition; other tasks do not require what it changes."""
 
     def conditional(edits: Mutate) -> Mutate:
         @wraps(edits)
@@ -78,13 +78,13 @@ def only_if(condition: Condition) -> Callable[[Mutate], Mutate]:
 
 
 def prompt_matches(pattern: str) -> Condition:
-    """The condition that a prompt matches, since a program may omit what no prompt asks for."""
+    """Return a condition that holds if any prompt matches; programs may omit what no prompt asks for."""
     compiled = re.compile(pattern)
     return lambda context: not context.prompts or any(map(compiled.search, context.prompts))
 
 
 def next_names(names: Sequence[str], name: str, most: int = 2) -> tuple[str, ...]:
-    """The names that follow a name in a cyclic list."""
+    """Return up to `most` names that follow a name in a list, starting over at its end."""
     folded = [one.lower() for one in names]
     at = folded.index(name.lower()) if name.lower() in folded else -1
     around = [*names[at + 1 :], *names[: max(at, 0)]]

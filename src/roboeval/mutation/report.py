@@ -1,4 +1,4 @@
-"""Mutation scores as tables, diffs and files."""
+"""Shows mutation scores as tables and diffs, and writes them to files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DESCRIPTIONS = {operator.name: operator.about for operator in MUTATION_OPERATORS
 
 
 def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
-    """A table of scores by task."""
+    """Return a table with the score of each task."""
     heads = "task", "worlds", "originals", "mutants", "killed", "equivalent", "survived", "score", "of all"
     table = _table(*heads, "same traces", "crashes")
     for score in scores:
@@ -39,7 +39,7 @@ def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
 
 
 def operators_view(scores: Sequence[MutationScore]) -> RenderableType:
-    """A table of the mutants that change behaviour, by operator."""
+    """Return a table that counts, for each operator, the mutants that change behaviour."""
     table = _table("operator", "mutants", "killed", "survived")
     tried = (one for score in scores for one in score.mutants)
     counts = Counter((one.mutant.operator, one.result.status) for one in tried)
@@ -51,7 +51,7 @@ def operators_view(scores: Sequence[MutationScore]) -> RenderableType:
 
 
 def survivors_view(score: MutationScore) -> RenderableType:
-    """The surviving mutants of a task with their operators and diffs."""
+    """Return the surviving mutants of a task, each with its operator and diff."""
     parts: list[RenderableType] = []
     for number, mutant in enumerate(score.survivors, 1):
         origin = f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
@@ -84,14 +84,14 @@ def write_scores(scores: Sequence[MutationScore], folder: Path) -> None:
 
 
 def to_yaml(mutants: Iterable[Mutant]) -> str:
-    """A list of equivalent mutants in YAML, with empty reasons."""
+    """Format mutants as a YAML list of equivalent mutants whose reasons are still empty."""
     entries = [{"operator": one.operator, "diff": one.diff, "because": ""} for one in mutants]
     listed = {"equivalent_mutants": entries}
     return yaml.dump(listed, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes multi-line strings as blocks."""
+    """Writes multi-line strings as YAML blocks."""
 
 
 def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:

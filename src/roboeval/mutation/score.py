@@ -1,4 +1,4 @@
-"""The status of mutants, and the mutation score of a task."""
+"""Defines the status of mutants and the mutation score of a task."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 from roboeval.mutation.mutants import Mutant, Original
 
-MIN_RELIABLE_MUTANTS = 60  # mutants that change behaviour, for a reliable score
-MAX_EQUIVALENT_SHARE = 0.15  # share of mutants that change behaviour
+MIN_RELIABLE_MUTANTS = 60  # a score from fewer mutants that change behaviour is unreliable
+MAX_EQUIVALENT_SHARE = 0.15  # of the mutants that change behaviour
 
 
 class MutantStatus(StrEnum):
-    """The status of a mutant."""
+    """Whether the checks reject a mutant, or why it is not counted."""
 
     KILLED = "killed"
     SURVIVED = "survived"
@@ -26,11 +26,11 @@ CHANGING_STATUSES = MutantStatus.KILLED, MutantStatus.SURVIVED, MutantStatus.EQU
 
 
 class MutantResult(NamedTuple):
-    """The status of a program, and the reason."""
+    """The status of a mutant and the reason for it."""
 
     status: MutantStatus
     world: str | None = None  # the world in which it was killed
-    why: str | None = None  # the failed check or the error; the reason of an equivalent mutant
+    why: str | None = None  # the failed check, the error, or why the mutant is equivalent
 
 
 class TriedMutant(NamedTuple):
@@ -40,7 +40,7 @@ class TriedMutant(NamedTuple):
     result: MutantResult
 
     def row(self) -> dict[str, Any]:
-        """The row in mutants.jsonl."""
+        """Return the mutant's row in mutants.jsonl."""
         return {
             "operator": self.mutant.operator,
             "original": self.mutant.original.name,
@@ -52,26 +52,26 @@ class TriedMutant(NamedTuple):
 
 @dataclass(frozen=True)
 class MutationScore:
-    """How many mutants of a task the checks kill."""
+    """Counts how many mutants of a task are killed by its checks."""
 
     task: str
     worlds: int
     right: tuple[Original, ...]
-    wrong: tuple[tuple[Original, MutantResult], ...]  # originals that fail the suite's checks
+    wrong: tuple[tuple[Original, MutantResult], ...]  # originals that fail the checks of the suite
     mutants: tuple[TriedMutant, ...]
 
     def count(self, *statuses: MutantStatus) -> int:
-        """The number of mutants with one of these statuses."""
+        """Count the mutants with any of the given statuses."""
         return sum(one.result.status in statuses for one in self.mutants)
 
     @property
     def score(self) -> float | None:
-        """The share of killed mutants, without equivalent ones."""
+        """The share of mutants that are killed, not counting equivalent ones."""
         return self._killed_of(MutantStatus.KILLED, MutantStatus.SURVIVED)
 
     @property
     def score_of_all(self) -> float | None:
-        """The share of killed mutants among all that change behaviour, including equivalent ones."""
+        """The share of killed mutants among all that change behaviour, including equivalent mutants."""
         return self._killed_of(*CHANGING_STATUSES)
 
     def _killed_of(self, *statuses: MutantStatus) -> float | None:
@@ -80,12 +80,12 @@ class MutationScore:
 
     @property
     def survivors(self) -> tuple[Mutant, ...]:
-        """The mutants that survive and are not listed as equivalent."""
+        """The mutants that pass in all worlds although they are not listed as equivalent."""
         return tuple(one.mutant for one in self.mutants if one.result.status is MutantStatus.SURVIVED)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons to doubt the score."""
+        """Sentences that explain why the score may be unreliable."""
         changing, equivalent = self.count(*CHANGING_STATUSES), self.count(MutantStatus.EQUIVALENT)
         found = []
         if changing < MIN_RELIABLE_MUTANTS:
@@ -96,7 +96,7 @@ class MutationScore:
         return tuple(found)
 
     def data(self) -> dict[str, Any]:
-        """The entry in scores.json."""
+        """Return the task's entry in scores.json."""
         return {
             "task": self.task,
             "worlds": self.worlds,

@@ -18,8 +18,8 @@ from roboeval.mutation.score import MutantResult, MutantStatus, MutationScore, T
 from roboeval.suites.load import Scenario, Suite, Task
 from roboeval.suites.solutions import equivalent_mutants
 
-DEFAULT_MUTANT_WORLDS = 200  # sampled by default
-WORLDS_PER_BATCH = 16  # worlds per batch; a killed mutant skips further batches
+DEFAULT_MUTANT_WORLDS = 200  # number of sampled worlds by default
+WORLDS_PER_BATCH = 16  # after a batch, killed mutants skip the remaining worlds
 CRASH_STATUSES = frozenset({Status.PYTHON_ERROR, Status.KILLED})
 
 ProgressBar: TypeAlias = Callable[[Iterable[Any], str, int], Iterator[Any]]  # items, label and count
@@ -36,10 +36,10 @@ def mutation_score(
     seed: int = 1,
     progress: ProgressBar = lambda items, *_: iter(items),
 ) -> MutationScore:
-    """Run the solutions of a task and further originals, and judge mutants of the right ones.
+    """Compute the mutation score of a task from mutants of its solutions and of further programs.
 
-    An original is right if it satisfies some prompt. A mutant is killed if it fails any prompt that its
-    original satisfies. Raises UserError if `worlds` is given for a suite with listed worlds.
+    A program is right if it satisfies at least one prompt. A mutant is killed if it fails any prompt that its
+    original satisfies. Raises UserError if `worlds` is given but the suite does not sample its worlds.
     """
     scenarios = mutation_worlds(suite, task, worlds, seed)
     robots = [partial(robot_in, scenario.world, suite) for scenario in scenarios]
@@ -82,13 +82,13 @@ def mutation_score(
 
 
 def _satisfied(scenarios: Sequence[Scenario], faults: Sequence[MutantResult | None]) -> tuple[Scenario, ...]:
-    """The scenarios with the requirements of the prompts that an original satisfies."""
+    """Restrict scenarios to the requirements of the prompts that an original satisfies."""
     fitting = [prompt for prompt, fault in enumerate(faults) if fault is None]
     return tuple(one.asked_by(*fitting) for one in scenarios)
 
 
 def mutation_worlds(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
-    """The worlds for mutants; sampled ones use another seed than the suite."""
+    """Return the worlds for mutants; if worlds are sampled, the seed differs from that of the suite."""
     if suite.worlds is not None:
         return (
             suite.with_worlds(count or DEFAULT_MUTANT_WORLDS, seed + 1 + (suite.seed or 0))
@@ -101,7 +101,7 @@ def mutation_worlds(suite: Suite, task: Task, count: int | None, seed: int) -> t
 
 
 def find_failure(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> MutantResult | None:
-    """The first failure of an original; None if it is right."""
+    """Return the first failure of a program, or None if it satisfies every scenario."""
     verdicts = map(judge, outcomes, scenarios)
     return next((_killed(verdict) for verdict in verdicts if not verdict.satisfied), None)
 
@@ -109,9 +109,9 @@ def find_failure(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> 
 def judge_mutant(
     outcomes: Iterable[Outcome], before: Sequence[Outcome], scenarios: Sequence[Scenario]
 ) -> MutantResult:
-    """Judge a mutant; outcomes are read until a check kills it.
+    """Judge a mutant, reading its outcomes only until a check fails.
 
-    A mutant that crashes in every world is not counted as killed, since no check is needed to reject it.
+    A mutant that crashes in every world does not count as killed, because no check is needed to reject it.
     """
     crashes: list[Verdict] = []
     changed = False

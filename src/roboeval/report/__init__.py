@@ -1,4 +1,4 @@
-"""The report: figures, tables and one page about how models do and why they fail.
+"""Creates reports: figures, tables and a page that show how models perform and why their programs fail.
 
-Start with `writing.py`, which assembles the sections; `page.yaml` holds their text.
+Start with `writing.py`, which assembles the sections; `page.yaml` contains their text.
 """

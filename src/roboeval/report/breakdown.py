@@ -1,4 +1,4 @@
-"""Sections on the abilities that tasks need, and on the phrasing of instructions."""
+"""Builds the sections on the abilities that tasks require, and on the phrasing of instructions."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ MAX_DISTINCT_WORDS = 12
 
 
 def abilities(runs: Sequence[JudgedRun]) -> Section:
-    """Failures by the abilities that a task needs (paper, section V.B)."""
+    """Build the section on failures by required ability (paper, section V.B)."""
     table = report_back_sheet(runs)
     return section("abilities", ability_sheet(runs), Prose(report_back_sentences(table)), table)
 
 
 def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """pass@1 and causes of failures by ability."""
+    """Build the table of pass@1 and causes of failures by ability."""
     order: list[str] = [ability for task in runs[0].suite.tasks.values() for ability in task.abilities]
     found = {(row[0], run.name): row[1:] for run in runs for row in by_ability(run.table, run.suite)}
     rows: list[list[Cell]] = []
@@ -40,7 +40,7 @@ def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Tasks that end with a report, compared with the others."""
+    """Build the table that compares tasks that end with a report to all others."""
     rows: list[list[Cell]] = []
     for run in runs:
         for reports, completions, failed, away, lost, passed in compare_report_back(run.results).iter_rows():
@@ -51,7 +51,7 @@ def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def report_back_sentences(table: Sheet) -> list[str]:
-    """Sentences about tasks that end with a report."""
+    """Describe the failures in tasks that end with a report."""
     return [
         f"{name}: of {failed:,} failures in tasks that end with a report, "
         f"{away:,} never returned and {lost:,} went to a room "
@@ -65,12 +65,12 @@ def report_back_sentences(table: Sheet) -> list[str]:
 
 
 def phrasings(runs: Sequence[JudgedRun]) -> Section:
-    """How much the phrasing of an instruction matters (paper, section V.A)."""
+    """Build the section on the effect of an instruction's phrasing (paper, section V.A)."""
     return section("phrasing", spread_sheet(runs), phrasing_sheet(runs))
 
 
 def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """The spread of pass@1 over the prompts of each task and run, the widest first."""
+    """Build the table of the spread of pass@1 over the prompts of each task and run, widest first."""
     order = tasks_of(runs)
     found = [(run, row) for run in runs for row in spread_by_task(run.table).iter_rows()]
     rows = []
@@ -81,7 +81,7 @@ def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def distinct_words(one: str | None, other: str | None) -> tuple[str, str]:
-    """The words that only the first text has, and those that only the second has."""
+    """Return the words that occur only in the first text, and those that occur only in the second."""
     if one is None or other is None:
         return NO_INSTRUCTION, NO_INSTRUCTION
     words = (re.findall(r"[^\W_]+(?:['\u2019][^\W_]+)*", text.lower()) for text in (one, other))
@@ -95,7 +95,7 @@ def _join(words: Sequence[str]) -> str:
 
 
 def phrasing_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Each prompt compared with the mean of its task, the most harmful first."""
+    """Build the table that compares each prompt with the mean of its task, most harmful prompts first."""
     order = tasks_of(runs)
     scores = [prompt_scores(run.table).with_columns(model=pl.lit(at)) for at, run in enumerate(runs)]
     found = compare_phrasings(pl.concat(scores)).rows()
@@ -103,6 +103,6 @@ def phrasing_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     return sheet("phrasings", [[*row, _instructions(runs, row[:2])] for row in rows])
 
 
-def _instructions(runs: Sequence[JudgedRun], key: Any) -> str:  # noqa: ANN401 - cells of a table have any type
+def _instructions(runs: Sequence[JudgedRun], key: Any) -> str:  # noqa: ANN401 - table cells may have any type
     found = {run.instructions.get(key) for run in runs} - {None}
     return " / ".join(sorted(map(str, found))) or NO_INSTRUCTION

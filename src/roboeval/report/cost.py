@@ -1,4 +1,4 @@
-"""Sections on rejection sampling and on the cost of programs that pass (paper, section VI)."""
+"""Builds the sections on rejection sampling and on the cost of passing programs (paper, section VI)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from roboeval.report.sheets import Cell, ReportFigure, Section, Sheet, section, 
 
 
 def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
-    """Results by limit of retries, for runs with checked programs."""
+    """Build the section on rejection sampling, for runs whose programs were checked."""
     checked = {run.name: run.trials for run in runs if run.trials}
     points = {name: retry_curves(prompts) for name, prompts in checked.items()}
     shares = {name: accepted_after(prompts, LIMITS[-1]) for name, prompts in checked.items()}
@@ -31,13 +31,13 @@ def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
 
 
 def retry_curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float, float]]]:
-    """Share of prompts by threshold of pass@1, for each limit of retries."""
+    """Compute the share of prompts that reach each threshold of pass@1, for each limit of retries."""
     found = {limit: resample(prompts, limit).by_prompt for limit in LIMITS}
     return {limit: threshold_curve([one.passed for one in each]) for limit, each in found.items()}
 
 
 def retries_sheet(checked: Mapping[str, Sequence[CheckedPrompt]]) -> Sheet:
-    """pass@1 of each run at each limit of retries."""
+    """Build the table of pass@1 by run and limit of retries."""
     rows: list[list[Cell]] = []
     for name, prompts in checked.items():
         for at in (resample(prompts, limit) for limit in LIMITS):
@@ -47,7 +47,7 @@ def retries_sheet(checked: Mapping[str, Sequence[CheckedPrompt]]) -> Sheet:
 
 
 def curves_sheet(points: Mapping[str, Mapping[int, Sequence[tuple[float, float]]]]) -> Sheet:
-    """The curves of rejection sampling as a table."""
+    """Build the table with the points of the rejection sampling curves."""
     rows = [
         [name, limit, *point]
         for name, of_limits in points.items()
@@ -61,19 +61,19 @@ def curves_sheet(points: Mapping[str, Mapping[int, Sequence[tuple[float, float]]
 
 
 def costs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
-    """The cost of programs, as far as the runs record it."""
+    """Build the section on the cost of programs, for runs that recorded it."""
     return section("cost", cost_sheet(runs, prices), budget_sheet(runs, prices))
 
 
 def cost_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
-    """The cost of each run, in total and per passing program."""
+    """Build the table of each run's cost, in total and per passing program."""
     found = [(run.name, cost_of(run.table, price_of(run, prices))) for run in runs]
     known = [one for one in found if one[1].input_tokens is not None or one[1].seconds is not None]
     return sheet("cost", [[name, *one] for name, one in known])
 
 
 def cost_sentence(run: JudgedRun, prices: Mapping[str, Price]) -> str:
-    """The cost per passing program, in words; empty where nothing is recorded."""
+    """Describe the cost per passing program; return an empty string if no cost was recorded."""
     cost = cost_of(run.table, price_of(run, prices))
     each = []
     if cost.money_per_pass is not None:
@@ -86,14 +86,14 @@ def cost_sentence(run: JudgedRun, prices: Mapping[str, Price]) -> str:
 
 
 def budget_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
-    """Passing programs per budget at each limit of retries, for runs with checked programs."""
+    """Build the table of passing programs per budget, for runs whose programs were checked."""
     checked = [run for run in runs if run.trials]
     rows = [[run.name, *one] for run in checked for one in budgets(run.table, price_of(run, prices))]
     return sheet("budget", rows)
 
 
 def read_prices(texts: Sequence[str]) -> dict[str, Price]:
-    """Read prices written as `MODEL=INPUT/OUTPUT`; return them by model."""
+    """Parse prices written as `MODEL=INPUT/OUTPUT`, and return them by model."""
     prices: dict[str, Price] = {}
     for text in texts:
         model, _, numbers = text.rpartition("=")
@@ -108,13 +108,13 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
 
 
 def price_of(run: JudgedRun, prices: Mapping[str, Price]) -> Price | None:
-    """The price given for a run's folder, its name or its model."""
+    """Return the price given for a run's folder, name or model, or None if there is none."""
     return next((prices[name] for name in (run.folder, run.name, run.model or "") if name in prices), None)
 
 
 def expect_known(prices: Mapping[str, Price], runs: Sequence[JudgedRun]) -> None:
-    """Raise a UserError for a price whose model wrote no run."""
+    """Raise UserError if a price is given for a model that none of the runs used."""
     for model, price in prices.items():
         if not any(price_of(run, {model: price}) for run in runs):
             names = ", ".join(run.name for run in runs)
-            raise UserError(f'--price names "{model}", but the runs are {names}')
+            raise UserError(f'--price is given for "{model}", but the runs are {names}')

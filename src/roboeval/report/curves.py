@@ -1,4 +1,4 @@
-"""Figures of curves: prompts by threshold of pass@1, and the effect of retries."""
+"""Draws curves: the share of prompts that reach each pass@1, and the effect of retries."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from roboeval.report.drawing import (
 )
 from roboeval.report.runs import JudgedRun
 
-LABELLED_POWERS = (0.1, 0.01, 0.001)  # labelled on an axis of thresholds
-MAX_SHORT_AXIS, EXTRA_LABELS = 20, (0.5, 0.2)  # more labels, if prompts have at most 20 completions
-MIN_LABEL_RATIO = 1.6  # smallest ratio of two labels that do not overlap
+LABELLED_POWERS = (0.1, 0.01, 0.001)  # tick labels of the threshold axis
+MAX_SHORT_AXIS, EXTRA_LABELS = 20, (0.5, 0.2)  # extra tick labels if no prompt has more completions
+MIN_LABEL_RATIO = 1.6  # two labels with a smaller ratio would overlap
 
 Points: TypeAlias = Sequence[tuple[float, float]]
 
 
 def draw_thresholds(runs: Sequence[JudgedRun]) -> Figure:
-    """Draw the share of prompts by threshold of pass@1, one line per model."""
+    """Draw the share of prompts that reach each threshold of pass@1, with one line per model."""
     most = most_completions(runs)
     lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()]), most) for run in runs}
     means = [run.mean for run in runs]
@@ -47,12 +47,12 @@ def draw_thresholds(runs: Sequence[JudgedRun]) -> Figure:
 
 
 def most_completions(runs: Sequence[JudgedRun]) -> int:
-    """The most completions of any prompt; at least 2, since an axis needs two ends."""
+    """Return the largest number of completions of a prompt, but at least 2 so that the axis has a length."""
     return max(2, *(prompt.n for run in runs for score in run.scores for prompt in score.prompts))
 
 
 def draw_accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
-    """Draw the share of accepted programs by number of retries, one line per model."""
+    """Draw the share of accepted programs by number of retries, with one line per model."""
     lines = {name: [*enumerate(those)] for name, those in shares.items()}
     figure = _plot_lines(lines, [those[-1] for those in shares.values()], 2.6, markevery=[*LIMITS])
     axes = figure.axes[0]
@@ -70,9 +70,9 @@ def _plot_lines(
     lines: Mapping[str, Points],
     quality: Sequence[float],
     height: float,
-    **style: Any,  # noqa: ANN401 - options of matplotlib
+    **style: Any,  # noqa: ANN401 - passed on to matplotlib
 ) -> Figure:
-    """Draw a line for each model; only the best have colours if there are too many models."""
+    """Draw one line per model; if there are too many models, only the best are coloured."""
     is_narrow = len(lines) <= MAX_COLOURED_RUNS
     columns = 1 if is_narrow and max(len(short_name(name)) for name in lines) > MAX_LEGEND_NAME else 2
     figure = new_figure(
@@ -95,14 +95,14 @@ def _plot_lines(
 
 
 def _steps(points: Points, most: int) -> Points:
-    """The part of a curve down to a threshold of 1 / `most`, the end of the axis."""
+    """Cut a curve at the threshold 1 / `most`, where the axis ends."""
     end = 1 / most
     shown = [(threshold, share) for threshold, share in points if threshold >= end]
     return [*shown, (end, shown[-1][1])]
 
 
 def _threshold_axes(axes: Axes, most: int) -> None:
-    """Set the scale and labels of shared axes; setting one of them sets all."""
+    """Set the scale and labels of a threshold axis; axes that share it follow."""
     axes.set_xscale("log")
     axes.set_xlim(1, 1 / most)
     shown = (*(EXTRA_LABELS if most <= MAX_SHORT_AXIS else ()), *LABELLED_POWERS)
@@ -112,7 +112,7 @@ def _threshold_axes(axes: Axes, most: int) -> None:
 
 
 def _threshold_labels(axes: Axes, most: int) -> None:
-    axes.minorticks_off()  # drawing them as one line is much faster
+    axes.minorticks_off()  # without them, drawing is much faster
     marks = (digit * power for power in LABELLED_POWERS for digit in range(2, 10))
     between = [mark for mark in marks if mark > 1 / most]
     small: dict[str, Any] = {"marker": TICKDOWN, "markersize": 1.5, "markeredgewidth": 0.6}
@@ -123,7 +123,7 @@ def _threshold_labels(axes: Axes, most: int) -> None:
 
 
 def draw_limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure:
-    """Draw the share of prompts by threshold of pass@1, for each model and limit of retries."""
+    """Draw the share of prompts that reach each threshold of pass@1, by model and limit of retries."""
     columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3 if len(curves) <= MAX_COLOURED_RUNS else 5)
     rows = math.ceil(len(curves) / columns)
     figure = new_figure(PAGE_WIDTH if columns > 1 else COLUMN_WIDTH, 1.75 * rows + 0.55)

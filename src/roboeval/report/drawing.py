@@ -1,4 +1,4 @@
-"""The style of all figures, and reproducible PNG, PDF and SVG files of them."""
+"""Defines the style of all figures, and renders them reproducibly as PNG, PDF and SVG."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from matplotlib.figure import Figure
 
 from codebotler.core.terminal import visible
 
-PAGE_WIDTH, COLUMN_WIDTH = 7.16, 3.5  # inches: the width of two columns of a paper, and of one
+PAGE_WIDTH, COLUMN_WIDTH = 7.16, 3.5  # widths of a page and of a column of a paper, in inches
 DPI, POINTS = 300, 72  # per inch
 
 BACKGROUND, FOREGROUND, PALE, MUTED = "#ffffff", "#1b1b1f", "#d5d5da", "#6f6f78"
-BLACK, WHITE = "#010101", "#fefefe"  # not #000000, which matplotlib omits from SVG and `darken` would miss
-DARKEST_SHADE = "#00507d"  # the shade of a share of 1; a single hue suits colour-blind readers and print
+BLACK, WHITE = "#010101", "#fefefe"  # matplotlib omits #000000 from SVG, so `darken` would miss it
+DARKEST_SHADE = "#00507d"  # for a share of 1; a single hue suits colour-blind readers and print
 MIDDLE_SHADE = "#7fb5d5"
 DARK_MIDDLE = "#2b5f80"
-# Colours of data stay the same on a dark page.
+# The colours of data are the same on light and dark pages.
 DARK_COLOURS = {
     BACKGROUND: "#17181c",
     FOREGROUND: "#e6e6ea",
@@ -33,13 +33,13 @@ DARK_COLOURS = {
     MUTED: "#8f919b",
     BLACK: "#ffffff",
 }
-# The palette of Okabe and Ito, which colour-blind readers can distinguish.
+# The palette by Okabe and Ito, whose colours are distinguishable for colour-blind readers.
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", BLACK, "#F0E442")
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 MAX_FIGURE_NAME = 26
 MAX_COLOURED_RUNS = len(COLOURS)
-MAX_LEGEND_NAME = 16  # letters; two names of this length fit side by side below a narrow figure
+MAX_LEGEND_NAME = 16  # characters; two of these names fit side by side below a narrow figure
 
 FIGURE_STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -58,7 +58,7 @@ FIGURE_STYLE: dict[Any, Any] = {
     ),
     **dict.fromkeys(("axes.facecolor", "figure.facecolor", "savefig.facecolor"), BACKGROUND),
     "axes.axisbelow": True,
-    "text.hinting": "none",  # at 300 dpi, hinting only distorts letters
+    "text.hinting": "none",  # hinting distorts letters and has no benefit at 300 dpi
     "text.parse_math": False,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
@@ -75,21 +75,21 @@ FIGURE_STYLE: dict[Any, Any] = {
 
 @contextmanager
 def use_style() -> Iterator[None]:
-    """Apply the style of reports, ignoring the user's own matplotlib settings."""
+    """Apply the style of reports instead of the user's matplotlib settings."""
     with warnings.catch_warnings(), mpl.rc_context():
-        warnings.simplefilter("ignore")  # names may contain letters that the font lacks
+        warnings.simplefilter("ignore")  # names may contain characters that the font lacks
         mpl.rcdefaults()
         mpl.rcParams.update(FIGURE_STYLE)
         yield
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Create an empty figure with automatic layout; sizes are in inches."""
+    """Create an empty figure with automatic layout; `width` and `height` are in inches."""
     return Figure(figsize=(width, height), dpi=DPI, layout="constrained")
 
 
 def render(figure: Figure) -> dict[str, bytes]:
-    """Return a figure as png, pdf and svg, without dates and versions; lay it out only once."""
+    """Render a figure as png, pdf and svg without dates and versions; the layout is computed only once."""
     if (layout := figure.get_layout_engine()) is not None:
         layout.execute(figure)
         figure.set_layout_engine(None)
@@ -103,7 +103,7 @@ def render(figure: Figure) -> dict[str, bytes]:
 
 
 def _slim(svg: bytes) -> bytes:
-    """Shrink a drawing: keep each letter's shape once, drop comments and metadata."""
+    """Shrink an SVG file by removing comments, metadata and repeated definitions of letter shapes."""
     seen: set[bytes] = set()
 
     def once(shape: re.Match[bytes]) -> bytes:
@@ -130,13 +130,13 @@ def dark_colours() -> dict[bytes, bytes]:
 
 
 def darken(svg: bytes) -> bytes:
-    """Recolour a drawing for a dark page."""
+    """Recolour an SVG file for dark pages."""
     colours = dark_colours()
     return re.sub(rb"#[0-9a-f]{6}\b", lambda colour: colours.get(colour[0], colour[0]), svg)
 
 
 def short_name(name: str, most: int = MAX_FIGURE_NAME) -> str:
-    """Shorten a name for a figure; keep its beginning and end, which distinguish names."""
+    """Shorten a name for a figure by omitting its middle; beginnings and ends distinguish names best."""
     name, end = visible(name), (most - 1) // 2
     return name if len(name) <= most else f"{name[: most - 1 - end]}…{name[-end:]}"
 

@@ -1,4 +1,4 @@
-"""Sections on failures: causes, groups of similar failures, and verdicts of another suite."""
+"""Builds the sections on causes of failures, groups of similar failures, and verdicts of another suite."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ MAX_GROUPS_PER_RUN, MIN_GROUPS_PER_RUN, MAX_GROUPS_SHOWN = (
     100,
     4,
     200,
-)  # groups on the page: at most and at least per run, and in all
+)  # groups shown on the page: maximum and minimum per run, and total
 
 
 # --- causes
 
 
 def causes_section(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
-    """Causes of failures (paper, section V.B)."""
+    """Build the section on causes of failures (paper, section V.B)."""
     found = all_causes(runs, with_published=with_published)
     figure = ReportFigure("causes", lambda: figures.draw_causes(found), coverage_of(runs))
     notes = Prose(published_notes(runs) if with_published else [])
@@ -35,7 +35,7 @@ def causes_section(runs: Sequence[JudgedRun], *, with_published: bool) -> Sectio
 
 
 def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple[str, Causes]]:
-    """The causes of each run, followed by the published ones if requested and known."""
+    """Collect the causes of each run, followed by the published causes if requested and available."""
     found: list[tuple[str, Causes]] = []
     for run in runs:
         found.append((run.name, causes(tally_of(run.table))))
@@ -45,7 +45,7 @@ def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple
 
 
 def most_frequent(run: JudgedRun) -> str:
-    """Describe the most frequent kind of failure and its share of all completions; empty if none fails."""
+    """Describe the most frequent kind of failure; return an empty string if no completion fails."""
     counts = {key: count for key, count in causes(tally_of(run.table)).counts.items() if key[1] != ALL}
     if not counts:
         return ""
@@ -54,13 +54,13 @@ def most_frequent(run: JudgedRun) -> str:
 
 
 def cut_off_warnings(run: JudgedRun) -> list[str]:
-    """Warn if many replies of a run were cut off."""
+    """Return a warning if many replies of a run were cut off."""
     warning = cut_off_replies(count_failures(tally_of(run.table)), run.results.scope).warning
     return [] if warning is None else [f"{warning}."]
 
 
 def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
-    """Shares and counts of all causes."""
+    """Build the table of all causes with their counts and shares."""
     rows = [
         [name, cause, kind, one.counts.get((cause, kind)), share]
         for name, one in found
@@ -71,7 +71,7 @@ def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
 
 
 def published_notes(runs: Sequence[JudgedRun]) -> list[str]:
-    """Caveats on published causes."""
+    """Describe the limits of comparing runs with published causes."""
     known = [run for run in runs if paper.model_of(run) is not None]
     if not known:
         return ["None of these runs uses a model of the paper, so no published causes are shown."]
@@ -85,7 +85,7 @@ def published_notes(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def failures_section(runs: Sequence[JudgedRun]) -> Section:
-    """Groups of similar failures; the page shows the programs of the largest groups of each run."""
+    """Build the section on groups of similar failures; the page shows the largest groups of each run."""
     most = max(MIN_GROUPS_PER_RUN, min(MAX_GROUPS_PER_RUN, MAX_GROUPS_SHOWN // len(runs)))
     every: list[tuple[str, FailureGroup]] = []
     shown: list[tuple[str, FailureGroup]] = []
@@ -102,7 +102,7 @@ def failures_section(runs: Sequence[JudgedRun]) -> Section:
 
 
 def groups_sheet(every: Sequence[tuple[str, FailureGroup]]) -> Sheet:
-    """All groups as a table."""
+    """Build the table of all groups."""
     rows = [
         [name, len(one.members), *_cells(one), one.fix and one.fix.name, one.fix and one.fix.changed]
         for name, one in every
@@ -120,7 +120,7 @@ def _cells(one: FailureGroup) -> list[Cell]:
 
 
 def other_suite(runs: Sequence[JudgedRun]) -> Section:
-    """Verdicts of another suite, compared with those of the report's own."""
+    """Build the section that compares the verdicts of this suite with those of another suite."""
     found = [
         verdict_changes(run.name, run.results, run.other_suite) for run in runs if run.other_suite is not None
     ]
@@ -129,7 +129,7 @@ def other_suite(runs: Sequence[JudgedRun]) -> Section:
 
 
 def changes_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """pass@1 under both suites."""
+    """Build the table of pass@1 under both suites."""
     here, there = ({one.name: one.pass_at_1[side] for one in found} for side in (0, 1))
     rows: list[list[Cell]] = []
     for one in found:
@@ -141,7 +141,7 @@ def changes_sheet(found: Sequence[VerdictChanges]) -> Sheet:
 
 
 def changed_tasks_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """How many completions of each task pass under which suite."""
+    """Build the table that counts, for each task, the completions that pass under each suite."""
     rows = [
         [task.task, one.name, task.both, task.first_only, task.second_only, task.neither]
         for one in found
@@ -151,7 +151,7 @@ def changed_tasks_sheet(found: Sequence[VerdictChanges]) -> Sheet:
 
 
 def reversals_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """Groups of completions that pass under one suite only."""
+    """Build the table of groups of completions that pass under only one suite."""
     rows: list[list[Cell]] = []
     for one in found:
         sides = zip(one.suites, (one.first_only, one.second_only), strict=True)

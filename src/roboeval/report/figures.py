@@ -1,4 +1,4 @@
-"""Figures of pass@1 by run and by task, and of the causes of failures."""
+"""Draws figures of pass@1 by run and by task, and of the causes of failures."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from roboeval.report.drawing import (
 )
 from roboeval.report.runs import JudgedRun, tasks_of
 
-HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "", "++++")  # distinguish bars without colours
-TASKS_PER_ROW = 8  # tasks per row
-MIN_TASK_SLOTS = 4  # leave room for this many tasks, so that a single bar does not fill the page
-BAR_FILL = 0.82  # share of a task's width that its bars fill
-MAX_PANELS_PER_ROW = 3  # panels side by side with labels between them
-MAX_NUMBERED_CELLS = 14  # rows or columns; cells of larger tables have no numbers
-DARK_CELL_SHARE = 0.75  # cells with larger shares need white text
+HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "", "++++")  # distinguish bars in print
+TASKS_PER_ROW = 8
+MIN_TASK_SLOTS = 4  # minimum width in tasks, so that a single bar does not fill the page
+BAR_FILL = 0.82  # share of a task's width that is filled by its bars
+MAX_PANELS_PER_ROW = 3  # leaves enough room for the labels between panels
+MAX_NUMBERED_CELLS = 14  # tables with more rows or columns have no numbers in their cells
+DARK_CELL_SHARE = 0.75  # cells with a larger share have white text
 
 Cells: TypeAlias = Sequence[Sequence[float | None]]
 
@@ -49,7 +49,7 @@ Cells: TypeAlias = Sequence[Sequence[float | None]]
 
 
 def draw_overall(runs: Sequence[JudgedRun]) -> Figure:
-    """Draw pass@1 of each run over all prompts, with its interval over tasks."""
+    """Draw the mean pass@1 of each run with its interval over tasks."""
     figure = new_figure(PAGE_WIDTH, 0.62 + 0.21 * len(runs))
     axes = figure.add_subplot()
     for at, run in enumerate(runs):
@@ -75,7 +75,7 @@ def _whisker(cap: float) -> dict[str, Any]:
 
 
 def draw_task_scores(runs: Sequence[JudgedRun]) -> Figure:
-    """Draw pass@1 by task and model, with intervals over prompts, and next to it the ablated tasks."""
+    """Draw pass@1 by task and model with intervals over prompts, and ablated tasks in a second panel."""
     tasks = tasks_of(runs)
     judged = {score.task for run in runs for score in run.ablated_scores}
     ablated = [task for task in runs[0].suite.tasks if task in judged]
@@ -151,13 +151,13 @@ def _mark(size: float) -> dict[str, Any]:
 
 
 def _two_lines(task: str) -> str:
-    """Break the name of a task before its last capital letter."""
+    """Break the name of a task into two lines before its last capital letter."""
     last = max((at for at, letter in enumerate(task) if letter.isupper()), default=0)
     return "\n".join(short_name(part, 14) for part in (task[:last], task[last:]) if part)
 
 
 def _heat_of_tasks(runs: Sequence[JudgedRun], tasks: Sequence[str], ablated: Sequence[str]) -> Figure:
-    """Draw pass@1 by task as a heat map with a row per model, if shown_runs are more models than colours."""
+    """Draw pass@1 by task as a heat map with one row per model, since there are too few colours for bars."""
     figure = new_figure(PAGE_WIDTH, 1.3 + 0.16 * len(runs))
     widths = [len(tasks), *([len(ablated)] if ablated else [])]
     grid = figure.add_gridspec(1, len(widths), width_ratios=widths)
@@ -180,7 +180,7 @@ def _means(scores: Sequence[TaskScore], tasks: Sequence[str]) -> list[float | No
 
 
 def draw_heat_map(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequence[str]) -> None:
-    """Draw a table of shares as a heat map, with numbers if they fit."""
+    """Draw shares as a heat map, with numbers if they fit."""
     shown = np.ma.masked_invalid(np.array(cells, dtype=float))
     axes.pcolormesh(shown, cmap=shades(), vmin=0, vmax=1, edgecolors=BACKGROUND, linewidth=0.6)
     axes.invert_yaxis()
@@ -197,18 +197,18 @@ def draw_heat_map(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequen
             if share is not None:
                 colour = MUTED if share == 0 else FOREGROUND if share < DARK_CELL_SHARE else WHITE
                 cell = axes.text(x, y, percent(share), ha="center", va="center", color=colour, fontsize=6)
-                cell.set_in_layout(False)  # text inside the axes only slows the layout down
+                cell.set_in_layout(False)  # the text is inside the axes, so layout may ignore it
 
 
 def draw_causes(found: Sequence[tuple[str, Causes]]) -> Figure:
-    """Draw the outcomes of completions by class, and the kinds of each class."""
+    """Draw the outcomes of completions by class, and the kinds of failure within each class."""
     happened = {name for _, one in found for name, share in one.classes.items() if share}
     shown = classes_to_show(happened)
     kinds = {name: kinds_in_order([one for _, one in found], name) for name in shown}
     tallest = max(3, *map(len, kinds.values()))
     many = len(found) > MAX_NUMBERED_CELLS
     longest = 0 if many else max(len(short_name(name, 18)) for name, _ in found)
-    # Slanted names of models need room below the panels.
+    # Leave room below the panels for the slanted names of models.
     below = 0.95 + (0.13 * len(found) if many else 0.155 * tallest) + 0.04 * max(0, longest - 8)
     columns = len(shown) if many or len(shown) <= MAX_PANELS_PER_ROW else 2
     lines = math.ceil(len(shown) / columns)
@@ -247,7 +247,7 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]], shown: Sequence[st
 
 
 def _looks() -> dict[str, tuple[str, str]]:
-    """The colour and the hatch of each outcome; the paper's classes always have the same ones."""
+    """Map each outcome to a colour and a hatch, which are fixed for the classes of the paper."""
     others = [name for name in FAILURE_CLASSES if name != NO_PROGRAM_CLASS]
     colours = cycle(COLOURS[at] for at in (1, 0, 3, 2, 4, 5))
     hatches = cycle(("", "////", "\\\\\\\\", "....", ""))

@@ -1,4 +1,4 @@
-"""The section on house rules: how often programs break them, and their effect on pass@1."""
+"""Builds the section on house rules: how often programs break them, and their effect on pass@1."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from roboeval.report.sheets import Cell, Section, Sheet, section, sheet
 
 
 def house(runs: Sequence[JudgedRun]) -> Section:
-    """The effect of house rules, for runs judged both with and without them."""
+    """Build the section on house rules, for runs judged both with and without them."""
     found = [
         (run, count_broken_rules(run.house.table, run.results.table)) for run in runs if run.house is not None
     ]
@@ -20,7 +20,7 @@ def house(runs: Sequence[JudgedRun]) -> Section:
 
 
 def rules_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:
-    """Share of programs that break a rule, and pass@1 without and with the rules."""
+    """Build the table of the share of programs that break a rule, and of pass@1 without and with rules."""
     rows: list[list[Cell]] = []
     notes = []
     for run, one in found:
@@ -40,6 +40,6 @@ def rules_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:
 
 
 def broken_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:
-    """How many programs each rule stops in at least one world."""
+    """Build the table that counts the programs stopped by each rule in at least one world."""
     rows = [[rule, run.name, count] for run, one in found for rule, count in one.by_rule.items()]
     return sheet("broken-rules", rows)

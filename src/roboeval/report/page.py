@@ -1,4 +1,4 @@
-"""The page of a report: one file that opens offline and is readable without JavaScript."""
+"""Renders a report as a single HTML file that works offline and is readable without JavaScript."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ from roboeval.report.sheets import (
 )
 from roboeval.suites.task import check_label
 
-MAX_TEXT, MAX_REPORTED_PROGRAM, MAX_DIFF_LINES = 500, 6_000, 80  # limits for text that models wrote
-MAX_TABLE_ROWS = 1_000  # per table on the page; the CSV file has all
-MAX_UNFOLDED_ROWS = 24  # tables with more rows are folded
-LONG_CELL = 70  # longer cells take several lines
+MAX_TEXT, MAX_REPORTED_PROGRAM, MAX_DIFF_LINES = 500, 6_000, 80  # limits for text written by models
+MAX_TABLE_ROWS = 1_000  # on the page; the CSV file contains all rows
+MAX_UNFOLDED_ROWS = 24  # larger tables are folded
+LONG_CELL = 70  # characters; longer cells are wrapped
 PAGE_STYLE = Path(__file__).with_name("page.css")
 PAGE_SCRIPT = Path(__file__).with_name("page.js")
-GENERATOR = '<meta name="generator" content="RoboEval">'  # identifies a page as a report
-DrawnFigure = tuple[bytes, bytes]  # SVG for light pages, and for dark ones
+GENERATOR = '<meta name="generator" content="RoboEval">'  # marks a page as a report
+DrawnFigure = tuple[bytes, bytes]  # SVG files for light and dark pages
 DrawnFigures = Mapping[str, DrawnFigure]
 
 
 def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawings: DrawnFigures) -> str:
-    """Return the page as HTML; all text is escaped, so nothing that a model wrote has an effect."""
+    """Render the page as HTML; all text is escaped, so text written by models has no effect."""
     script = PAGE_SCRIPT.read_text()
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'"
@@ -66,7 +66,7 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawings:
 
 
 def _text(words: str) -> str:
-    """Escape text for HTML; write unprintable characters, such as lone surrogates, as escapes."""
+    """Escape text for HTML; unprintable characters, such as lone surrogates, are shown as escapes."""
     plain = "".join(
         c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in words
     )
@@ -74,7 +74,7 @@ def _text(words: str) -> str:
 
 
 def _prose(words: str) -> str:
-    """Escape a sentence for HTML and format the commands between backticks."""
+    """Escape a sentence for HTML, and format text in backticks as code."""
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", _text(words))
 
 
@@ -165,7 +165,7 @@ def _table(sheet: Sheet) -> str:
     return f'<div class="sheet" id="table-{name}"><h3>{title}</h3>{inside}</div>\n'
 
 
-NAME_BREAKS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[_:])(?=\w)")  # line breaks allowed in long names
+NAME_BREAKS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[_:])(?=\w)")  # where long names may break
 
 
 def _css(column: Column) -> str:

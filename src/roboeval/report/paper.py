@@ -1,4 +1,4 @@
-"""The paper's published results, and the runs that they may be compared with."""
+"""Provides the published results of the paper, and decides which runs can be compared with them."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ PAPER_SUITE = "paper"
 
 @cache
 def published() -> dict[str, Any]:
-    """Read the published results."""
+    """Read the published results of the paper."""
     data: dict[str, Any] = json.loads(Path(__file__).with_name("published.json").read_text())
     return data
 
 
 def model_of(run: JudgedRun) -> str | None:
-    """The model of the paper that a run used, by its recorded name or its folder; None if unsure."""
+    """Return the model of the paper that a run used, by its recorded name or folder, or None if unsure."""
     if run.results.manifest.get("suite") != PAPER_SUITE or run.is_mixed:
         return None
     provider, colon, name = (run.model or run.folder).lower().partition(":")
@@ -33,37 +33,37 @@ def model_of(run: JudgedRun) -> str | None:
 
 
 def recognised_models(runs: Iterable[JudgedRun]) -> list[str]:
-    """Say which runs are recognised as models of the paper."""
+    """Describe which runs are recognised as models of the paper."""
     pairs = [f"{run.name} is {model}" for run in runs if (model := model_of(run)) is not None]
     return [f"Recognised by name as models of the paper: {', '.join(pairs)}."] if pairs else []
 
 
 def uses_authors_prompts(run: JudgedRun) -> bool:
-    """Whether completions answer the authors' prompts: they are imported, and not for the suite's prompts."""
+    """Whether the completions are imported ones that answer the authors' prompts instead of the suite's."""
     ours = {prompt for task in run.suite.tasks.values() for prompt in task.prompts}
     return "settings" not in run.results.about and not ours & {*run.instructions.values()}
 
 
 def cell(model: str, task: str, prompt: int) -> float | None:
-    """The published pass@1 of a prompt of the authors."""
+    """Return the published pass@1 of one of the authors' prompts."""
     rows = published()["pass_at_1"].get(task, [])
     return rows[prompt][_column(model)] if prompt < len(rows) else None
 
 
 def task_mean(model: str, task: str) -> float | None:
-    """The mean of the published pass@1 over the prompts of a task."""
+    """Return the mean of the published pass@1 over the prompts of a task."""
     rows = published()["pass_at_1"].get(task)
     return None if rows is None else sum(row[_column(model)] for row in rows) / len(rows)
 
 
 def overall_mean(model: str, tasks: Sequence[str]) -> float | None:
-    """The mean of the published pass@1 over tasks; None if one of them was not published."""
+    """Return the mean of the published pass@1 over tasks, or None if a task was not published."""
     means = [mean for task in tasks if (mean := task_mean(model, task)) is not None]
     return sum(means) / len(means) if means and len(means) == len(tasks) else None
 
 
 def causes(model: str) -> Causes:
-    """The published causes of a model's failures."""
+    """Return the published causes of a model's failures."""
     at, classes, kinds = _column(model), published()["classes"], published()["kinds"]
     return Causes(
         {name: shares[at] / 100 for name, shares in classes.items()},
@@ -77,7 +77,7 @@ def _column(model: str) -> int:
 
 
 def published_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Means by task and the published ones, for runs of the paper's models."""
+    """Build the table that compares runs of the paper's models with the published means by task."""
     known = [(run, model) for run in runs if (model := model_of(run)) is not None]
     rows: list[list[Cell]] = []
     for run, model in known:

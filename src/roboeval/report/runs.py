@@ -1,4 +1,4 @@
-"""Judged runs as a report shows them, under unique names."""
+"""Prepares judged runs for a report, with unique names."""
 
 from __future__ import annotations
 
@@ -25,63 +25,63 @@ MAX_RUN_NAME = 100
 
 @dataclass(frozen=True, eq=False)
 class JudgedRun:
-    """A run with its verdicts."""
+    """A judged run, with results under further requirements if available."""
 
     results: Results
-    table: pl.DataFrame  # `accepted` is null for unchecked programs
+    table: pl.DataFrame  # the column `accepted` is null for unchecked programs
     ablated: Results | None = None  # judged by common-sense requirements only
-    other_suite: Results | None = None  # judged by another suite
-    house: Results | None = None  # judged by the same suite with house rules
+    other_suite: Results | None = None  # judged with another suite
+    house: Results | None = None  # judged with the same suite and house rules
     name: str = ""  # unique within a report
 
     @property
     def suite(self) -> Suite:
-        """The suite that judged it."""
+        """The suite that judged the run."""
         return self.results.known_suite
 
     @property
     def folder(self) -> str:
-        """The name of its folder."""
+        """The name of the run's folder."""
         return self.results.run.path.resolve().name
 
     @cached_property
     def is_mixed(self) -> bool:
-        """Whether several models wrote the completions."""
+        """Whether the completions were written by several models."""
         return self.table["model"].n_unique() > 1
 
     @property
     def model(self) -> str | None:
-        """The model that wrote the completions; None if unrecorded or if there are several."""
+        """The model that wrote the completions, or None if it was not recorded or there are several."""
         return None if self.is_mixed else self.table["model"][0]
 
     @cached_property
     def completions(self) -> pl.DataFrame:
-        """One row for each judged completion."""
+        """A table with one row for each judged completion."""
         return completions_of(self.table)
 
     @cached_property
     def scores(self) -> tuple[TaskScore, ...]:
-        """The scores of tasks, in the order of the suite."""
+        """The scores of all tasks, in the order of the suite."""
         return task_scores(self.table, self.suite.tasks)
 
     @cached_property
     def ablated_scores(self) -> tuple[TaskScore, ...]:
-        """The scores of tasks by common-sense requirements only."""
+        """The scores of all tasks when judged by common-sense requirements only."""
         return () if self.ablated is None else task_scores(self.ablated.table, self.suite.tasks)
 
     @cached_property
     def by_prompt(self) -> dict[tuple[str, int], float]:
-        """pass@1 of each prompt."""
+        """The pass@1 of each prompt, by task and prompt."""
         return pass_at_1(self.scores)
 
     @property
     def coverage(self) -> Coverage:
-        """How many completions were judged, are there, and were requested."""
+        """The numbers of judged, existing and requested completions."""
         return self.results.scope.coverage(self.completions.height)
 
     @property
     def coverage_sentence(self) -> str:
-        """The coverage in words, with prompts and tasks."""
+        """A description of the coverage of completions, prompts and tasks."""
         prompts = counted(len(self.by_prompt), "prompt")
         return f"{self.coverage}, {prompts} of {counted(len(self.scores), 'task')}"
 
@@ -92,24 +92,24 @@ class JudgedRun:
 
     @cached_property
     def instructions(self) -> Mapping[tuple[str, int], str]:
-        """The recorded instruction of each prompt."""
+        """The recorded instruction of each prompt, by task and prompt."""
         completions = self.results.completions.items()
         return {key[:2]: one.instruction for key, one in completions if one.instruction is not None}
 
     @cached_property
     def trials(self) -> tuple[CheckedPrompt, ...]:
-        """The checked completions by prompt; empty unless all were checked."""
+        """The checked completions of each prompt; empty unless all completions were checked."""
         return () if self.table["accepted"].null_count() else trials_by_prompt(self.table)
 
 
 def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
-    """The tasks with completions in any run, in the order of the suite."""
+    """Return the tasks that have completions in any run, in the order of the suite."""
     judged = {score.task for run in runs for score in run.scores}
     return [task for task in dict.fromkeys([*runs[0].suite.tasks, *sorted(judged)]) if task in judged]
 
 
 def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
-    """Sentences for captions: the completions and tasks that each run has results for; equal ones once."""
+    """Describe the coverage of each run for captions, without repeating equal sentences."""
     sentences: dict[str, list[str]] = {}
     for run in runs:
         sentences.setdefault(run.coverage_sentence, []).append(run.name)
@@ -120,7 +120,7 @@ def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
-    """Read labels written as `RUN=TEXT`; return them by the index of the run, which its folder names."""
+    """Parse labels written as `RUN=TEXT`, and return them by the index of the run with that folder."""
     labels: dict[int, str] = {}
     names = [{str(path), path.resolve().name} for path in paths]
     for text in texts:
@@ -130,13 +130,13 @@ def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
         found = [at for at, known in enumerate(names) if run.rstrip("/") in known]
         if len(found) != 1:
             which = "more than one run has that name" if found else "no such run is in the report"
-            raise UserError(f'--label names "{run}", but {which}; name one of {", ".join(map(str, paths))}')
+            raise UserError(f'--label is for "{run}", but {which}; use one of {", ".join(map(str, paths))}')
         labels[found[0]] = label.strip()
     return labels
 
 
 def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
-    """Name each run by its label or its model; make names unique with the folder or a number."""
+    """Name each run by its label or model, and make duplicate names unique by the folder or a number."""
     given = {at: short_name(label, MAX_RUN_NAME) for at, label in labels.items()}
     plain = [
         given.get(at) or short_name(run.model or run.folder, MAX_RUN_NAME) for at, run in enumerate(runs)

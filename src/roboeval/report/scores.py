@@ -1,4 +1,4 @@
-"""Sections on pass@1 by model, by task and by prompt."""
+"""Builds the sections on pass@1 by model, by task and by prompt."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, no
 
 
 def results(runs: Sequence[JudgedRun]) -> Section:
-    """pass@1 of each run and task."""
+    """Build the section on pass@1 by run and task."""
     coverage = coverage_of(runs)
     by_run = ReportFigure("overall", lambda: figures.draw_overall(runs), coverage)
     by_task = ReportFigure("tasks", lambda: figures.draw_task_scores(runs), coverage)
@@ -38,7 +38,7 @@ def results(runs: Sequence[JudgedRun]) -> Section:
 
 
 def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """pass@1 of each run, with intervals."""
+    """Build the table of pass@1 by run, with intervals."""
     rows: list[list[Cell]] = []
     for run in runs:
         tasks = [[prompt.pass_at(1) for prompt in score.prompts] for score in run.scores]
@@ -78,7 +78,7 @@ def _unfinished(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def task_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """pass@1 by task."""
+    """Build the table of pass@1 by task and run."""
     rows: list[list[Cell]] = [
         _task_row(run, score, what)
         for what, is_ablated in (("all", False), ("common sense only", True))
@@ -101,12 +101,12 @@ def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
 
 
 def thresholds(runs: Sequence[JudgedRun]) -> Section:
-    """The share of prompts that reach each pass@1 (paper, section V.A)."""
+    """Build the section on the share of prompts that reach each pass@1 (paper, section V.A)."""
     return section("thresholds", ReportFigure("thresholds", lambda: draw_thresholds(runs)), curve_sheet(runs))
 
 
 def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """The figure of thresholds as a table."""
+    """Build the table of the share of prompts that reach each pass@1."""
     curves = [[*run.by_prompt.values()] for run in runs]
     steps = sorted({t for values in curves for t, _ in threshold_curve(values)}, reverse=True)
     rows = [[t, *(share_at_least(values, t) for values in curves)] for t in steps]
@@ -114,7 +114,7 @@ def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def differences(runs: Sequence[JudgedRun]) -> Section:
-    """Compare several runs pair by pair."""
+    """Build the section that compares pairs of runs."""
     rows: list[list[Cell]] = []
     sentences: list[str] = []
     notes: list[str] = []
@@ -142,7 +142,7 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
 
 
 def leader(runs: Sequence[JudgedRun]) -> list[str]:
-    """Compare the two best runs in a sentence; nothing for a single run."""
+    """Compare the two best runs in a sentence; return nothing for a single run."""
     if len(runs) == 1:
         return []
     best, second, *_ = sorted(runs, key=lambda run: -run.mean)
@@ -155,7 +155,7 @@ def leader(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def prompts(runs: Sequence[JudgedRun]) -> Section:
-    """pass@1 of each prompt, and the published results."""
+    """Build the section on pass@1 by prompt, with the published results."""
     unknown = ", ".join(run.name for run in runs if paper.model_of(run) is None)
     published = paper.published_sheet(runs)
     nothing = f"The paper has no results for {unknown}."
@@ -164,7 +164,7 @@ def prompts(runs: Sequence[JudgedRun]) -> Section:
 
 
 def prompt_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """pass@1 by task and prompt, with the published value if it is for the same prompt."""
+    """Build the table of pass@1 by task and prompt, with published values for the same prompts."""
     imported = [run for run in runs if paper.uses_authors_prompts(run)]
     theirs = {run.name: model for run in imported if (model := paper.model_of(run)) is not None}
     heads = [[run.name, *([f"{run.name}, published"] if run.name in theirs else [])] for run in runs]

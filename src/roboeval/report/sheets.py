@@ -1,4 +1,4 @@
-"""The building blocks of a report: tables (also written as CSV files), figures and text."""
+"""Defines the parts of a report: tables (also written as CSV files), figures and text."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ Cell: TypeAlias = str | int | float | None
 
 @cache
 def page_words() -> dict[str, dict[str, Any]]:
-    """Read page.yaml: the text of sections, figures, tables and notes, by name."""
+    """Read page.yaml, which contains the text of sections, figures, tables and notes by name."""
     text = Path(__file__).with_name("page.yaml").read_text()
     return yaml.load(text, Loader)  # type: ignore[no-any-return]  # noqa: S506 - a safe loader; YAML is untyped
 
 
-def page_text(kind: str, name: str) -> Any:  # noqa: ANN401 - a string, or a mapping for a table
-    """The text in page.yaml for a section, figure, table or note."""
+def page_text(kind: str, name: str) -> Any:  # noqa: ANN401 - a string, or a mapping for tables
+    """Return the text of a section, figure, table or note from page.yaml."""
     return page_words()[kind][name]
 
 
 def note(name: str) -> str:
-    """A note from page.yaml."""
+    """Return the text of a note from page.yaml."""
     return str(page_text("notes", name))
 
 
 class Column(NamedTuple):
-    """A column of a table."""
+    """Defines a column of a table."""
 
     head: str
-    kind: ColumnKind = "text"  # "class": of failures; "share": from 0 to 1
+    kind: ColumnKind = "text"  # "class" is a class of failures; "share" is from 0 to 1
 
 
 class Sheet(NamedTuple):
-    """A table."""
+    """A table of a report."""
 
     name: str  # the key in page.yaml and the name of the CSV file
     columns: Sequence[Column]
@@ -59,18 +59,18 @@ class Sheet(NamedTuple):
 def sheet(
     name: str, rows: Sequence[Sequence[Any]], *, notes: Sequence[str] = (), shares: Sequence[str] = ()
 ) -> Sheet:
-    """Create a table that page.yaml describes, with additional columns of shares, such as one per model."""
+    """Create a table described in page.yaml; `shares` adds columns of shares, such as one per model."""
     kinds = page_text("tables", name)["columns"]
     columns = [Column(head, kind) for part in kinds for kind, heads in part.items() for head in heads]
     return Sheet(name, [*columns, *(Column(head, "share") for head in shares)], rows, notes)
 
 
 class ReportFigure(NamedTuple):
-    """A figure."""
+    """A figure of a report, which is drawn when needed."""
 
     name: str  # the key in page.yaml and the name of the files
     draw: Callable[[], Figure]
-    about: Sequence[str] = ()  # sentences about the runs, added to the caption
+    about: Sequence[str] = ()  # sentences about the runs to add to the caption
 
 
 class Prose(NamedTuple):
@@ -86,24 +86,24 @@ class Code(NamedTuple):
 
 
 class Groups(NamedTuple):
-    """Groups of similar failures, each with the name of its run."""
+    """Groups of similar failures, each with the name of a run."""
 
     shown: Sequence[tuple[str, FailureGroup]]
 
 
 class Card(NamedTuple):
-    """A run at a glance."""
+    """Summarises a run."""
 
     name: str
     passed: Estimate  # pass@1
-    coverage: str  # judged completions and tasks, in words
-    failure: str  # the most frequent one, in words; empty if none failed
-    cost: str  # in words; empty if unknown
+    coverage: str  # describes the judged completions and tasks
+    failure: str  # describes the most frequent failure; empty if nothing failed
+    cost: str  # describes the cost; empty if unknown
     warnings: Sequence[str] = ()
 
 
 class Cards(NamedTuple):
-    """Runs at a glance."""
+    """Summaries of runs, shown side by side."""
 
     cards: Sequence[Card]
 
@@ -112,14 +112,14 @@ Part: TypeAlias = Sheet | ReportFigure | Prose | Code | Groups | Cards
 
 
 class Section(NamedTuple):
-    """A section of the page."""
+    """A section of a report."""
 
     name: str  # the key in page.yaml and the anchor
     parts: Sequence[Part]
 
 
 def section(name: str, *parts: Part) -> Section:
-    """Create a section of the parts that are not empty."""
+    """Create a section from the parts that are not empty."""
     return Section(name, [part for part in parts if not _is_empty(part)])
 
 
@@ -131,7 +131,7 @@ def _is_empty(part: Part) -> bool:
 
 
 def write_csv(table: Sheet, folder: Path) -> None:
-    """Write a table as a CSV file, with all digits."""
+    """Write a table as a CSV file with full precision."""
     types = {"text": pl.String, "class": pl.String, "count": pl.Int64}
     kinds = [types.get(column.kind, pl.Float64) for column in table.columns]
     schema = dict(zip(_heads(table.columns), kinds, strict=True))
@@ -141,19 +141,19 @@ def write_csv(table: Sheet, folder: Path) -> None:
 
 
 def _heads(columns: Sequence[Column]) -> list[str]:
-    """The heads of columns, made unique by numbers, since a model may be named `task`."""
+    """Return the headings of columns, made unique by numbers because a model may be named `task`."""
     heads: list[str] = []
     for column in columns:
         plain = storable(column.head)
         if plain.startswith(("=", "+", "-", "@", "\t", "\r", "\n")):
-            plain = f"'{plain}"  # otherwise a spreadsheet reads it as a formula
+            plain = f"'{plain}"  # otherwise spreadsheets would read it as a formula
         others = (f"{plain} #{number}" for number in count(2))
         heads.append(plain if plain not in heads else next(head for head in others if head not in heads))
     return heads
 
 
 def format_cell(cell: Cell, kind: ColumnKind) -> str:
-    """Format a cell for people."""
+    """Format a cell for readers."""
     if cell is None or isinstance(cell, str):
         return "-" if cell is None else label_of(cell) if kind == "class" else cell
     match kind:

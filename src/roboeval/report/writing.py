@@ -1,4 +1,4 @@
-"""Assembles a report and writes it: figures as PNG and PDF, tables as CSV, and the page."""
+"""Assembles and writes a report: figures as PNG and PDF, tables as CSV, and an HTML page."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ from roboeval.report.sheets import (
 FIGURE_FORMATS = ("png", "pdf")
 PAGE_FILE = "index.html"
 UNFINISHED = ("This report is not finished. Run its command again.",)
-GENERATOR_WITHIN = 4_000  # bytes; the start of a page contains its generator
+GENERATOR_WITHIN = 4_000  # bytes at the start of a page that are searched for its generator
 
 
 def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
-    """The title of a page, and the paragraphs below it."""
+    """Return the title of a report and its introductory paragraphs."""
     title = runs[0].name if len(runs) == 1 else _models(runs)
     each = [run.coverage for run in runs]
     count = Coverage(
@@ -60,7 +60,7 @@ def sections(
     prices: Mapping[str, Price] = {},
     command: str = "",
 ) -> list[Section]:
-    """All sections of a report on runs that the same suite judged."""
+    """Build all sections of a report on runs judged with the same suite."""
     found = [
         glance(runs, prices),
         scores.results(runs),
@@ -81,7 +81,7 @@ def sections(
 
 
 def glance(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
-    """A card for each run, and a comparison of the two best."""
+    """Build the section with a card for each run and a comparison of the two best runs."""
     cards = [
         Card(
             name=run.name,
@@ -102,12 +102,12 @@ def _models(runs: Sequence[JudgedRun]) -> str:
 
 
 def origin(runs: Sequence[JudgedRun], command: str) -> Section:
-    """The runs, the suite, and the command that reproduces the report."""
+    """Build the section on the runs, the suite, and the command that reproduces the report."""
     return section("origin", origin_sheet(runs), Prose(about_suite(runs)), Code(command))
 
 
 def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """How each run was generated and judged."""
+    """Build the table that shows how each run was generated and judged."""
     rows: list[list[Cell]] = []
     for run in runs:
         about, head = run.results.about, run.results.manifest
@@ -126,7 +126,7 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
-    """Sentences about the suite and its rules."""
+    """Describe the suite, its rules, and how to reproduce the report."""
     head = runs[0].results.manifest
     version, digest = head.get("version"), head.get("digest")
     return (
@@ -140,7 +140,7 @@ def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
 
 
 def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], out: Path) -> Iterator[str]:
-    """Write a report into a folder and yield the name of each piece; the page comes last."""
+    """Write a report to a folder and yield the name of each part; the page comes last."""
     parts = [part for section in sections for part in section.parts]
     (out / "tables").mkdir(parents=True, exist_ok=True)
     if not (out / PAGE_FILE).exists():
@@ -159,7 +159,7 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
 
 
 def expect_no_others(out: Path) -> None:
-    """Raise a UserError for a folder that is neither empty nor a report."""
+    """Raise UserError if a folder is neither empty nor a report."""
     if not out.is_dir():
         return
     others = sorted(one.name for one in out.iterdir() if not one.name.startswith("."))
@@ -167,19 +167,18 @@ def expect_no_others(out: Path) -> None:
     start = page_file.read_bytes()[:GENERATOR_WITHIN] if page_file.is_file() else b""
     if others and GENERATOR.encode() not in start:
         raise UserError(
-            f'is not a report but contains other files such as "{others[0]}"; name a new folder', file=out
+            f'is not a report but contains other files such as "{others[0]}"; choose another folder', file=out
         )
 
 
 def _remove_others(out: Path, names: AbstractSet[str]) -> None:
-    """Remove files of an earlier report that this one lacks, such as rejection sampling."""
     for name in {*page_words()["figures"], *page_words()["tables"]} - names:
         for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FIGURE_FORMATS)):
             (out / file).unlink(missing_ok=True)
 
 
 def pieces(sections: Sequence[Section]) -> int:
-    """The number of pieces that `write_report` yields."""
+    """Count the names that `write_report` yields."""
     return 1 + sum(isinstance(part, Sheet | ReportFigure) for section in sections for part in section.parts)
 
 

@@ -1,5 +1,5 @@
-"""The benchmark in a browser: runs side by side, heat maps, and every completion with its verdicts.
+"""Shows the benchmark in a browser: runs side by side, heat maps, and completions with their verdicts.
 
-Start with `pages.py`, which adds the pages and the API. All of them show snapshots of runs (`snapshot.py`),
-which `run_store.py` reads again when a file changes.
+Start with `pages.py`, which registers the pages and the API. They show snapshots of runs (`snapshot.py`),
+which `run_store.py` renews when a file changes.
 """

@@ -1,4 +1,4 @@
-"""The HTTP API: runs, their prompts, and their completions with verdicts."""
+"""Defines the HTTP API, which returns runs, their prompts, and their completions with verdicts."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ REPORT_POLICY = (
     "script-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
-TABLE_NAME = re.compile(r"[\w-]{1,100}")  # a name of a table cannot lead to another folder
+TABLE_NAME = re.compile(r"[\w-]{1,100}")  # excludes names that lead to another folder
 
 FilterQuery: TypeAlias = Annotated[CompletionFilter, Depends()]
 EvaluationQuery: TypeAlias = Annotated[
     str | None,
-    Query(max_length=200, description="The evaluation; by default, the first that is not an ablation."),
+    Query(max_length=200, description="Name of the evaluation (default: the first that is not an ablation)."),
 ]
 
 
@@ -49,7 +49,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
 
     @api.get("/{run}")
     def show_run(run: str, evaluation: EvaluationQuery = None) -> Response:
-        """Show one run with every prompt and every kind of failure."""
+        """Show one run with all prompts and all kinds of failure."""
         return _json(run_details(store.open(run, evaluation)))
 
     _add_report(api, store)
@@ -59,10 +59,10 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         run: str,
         chosen: FilterQuery,
         evaluation: EvaluationQuery = None,
-        offset: Annotated[int, Query(ge=0, description="Completions to skip.")] = 0,
-        limit: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="Completions to return.")] = 100,
+        offset: Annotated[int, Query(ge=0, description="Number of completions to skip.")] = 0,
+        limit: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="Maximum number to return.")] = 100,
     ) -> Response:
-        """List completions of a run page by page, optionally of a prompt or with a kind of failure."""
+        """List completions of a run page by page, optionally those of a prompt or with a kind of failure."""
         found = store.open(run, evaluation).select(chosen)
         part = [entry_data(row) for row in found[offset : offset + limit].iter_rows(named=True)]
         return _json({"total": found.height, "offset": offset, "completions": part})
@@ -71,7 +71,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
     def show_completion(
         run: str, task: str, prompt: int, index: int, evaluation: EvaluationQuery = None
     ) -> Response:
-        """Show one completion: its program, and for each world the robot's actions and failed checks."""
+        """Show one completion with its program, and the robot's actions and failed checks in each world."""
         snapshot = store.open(run, evaluation)
         row = snapshot.row(name_of((task, prompt, index)))
         if row is None:
@@ -84,17 +84,17 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
 def _add_report(api: APIRouter, store: RunStore) -> None:
     @api.get("/{run}/report")
     def show_report(run: str) -> Response:
-        """Show the report in the folder of a run, from `roboeval run` or `roboeval report`."""
+        """Show the report in the folder of a run, created by `roboeval run` or `roboeval report`."""
         text = store.report(run)
         if text is None:
             raise HTTPException(404, "this run has no report")
-        # The folder may contain any page instead of a report, so scripts are forbidden.
+        # Forbid scripts, because the folder may contain any page instead of a report.
         headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
         return HTMLResponse(text, headers=headers)
 
     @api.get("/{run}/tables/{table}.csv")
     def show_table(run: str, table: str) -> Response:
-        """Show a table of a run's report, as CSV."""
+        """Show a table of a run's report as CSV."""
         text = store.report(run, f"tables/{table}.csv") if TABLE_NAME.fullmatch(table) else None
         if text is None:
             raise HTTPException(404, "this run has no such table")
@@ -102,12 +102,11 @@ def _add_report(api: APIRouter, store: RunStore) -> None:
 
 
 def _json(data: object) -> Response:
-    """Encode as ASCII, since UTF-8 cannot represent lone surrogates in texts."""
+    """Encode as ASCII, because texts may contain lone surrogates, which UTF-8 cannot represent."""
     return Response(json.dumps(data), media_type="application/json", headers={"cache-control": "no-store"})
 
 
 def _raise_http_errors() -> Iterator[None]:
-    """Turn errors for users into HTTP errors."""
     try:
         yield
     except MissingError as error:

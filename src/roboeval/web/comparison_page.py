@@ -1,4 +1,4 @@
-"""The page that compares runs: pass rates by prompt, and causes of failures."""
+"""Draws the page that compares runs by pass rates of prompts and causes of failures."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 from roboeval.web.widgets import REFRESH_SECONDS, HeatMap, completions_text, score_text, show_state
 
-MAX_COMPARED_RUNS = 12  # runs on the page
+MAX_COMPARED_RUNS = 12
 DIFFERENT_SUITES = (
     "These runs were judged with different suites or versions of a suite. Compare them with care."
 )
 
 
 async def draw_comparison(store: RunStore, names: Sequence[str]) -> None:
-    """Draw the runs of these names."""
+    """Draw the runs with the given names side by side."""
     PlainText("h1", "Runs side by side")
     if not names:
         PlainText("p", "Select runs in the list, then click \u201cShow side by side\u201d.", "quiet")
@@ -39,8 +39,6 @@ async def draw_comparison(store: RunStore, names: Sequence[str]) -> None:
 
 
 class _Comparison:
-    """Runs side by side, kept up to date with their folders."""
-
     def __init__(self, store: RunStore, names: Sequence[str]) -> None:
         self._store, self._names = store, names
         self._versions: list[Hashable] = []
@@ -58,7 +56,6 @@ class _Comparison:
             PlainText("p", "Percent of all judged completions of a run.", "quiet")
 
     async def refresh(self) -> None:
-        """Show the runs as they are now."""
         runs, errors = await asyncio.to_thread(self._read)
         versions: list[Hashable] = [*((run.name, run.version) for run in runs), *errors]
         if versions != self._versions:

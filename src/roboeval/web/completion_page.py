@@ -1,4 +1,4 @@
-"""The page of one completion: its program, and for each world the robot's actions and failed checks."""
+"""Draws the page of a completion: its program, and the robot's actions and failed checks in each world."""
 
 from __future__ import annotations
 
@@ -38,15 +38,13 @@ from roboeval.web.widgets import ProgramView
 MAX_SENTENCE, MAX_INSTRUCTION, MAX_REPLY = 2_000, 5_000, 50_000
 FAILED_STEP_NOTE = "Red marks the step at which a check failed."
 NEIGHBOUR_LINKS = ("Previous completion", "Next completion")
-PROGRAM_CHANGED = (
-    "The program was changed or removed after it was judged. The verdicts refer to the earlier version."
-)
+PROGRAM_CHANGED = "The program was changed or removed after judging. Verdicts refer to the earlier version."
 
 
 async def draw_completion(
     store: RunStore, run: str, name: str, chosen: CompletionFilter, evaluation: str | None
 ) -> None:
-    """Draw a completion, with links to its neighbours in the filtered list."""
+    """Draw a completion with links to the previous and next completions in the filtered list."""
     snapshot, data, fix = await asyncio.to_thread(_read, store, run, name, evaluation)
     _draw_head(snapshot, data, fix, chosen, chosen.query(evaluation))
     with ui.element("div").classes("one-program"):
@@ -59,7 +57,7 @@ async def draw_completion(
 def _read(
     store: RunStore, run: str, name: str, evaluation: str | None
 ) -> tuple[Snapshot, dict[str, Any], Fix | None]:
-    """Read a run and a completion; if that failed, also the most similar program that passes."""
+    """Read a run and one of its completions, and find the smallest fix if the completion failed."""
     snapshot = store.open(run, evaluation)
     row = snapshot.row(name)
     if row is None:
@@ -72,7 +70,7 @@ def _read(
 
 
 def _worlds(run: Snapshot, task: str) -> dict[str, World]:
-    """The worlds of a task by description; none if the suite is unavailable."""
+    """Return the worlds of a task by description, or nothing if the suite is unavailable."""
     if run.suite is None or task not in run.suite.tasks:
         return {}
     scenarios = run.suite.tasks[task].judged_in(ablated=run.results.is_ablated)
@@ -83,7 +81,7 @@ def _draw_head(
     run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: CompletionFilter, query: str
 ) -> None:
     key: CompletionKey = data["task"], data["prompt"], data["index"]
-    with ui.element("nav").classes("trail").props('aria-label="Where this is"'):
+    with ui.element("nav").classes("trail").props('aria-label="Breadcrumb"'):
         html.a(
             shortened(run.name, MAX_NAME), href=outside(f"{run_address(run.name)}{query}#completions")
         ).props("dir=auto")
@@ -118,7 +116,7 @@ def _draw_program(data: Mapping[str, Any]) -> None:
         title = "Program" if _no_program_sentence(data) is None else "Extracted from the reply"
         PlainText("h2", title).props("id=h-program")
         if data["program"] is None:
-            PlainText("p", "The program is no longer in this run.", "quiet")
+            PlainText("p", "This run no longer contains the program.", "quiet")
             return
         ran = data["worlds"] if _no_program_sentence(data) is None else ()
         lines = (world["line"] for world in ran if not world["satisfied"])
@@ -128,12 +126,11 @@ def _draw_program(data: Mapping[str, Any]) -> None:
 
 
 def _no_program_sentence(data: Mapping[str, Any]) -> str | None:
-    """Why the reply contains no program; None if it contains one."""
+    """Explain why the reply contains no program, or return None if it contains one."""
     return None if data["failure"] is None else no_program_sentence(data["failure"])
 
 
 def _draw_reply(reply: Mapping[str, Any] | None) -> None:
-    """Draw how the reply ended; its reasoning and full text are folded."""
     if reply is None:
         return
     with ui.element("section").classes("pane reply").props("aria-labelledby=h-reply"):
@@ -153,7 +150,7 @@ def _draw_text(text: str, name: str) -> None:
 def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> None:
     judged = completion["worlds"]
     with ui.element("div").classes("worlds-of"):
-        if (sentence := _no_program_sentence(completion)) is not None:  # without a program nothing was run
+        if (sentence := _no_program_sentence(completion)) is not None:  # no program was run
             PlainText("p", sentence, "trouble")
             return
         if completion["lowered"] and judged:
@@ -192,7 +189,7 @@ def _draw_reasons(data: Mapping[str, Any], anchor: str) -> None:
 
 
 def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> None:
-    """Draw what happened in a world; the ids of its steps are the `anchor` and a number."""
+    """Draw what happened in a world; `anchor` is the prefix of the ids of its steps."""
     _draw_reasons(data, anchor)
     steps, cut = data["steps"], data.get("cut")
     wrong = {check["step"] for check in data["failed_checks"]} - {None}
@@ -224,7 +221,7 @@ def _draw_check(check: Mapping[str, Any], anchor: str) -> None:
 
 
 def _draw_folded(head: Callable[[], object], draw: Callable[[], None]) -> None:
-    """Draw a foldable section; its content is drawn when it is first unfolded."""
+    """Draw a foldable section whose content is drawn when it is first unfolded."""
     with html.details() as details:
         with ui.element("summary"):
             head()

@@ -1,4 +1,4 @@
-"""The difference between two runs by task, and the completions with different verdicts."""
+"""Compares two runs by task, and lists the completions whose verdicts differ."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from roboeval.web.widgets import interval_text
 MAX_PAIR_TASKS, MAX_DIFFERING = 100, 30
 RUNS_IN_PAIR = 2
 DIFFERENCE_HEADS = ("95% confidence interval", "Different verdicts")
-INTERVAL_NOTE = "The interval for all tasks is over tasks, that for a task over its prompts."
-UNKNOWN_NOTE = " It is unknown for a single prompt or without variation."
+INTERVAL_NOTE = "The interval for all tasks is over tasks; other intervals are over the prompts of a task."
+UNKNOWN_NOTE = " An interval is unknown if there is only one prompt or no variation."
 
 
 @dataclass(frozen=True)
 class TaskRow:
-    """The difference between two runs in a task."""
+    """The difference between two runs in one task, or in all tasks."""
 
     task: str
     shares: tuple[float, float]  # mean pass@1 over common prompts
-    difference: Estimate  # second minus first; the interval is over prompts, for all tasks over tasks
-    differing: tuple[tuple[CompletionKey, bool], ...]  # passed in one run only; True: in the second run
+    difference: Estimate  # second minus first; interval over prompts, or over tasks for all tasks
+    differing: tuple[tuple[CompletionKey, bool], ...]  # passed in one run only; True if in the second
 
 
 def task_rows(first: Snapshot, second: Snapshot) -> list[TaskRow]:
-    """Compare the tasks that both runs have; the largest differences come first."""
+    """Compare the tasks that both runs have in common, largest differences first."""
     scores = [pass_at_1(run.scores) for run in (first, second)]
     prompts: dict[str, list[tuple[float, float]]] = {}
     for key in scores[0]:
@@ -72,13 +72,13 @@ class Difference:
     """The difference between two judged runs."""
 
     runs: tuple[Snapshot, Snapshot]
-    sentence: str  # which run is better, and how significant the difference is
+    sentence: str  # states which run is better, and how significant the difference is
     overall: TaskRow | None = None  # over all tasks; None if they have no prompt in common
     rows: tuple[TaskRow, ...] = ()
 
 
 def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
-    """Compare judged runs pair by pair, and two runs also by task; may take seconds for large runs."""
+    """Compare pairs of judged runs, and a single pair also by task; large runs may take seconds."""
     pairs = pairs_to_compare(runs, lambda run: 0.0 if run.pass_at_1 is None else run.pass_at_1.mean)
     return [_difference(*pair, by_task=len(runs) == RUNS_IN_PAIR) for pair in pairs]
 
@@ -97,7 +97,7 @@ def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Differen
 
 
 def draw_differences(found: Sequence[Difference]) -> None:
-    """Draw the comparison of each pair; for a single pair also by task."""
+    """Draw the comparison of each pair of runs, and of a single pair also by task."""
     if len(found) == 1:
         _draw_difference(found[0])
         return

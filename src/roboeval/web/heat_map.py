@@ -1,4 +1,4 @@
-"""Heat maps: the text, shade and link of each cell."""
+"""Computes the text, shade and link of each cell of a heat map."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EMPTY_CELL = {"text": "", "shade": "none"}
 
 
 def shade(share: float | None, *, bad: bool) -> str:
-    """The CSS class of a cell with a share from 0 to 1, or None without one."""
+    """Return the CSS class of a cell with a share from 0 to 1, or None if the share is unknown."""
     if share is None:
         return "waits"
     step = (
@@ -35,19 +35,19 @@ def shade(share: float | None, *, bad: bool) -> str:
 
 
 def run_address(run: str) -> str:
-    """The address of a run's page."""
+    """Return the address of a run's page."""
     return f"/runs/{quote(run, safe='', errors='replace')}"
 
 
 def models_of(run: Snapshot) -> str:
-    """Format the models of a run."""
+    """Format the models of a run, shortened if there are many."""
     if not run.models:
         return "model not recorded"
     return shortened(", ".join(run.models), MAX_MODELS_TEXT) + recorded_suffix(run.models)
 
 
 def failure_text(chosen: CompletionFilter) -> str | None:
-    """Describe the failure that a filter selects, such as `in NameError`; None if it selects no failure."""
+    """Describe the failure that a filter selects, e.g. `in NameError`, or return None if it selects none."""
     kind = None if chosen.failure_kind is None else shortened(chosen.failure_kind, MAX_NAME)
     if chosen.failure_class == NO_PROGRAM_CLASS:
         return ending_of(NO_PROGRAM_CLASS) + ("" if kind is None else f" ({kind})")
@@ -57,7 +57,7 @@ def failure_text(chosen: CompletionFilter) -> str | None:
 
 
 class TaskCells:
-    """The cells of a run in a heat map of tasks by prompts; the selected cell is marked."""
+    """Computes the cells of a run in a heat map of tasks by prompts, with the selected cell marked."""
 
     def __init__(self, run: Snapshot, chosen: CompletionFilter, evaluation: str | None = None) -> None:
         self._run, self._filter, self._evaluation = run, chosen, evaluation
@@ -72,12 +72,12 @@ class TaskCells:
 
     @property
     def columns(self) -> list[dict[str, Any]]:
-        """A column for the mean and one for each prompt."""
+        """Return a column for the mean and a column for each prompt."""
         numbers = [{"name": f"prompt {n}", "title": f"prompt {n} of each task"} for n in range(self._prompts)]
         return [{"name": "mean", "title": "mean over the prompts"}, *numbers]
 
     def row(self, task: str) -> list[dict[str, Any]]:
-        """The cells of a task."""
+        """Return the cells of a task."""
         prompts = self.tasks.get(task)
         if prompts is None:
             return [{**EMPTY_CELL, "text": "no completions", "span": 1 + self._prompts}]
@@ -113,7 +113,7 @@ class TaskCells:
 
 
 def failure_rows(runs: Sequence[Snapshot]) -> list[dict[str, Any]]:
-    """Rows of failures by run: each class with its kinds, the most frequent first."""
+    """Return the rows of failures by run: each class followed by its kinds, most frequent first."""
     by_run: list[dict[tuple[str, str | None], Failures]] = []
     largest: dict[tuple[str, str | None], float] = {}
     for run in runs:

@@ -1,4 +1,4 @@
-"""The pages of the benchmark, for `roboeval serve` and, by an entry point, for `codebotler serve`."""
+"""Registers the pages of the benchmark for `roboeval serve` and, via an entry point, `codebotler serve`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from roboeval.web.widgets import page_of
 
 
 def pages(suites: Sequence[Suite] = ()) -> Pages:
-    """Create the pages; `suites` extends the suites that ship with the package."""
+    """Create the pages; `suites` are available in addition to the suites in the package."""
 
     def add(site: Site) -> None:
         store = RunStore(site.runs, suites)

@@ -1,4 +1,4 @@
-"""The page of one run: its progress, its failures by task and kind, and all completions."""
+"""Draws the page of a run: its progress, its failures by task and kind, and all completions."""
 
 from __future__ import annotations
 
@@ -33,14 +33,12 @@ RUN_DELETED = "This run was deleted or renamed. The page shows its last known st
 
 
 async def draw_run(store: RunStore, name: str, chosen: CompletionFilter, evaluation: str | None) -> None:
-    """Draw a run; its list of completions starts with a filter."""
+    """Draw a run with a list of completions that is initially filtered by `chosen`."""
     page = _RunPage(store, await asyncio.to_thread(store.open, name, evaluation), chosen, evaluation)
     page.timer = ui.timer(REFRESH_SECONDS, page.refresh, immediate=False)
 
 
 class _RunPage:
-    """A run on the page, kept up to date with its folder."""
-
     timer: ui.timer
 
     def __init__(
@@ -70,7 +68,6 @@ class _RunPage:
         self._show()
 
     async def refresh(self) -> None:
-        """Show the current state of the run; stop refreshing if it is gone."""
         try:
             run = await asyncio.to_thread(self._store.open, self._run.name, self._evaluation)
         except MissingError:
@@ -138,7 +135,7 @@ class _RunPage:
 
 
 class _Kind:
-    """An outcome of programs, as a button that selects it."""
+    """A button that shows how often an outcome occurs and selects it."""
 
     def __init__(self, name: str, kind: CompletionFilter, choose: Callable[[CompletionFilter], None]) -> None:
         look = "kind" + " of-class" * (kind.failure_kind is not None)
@@ -149,7 +146,6 @@ class _Kind:
             self._share = PlainText("small", "", "quiet")
 
     def show(self, count: int, total: int, *, is_here: bool) -> None:
-        """Show the count, its share, and whether the outcome is selected."""
         self._button.props(f"aria-pressed={'true' if is_here else 'false'}")
         self._button.style(f"--share: {count / total if total else 0:.3f}")
         self._count.say(f"{count:,}")

@@ -1,4 +1,4 @@
-"""The folder of runs: finds runs by name, and reads them again when their files change."""
+"""Finds the runs in a folder by name, and reads them again when their files change."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from roboeval.evaluation.runs.results import Results, read_results
 from roboeval.suites.load import ABLATED, Suite, has_suite, load_suite
 from roboeval.web.snapshot import Snapshot
 
-MAX_SNAPSHOTS = 16  # evaluations in memory
+MAX_SNAPSHOTS = 16  # number of evaluations kept in memory
 REPORT_PAGE, MAX_REPORT_BYTES = (
     "index.html",
     20_000_000,
-)  # the page of a report, and its largest size in bytes
-REST_FACTOR = 10  # wait this many times the duration of a read before reading a run again
+)  # file name of a report, and its maximum size in bytes
+REST_FACTOR = 10  # pause between two reads of a run, as a multiple of the duration of a read
 OUTSIDE_FOLDER = "leads outside the folder of runs; move it into the folder"
 
 FileStamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
 
 
 class MissingError(UserError):
-    """A run or a completion does not exist or was removed."""
+    """Raised if a run or a completion does not exist or was removed."""
 
 
 class RunStore:
-    """The runs in a folder, thread-safe; the folder may be a run itself, and need not exist yet."""
+    """Provides the runs in a folder, which may also be a run itself or not exist yet; thread-safe."""
 
     def __init__(self, folder: Path, suites: Sequence[Suite] = ()) -> None:
         self.folder = folder
@@ -42,19 +42,19 @@ class RunStore:
         self._reader_of = lru_cache(maxsize=MAX_SNAPSHOTS)(partial(_Reader, self))
 
     def names(self) -> list[str]:
-        """The sorted names of the runs."""
+        """Return the sorted names of the runs."""
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """Read a run, or reuse a recent snapshot; the default evaluation is the first that is no ablation."""
+        """Read a run or reuse a snapshot; `key` defaults to the first evaluation that is not an ablation."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:
-        """The version of a run, found without reading it."""
+        """Return the version of a run without reading the run."""
         return self._reader(name, None).version()
 
     def report(self, name: str, part: str = REPORT_PAGE) -> bytes | None:
-        """Read the page of a run's report, or another part of it; None if it cannot be read."""
+        """Read the page or another part of a run's report; return None if it cannot be read."""
         path = self._reader(name, None).folder / "report" / part
         if _stamp(path, self.folder.resolve()) is None:
             return None
@@ -67,14 +67,14 @@ class RunStore:
             return None
 
     def has_report(self, name: str) -> bool:
-        """Whether a run's folder contains a report."""
+        """Whether the folder of a run contains a report."""
         try:
             return self.report(name) is not None
         except UserError:
             return False
 
     def suite(self, name: str) -> Suite | None:
-        """Load a suite that ships, is installed or was given; None if it is unavailable."""
+        """Load a built-in, installed or given suite; return None if it is unavailable."""
         if name not in self._suites:
             try:
                 self._suites[name] = load_suite(name) if has_suite(name) else None
@@ -84,7 +84,7 @@ class RunStore:
         return self._suites[name]
 
     def _folders(self) -> dict[str, Path]:
-        """The folder if it is a run itself, otherwise its entries, by name."""
+        """Return the folder if it is a run itself, otherwise its entries, by name."""
         if RunFolder(self.folder).completions.is_file():
             return {self.folder.resolve().name: self.folder.resolve()}
         try:
@@ -95,7 +95,7 @@ class RunStore:
             raise UserError(f"cannot be read ({error.strerror})", file=self.folder) from None
 
     def _reader(self, name: str, key: str | None) -> _Reader:
-        path = self._folders().get(name)  # compared with entries, so a name cannot lead to another folder
+        path = self._folders().get(name)  # looked up among entries, so a name cannot lead to another folder
         if path is None or not _is_run(path):
             raise MissingError(f'this folder has no run "{shortened(name)}"; it may have been deleted')
         if not path.resolve().is_relative_to(self.folder.resolve()):
@@ -111,7 +111,7 @@ class RunStore:
 
 
 class _Reader:
-    """Reads one evaluation of a run, again when one of its files changes."""
+    """Reads one evaluation of a run, and reads it again when one of its files changes."""
 
     def __init__(self, store: RunStore, run: RunFolder, key: str | None) -> None:
         self._store, self._run, self._key = store, run, key
@@ -124,7 +124,6 @@ class _Reader:
 
     @property
     def folder(self) -> Path:
-        """The folder of the run."""
         return self._run.path
 
     def read(self) -> Snapshot:
@@ -135,7 +134,7 @@ class _Reader:
                 began = time.monotonic()
                 self._results, self._stamps = self._read_files(), stamps
                 ended = time.monotonic()
-                # Faults may come from files that changed during the read, so read them again soon.
+                # Files that changed while being read may cause faults, so read them again soon.
                 mixed = bool(self._results.faults) and self._stamps_now() != stamps
                 self._rests_until = ended + (0 if mixed else REST_FACTOR * (ended - began))
             version = self._version(self._stamps)
@@ -152,7 +151,7 @@ class _Reader:
         return self._key, self.evaluations, self._run.is_being_written, stamps
 
     def _stamps_now(self) -> FileStamps:
-        """The stamps of all files, which change with their content."""
+        """Return the stamps of all files, which change when the content changes."""
         run, key = self._run, self._key or ""
         checks = run.checks(key.removesuffix(ABLATED))
         within = self._store.folder.resolve()
@@ -162,14 +161,14 @@ class _Reader:
     def _read_files(self) -> Results:
         faults: list[UserError] = []
         results = read_results(self._run, self._key, keep_failed=False, faults=faults)
-        existing = tuple(fault for fault in faults if Path(str(fault.file)).exists())  # a new run lacks files
+        existing = tuple(fault for fault in faults if Path(str(fault.file)).exists())  # new runs lack files
         name = results.manifest.get("suite") or results.about.get("suite")
         suite = self._store.suite(name if isinstance(name, str) else "paper")
         return replace(results, suite=suite, faults=existing)
 
 
 def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
-    """A value that changes with a file; None if it does not exist."""
+    """Return a value that changes when a file changes, or None if the file does not exist."""
     try:
         found = path.resolve(strict=True)
         status = found.stat()
@@ -183,7 +182,7 @@ def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
 
 
 def _is_run(path: Path) -> bool:
-    """Whether a folder looks like a run, even before its first completion."""
+    """Whether a folder looks like a run, even if it has no completions yet."""
     run = RunFolder(path)
     is_named = path.name.isprintable() and not path.name.startswith(".")
     return is_named and (run.completions.exists() or run.about.exists())

@@ -1,4 +1,4 @@
-"""The page of all runs: their models, progress and pass rates."""
+"""Draws the page of all runs with their models, progress and pass rates."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from roboeval.web.heat_map import MAX_NAME, MISSING, run_address
 from roboeval.web.serializers import RunList
 from roboeval.web.widgets import REFRESH_SECONDS, count_text, date_text, interval_text, show_state, tasks_text
 
-MAX_READ_SECONDS = 0.5  # seconds; then the page shows runs that are not read yet
+MAX_READ_SECONDS = 0.5  # seconds to wait before the page shows runs that are not read yet
 
 SortKey: TypeAlias = Callable[[Mapping[str, Any]], tuple[float, str]]
 SORT_ORDERS: Mapping[str, tuple[str, SortKey]] = {
@@ -41,7 +41,7 @@ def _moment(date: str | None) -> float:
 
 
 async def draw_runs(folder: Path, runs: RunList) -> None:
-    """Draw the runs in a folder."""
+    """Draw a table of the runs in a folder."""
     PlainText("h1", "Runs")
     PlainText("p", f"In {shortened(str(await asyncio.to_thread(folder.resolve)), 200)}", "quiet")
     table = _Table(runs)
@@ -50,8 +50,6 @@ async def draw_runs(folder: Path, runs: RunList) -> None:
 
 
 class _Table:
-    """The table of runs."""
-
     def __init__(self, runs: RunList) -> None:
         self._runs = runs
         self._order = "Run"
@@ -85,7 +83,6 @@ class _Table:
                 PlainText("span", name)
 
     async def refresh(self) -> None:
-        """Show the current state of the runs."""
         try:
             data = await asyncio.to_thread(self._runs.data, MAX_READ_SECONDS)
         except UserError as error:
@@ -109,8 +106,6 @@ class _Table:
 
 
 class _RunRow:
-    """A run as a row of the table."""
-
     def __init__(self, name: str) -> None:
         self.name = name
         with html.tr():
@@ -141,7 +136,6 @@ class _RunRow:
                 self._date = PlainText("span")
 
     def show(self, run: Mapping[str, Any]) -> None:
-        """Show the data of a run, from `run_data`."""
         by_hand = ", programs written by hand" if run.get("by_hand") else ""
         self._models.say(shortened(", ".join(run.get("models", ())), 160) + by_hand)
         self._settings.say(shortened(run.get("settings") or "", 160))

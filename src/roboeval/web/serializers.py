@@ -1,4 +1,4 @@
-"""Runs and completions as plain data, for the API and the pages."""
+"""Converts runs and completions to plain data for the API and the pages."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def state_of(run: Snapshot) -> RunState:
 
 
 def run_data(run: Snapshot) -> dict[str, Any]:
-    """Summarise a run."""
+    """Summarise a run as plain data."""
     results, mean, coverage = run.results, run.pass_at_1, run.coverage
     return {
         "run": run.name,
@@ -83,7 +83,7 @@ def run_data(run: Snapshot) -> dict[str, Any]:
 
 
 def settings_text(about: Mapping[str, Any]) -> str:
-    """Format the settings in run.json, except those that were not sent."""
+    """Format the settings in run.json, without settings that were not sent to the model."""
     settings = about.get("settings")
     named = settings.items() if isinstance(settings, dict) else ()
     return ", ".join(
@@ -94,13 +94,13 @@ def settings_text(about: Mapping[str, Any]) -> str:
 
 
 def date_of(about: Mapping[str, Any]) -> str | None:
-    """The time of the first request of a run, as ISO 8601; None if unrecorded."""
+    """Return the time of a run's first request in ISO 8601, or None if it was not recorded."""
     began = [one.get("started") for one in batches(about)]
     return min((text for text in began if isinstance(text, str)), default=None)
 
 
 def notes(run: Snapshot) -> list[str]:
-    """Describe problems of a run in sentences."""
+    """Describe the problems of a run in sentences."""
     results, stale = run.results, len(run.results.stale)
     faults = [UserError(f.sentence, file=Path(str(f.file)).name, line=f.line) for f in results.faults]
     found = [str(fault) for fault in faults[:MAX_FAULTS_SHOWN]]
@@ -124,14 +124,14 @@ def notes(run: Snapshot) -> list[str]:
 
 
 class RunList:
-    """Summaries of the runs of a store, which are updated only when a run changes."""
+    """Summarises the runs of a store, and updates a summary only when its run changes."""
 
     def __init__(self, store: RunStore) -> None:
         self._store = store
         self._known: dict[str, tuple[Hashable, dict[str, Any]]] = {}
 
     def data(self, seconds: float = math.inf) -> list[dict[str, Any]]:
-        """Summarise all runs, or say why one cannot be read; stop reading runs after so many seconds."""
+        """Summarise all runs, or say why a run cannot be read; stop reading runs after `seconds`."""
         until = time.monotonic() + seconds
         return [self._run_data(name, may_read=time.monotonic() < until) for name in self._store.names()]
 
@@ -149,7 +149,7 @@ class RunList:
 
 
 def run_details(run: Snapshot) -> dict[str, Any]:
-    """A run with its tasks, prompts and kinds of failure."""
+    """Return a run with its tasks, prompts and kinds of failure."""
     means = {score.task: score.pass_at(1).mean for score in run.scores}
     shares = pass_at_1(run.scores)
     tasks: dict[str, list[dict[str, Any]]] = {}
@@ -181,7 +181,7 @@ def _prompt_data(
 
 
 def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Summarise a completion, from a row of `Snapshot.completions`."""
+    """Summarise a completion, given its row in `Snapshot.completions`."""
     failure = {name: row[f"failure_{name}"] for name in ("class", "kind", "world", "check")}
     return {
         **{name: row[name] for name in (*KEY, "passed")},
@@ -193,7 +193,7 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
-    """A completion with its program, and the steps, failed checks and explanations of each world."""
+    """Return a completion with its program, and the steps, failed checks and explanations of each world."""
     results = run.results
     key: CompletionKey = row["task"], row["prompt"], row["index"]
     completion = results.completions.get(key)

@@ -1,4 +1,4 @@
-"""A snapshot of a run: its completions, judged or not, and their counts."""
+"""Snapshots of a run: judged and unjudged completions, and their counts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from roboeval.suites.load import Suite
 from roboeval.suites.task import check_label
 
 HAS_NO_PROGRAM = pl.col("failure_class").eq_missing(NO_PROGRAM_CLASS)
-# The result of a program in a world: + satisfied, - not satisfied, ! error.
+# A sign for the result of a program in a world: + satisfied, - not satisfied, ! error.
 WORLD_SIGN = (
     pl.when("satisfied")
     .then(pl.lit("+"))
@@ -33,7 +33,7 @@ WORLD_SIGN = (
     .then(pl.lit("-"))
     .otherwise(pl.lit("!"))
 )
-# The cause of a failure: the failed check, the limit that stopped the program, or its error.
+# The cause of a failure: a failed check, the limit that stopped the program, or an error.
 ERROR_MESSAGE = pl.col("error_message")
 FAILURE_CAUSE = (
     pl.when(HAS_NO_PROGRAM)
@@ -49,29 +49,29 @@ INT64_LIMIT = 2**63
 
 @dataclass(frozen=True)
 class CompletionFilter:
-    """Selects completions by the values of columns; also the query of pages and of the API."""
+    """Selects completions by values of columns; pages and the API accept it as a query."""
 
     task: Annotated[str | None, Query(description="Only this task.")] = None
     prompt: Annotated[
-        int | None, Query(ge=0, lt=INT64_LIMIT, description="Only this prompt, counted from 0.")
+        int | None, Query(ge=0, lt=INT64_LIMIT, description="Only this prompt, numbered from 0.")
     ] = None
-    passed: Annotated[bool | None, Query(description="Only those that passed, or that failed.")] = None
-    failure_class: Annotated[str | None, Query(description="Only this class of failure.")] = None
-    failure_kind: Annotated[str | None, Query(description="Only this kind of failure.")] = None
+    passed: Annotated[bool | None, Query(description="Only passed (true) or failed (false).")] = None
+    failure_class: Annotated[str | None, Query(description="Only failures of this class.")] = None
+    failure_kind: Annotated[str | None, Query(description="Only failures of this kind.")] = None
 
     @property
     def condition(self) -> pl.Expr:
-        """The filter as a condition on `Snapshot.completions`."""
+        """The condition on `Snapshot.completions` that corresponds to the filter."""
         conditions = [pl.col(name) == value for name, value in asdict(self).items() if value is not None]
         return pl.all_horizontal(pl.lit(value=True), *conditions)
 
     @property
     def verdict(self) -> Self:
-        """The filter without its task and prompt."""
+        """The same filter for all tasks and prompts."""
         return replace(self, task=None, prompt=None)
 
     def query(self, evaluation: str | None) -> str:
-        """The filter as the query of a URL; empty if it selects all completions of the default evaluation."""
+        """Return the query of a URL, which is empty for all completions of the default evaluation."""
         values = {"evaluation": evaluation, **asdict(self)}
         if self.passed is not None:
             values["passed"] = str(self.passed).lower()
@@ -81,34 +81,34 @@ class CompletionFilter:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """One evaluation of a run, read at one time."""
+    """The state of one evaluation of a run at the time when it was read."""
 
     results: Results
     evaluations: tuple[str, ...]  # the names of all evaluations of the run
-    is_written: bool  # whether a process is writing it
-    version: Hashable  # changes whenever a file does
+    is_written: bool  # whether a process is writing the run
+    version: Hashable  # changes whenever a file of the run changes
 
     @property
     def name(self) -> str:
-        """The name of the run."""
+        """The name of the run's folder."""
         return self.results.run.path.name
 
     @property
     def suite(self) -> Suite | None:
-        """The suite that judges the run; None if it is unavailable."""
+        """The suite that judges the run, or None if it is unavailable."""
         return self.results.suite
 
     @cached_property
     def models(self) -> list[str]:
-        """The recorded models of the completions."""
+        """The recorded models that wrote the completions."""
         return sorted({c.model for c in self.results.completions.values() if c.model is not None})
 
     @cached_property
     def completions(self) -> pl.DataFrame:
-        """A row for each completion in the suite's order, even if only its verdict is left.
+        """One row for each completion in the order of the suite, even if only its verdict still exists.
 
-        `passed` is null if it was not judged, `worlds` has a sign for each world, `why` is the check or the
-        error that caused the failure, and `written` tells whether the run still has the completion.
+        `passed` is null if the completion was not judged, `worlds` contains a sign for each world, `why` is
+        the check or error that caused the failure, and `written` tells whether the completion still exists.
         """
         judged = self.results.table.group_by(KEY, maintain_order=True).agg(
             pl.col("passed", "^failure_.*$", "stale").first(),
@@ -129,24 +129,24 @@ class Snapshot:
         return judged.join(written, on=KEY, how="full", coalesce=True).with_columns(*filled).sort(place, *KEY)
 
     def row(self, name: str) -> dict[str, Any] | None:
-        """Find the row of a completion by its name; None if there is none."""
+        """Find the row of a completion by its name; return None if there is no such completion."""
         found = self.completions.filter(pl.format("{}/{}/{}", *KEY) == name)
         return found.row(0, named=True) if found.height else None
 
     def select(self, chosen: CompletionFilter) -> pl.DataFrame:
-        """Select completions, in order."""
+        """Select the completions that pass a filter, in order."""
         return self.completions.filter(chosen.condition)
 
     def neighbours(
         self, key: CompletionKey, chosen: CompletionFilter
     ) -> tuple[CompletionKey | None, CompletionKey | None]:
-        """The completions before and after one in the filtered list; None at an end."""
+        """Return the previous and the next completion in the filtered list, each None if there is none."""
         keys = [None, *self.select(chosen).select(KEY).iter_rows(), None]
         at = keys.index(key) if key in keys else None
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
     def prompts(self, chosen: CompletionFilter) -> list[dict[str, Any]]:
-        """All prompts, and how many completions are `written`, `judged` and `counted` (pass the filter)."""
+        """Count for each prompt the completions `written`, `judged`, and `counted` (matching the filter)."""
         return prompt_counts(self.completions, chosen.verdict.condition).to_dicts()
 
     @property
@@ -156,37 +156,37 @@ class Snapshot:
 
     @property
     def passed(self) -> int:
-        """The number of completions that passed."""
+        """The number of judged completions that passed."""
         return passed_count(prompts_of(self.scores))
 
     @cached_property
     def scope(self) -> JudgingScope:
-        """The completions that are to be judged."""
+        """The completions that were selected for judging."""
         return self.results.scope
 
     @property
     def coverage(self) -> Coverage:
-        """How many completions were judged, are there, and were requested."""
+        """The numbers of judged, existing and requested completions."""
         return self.scope.coverage(self.judged)
 
     @property
     def cut_off(self) -> CutOff:
-        """The replies that were cut off."""
+        """Counts of the replies that were cut off."""
         return cut_off_replies(self.failures, self.scope)
 
     @cached_property
     def scores(self) -> tuple[TaskScore, ...]:
-        """The scores by task and prompt."""
+        """The scores of each task and prompt."""
         return task_scores(self.results.table)
 
     @cached_property
     def pass_at_1(self) -> Estimate | None:
-        """pass@1 over all prompts, with its interval over tasks; None if nothing was judged."""
+        """The mean pass@1 over all prompts with its interval over tasks, or None if nothing was judged."""
         return overall(self.scores, 1) if self.scores else None
 
     @cached_property
     def failures(self) -> list[Failures]:
-        """The classes of failures that occur, each with its kinds, the most frequent first."""
+        """The classes of failures that occur, each with its kinds, most frequent first."""
         if not self.judged:
             return []
         return [

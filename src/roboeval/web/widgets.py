@@ -1,4 +1,4 @@
-"""Elements of the pages: heat maps, lists, programs, and the progress of runs."""
+"""Elements shared by the pages: heat maps, lists, programs, and the progress of runs."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from roboeval.web.run_store import MissingError
 from roboeval.web.serializers import RunState
 
 STYLESHEET_LINK = '<link rel="stylesheet" href="{prefix}/static/benchmark/benchmark.css">'
-REFRESH_SECONDS = 1.0  # seconds between refreshes of a page
+REFRESH_SECONDS = 1.0  # interval between refreshes of a page
 MAX_PAGE_TITLE = 80
 
 
 @contextmanager
 def page_of(frame: Frame, title: str) -> Iterator[None]:
-    """Draw a page of the benchmark; show the sentence of an error for users."""
+    """Draw a page of the benchmark; errors for users are shown as sentences on the page."""
     frame(shortened(title, MAX_PAGE_TITLE), "/runs")
     ui.add_head_html(STYLESHEET_LINK.format(prefix=outside("")))
     with ui.element("div").classes("benchmark"):
@@ -51,7 +51,7 @@ class _DataElement(Element):
 
 
 class HeatMap(_DataElement, component="static/heat.js"):
-    """A table of shaded shares; a click on a cell follows its link, or calls `chosen` with task and prompt.
+    """A table of shaded shares; clicking a cell follows its link or calls `chosen` with task and prompt.
 
     Its properties are `groups` with `name`, `href` and `columns` (`name`, `title`, `href`), and `rows` with
     `name` and `cells` (`text`, `shade`, `title`, `href`, `at`).
@@ -68,15 +68,15 @@ class HeatMap(_DataElement, component="static/heat.js"):
 
 
 class CompletionList(_DataElement, component="static/rows.js"):
-    """A list of completions; the browser fetches only those in view.
+    """A list of completions, of which the browser fetches only those in view.
 
-    Its properties are `source` (the URL of the API), `base` and `query` (of the pages of completions), and
-    `version`, which changes with the completions.
+    Its properties are `source` (the URL of the API), `base` and `query` (parts of the URLs of completion
+    pages), and `version`, which changes when the completions change.
     """
 
 
 class ProgramView(Element, component="static/code.js"):
-    """A program with some lines marked, counted from 1; the text need not be valid Python."""
+    """A program with some lines marked, numbered from 1; the text need not be valid Python."""
 
     def __init__(self, program: str, marked: Iterable[int]) -> None:
         super().__init__()
@@ -88,7 +88,7 @@ class ProgramView(Element, component="static/code.js"):
 
 
 def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = None) -> None:
-    """Show the progress of a run on a label, and on a bar."""
+    """Show the progress of a run on a label and, if given, on a bar."""
     state = str(data["state"])
     label.say(state)
     label.classes(replace=f"state state-{state.replace(' ', '-')}")
@@ -100,7 +100,7 @@ def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = 
 
 
 def count_text(data: Mapping[str, Any]) -> str:
-    """Format the coverage of a run, in short."""
+    """Format the coverage of a run briefly, for a table."""
     if "completions" not in data:
         return MISSING
     coverage = _coverage(data)
@@ -118,7 +118,7 @@ def _coverage(data: Mapping[str, Any]) -> Coverage:
 
 
 def tasks_text(data: Mapping[str, Any]) -> str:
-    """Format the number of tasks with completions, and of tasks in the suite."""
+    """Format the number of tasks that have completions and the number of tasks in the suite."""
     if "tasks_there" not in data:
         return MISSING
     total = data["tasks_of_suite"]
@@ -126,17 +126,17 @@ def tasks_text(data: Mapping[str, Any]) -> str:
 
 
 def date_text(data: Mapping[str, Any]) -> str:
-    """Format the start of a run, in UTC."""
+    """Format the start time of a run in UTC."""
     return (data.get("date") or MISSING)[:16].replace("T", " ")
 
 
 def interval_text(estimate: Estimate, form: str = ".2f") -> str:
-    """Format an interval, in short."""
+    """Format an interval briefly."""
     return estimate.ends(form) if estimate.is_known else "interval unknown"
 
 
 def score_text(data: Mapping[str, Any]) -> str:
-    """Format pass@1 of a run; empty if nothing was judged."""
+    """Format pass@1 of a run; return an empty string if nothing was judged."""
     mean = data.get("pass@1")
     if mean is None:
         return ""

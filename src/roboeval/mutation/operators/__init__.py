@@ -1,1 +1,1 @@
-"""Mutation operators, a module for each kind; every public function in them is one."""
+"""Mutation operators, grouped by kind of mistake; every public function of a module is an operator."""

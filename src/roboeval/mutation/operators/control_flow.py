@@ -1,4 +1,4 @@
-"""Operators about order, conditions and loops."""
+"""Mutation operators that change the order of steps, conditions and loops."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ENDS = ast.Break | ast.Continue | ast.Return
 
 
 def before_the_last(program: ProgramTree, _: Context) -> Edits:
-    """Does before the last turn of a loop what belongs after it."""
+    """Moves code that belongs after a loop before its last iteration."""
     for block in program.blocks:
         for at, loop in enumerate(block):
             after = block[at + 1 :]
@@ -61,8 +61,8 @@ def negate_a_condition(program: ProgramTree, _: Context) -> Edits:
 
 
 def drop_a_condition(program: ProgramTree, _: Context) -> Edits:
-    """Ignores a condition and always acts."""
-    of_loops = {loop.test for loop in program.loops if isinstance(loop, ast.While)}  # would never end
+    """Replaces a condition by true, so that the program always acts."""
+    of_loops = {loop.test for loop in program.loops if isinstance(loop, ast.While)}  # mutants would never end
     for test in _tests(program):
         if test not in of_loops and not isinstance(test, ast.Constant):
             yield {test: expression("True")}
@@ -73,7 +73,7 @@ def drop_a_condition(program: ProgramTree, _: Context) -> Edits:
 
 
 def never(program: ProgramTree, _: Context) -> Edits:
-    """Ignores a condition and never acts."""
+    """Replaces a condition by false, so that the program never acts."""
     for test in _tests(program):
         if not (isinstance(test, ast.Constant) and test.value is False):
             yield {test: expression("False")}
@@ -88,7 +88,7 @@ def and_or(program: ProgramTree, _: Context) -> Edits:
 
 
 def drop_the_else(program: ProgramTree, _: Context) -> Edits:
-    """Omits the alternative of a condition."""
+    """Removes the `else` branch of a condition."""
     for node in program.nodes:
         match node:
             case ast.If(test, body, [_, *_] as otherwise) if not all(map(is_pause, otherwise)):
@@ -96,20 +96,20 @@ def drop_the_else(program: ProgramTree, _: Context) -> Edits:
 
 
 def swap_steps(program: ProgramTree, _: Context) -> Edits:
-    """Does two steps in the wrong order."""
+    """Swaps two consecutive steps."""
     idle = {statement for statement, _ in program.steps("is_in_room")}
     for block in program.blocks:
         for first, second in pairwise(block):
             if idle & {first, second} or isinstance(first, ast.FunctionDef | ast.ClassDef):
                 continue
             kinds = skills_in(first), skills_in(second)
-            # Two sentences or two questions have no order.
+            # Instructions do not prescribe the order of two messages or two questions.
             if all(kinds) and (kinds[0] != kinds[1] or "go_to" in kinds[0]):
                 yield {first: second, second: first}
 
 
 def stop_at_the_first(program: ProgramTree, _: Context) -> Edits:
-    """Stops a loop after its first turn or match."""
+    """Ends a loop after the first iteration or match."""
     for loop in program.loops:
         last = loop.body[-1]
         yield {last: [last, ast.Break()]}
@@ -122,7 +122,6 @@ def stop_at_the_first(program: ProgramTree, _: Context) -> Edits:
 
 
 def _inside(block: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """The statements of a loop's body outside of inner loops."""
     for statement in block:
         yield statement
         if isinstance(statement, ast.If):
@@ -131,7 +130,7 @@ def _inside(block: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def do_not_stop(program: ProgramTree, _: Context) -> Edits:
-    """Continues where it should stop."""
+    """Removes a `break`, `continue` or `return`."""
     for node in program.nodes:
         match node:
             case ast.Break() | ast.Continue() | ast.Return(value=None):
@@ -139,7 +138,7 @@ def do_not_stop(program: ProgramTree, _: Context) -> Edits:
 
 
 def give_up(program: ProgramTree, _: Context) -> Edits:
-    """Gives up waiting after one or three attempts."""
+    """Stops waiting after one or three attempts."""
     for loop in program.loops:
         if isinstance(loop, ast.While):
             endless = isinstance(loop.test, ast.Constant) and loop.test.value
@@ -150,7 +149,7 @@ def give_up(program: ProgramTree, _: Context) -> Edits:
 
 
 def stop_half_way(program: ProgramTree, _: Context) -> Edits:
-    """Ends before everything is done."""
+    """Ends the program before all steps are done."""
     for node in program.nodes:
         if isinstance(node, ast.FunctionDef) and node.name == TASK_FUNCTION:
             doing = [s for s in node.body[:-1] if skills_in(s) and not isinstance(s, ast.Return)]
@@ -158,7 +157,7 @@ def stop_half_way(program: ProgramTree, _: Context) -> Edits:
 
 
 def into_the_loop(program: ProgramTree, _: Context) -> Edits:
-    """Does in every turn of a loop what belongs after it."""
+    """Moves code that belongs after a loop into its body."""
     for block in program.blocks:
         for loop, after in pairwise(block):
             if isinstance(loop, ast.For | ast.While) and skills_in(after):
@@ -167,7 +166,7 @@ def into_the_loop(program: ProgramTree, _: Context) -> Edits:
 
 
 def out_of_the_block(program: ProgramTree, _: Context) -> Edits:
-    """Does after a loop or a condition what belongs inside it."""
+    """Moves the last step of a loop or a condition out of its body."""
     for node in program.nodes:
         match node:
             case ast.For(body=[_, *_, last]) | ast.While(body=[_, *_, last]) | ast.If(body=[_, *_, last]):

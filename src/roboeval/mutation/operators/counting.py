@@ -1,4 +1,4 @@
-"""Operators about numbers and about what the robot remembers."""
+"""Mutation operators that change numbers, counters and collections."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ BOUNDARIES = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt
 
 
 def off_by_one(program: ProgramTree, _: Context) -> Edits:
-    """Uses a number that is off by one."""
+    """Increases or decreases a number by one."""
     exact = {inner for node in program.nodes if _is_exact(node) for inner in ast.walk(node)}
     pauses = {inner for node in program.nodes if is_pause(node) for inner in ast.walk(node)}
     for node in program.nodes:
@@ -23,7 +23,7 @@ def off_by_one(program: ProgramTree, _: Context) -> Edits:
 
 
 def _is_exact(node: ast.AST) -> bool:
-    """Whether the numbers in a node count, compare or scale, rather than propose something."""
+    """Whether numbers in a node are used to count, compare or scale; other numbers may be arbitrary."""
     match node:
         case ast.Compare() | ast.Subscript() | ast.AugAssign():
             return True
@@ -35,7 +35,7 @@ def _is_exact(node: ast.AST) -> bool:
 
 
 def wrong_boundary(program: ProgramTree, _: Context) -> Edits:
-    """Stops one turn too late or too early."""
+    """Includes or excludes the boundary value of a comparison."""
     for node in program.nodes:
         match node:
             case ast.Compare(left, [comparison], right) if type(comparison) in BOUNDARIES:
@@ -43,7 +43,7 @@ def wrong_boundary(program: ProgramTree, _: Context) -> Edits:
 
 
 def miscount(program: ProgramTree, _: Context) -> Edits:
-    """Counts one too many or one too few."""
+    """Increases or decreases the result of a count by one."""
     for node in program.nodes:
         match node:
             case ast.Call(ast.Name("len" | "sum") | ast.Attribute(_, "count"), [_, *_]):
@@ -52,7 +52,7 @@ def miscount(program: ProgramTree, _: Context) -> Edits:
 
 
 def forget_to_count(program: ProgramTree, _: Context) -> Edits:
-    """Does not update a counter or a list."""
+    """Removes an update of a counter or a collection."""
     return ({node: []} for node in program.nodes if _remembers(node))
 
 
@@ -68,7 +68,7 @@ def _remembers(node: ast.AST) -> bool:
 
 
 def only_the_last(program: ProgramTree, _: Context) -> Edits:
-    """Remembers only the last item."""
+    """Keeps only the last item instead of adding it to the previous ones."""
     for node in program.nodes:
         match node:
             case ast.AugAssign(target, ast.Add(), value):
@@ -82,7 +82,7 @@ def only_the_last(program: ProgramTree, _: Context) -> Edits:
 
 
 def wrong_sign(program: ProgramTree, _: Context) -> Edits:
-    """Subtracts instead of adding, or adds instead of subtracting."""
+    """Swaps addition and subtraction."""
     for node in program.nodes:
         match node:
             case ast.AugAssign(target, ast.Add(), ast.Constant(int()) as value):
@@ -113,7 +113,7 @@ def add_as_texts(program: ProgramTree, _: Context) -> Edits:
 
 
 def reset_in_the_loop(program: ProgramTree, _: Context) -> Edits:
-    """Resets a counter or a list in each turn of a loop."""
+    """Resets a counter or a collection in each iteration of a loop."""
     for block in program.blocks:
         for at, loop in enumerate(block):
             if isinstance(loop, ast.For | ast.While):

@@ -1,4 +1,4 @@
-"""Operators about what the robot picks up and puts down."""
+"""Mutation operators that change which objects the robot picks up and puts down."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ PUTTING_DOWN = re.compile(
 
 
 def _is_put_down(context: Context) -> bool:
-    """Whether every phrasing that has something brought here also has it put down."""
+    """Whether each prompt that asks to bring something here also asks to put it down."""
     return not any(BRINGING_HERE.search(one) and not PUTTING_DOWN.search(one) for one in context.prompts)
 
 
 @only_if(_is_put_down)
 def forget_to_place(program: ProgramTree, _: Context) -> Edits:
-    """Does not put down the thing that it brings."""
+    """Removes the step that puts an object down."""
     return ({step: []} for step, _call in program.steps("place"))
 
 
 def forget_to_pick(program: ProgramTree, _: Context) -> Edits:
-    """Does not pick up the thing that it should bring."""
+    """Removes the step that picks an object up."""
     return ({step: []} for step, _call in program.steps("pick"))
 
 
 def bring_nothing(program: ProgramTree, _: Context) -> Edits:
-    """Drives without picking up or putting down anything."""
+    """Removes all steps that pick up or put down objects."""
     steps = [step for step, _ in program.steps("pick", "place")]
     if len(steps) > 1:
         yield {step: [] for step in steps}
@@ -41,12 +41,12 @@ def bring_nothing(program: ProgramTree, _: Context) -> Edits:
 
 @only_if(_is_put_down)
 def place_by_words(program: ProgramTree, _: Context) -> Edits:
-    """Says that it brings a thing, but does not put it down."""
+    """Announces that an object was brought instead of putting it down."""
     return ({step: statement('say("Here it is.")')} for step, _call in program.steps("place"))
 
 
 def wrong_thing(program: ProgramTree, context: Context) -> Edits:
-    """Brings the wrong thing."""
+    """Replaces an object by a different one."""
     things = [argument(call, 0) for _, call in program.steps("pick", "place")]
     named = next((name for thing in things if (name := text_of(thing))), "")
     if len(context.things) > 1 and things:
@@ -56,7 +56,7 @@ def wrong_thing(program: ProgramTree, context: Context) -> Edits:
 
 
 def place_where_found(program: ProgramTree, _: Context) -> Edits:
-    """Puts a thing down where it found it."""
+    """Puts an object down immediately after picking it up."""
     places = [step for step, _ in program.steps("place")]
     for step, call in program.steps("pick"):
         thing = argument(call, 0)

@@ -1,4 +1,4 @@
-"""Operators about a user's own skills: wrong values, errors that nobody handles, steps left out."""
+"""Mutation operators for custom skills: wrong arguments, unhandled errors and missing steps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NO_CHOICE: dict[str, Any] = {"str": "anything", "int": 1_000, "float": 1_000.5}
 
 
 def pass_another_type(program: ProgramTree, _: Context) -> Edits:
-    """Passes a value of the wrong type."""
+    """Passes an argument of the wrong type."""
     for node, skill in _own_calls(program):
         for argument, parameter in zip(node.args, skill.parameters, strict=False):
             value = OTHER_TYPE[parameter.type.base or "str"]
@@ -25,7 +25,7 @@ def pass_another_type(program: ProgramTree, _: Context) -> Edits:
 
 
 def pass_no_choice(program: ProgramTree, _: Context) -> Edits:
-    """Passes a value that is not one of the skill's choices."""
+    """Passes an argument that is not one of the allowed choices."""
     for node, skill in _own_calls(program):
         for argument, parameter in zip(node.args, skill.parameters, strict=False):
             if parameter.type.choices:
@@ -33,14 +33,14 @@ def pass_no_choice(program: ProgramTree, _: Context) -> Edits:
 
 
 def forget_an_argument(program: ProgramTree, _: Context) -> Edits:
-    """Omits the last argument."""
+    """Removes the last argument of a call."""
     for node, _skill in _own_calls(program):
         if node.args:
             yield {node: ast.Call(node.func, node.args[:-1], node.keywords)}
 
 
 def handle_no_error(program: ProgramTree, _: Context) -> Edits:
-    """Does not handle errors of a skill."""
+    """Removes the error handling around a skill."""
     for node in program.nodes:
         if isinstance(node, ast.Try) and any(
             _is_own(inner) for part in node.body for inner in ast.walk(part)
@@ -49,7 +49,7 @@ def handle_no_error(program: ProgramTree, _: Context) -> Edits:
 
 
 def skip_a_step(program: ProgramTree, _: Context) -> Edits:
-    """Omits a step that others may need."""
+    """Removes a step that later steps may depend on."""
     return ({node: []} for node in program.nodes if isinstance(node, ast.Expr) and _is_own(node.value))
 
 
@@ -61,7 +61,7 @@ def take_a_step_again(program: ProgramTree, _: Context) -> Edits:
 
 
 def ask_for_success_in_vain(program: ProgramTree, _: Context) -> Edits:
-    """Continues as if a skill had succeeded."""
+    """Ignores whether a skill succeeded."""
     for node in program.nodes:
         match node:
             case ast.If(test, body) if _is_own(test):

@@ -1,4 +1,4 @@
-"""Operators about where the robot drives and what it looks for there."""
+"""Mutation operators that change where the robot drives and what it looks for."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ STAYING_OUT = prompt_matches(
 
 
 def _sequences(program: ProgramTree) -> Iterator[ast.expr]:
-    """Sequences that a loop or a comprehension goes through, and all lists of rooms."""
+    """Yield the sequences that loops and comprehensions iterate over, and all lists of rooms."""
     found = [node.iter for node in program.nodes if isinstance(node, ast.For | ast.comprehension)]
     yield from found
     yield from (call for call in program.calls("get_all_rooms") if call not in found)
 
 
 def skip_the_first(program: ProgramTree, _: Context) -> Edits:
-    """Skips the first item of a sequence: a room, a person or a report."""
+    """Skips the first item of a sequence, such as a room, a person or a report."""
     return ({items: expression("list(items)[1:]", items=items)} for items in _sequences(program))
 
 
@@ -45,7 +45,7 @@ def skip_the_last(program: ProgramTree, _: Context) -> Edits:
 
 
 def _return_places(program: ProgramTree) -> dict[ast.Call, ast.expr]:
-    """The drives to a former location of the robot, and these places."""
+    """Find the calls that drive to a location stored earlier, and map each to its argument."""
     kept = set()
     for node in program.nodes:
         match node:
@@ -57,19 +57,19 @@ def _return_places(program: ProgramTree) -> dict[ast.Call, ast.expr]:
 
 @only_if(COMING_BACK)
 def drop_the_return(program: ProgramTree, _: Context) -> Edits:
-    """Does not come back."""
+    """Removes the drive back to the starting point."""
     returns = _return_places(program)
     return ({step: []} for step, call in program.steps("go_to") if call in returns)
 
 
 def drop_a_drive(program: ProgramTree, _: Context) -> Edits:
-    """Omits a drive."""
+    """Removes a drive."""
     returns = _return_places(program)
     return ({step: []} for step, call in program.steps("go_to") if call not in returns)
 
 
 def wrong_room(program: ProgramTree, context: Context) -> Edits:
-    """Uses a room other than the instructed one."""
+    """Replaces a room by another one."""
     for node in program.nodes:
         room = (text_of(node) or "").lower().removeprefix("the ")
         if room in {one.lower() for one in context.rooms}:
@@ -78,26 +78,26 @@ def wrong_room(program: ProgramTree, context: Context) -> Edits:
 
 @only_if(COMING_BACK)
 def return_elsewhere(program: ProgramTree, context: Context) -> Edits:
-    """Returns to a place other than its start."""
+    """Returns to a room other than the starting point."""
     rooms = dict.fromkeys((*context.rooms[:1], *context.idle_rooms(program)[-1:]))
     return ({place: ast.Constant(room)} for place in _return_places(program).values() for room in rooms)
 
 
 @only_if(COMING_BACK)
 def return_to_here(program: ProgramTree, _: Context) -> Edits:
-    """Returns to where it already is."""
+    """Replaces the drive back by a drive to the current location."""
     return ({place: expression("get_current_location()")} for place in _return_places(program).values())
 
 
 def drive_by_words(program: ProgramTree, _: Context) -> Edits:
-    """Announces a drive but stays."""
+    """Announces a drive instead of driving."""
     for step, call in program.steps("go_to"):
         if (place := argument(call, 0)) is not None:
             yield {step: statement('say(f"I am going to {place}")', place=place)}
 
 
 def one_drive_for_all(program: ProgramTree, _: Context) -> Edits:
-    """Passes all rooms to a single drive, which reaches only one."""
+    """Passes all rooms to a single drive, which reaches only one of them."""
     for loop in program.loops:
         if not isinstance(loop, ast.For) or not isinstance(loop.target, ast.Name):
             continue
@@ -110,14 +110,14 @@ def one_drive_for_all(program: ProgramTree, _: Context) -> Edits:
 
 @only_if(STAYING_OUT)
 def detour(program: ProgramTree, context: Context) -> Edits:
-    """Drives through a room that the instruction does not mention."""
+    """Adds a drive through a room that the instruction does not mention."""
     last = [step for step, _ in program.steps("go_to")][-1:]
     for room in context.idle_rooms(program)[:1]:
         yield from ({step: [statement(f"go_to({room!r})"), step]} for step in last)
 
 
 def plural_rooms(program: ProgramTree, _: Context) -> Edits:
-    """Searches room names for a plural."""
+    """Searches room names for the plural of a word."""
     for node in program.nodes:
         match node:
             case ast.Compare(ast.Constant(str(word)) as left, [ast.In() | ast.NotIn()], [_]):
@@ -131,7 +131,7 @@ def plural_rooms(program: ProgramTree, _: Context) -> Edits:
 
 
 def _looks(program: ProgramTree) -> list[ast.Call]:
-    """The looks whose result decides, not those joined by `or`."""
+    """Find the looks whose result is used, except operands of `or`."""
     choices = (node for node in program.nodes if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.Or))
     idle = {value for choice in choices for value in choice.values}
     idle |= {call for _, call in program.steps("is_in_room")}
@@ -147,17 +147,17 @@ def _looks_in_loops(program: ProgramTree) -> Iterator[tuple[ast.For | ast.While,
 
 
 def drop_the_look(program: ProgramTree, _: Context) -> Edits:
-    """Assumes without looking that somebody or something is there."""
+    """Assumes that a person or thing is present, without looking."""
     return ({call: expression("True")} for call in _looks(program))
 
 
 def see_nothing(program: ProgramTree, _: Context) -> Edits:
-    """Assumes without looking that nobody and nothing is there."""
+    """Assumes that a person or thing is absent, without looking."""
     return ({call: expression("False")} for call in _looks(program))
 
 
 def look_once(program: ProgramTree, _: Context) -> Edits:
-    """Looks only once, before a loop."""
+    """Looks once before a loop instead of in each iteration."""
     for loop, look in _looks_in_loops(program):
         if text_of(argument(look, 0)) is not None:
             first = statement("seen_once = look", look=look)
@@ -165,7 +165,7 @@ def look_once(program: ProgramTree, _: Context) -> Edits:
 
 
 def look_at_first_only(program: ProgramTree, _: Context) -> Edits:
-    """Looks twice, then assumes success."""
+    """Looks in the first two iterations of a loop only, then assumes success."""
     for loop, look in _looks_in_loops(program):
         after = rewrite(loop, {look: expression("turns > 2 or look", look=look)})
         after.body.insert(0, statement("turns += 1"))
@@ -173,7 +173,7 @@ def look_at_first_only(program: ProgramTree, _: Context) -> Edits:
 
 
 def look_afterwards(program: ProgramTree, _: Context) -> Edits:
-    """Acts before looking."""
+    """Acts before looking, whatever the robot would see."""
     looks = set(_looks(program))
     for node in program.nodes:
         match node:
@@ -184,7 +184,7 @@ def look_afterwards(program: ProgramTree, _: Context) -> Edits:
 
 
 def look_for_another(program: ProgramTree, context: Context) -> Edits:
-    """Looks for another person or thing."""
+    """Looks for a different person or thing."""
     for look in _looks(program):
         wanted = argument(look, 0)
         if (name := text_of(wanted)) is None:
@@ -196,7 +196,7 @@ def look_for_another(program: ProgramTree, context: Context) -> Edits:
 
 
 def look_at_the_name(program: ProgramTree, _: Context) -> Edits:
-    """Searches the room's name instead of the room."""
+    """Searches the name of a room instead of the room."""
     for loop, look in _looks_in_loops(program):
         wanted = argument(look, 0)
         if isinstance(loop, ast.For) and isinstance(loop.target, ast.Name) and wanted is not None:

@@ -1,4 +1,4 @@
-"""Operators about what the robot asks and says, and when."""
+"""Mutation operators that change questions, answers and messages."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _answers(call: ast.Call) -> Iterator[ast.expr]:
 
 
 def _used(program: ProgramTree) -> Iterator[tuple[ast.Call, ast.expr]]:
-    """The questions whose answer is used, with each of its answers."""
+    """Yield each question whose answer is used, with its first and last option."""
     unused = {call for _, call in program.steps("ask")}
     for call in program.calls("ask"):
         if call not in unused:
@@ -70,7 +70,7 @@ def _used(program: ProgramTree) -> Iterator[tuple[ast.Call, ast.expr]]:
 
 
 def ignore_the_answer(program: ProgramTree, _: Context) -> Edits:
-    """Asks, but assumes a fixed answer."""
+    """Asks a question, but ignores the answer and assumes a fixed one."""
     return (
         {call: expression("(question, answer)[1]", question=call, answer=answer)}
         for call, answer in _used(program)
@@ -78,12 +78,12 @@ def ignore_the_answer(program: ProgramTree, _: Context) -> Edits:
 
 
 def assume_the_answer(program: ProgramTree, _: Context) -> Edits:
-    """Assumes an answer without asking."""
+    """Assumes a fixed answer without asking."""
     return ({call: answer} for call, answer in _used(program))
 
 
 def ask_by_saying(program: ProgramTree, _: Context) -> Edits:
-    """Says the question instead of asking it."""
+    """Says a question instead of asking it, and assumes an answer."""
     for call in program.calls("ask"):
         question, answer = argument(call, 1), next(_answers(call), None)
         if question is not None and answer is not None:
@@ -91,12 +91,12 @@ def ask_by_saying(program: ProgramTree, _: Context) -> Edits:
 
 
 def drop_a_question(program: ProgramTree, _: Context) -> Edits:
-    """Omits a request that needs no answer."""
+    """Removes a question whose answer is not used."""
     return ({step: []} for step, _call in program.steps("ask"))
 
 
 def forget_an_option(program: ProgramTree, _: Context) -> Edits:
-    """Omits one of the options."""
+    """Removes one of the options of a question."""
     for call in program.calls("ask"):
         options = argument(call, 2)
         if isinstance(options, ast.List) and len(options.elts) > 1:
@@ -105,7 +105,7 @@ def forget_an_option(program: ProgramTree, _: Context) -> Edits:
 
 
 def vague_question(program: ProgramTree, _: Context) -> Edits:
-    """Asks without naming the subject."""
+    """Replaces a question by one that does not name its subject."""
     for call in program.calls("ask"):
         question, options = argument(call, 1), argument(call, 2)
         offered = [text for node in ast.walk(options) if (text := text_of(node))] if options else []
@@ -114,7 +114,7 @@ def vague_question(program: ProgramTree, _: Context) -> Edits:
 
 
 def wrong_person(program: ProgramTree, context: Context) -> Edits:
-    """Confuses two people."""
+    """Replaces the name of a person by another name."""
     for node in program.nodes:
         text = text_of(node) or ""
         for name in context.people:
@@ -134,13 +134,13 @@ def _compared(program: ProgramTree) -> Iterator[tuple[ast.expr, str]]:
 
 
 def other_spelling(program: ProgramTree, _: Context) -> Edits:
-    """Compares the answer with another spelling."""
+    """Changes the capitalization of a string that an answer is compared with."""
     for node, text in _compared(program):
         yield {node: ast.Constant(text.lower() if text[0].isupper() else text.capitalize())}
 
 
 def unknown_option(program: ProgramTree, _: Context) -> Edits:
-    """Compares the answer with an option that it did not offer."""
+    """Compares an answer with an option that was not offered."""
     return ({node: ast.Constant("maybe")} for node, _text in _compared(program))
 
 
@@ -148,7 +148,7 @@ def unknown_option(program: ProgramTree, _: Context) -> Edits:
 
 
 def _messages(program: ProgramTree) -> Iterator[ast.AST]:
-    """All nodes that may be part of a message: all but the calls of other skills."""
+    """Find all nodes that may be part of a message, which excludes calls of other skills."""
     other_calls = (node for node in program.nodes if skill_of(node) not in {None, "say"})
     elsewhere = {inner for call in other_calls for inner in ast.walk(call)}
     return (node for node in program.nodes if node not in elsewhere)
@@ -171,7 +171,7 @@ def _in_place_of(reported: ast.AST, value: str | float) -> ast.expr:
 
 @only_if(TELLING)
 def forget_to_say(program: ProgramTree, _: Context) -> Edits:
-    """Omits a message."""
+    """Removes a message."""
     return ({step: []} for step, _call in program.steps("say"))
 
 
@@ -183,19 +183,19 @@ def say_nothing_of_it(program: ProgramTree, _: Context) -> Edits:
 
 @only_if(TELLING)
 def constant_for_a_value(program: ProgramTree, _: Context) -> Edits:
-    """Reports a constant instead of a counted or received value."""
+    """Reports a constant instead of a computed value or an answer."""
     return ({node: _in_place_of(node, value)} for node in _reported(program) for value in (1, 2, 12))
 
 
 @only_if(TELLING)
 def hedge(program: ProgramTree, _: Context) -> Edits:
-    """Reports several numbers, one of them right."""
+    """Reports several numbers, one of which may be correct."""
     return ({node: _in_place_of(node, "0, 1, 2, 3 or 4")} for node in _reported(program))
 
 
 @only_if(TELLING)
 def leave_out_a_clause(program: ProgramTree, _: Context) -> Edits:
-    """Omits a clause of a message."""
+    """Removes a clause from a message."""
     asked = {inner for call in program.calls("ask") for inner in ast.walk(call)}
     for node in _messages(program):
         clauses = CLAUSES.findall(text_of(node) or "")
@@ -206,7 +206,7 @@ def leave_out_a_clause(program: ProgramTree, _: Context) -> Edits:
 
 @only_if(TELLING)
 def leave_out_a_value(program: ProgramTree, _: Context) -> Edits:
-    """Omits a value of a message."""
+    """Removes a value from a message."""
     for node in _messages(program):
         match node:
             case ast.JoinedStr(parts) if len(parts) > 1:
@@ -223,7 +223,7 @@ def leave_out_a_value(program: ProgramTree, _: Context) -> Edits:
 def swap_values(program: ProgramTree, _: Context) -> Edits:
     """Swaps two values in a message."""
     targets = (node.target for node in program.nodes if isinstance(node, ast.For | ast.comprehension))
-    gone_through = {name for target in targets for name in names_in(target, ast.Store)}  # has no place
+    gone_through = {name for target in targets for name in names_in(target, ast.Store)}  # loop variables
     for a, b in _neighbours(program):
         if not {_variable(a), _variable(b)} & gone_through:
             yield {a: b, b: a}
@@ -256,7 +256,7 @@ def _added(node: ast.expr) -> Iterator[ast.expr]:
 
 
 def say_the_opposite(program: ProgramTree, _: Context) -> Edits:
-    """Says the opposite."""
+    """Reverses the meaning of a message."""
     roots = (*program.calls("ask"), *(node for node in program.nodes if isinstance(node, ast.Compare)))
     no_message = {inner for root in roots for inner in ast.walk(root)}
     for node in _messages(program):
@@ -275,7 +275,7 @@ def _opposite(found: re.Match[str]) -> str:
 
 
 def say_before_asking(program: ProgramTree, _: Context) -> Edits:
-    """Reports before asking instead of afterwards."""
+    """Moves a message before the question that it should follow."""
     for block in program.blocks:
         for at, saying in enumerate(block):
             if "say" not in skills_in(saying) or "ask" in skills_in(saying):

@@ -1,4 +1,4 @@
-// A program with line numbers and coloured syntax; all of it is inserted as text.
+// Shows a program with line numbers and coloured syntax; everything is inserted as text.
 const MOST_COLOURED = 100_000;
 
 // The text may be invalid Python, for example with unterminated strings.
@@ -32,7 +32,7 @@ export default {
   methods: {
     *pieces() {
       let end = 0;
-      const coloured = this.program.length <= MOST_COLOURED; // colouring longer programs is slow
+      const coloured = this.program.length <= MOST_COLOURED; // colouring longer programs would be slow
       for (const found of coloured ? this.program.matchAll(words(this.keywords, this.skills)) : []) {
         yield ["", this.program.slice(end, found.index)];
         yield [Object.keys(found.groups).find((name) => found.groups[name] !== undefined), found[0]];

@@ -1,4 +1,4 @@
-// A table of shares with a shade and a number in each cell; cells link to their completions.
+// A table with a shade and a number for each share; cells link to their completions.
 export default {
   props: { prefix: String, label: String, corner: String, groups: Array, rows: Array, chooses: Boolean },
   emits: ["choose"],

@@ -1,4 +1,4 @@
-// A virtual list of completions: only rows in view are on the page; others are fetched before they scroll in.
+// A virtual list of completions: rows are fetched shortly before they scroll into view.
 const PAGE = 200;
 const BEYOND = 12;
 const LOST = "The server cannot be reached. Is it still running?";
