@@ -160,7 +160,7 @@ def test_rows_are_those_of_generate(tmp_path: Path, model: str) -> None:
     assert about["usage"]["output_tokens"] == sum(used)
     assert about["batches"][0]["ended"] is not None
     again = roboeval(*words, "--out", "run", cwd=tmp_path)
-    assert f"{COUNT} of {COUNT} completions were there already" in again.err
+    assert f"{COUNT} of {COUNT} completions already exist" in again.err
 
 
 @pytest.mark.parametrize(

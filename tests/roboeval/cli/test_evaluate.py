@@ -40,7 +40,7 @@ def test_a_missing_file(tmp_path: Path) -> None:
 
 def test_an_empty_name() -> None:
     for verb in (("evaluate",), ("import", "--out", "run")):
-        assert "a run, a .jsonl, or a folder or zip of .py" in refused(*verb, "").sentence
+        assert "a run, a .jsonl file, or a folder or zip of .py files" in refused(*verb, "").sentence
     for words in (("show",), ("export",), ("import", "a.jsonl", "--out"), ("evaluate", "a.jsonl", "--out")):
         assert refused(*words, "").sentence.endswith("a run")
     assert refused("export", "run", "--out", "").sentence.endswith("a file")
@@ -486,7 +486,7 @@ def test_a_failure_names_the_nearest_program_that_passes(tmp_path: Path) -> None
     (first,) = re.findall(r"`roboeval show run (SayGoodDay/\d/\d)`", made.err)
     failed = roboeval("show", "run", first, cwd=tmp_path)
     (again,) = re.findall(
-        r"the nearest program that passes differs in \d+ lines?: `roboeval (.*)`", failed.err
+        r"the nearest passing program differs in \d+ lines?: `roboeval (.*)`", failed.err
     )
     shown = roboeval(*shlex.split(again), cwd=tmp_path)
     assert re.match(r"SayGoodDay/\d/\d  passed\n", shown.out)

@@ -347,7 +347,7 @@ def test_a_source_can_be_a_run_a_file_a_folder_or_a_recorded_model(tmp_path: Pat
     (folder / "SayGoodDay_0_3.py").write_text(f"name = 'x'\nprompt = 'p'\ncompletion = {GREETS!r}\n")
     assert [c.key for c in open_source(str(folder), paper).completions] == [("SayGoodDay", 0, 3)]
     assert len(open_source("recorded:hasty", paper).completions) >= 160
-    with pytest.raises(UserError, match="no such file or folder") as error:
+    with pytest.raises(UserError, match="does not exist") as error:
         open_source(str(tmp_path / "nothing"), paper)
     assert str(error.value.file) == str(tmp_path / "nothing")
 
