@@ -338,7 +338,7 @@ def test_a_damaged_row_is_said_and_the_others_are_shown(few_runs: Path, opened: 
     rows.write_bytes(b"".join([*lines[:10], b"{broken\n", *lines[11:]]))
     with serving(few_runs) as server:
         page = opened(server, "runs/hasty")
-        expect(page.locator(".notes")).to_contain_text("paper.jsonl, line 11: this line is not an evaluation row")
+        expect(page.locator(".notes")).to_contain_text("paper.jsonl, line 11: this line is not an evaluation")
         expect(page.locator(".facts .state")).to_have_text("damaged")
         expect(page.locator("#count")).to_have_text("15 completions")
         page.context.close()

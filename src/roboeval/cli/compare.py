@@ -47,7 +47,7 @@ def compare(
     ablation: AblationOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Show how much better one of two runs is, and how certain that is.
+    """Show how much better one run is, and how certain that is.
 
     The difference is the second run's pass rate minus the first's.
     """

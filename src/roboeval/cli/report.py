@@ -42,9 +42,9 @@ def report(
     workers: WorkersOption = None,
     rules: HouseRulesOption = None,
 ) -> None:
-    """Write a report with the paper's figures, tables and one web page.
+    """Write a report with figures, tables and a web page.
 
-    The page also shows why programs fail and how certain the numbers are.
+    It has the paper's figures. The page also shows why programs fail and how certain the numbers are.
     """
     import atexit
     import gc

@@ -133,7 +133,7 @@ def print_summary(
 
 
 def show_run(results: Results, k: list[int], *, title: str, has_rules: bool, as_json: bool) -> None:
-    """Print the tables of a run."""
+    """Print the tables of a whole run."""
     from roboeval.analysis.counts import tally_of
     from roboeval.analysis.summary import summarise
 
@@ -144,7 +144,7 @@ def show_run(results: Results, k: list[int], *, title: str, has_rules: bool, as_
 
 
 def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool) -> None:
-    """Print a task or a prompt."""
+    """Print the results of a task or a prompt."""
     from roboeval.analysis.tasks import prompt_data, task_data
     from roboeval.cli.views.completions import prompt_view
     from roboeval.cli.views.results import task_view
@@ -202,7 +202,7 @@ def export(
         str | None, typer.Option(help="INPUT/OUTPUT, the prices per million tokens, for the column `cost`.")
     ] = None,
 ) -> None:
-    """Write a run's verdicts as one flat table."""
+    """Write a run's verdicts to a file as one flat table."""
     from codebotler.core.files import expect_replaceable
     from roboeval.evaluation.runs.table import TABLE_BEGINNINGS, Price, kind_of, with_cost, write_table
 

@@ -90,7 +90,7 @@ def plural_of(name: str) -> str:
 
 
 def ending_of(name: str) -> str:
-    """Return how programs of a class end, such as `in a Python error`."""
+    """Return how programs in this class end, such as `in a Python error`."""
     return (FAILURE_CLASSES[name].ending if name in FAILURE_CLASSES else "") or f"in a {label_of(name)}"
 
 

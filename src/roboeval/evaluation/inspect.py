@@ -44,8 +44,8 @@ def roboeval(
     Args:
         suite: the name or folder of a suite.
         tasks: tasks to select; all by default.
-        worlds: how many worlds to draw, 1 to 10,000, if the suite draws worlds.
-        seed: the seed of the drawn worlds.
+        worlds: the number of worlds, 1 to 10,000, if the suite samples worlds.
+        seed: the random seed for sampling worlds.
     """
     our, drawn = SamplingSettings(), _suite(suite, worlds, seed)
     samples = [

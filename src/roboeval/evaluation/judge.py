@@ -87,7 +87,7 @@ def evaluate(
         completions: completions for tasks of the suite; an iterator is consumed lazily.
         suite: the tasks and simulation settings.
         ablated: whether to require only common sense; then every task needs an ablation.
-        workers: how many programs to run at the same time.
+        workers: the number of programs to run in parallel.
         require_isolation: whether to raise an error, rather than warn, if programs are not fully isolated.
         engine: the engine that runs programs; by default a pool of workers on this machine.
 

@@ -51,9 +51,9 @@ def reward(
         task: the name of the task.
         prompt: the number of the phrasing that the programs were written for, from 0.
         programs: source texts, which need not parse; equal programs are judged once.
-        worlds: how many worlds to draw, 1 to 10,000, if the suite draws worlds.
-        seed: the seed of the drawn worlds.
-        suite: a suite, or its name or folder.
+        worlds: the number of worlds, 1 to 10,000, if the suite samples worlds.
+        seed: the random seed for sampling worlds.
+        suite: a suite, or the name or folder of a suite.
 
     Raises:
         UserError: the suite, task or prompt does not exist, its worlds are not sampled or are too many,
@@ -71,7 +71,7 @@ def reward(
 
 @dataclass(frozen=True)
 class Share:
-    """The share of satisfied requirements in one world."""
+    """The share of requirements that a run satisfies in one world."""
 
     gained: float | None  # satisfied share of the requirements not met at the start, or None
     kept: float  # share of the other requirements still met, halved by an error
@@ -89,7 +89,7 @@ class Share:
 
 @lru_cache(maxsize=160)  # twice the number of prompts in a suite
 def first_equal_prompt(suite: Suite, task: str, prompt: int) -> int:
-    """Return the first prompt with the same requirements."""
+    """Return the number of the first prompt with the same requirements."""
     scenarios = suite.tasks[task].scenarios
     asked = [[scenario.asked_by(number) for scenario in scenarios] for number in range(prompt + 1)]
     return asked.index(asked[prompt])

@@ -13,7 +13,7 @@ CLOCK_CHECKS = 100  # clock checks per limit; each also lets other threads run
 
 
 class TimeLimitExceeded(Exception):  # noqa: N818 - a signal, not an error
-    """The limit was reached."""
+    """Raised in the block when the limit is reached."""
 
 
 @contextlib.contextmanager

@@ -50,7 +50,7 @@ class JudgedWorld:
         return YamlFile.read(self.task.path).line(("worlds", self.number - 1))
 
     def finding(self, kind: FindingKind, subject: str, message: str, line: int | None) -> Finding:
-        """Create a finding in the task file."""
+        """Create a finding with the path of the task file."""
         return Finding(kind, subject, message, self.task.path, line)
 
     def findings(self) -> Iterator[Finding]:

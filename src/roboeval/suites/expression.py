@@ -18,7 +18,7 @@ Names = Mapping[str, Any]  # strings, numbers, lists, and namespaces for people 
 
 
 class ExpressionError(ValueError):
-    """The expression is not valid, or refers to an unknown name."""
+    """Raised if an expression is not valid or refers to an unknown name."""
 
 
 def _product(one: object, other: object) -> int:

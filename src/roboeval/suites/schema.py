@@ -55,7 +55,7 @@ class CheckFile(StrictForm):
 
     category: Category  # the kind of failure if the check fails
     commonsense: bool = False  # whether the check tests something that no prompt mentions
-    rtl: YamlText  # the formula
+    rtl: YamlText  # the formula in RTL
     means: Annotated[dict[str, Name], BeforeValidator(_default_to_say)] = {}
 
 

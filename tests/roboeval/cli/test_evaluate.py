@@ -485,9 +485,7 @@ def test_a_failure_names_the_nearest_program_that_passes(tmp_path: Path) -> None
     assert False in passed
     (first,) = re.findall(r"`roboeval show run (SayGoodDay/\d/\d)`", made.err)
     failed = roboeval("show", "run", first, cwd=tmp_path)
-    (again,) = re.findall(
-        r"the nearest passing program differs in \d+ lines?: `roboeval (.*)`", failed.err
-    )
+    (again,) = re.findall(r"the nearest passing program differs in \d+ lines?: `roboeval (.*)`", failed.err)
     shown = roboeval(*shlex.split(again), cwd=tmp_path)
     assert re.match(r"SayGoodDay/\d/\d  passed\n", shown.out)
     assert "nearest" not in shown.err

@@ -64,7 +64,7 @@ def test_a_suite_has_one_name(name: str) -> None:
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [
-        (("exam",), 'no split "exam"; .*train, validation and test'),
+        (("exam",), 'unknown split "exam"; .*train, validation and test'),
         (("test", -1), "the seed is -1, but with 17 tasks it must be from 0 to"),
         (("test", 1_000_000_000), "the seed is 1000000000"),
         (("test", 0, 0), "the number of tasks is 0"),

@@ -31,7 +31,7 @@ NO_PROGRAM_COLUMN = "no_program"  # the table column for replies without a progr
 
 @dataclass(frozen=True, kw_only=True)
 class Completion:
-    """One row of completions.jsonl: a program that a model wrote for an instruction.
+    """A row of completions.jsonl: a program that a model wrote for an instruction.
 
     Args:
         task: the task's name.

@@ -223,7 +223,7 @@ class Seal:
         return {"rows": self._count, "sha256": self._hash.hexdigest()}
 
     def is_broken(self, manifest: Mapping[str, Any]) -> bool:
-        """Whether the rows have changed since the evaluation was finished."""
+        """Whether the rows differ from those recorded when the evaluation was finished."""
         return is_sealed(manifest) and any(manifest.get(name) != value for name, value in self.data().items())
 
 
