@@ -663,7 +663,7 @@ def test_a_row_that_is_none_gets_a_sentence(tmp_path: Path) -> None:
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
     rows = tmp_path / "run" / "evaluations" / "paper.jsonl"
     for line, fault in [
-        ('{"task": "SayGoodDay"}', "row of an evaluation"),
+        ('{"task": "SayGoodDay"}', "evaluation row"),
         ("?", "JSON is malformed"),
         ("[]", "Expected `object`"),
     ]:
