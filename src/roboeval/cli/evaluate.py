@@ -224,7 +224,7 @@ def missing_sentences(found: ImportResult) -> Iterator[str]:
     for error, keys in by_error.items():
         yield f"{counted(len(keys), 'request')} failed: {error}: {_named(keys)}"
     if found.unanswered:
-        yield f"{counted(len(found.unanswered), 'request')} not answered:  {_named(found.unanswered)}"
+        yield f"{counted(len(found.unanswered), 'request')} not answered: {_named(found.unanswered)}"
 
 
 MAX_NAMED_REQUESTS = 10  # listed in one sentence

@@ -174,7 +174,9 @@ def test_requested_completions_that_are_missing_are_counted() -> None:
     text = printed(summary_view(counted, title="x"), 200)
     assert "\n3 of 6 completions (2 missing, 1 not judged)," in text
     assert re.search(r"\nVisit +3 of 6 ", text)
-    assert re.search(r"\n3 of 4 replies \(75\.0%\) .*512 tokens, 3 .* whole program; .*--max-tokens\n", text)
+    assert re.search(
+        r"\n3 of 4 replies \(75\.0%\) .*512 tokens, 3 .* complete program; .*--max-tokens\n", text
+    )
 
 
 @pytest.mark.parametrize(("cut_off", "is_said"), [(2, False), (3, True)])

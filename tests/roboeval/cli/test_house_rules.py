@@ -99,7 +99,7 @@ def test_an_interval_of_what_is_alike_everywhere_is_unknown(folder: Path) -> Non
     (folder / "house.yaml").write_text(rule)
     assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
     shown = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder).out
-    assert "100.0% of the programs" in shown
+    assert "100.0% of a prompt's programs" in shown
     assert "(95% interval over tasks unknown: no variation between tasks)" in " ".join(shown.split())
     reported = roboeval("report", "run", "--rules", "house.yaml", "--out", "report", "--no-check", cwd=folder)
     assert reported.status == 0, reported.err

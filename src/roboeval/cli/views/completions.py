@@ -30,7 +30,7 @@ from roboeval.suites.task import check_label, world_title
 MAX_EXPLANATION = 2_000  # characters
 ALL_GONE = "the judged programs are no longer in this run"
 ALL_STEPS = "--all shows what the robot did in satisfied worlds."
-SHOW_REPLY = "use --reply to show."
+SHOW_REPLY = "--reply shows them."
 SHOWN_REPLY_CHARACTERS = 100_000  # the most characters of a reply or its reasoning to print
 
 
