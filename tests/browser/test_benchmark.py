@@ -180,7 +180,7 @@ def test_reply_without_a_program_is_explained_and_its_texts_are_folded(
         expect(page.locator(".worlds-of .trouble")).to_have_text(NO_PROGRAM_SENTENCES["cut-off"])
         expect(page.locator(".world-of")).to_have_count(0)
         reply = page.locator(".reply")
-        expect(reply).to_contain_text("512 of the reply")
+        expect(reply).to_contain_text("512 in the reply")
         expect(reply.locator("pre")).to_have_count(0)
         reply.locator("summary", has_text="Reasoning").click()
         expect(reply.locator("pre")).to_have_text("Let me think <b>hard</b>.")
@@ -338,7 +338,7 @@ def test_a_damaged_row_is_said_and_the_others_are_shown(few_runs: Path, opened: 
     rows.write_bytes(b"".join([*lines[:10], b"{broken\n", *lines[11:]]))
     with serving(few_runs) as server:
         page = opened(server, "runs/hasty")
-        expect(page.locator(".notes")).to_contain_text("paper.jsonl, line 11: this line is not a row")
+        expect(page.locator(".notes")).to_contain_text("paper.jsonl, line 11: this line is not an evaluation")
         expect(page.locator(".facts .state")).to_have_text("damaged")
         expect(page.locator("#count")).to_have_text("15 completions")
         page.context.close()

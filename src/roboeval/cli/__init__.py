@@ -1,4 +1,4 @@
-"""The commands of `roboeval`: they parse, call and print; the rooms below count and judge.
+"""The commands of `roboeval`: they parse options and print results; other packages count and judge.
 
-Start with `app.py`, which lists them.
+Start with `app.py`, which lists the commands.
 """

@@ -1,4 +1,4 @@
-"""The command line of RoboEval."""
+"""Defines the command line of RoboEval."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands compare, for two runs or suites, and resample, for the effect of rejection sampling."""
+"""Defines the commands compare, for two runs or suites, and resample, for rejection sampling."""
 
 from __future__ import annotations
 
@@ -34,14 +34,12 @@ if TYPE_CHECKING:
 def compare(
     runs: Annotated[
         list[Path],
-        typer.Argument(
-            help="Two runs that were judged; with --suites, one or more.", parser=path_to("a run")
-        ),
+        typer.Argument(help="Two judged runs; with --suites, one or more.", parser=path_to("a run")),
     ],
     suite: SuiteOption = "paper",
     suites: Annotated[
         str | None,
-        typer.Option(help="Two suites, such as paper,plus: show what the second changes for each run."),
+        typer.Option(help="Two suites, such as paper,plus; shows which verdicts the second changes."),
     ] = None,
     most: Annotated[
         int, typer.Option("--groups", min=0, help="With --suites: how many groups of programs to show.")
@@ -49,23 +47,23 @@ def compare(
     ablation: AblationOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Show by how much one run is better, and how sure that is.
+    """Show how much better one run is, and how certain that is.
 
-    It compares how often the second run passes with the first.
+    The difference is the second run's pass rate minus the first's.
     """
     if suites is not None:
         compare_suites(runs, suites, most=most, ablated=ablation, as_json=json)
     elif len(runs) == _PAIR:
         compare_runs(runs, suite, ablated=ablation, as_json=json)
     else:
-        fail(f"name two runs rather than {len(runs)}; with --suites, any number")
+        fail(f"name two runs, not {len(runs)}; only --suites takes another number")
 
 
 _PAIR = 2
 
 
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
-    """Print by how much the second of two runs is better."""
+    """Print how much better the second of two runs is."""
     from roboeval.analysis.compare import ComparedRun, compare_scores, comparison_data, other_differences
     from roboeval.analysis.counts import task_scores
     from roboeval.analysis.metrics import pass_at_1
@@ -87,13 +85,13 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
 
 
 def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bool, as_json: bool) -> None:
-    """Print what the second of two suites changes."""
+    """Print which verdicts the second of two suites changes."""
     from roboeval.analysis.verdict_changes import changes_data, verdict_changes
     from roboeval.cli.views.comparison import changes_view
     from roboeval.evaluation.runs.completions import how_many
 
     if len({path.resolve() for path in paths}) < len(paths):
-        fail("a run is named twice; name each run once")
+        fail("a run is listed twice; list each run once")
     names = [name.strip() for name in suites.split(",")]
     if len(names) != _PAIR or len({*names}) != _PAIR or not all(names):
         fail(f'--suites takes two suites separated by a comma, such as paper,plus, not "{suites}"')
@@ -104,7 +102,7 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
         found.append(verdict_changes(str(path), first, second))
     for one in found:
         if one.left_out:
-            note(f"{one.name}: left out, since only one suite has judged them: {how_many(one.left_out)}")
+            note(f"{one.name}: left out because only one suite has judged them: {how_many(one.left_out)}")
     if as_json:
         print_json(changes_data(found))
     else:
@@ -114,10 +112,10 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
 def resample(
     run: RunArgument,
     retries: Annotated[
-        list[int] | None, typer.Option(min=0, help="A limit of retries; may be given several times.")
+        list[int] | None, typer.Option(min=0, help="Maximum number of retries; may be given several times.")
     ] = None,
     samples: Annotated[
-        int, typer.Option(min=1, max=10_000, help="How many worlds to imagine for each check.")
+        int, typer.Option(min=1, max=10_000, help="Number of imagined worlds for each check.")
     ] = 5,
     seed: Annotated[int, typer.Option(help="The random seed of the imagined worlds.")] = 0,
     suite: SuiteOption = "paper",
@@ -129,8 +127,8 @@ def resample(
 ) -> None:
     """Compute how often programs would pass with rejection sampling.
 
-    It checks the programs of a judged run, also by its house rules, and computes the result for each limit
-    of retries; no model is asked.
+    The programs of a judged run are checked, also against its house rules. The result is computed for each
+    limit of retries, without querying a model.
     """
     from roboeval.analysis.resample import LIMITS, curve_data, trials_by_prompt
     from roboeval.cli.views.groups import resample_view
@@ -149,7 +147,7 @@ def resample(
 
 
 def check_run(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
-    """Check the programs of a run, save the results in the run, and return its table with them."""
+    """Check the programs of a run, save the results, and return the run's table with these results."""
     from roboeval.evaluation.checks import check_programs
     from roboeval.evaluation.runs.table import with_answers
 

@@ -1,4 +1,4 @@
-"""Completion of names by the shell."""
+"""Offers names for shell completion."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import typer
 
 
 def suite_names(incomplete: str) -> list[str]:
-    """Return built-in and installed suites; the shell itself completes folders."""
+    """Return the names of built-in and installed suites; the shell itself completes folders."""
     from roboeval.suites.installed import installed_suites
     from roboeval.suites.load import shipped_suites
 
@@ -15,7 +15,7 @@ def suite_names(incomplete: str) -> list[str]:
 
 
 def task_names(context: typer.Context, incomplete: str) -> list[str]:
-    """Return the tasks of the suite in the command line, by default of `paper`."""
+    """Return the task names of the suite on the command line, by default of `paper`."""
     from codebotler.core.errors import UserError
     from roboeval.suites.load import suite_folder, task_files
 
@@ -27,18 +27,18 @@ def task_names(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def listed_task_names(context: typer.Context, incomplete: str) -> list[str]:
-    """Return the tasks for the last of several comma-separated names."""
+    """Complete the last of several comma-separated task names."""
     *whole, last = incomplete.split(",")
     return [",".join([*whole, name]) for name in task_names(context, last) if name not in whole]
 
 
 def split_names(incomplete: str) -> list[str]:
-    """The splits of families."""
+    """Return the splits of task families."""
     from roboeval.suites.families.suite import FIRST_SEEDS
 
     return [name for name in FIRST_SEEDS if name.startswith(incomplete)]
 
 
 def engine_names(incomplete: str) -> list[str]:
-    """Return the engines."""
+    """Return the names of the engines."""
     return [name for name in ("local", "ray") if name.startswith(incomplete)]

@@ -1,4 +1,4 @@
-"""The choice of the engine that runs programs."""
+"""Chooses the engine that runs programs."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from roboeval.cli.output import fail
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
 
-MAX_WORKERS_OF_PROCESS = 2  # workers that one process can keep busy
-MIN_PROGRAMS_FOR_PROCESSES = 5_000  # starting processes is too slow for fewer
+MAX_WORKERS_OF_PROCESS = 2  # the most workers that one process can keep busy
+MIN_PROGRAMS_FOR_PROCESSES = 5_000  # with fewer programs, starting processes costs more than it saves
 
 
 @contextmanager
 def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[Callable[[int], OpenEngine]]:
-    """Yield a function that returns the engine of a name for a number of programs.
+    """Yield a function that returns the named engine, given the number of programs to run.
 
-    A worker starts in parallel to the block; `WorkerPool` explains the arguments of isolation.
+    A worker starts in parallel with the block; `WorkerPool` documents the isolation arguments.
     """
     if name == "local":
         from codebotler.simulator.pool import WorkerPool, cores
@@ -33,14 +33,14 @@ def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[
                     return Local(pool)
                 from roboeval.evaluation.processes import Processes
 
-                pool.close()  # it has warned of missing isolation
+                pool.close()  # the pool has already warned about missing isolation
                 return Processes(workers, **isolation)
 
             yield local
         return
     if name != "ray":
-        fail(f'there is no engine "{name}"; use local or ray')
+        fail(f'unknown engine "{name}"; use local or ray')
     from roboeval.evaluation.ray import RayCluster
 
-    cluster = RayCluster(workers, **isolation)  # fails before anything is written
+    cluster = RayCluster(workers, **isolation)  # may fail, so create it before anything is written
     yield lambda _: cluster

@@ -1,4 +1,4 @@
-"""The commands evaluate, which judges completions, and import, which makes a run of them."""
+"""Defines the commands evaluate, which judges completions, and import, which creates a run from them."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def evaluate(
     skills: SkillsOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Judge whether each completion does what was asked."""
+    """Judge whether each completion does what its prompt asks."""
     isolation = {"require_isolation": require_isolation, "one_process_per_run": one_process_per_run}
     with engine_named(engine, workers, **isolation) as engine_for:
         from roboeval.analysis.metrics import judged_count
@@ -78,7 +78,7 @@ def evaluate(
             judged_by = judged_by.with_worlds(worlds, seed).with_house_rules(judged_by.house)
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
         if left:
-            note(f"not judged, since they have no ablation: {', '.join(left)}")
+            note(f"not judged because they have no ablation: {', '.join(left)}")
         tally, table, is_started = Tally(), None if rules is None else _new_table(), False
         run = None if out is None else RunFolder(out)
         try:
@@ -87,7 +87,7 @@ def evaluate(
             about = {} if opened.run is None else about_of(opened.run)
             scope = JudgingScope.of(opened.completions, wanted, about, judged_by)
             if scope.total == 0:
-                fail(f"{source}: contains no completion of {tasks or 'a task with an ablation'}")
+                fail(f"{source}: contains no completion for {tasks or 'a task with an ablation'}")
             if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
                 run.keep(opened.completions)
             running = engine_for(scope.total)
@@ -106,13 +106,13 @@ def evaluate(
         if run is not None:
             _name_next_command(run, tally.first_failed, suite=suite, ablated=ablation, rules=rules)
         if (left_out := scope.total - judged_count(counted.prompts)) > 0:
-            again = "the others are judged" if run is None else "the same command tries again"
+            again = "all others are judged" if run is None else "run the same command to try again"
             note(f"roboeval: not judged: {how_many(left_out)} of {scope.total:,}; {again}")
             raise SystemExit(1)
 
 
 def _new_table() -> TableBuilder:
-    from roboeval.evaluation.runs.table import TableBuilder  # imports polars, which is slow
+    from roboeval.evaluation.runs.table import TableBuilder  # imports polars, which loads slowly
 
     return TableBuilder()
 
@@ -125,13 +125,13 @@ def _name_next_command(
     shown = [] if failed is None else [name_of(failed)]
     again = command("show", run.path, *shown, suite=suite, ablated=ablated, rules=rules)
     does = "explains the first failure" if shown else "prints these tables again"
-    note(f"verdicts are in {run.path}; `{again}` {does}")
+    note(f"the verdicts are in {run.path}; `{again}` {does}")
 
 
 def stop_sentence(*, is_kept: bool, is_started: bool, redo: bool) -> str:
-    """Say what Ctrl-C leaves behind, and how to continue."""
+    """Return a sentence about what was saved before Ctrl-C, and how to continue."""
     if not is_kept:
-        return "stopped; nothing is kept (add --out RUN to keep verdicts)"
+        return "stopped; nothing was saved (add --out RUN to save verdicts)"
     if not is_started:
         return "stopped before judging; run the same command again"
     return f"stopped; the same command {'without --redo ' * redo}continues where it stopped"
@@ -163,17 +163,19 @@ def _judged(
 
 def import_(
     path: Annotated[
-        str, typer.Argument(help="A .jsonl, a folder or zip of .py completions, or answers of a batch.")
+        str, typer.Argument(help="A .jsonl file, a folder or zip of .py files, or the answers to a batch.")
     ],
     out: Annotated[
         Path,
-        typer.Option(help="The run folder to create, or for answers theirs.", parser=path_to("a run")),
+        typer.Option(
+            help="The run folder to create; for answers, the run with the requests.", parser=path_to("a run")
+        ),
     ],
     suite: SuiteOption = "paper",
 ) -> None:
-    """Make a run from completions written elsewhere.
+    """Create a run from completions generated elsewhere.
 
-    Answers to `generate --requests` are added to its run.
+    Answers to requests of `generate --requests` are added to the run they belong to.
     """
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import RunFolder
@@ -191,7 +193,7 @@ def import_(
 
 
 def import_batch(path: Path, out: Path, suite: str) -> None:
-    """Add answers of a batch endpoint to their run; exit with status 1 if completions are missing."""
+    """Add the answers from a batch endpoint to their run; exit with status 1 if completions are missing."""
     with installed():
         from roboeval.evaluation.batches import import_answers
     from roboeval.evaluation.runs.completions import how_many
@@ -215,17 +217,17 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
 
 
 def missing_sentences(found: ImportResult) -> Iterator[str]:
-    """Yield a sentence for each error with its requests, then one for requests without an answer."""
+    """Yield a sentence for each error with its requests, then a sentence about unanswered requests."""
     by_error: dict[str, list[CompletionKey]] = {}
     for key, error in found.failed.items():
         by_error.setdefault(error, []).append(key)
     for error, keys in by_error.items():
         yield f"{counted(len(keys), 'request')} failed: {error}: {_named(keys)}"
     if found.unanswered:
-        yield f"{counted(len(found.unanswered), 'request')} without an answer: {_named(found.unanswered)}"
+        yield f"{counted(len(found.unanswered), 'request')} not answered: {_named(found.unanswered)}"
 
 
-MAX_NAMED_REQUESTS = 10  # in a sentence
+MAX_NAMED_REQUESTS = 10  # listed in one sentence
 
 
 def _named(keys: Sequence[CompletionKey]) -> str:

@@ -1,4 +1,4 @@
-"""The command find, which searches completions by what they did, and groups the failures."""
+"""Defines the command find, which searches completions by behaviour and groups the failures."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ if TYPE_CHECKING:
 def find(
     run: RunArgument,
     formula: Annotated[
-        str | None, typer.Argument(help='An RTL formula, such as tr.Exists(goto("kitchen")); all by default.')
+        str | None, typer.Argument(help='An RTL formula, such as tr.Exists(goto("kitchen")); default: all.')
     ] = None,
     negated: Annotated[
-        bool, typer.Option("--not", help="Find completions for which the formula does not hold.")
+        bool, typer.Option("--not", help="Find completions whose traces do not satisfy the formula.")
     ] = False,
     task: TaskOption = None,
     world: InWorldOption = None,
-    most: Annotated[int, typer.Option("--groups", min=0, help="How many groups of failures to show.")] = 10,
+    most: Annotated[int, typer.Option("--groups", min=0, help="Number of failure groups to show.")] = 10,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
     workers: Annotated[
-        int | None, typer.Option(min=1, help="How many processes to use; all cores by default.")
+        int | None, typer.Option(min=1, help="Number of processes; one per core by default.")
     ] = None,
     json: JsonOption = False,
 ) -> None:
     """Find completions by what they did, and group the failures.
 
-    It finds the completions whose trace satisfies the formula in some world, and groups those
-    that failed by reason.
+    A completion is found if its trace satisfies the formula in some world. Completions that failed are
+    grouped by the reason.
     """
     from codebotler.simulator.pool import cores
     from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures
@@ -55,7 +55,7 @@ def find(
     from roboeval.evaluation.runs.folder import RunFolder, with_judged_worlds
 
     if negated and formula is None:
-        fail("--not needs a formula; add one, or leave --not out")
+        fail("--not needs a formula; add one, or leave out --not")
     known = with_judged_worlds(RunFolder(run), load(suite), ablated=ablation)
     task = None if task is None else known.task(task).name
     query = TraceQuery(formula, negated, task, world)
@@ -70,7 +70,7 @@ def find(
     described = list(show_progress(describe_groups(shown, results), "comparing", len(shown)))
     undecided = [one for one in every if one.cut]
     if undecided:
-        note(f"undecided, since their traces were too long to keep: {how_many(len(undecided))}")
+        note(f"undecided because their traces were too long to save: {how_many(len(undecided))}")
     total, passed = count_searched(results.table, task), {*results.passed}
     if json:
         data = {
@@ -86,7 +86,7 @@ def find(
 
 
 def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:
-    """Raise UserError for an invalid formula or a world that no task has."""
+    """Raise UserError if the formula is invalid or no task has the world."""
     from codebotler.core.errors import UserError
     from codebotler.rtl import RtlSyntaxError, parse
 
@@ -94,7 +94,7 @@ def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:
         try:
             parse(query.formula)
         except RtlSyntaxError as error:
-            raise UserError(f"this is not a formula: {error}") from None
+            raise UserError(f"the formula is not valid: {error}") from None
     if query.world is None:
         return
     tasks = [suite.tasks[query.task]] if query.task else list(suite.tasks.values())
@@ -109,7 +109,7 @@ def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:
 def found_data(
     one: TraceMatch, worlds: Sequence[tuple[int, str]], passed: Container[CompletionKey]
 ) -> dict[str, Any]:
-    """Return a completion and the worlds in which it was found as JSON data."""
+    """Return a found completion and its matching worlds as JSON data."""
     from roboeval.evaluation.runs.completions import name_of
 
     return {

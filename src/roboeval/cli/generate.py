@@ -1,4 +1,4 @@
-"""The commands generate, and run, which also evaluates and reports."""
+"""Defines the commands generate, and run, which also evaluates and reports."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ MAX_BATCH_REQUESTS = 50_000
 
 @dataclass(frozen=True)
 class GenerationRequest:
-    """The completions that a command requests, of a model and for a run."""
+    """What a command requests: which completions, from which model, for which run."""
 
-    name: str  # of the model
+    name: str  # the name of the model
     settings: SamplingSettings
     plan: GenerationPlan
     pace: Pace
@@ -62,7 +62,7 @@ class GenerationRequest:
     out: Path | None
 
     def run_of(self, model: Model | BatchModel) -> RunFolder:
-        """Return the run of --out, by default one named after the model."""
+        """Return the run folder given by --out, by default one named after the model."""
         from roboeval.evaluation.runs.folder import RunFolder
 
         folder = re.sub(r"[^\w.]+", "-", model.name).strip("-.")
@@ -70,7 +70,7 @@ class GenerationRequest:
         return RunFolder(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
 
     def open(self) -> Model:
-        """Open the model."""
+        """Open the model, which may be a recorded one."""
         from codebotler.models.open import open_model
         from codebotler.models.recorded import is_recorded
         from roboeval.evaluation.runs.source import recorded_model_for
@@ -95,7 +95,7 @@ def read_options(
     base_url: BaseUrlOption = None,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> GenerationRequest:
-    """Interpret the options that `generate` and `run` share."""
+    """Convert the options that `generate` and `run` share to a request."""
     from codebotler.models.chosen import choose_model
     from roboeval.evaluation.generate import Pace
     from roboeval.evaluation.requests import GenerationPlan
@@ -113,7 +113,7 @@ def read_options(
 
 
 def suite_of_families(suite: str, families: str | None, num_tasks: int | None, seed: int | None) -> str:
-    """Return the name of the suite of families, which replaces --suite."""
+    """Return the name of the suite of task families that replaces --suite."""
     from roboeval.suites.families.suite import FamilyTasks
     from roboeval.suites.families.tasks import family_names
 
@@ -125,7 +125,7 @@ def suite_of_families(suite: str, families: str | None, num_tasks: int | None, s
 
 
 def complete_run(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
-    """Generate the missing completions of a run; exit with status 1 if some are still missing."""
+    """Generate the missing completions of a run; exit with status 1 if any are still missing."""
     from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
     from roboeval.evaluation.generate import generate_run
 
@@ -150,9 +150,9 @@ def generate(
     requests: RequestsOption = None,
     **options: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
-    """Have a model write programs for a suite.
+    """Let a model write programs for a suite.
 
-    After an interruption, the same command continues.
+    If generation is interrupted, the same command continues it.
     """
     what = read_options(**options)
     if requests is not None:
@@ -165,7 +165,7 @@ def generate(
 
 
 def write_batch(what: GenerationRequest, path: Path) -> None:
-    """Write the requests of a run to a file, and note how to continue."""
+    """Write the requests of a run to a file, and print how to continue."""
     with installed():
         from codebotler.models.batch import BatchModel
     from roboeval.evaluation.batches import write_requests
@@ -176,11 +176,9 @@ def write_batch(what: GenerationRequest, path: Path) -> None:
         with progress_meter("writing", len(what.plan.keys())) as update:
             count = write_requests(run, what.plan, model, path, progress=lambda done: update(done, ""))
     again = command("import", "ANSWERS.jsonl", "--out", run.path, suite=what.suite)
-    note(
-        f"{counted(count, 'request')} {'is' if count == 1 else 'are'} in {path}; `{again}` takes the answers"
-    )
+    note(f"{counted(count, 'request')} {'is' if count == 1 else 'are'} in {path}; `{again}` adds answers")
     if count > MAX_BATCH_REQUESTS:
-        note(f"OpenAI takes at most {MAX_BATCH_REQUESTS:,} requests in a file; split it")
+        note(f"OpenAI accepts at most {MAX_BATCH_REQUESTS:,} requests per file; split the file")
 
 
 @inherit_options(read_options)
@@ -191,35 +189,36 @@ def run(
     require_isolation: IsolationOption = False,
     one_process_per_run: ProcessOption = False,
     with_report: Annotated[
-        bool, typer.Option("--report/--no-report", help="Write the report, to the folder report of the run.")
+        bool,
+        typer.Option("--report/--no-report", help="Write a report to the subfolder `report` of the run."),
     ] = True,
     repair: Annotated[
         int,
-        typer.Option(min=0, help="Rounds in which the model repairs programs that the check rejects."),
+        typer.Option(min=0, help="Number of rounds in which the model repairs rejected programs."),
     ] = 0,
     retries: Annotated[
-        int, typer.Option(min=0, help="Rounds in which rejected programs are requested again.")
+        int, typer.Option(min=0, help="Number of rounds in which rejected programs are regenerated.")
     ] = 0,
     json: JsonOption = False,
     **options: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
-    """Have a model write programs, judge them, and write a report.
+    """Let a model write programs, judge them, and write a report.
 
-    It prints the tables. After an interruption, the same command continues.
+    The tables are also printed. If the command is interrupted, the same command continues.
     """
     if repair and retries:
-        fail("--repair and --retries exclude each other; give one of them")
+        fail("--repair and --retries cannot be combined; use one of them")
     if json and (repair or retries):
-        fail("--json excludes --repair and --retries; evaluate each round's folder with it instead")
-    if with_report and find_spec("matplotlib") is None:  # before anything is paid for
-        fail(f"the report needs matplotlib; {install_command('matplotlib')}, or add --no-report")
+        fail("--json excludes --repair and --retries; run `evaluate --json` on each round's folder")
+    if with_report and find_spec("matplotlib") is None:  # check this before requests cost money
+        fail(f"the report needs matplotlib; {install_command('matplotlib')}, or use --no-report")
     from roboeval.evaluation.evaluate import expect_same_judge
 
     what = read_options(tasks=tasks, **options)
     suite, plan, model = what.suite, what.plan, what.open()
     note_unsent(what.settings, model)
     first = what.run_of(model)
-    expect_same_judge(first, plan.suite, ablated=False)  # before anything is paid for
+    expect_same_judge(first, plan.suite, ablated=False)  # check this before requests cost money
     path = complete_run(first, plan, model, what.pace)
     evaluate(
         str(path),
@@ -252,41 +251,41 @@ def write_report_of(paths: list[Path], suite: str, workers: int | None) -> None:
         report(paths, folder, suite=suite, workers=workers)
     except KeyboardInterrupt:
         again = command("report", *paths, "--out", folder, suite=suite)
-        note(f"roboeval: stopped; verdicts are in {paths[0]}; `{again}` writes the report")
+        note(f"roboeval: stopped; the verdicts are in {paths[0]}; `{again}` writes the report")
         raise SystemExit(STOPPED) from None
 
 
 class GenerationMeter(ExitStack):
-    """Shows the progress of a run: its rate, its tokens and the time left."""
+    """Shows the progress of a run: its rate, its token count and the remaining time."""
 
     progress: GenerationProgress | None = None
 
     def show(self, progress: GenerationProgress) -> None:
-        """Update the progress bar; first start it, and note the completions there are."""
+        """Update the progress bar; the first call starts it and tells how many completions already exist."""
         if self.progress is None:
             self.progress = progress
             if progress.found:
-                note(f"{progress.found:,} of {counted(progress.total, 'completion')} were there already")
+                note(f"{progress.found:,} of {counted(progress.total, 'completion')} already exist")
             if progress.interrupted:
                 note(
-                    f"{requests_under_way(progress.interrupted)} at the interruption; these may be paid twice"
+                    f"{requests_under_way(progress.interrupted)} at the interruption, and may be billed twice"
                 )
             self._draw = self.enter_context(progress_meter("generating", progress.total, progress.found))
         else:
             tokens = progress.usage.total()
-            rate = f"{progress.rate:.1f} a second"
+            rate = f"{progress.rate:.1f} per second"
             self._draw(progress.done, f"{rate}, {tokens:,} tokens" if tokens else rate)
 
     def stop_sentence(self) -> str:
-        """Say what Ctrl-C leaves behind, and how to continue."""
+        """Return a sentence about what was saved before Ctrl-C, and how to continue."""
         if self.progress is None:
             return "stopped before the first request; run the same command again"
-        kept = f"{self.progress.done:,} of {counted(self.progress.total, 'completion')} are kept"
+        kept = f"{self.progress.done:,} of {counted(self.progress.total, 'completion')} are saved"
         open_requests = self.progress.under_way
-        paid = f"; {requests_under_way(open_requests)}, which may be paid twice" if open_requests else ""
+        paid = f"; {requests_under_way(open_requests)}, and may be billed twice" if open_requests else ""
         return f"stopped; {kept}{paid}; the same command continues where it stopped"
 
 
 def requests_under_way(requests: int) -> str:
-    """Format the number of pending requests, such as `1 request was under way`."""
-    return f"{counted(requests, 'request')} {'was' if requests == 1 else 'were'} under way"
+    """Format the number of pending requests, such as `1 request was pending`."""
+    return f"{counted(requests, 'request')} {'was' if requests == 1 else 'were'} pending"

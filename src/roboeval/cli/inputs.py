@@ -1,4 +1,4 @@
-"""The suites and judged runs of command lines."""
+"""Opens the suites and judged runs that command lines name."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
-    """Read a suite by name or folder, with files of further skills and of house rules."""
+    """Read a suite by name or folder, with optional files of house rules and additional skills."""
     from codebotler.checking.evasions import find_evasions
     from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
@@ -32,7 +32,7 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
         return read
     rooms = rooms_in(read.tasks.values())
     house = HouseRules.read(rules, read.skills, rooms)
-    for sentence in find_evasions(house.rules, rooms, SKILLS):  # simulated rules look into users' skills
+    for sentence in find_evasions(house.rules, rooms, SKILLS):  # simulation sees calls inside users' skills
         note(sentence)
     return read.with_house_rules(house)
 
@@ -40,7 +40,7 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
 def command(
     verb: str, *arguments: object, suite: str, ablated: bool = False, rules: Path | None = None
 ) -> str:
-    """Return a command line to paste."""
+    """Return a command line that can be pasted into a shell."""
     words = ["roboeval", verb, *map(str, arguments)]
     words += [] if suite == "paper" else ["--suite", suite]
     words += ["--ablation"] if ablated else []
@@ -49,21 +49,21 @@ def command(
 
 
 class Opened(NamedTuple):
-    """A judged run."""
+    """A judged run, with its suite and the command that continues its evaluation."""
 
     results: Results
     again: str  # the command that continues its evaluation
 
 
 def note_houses(runs: Iterable[RunFolder], suite: str) -> None:
-    """Note that runs were also judged with house rules, and which option shows that."""
+    """Tell the user if runs were also judged with house rules, and which option shows those verdicts."""
     if houses := dict.fromkeys(house for run in runs for house in run.houses(suite)):
         files = " or ".join(f"--rules {house}.yaml" for house in houses)
-        note(f"judged with house rules, too; {files} shows that")
+        note(f"also judged with house rules; {files} shows those verdicts")
 
 
 def expect_same_suite(opened: Sequence[Opened]) -> None:
-    """Raise UserError if runs were judged by suites of different content."""
+    """Raise UserError if runs were judged by suites with different content."""
     from codebotler.core.errors import UserError
 
     digests = [str(one.results.manifest.get("digest")) for one in opened]
@@ -76,7 +76,7 @@ def expect_same_suite(opened: Sequence[Opened]) -> None:
     hashes = " and ".join(digests[at][:8] for at in (stale, other))
     raise UserError(
         f"{paths} were judged by different versions of a suite ({hashes}); "
-        f"`{opened[stale].again} --redo` judges it by the current suite"
+        f"`{opened[stale].again} --redo` judges with the current suite"
     )
 
 
@@ -90,9 +90,9 @@ def open_run(
     reuse_from: Results | None = None,
     on_line: Callable[[bytes], None] | None = None,
 ) -> Opened:
-    """Read a judged run, or only its rows on the task of a completion.
+    """Read a judged run; if a completion is given, read only the rows of its task.
 
-    `on_line` is called with each line of its verdicts; `reuse_from` is another evaluation of the run.
+    `on_line` is called with each line of verdicts; `reuse_from` is another evaluation of the same run.
     """
     from codebotler.core.errors import UserError
     from roboeval.evaluation.runs.folder import evaluation_of
@@ -114,7 +114,8 @@ def open_run(
         judged_by = results.manifest.get("house_rules") or {}
         if judged_by.get(suite.house.name) != suite.house.digest:
             raise UserError(
-                f"has changed since the run was judged; `{again} --redo` judges by it", file=rules
+                f"has changed since the run was judged; `{again} --redo` judges with the new rules",
+                file=rules,
             )
     if results.manifest.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
@@ -131,7 +132,7 @@ def open_current(
     reuse_from: Results | None = None,
     on_line: Callable[[bytes], None] | None = None,
 ) -> Opened:
-    """Read a judged run with `open_run`; raise UserError if it has no verdicts, or outdated ones."""
+    """Read a judged run with `open_run`; raise UserError if verdicts are absent or outdated."""
     from codebotler.core.errors import UserError
 
     opened = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from, on_line=on_line)
@@ -140,12 +141,12 @@ def open_current(
     if opened.results.table.is_empty():
         raise UserError(f"no completion has been judged; `{opened.again}` continues", file=run)
     if (unfinished := unfinished_sentence(opened.results)) is not None:
-        note(f"{unfinished}, and only those count; `{opened.again}` continues")
+        note(f"{unfinished}, and only these are counted; `{opened.again}` continues")
     return opened
 
 
 def stale_sentence(results: Results) -> str | None:
-    """Return a sentence about rows whose programs are no longer in the run, if there are any."""
+    """Return a sentence about rows whose programs are no longer in the run, or None."""
     from roboeval.evaluation.runs.completions import name_of
 
     if not (stale := results.stale):
@@ -156,7 +157,7 @@ def stale_sentence(results: Results) -> str | None:
 
 
 def unfinished_sentence(results: Results) -> str | None:
-    """Return a clause about completions that are not judged yet, if there are any."""
+    """Return a clause about the completions not judged yet, or None if all are judged."""
     from roboeval.evaluation.runs.completions import how_many
 
     count, total = len(results.places), results.scope.total

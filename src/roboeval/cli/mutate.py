@@ -1,4 +1,4 @@
-"""The command mutate, which tests a suite by mutation."""
+"""Defines the command mutate, which tests a suite by mutation."""
 
 from __future__ import annotations
 
@@ -32,39 +32,39 @@ def mutate(
     also: Annotated[
         list[str] | None,
         typer.Option(
-            help="Mutate the right ones of these programs, too: a run, or another source that "
+            help="Also mutate the right programs in this run, or in another source that "
             "`roboeval evaluate` reads; may be given several times."
         ),
     ] = None,
     worlds: Annotated[
         int | None,
         typer.Option(
-            min=1, max=10_000, help="Try mutants in this many drawn worlds, if the suite draws worlds."
+            min=1, max=10_000, help="Number of worlds to try mutants in, if the suite samples worlds."
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="The random seed of mutants and worlds.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed for mutants and worlds.")] = 1,
     most: Annotated[
         int,
         typer.Option(
             "--mutants",
             min=1,
-            help="Try at most this many mutants of each task, drawn evenly over operators.",
+            help="Maximum number of mutants per task, sampled evenly from all operators.",
         ),
     ] = 400,
     out: Annotated[
         Path | None,
-        typer.Option(help="Keep scores, mutants and survivors in this folder.", parser=path_to("a folder")),
+        typer.Option(help="Save scores, mutants and survivors in this folder.", parser=path_to("a folder")),
     ] = None,
-    brief: Annotated[bool, typer.Option("--brief", help="Only the tables, without the survivors.")] = False,
+    brief: Annotated[bool, typer.Option("--brief", help="Print only the tables, not the survivors.")] = False,
     at_least: Annotated[
-        float | None, typer.Option(min=0, max=1, help="Status 1 if a task scores less than this.")
+        float | None, typer.Option(min=0, max=1, help="Exit with status 1 if a task scores less than this.")
     ] = None,
     workers: WorkersOption = None,
     one_process_per_run: ProcessOption = False,
 ) -> None:
     """Measure which wrong programs survive a suite's checks.
 
-    It runs and judges mutants: right programs changed by mistakes that models make.
+    The wrong programs are mutants: right programs with mistakes that models typically make.
     """
     from codebotler.simulator.pool import WorkerPool, cores
     from roboeval.mutation.report import write_scores
@@ -79,19 +79,19 @@ def mutate(
     show_scores(scores, known.name, brief=brief)
     if out is not None:
         write_scores(scores, out)
-        note(f"scores, mutants and survivors are in {out}")
+        note(f"the scores, mutants and survivors are in {out}")
     if at_least is not None and any(score.score is None or score.score < at_least for score in scores):
         raise SystemExit(1)
 
 
 def select_tasks(suite: Suite, words: Sequence[str] | None) -> list[Task]:
-    """Return the tasks with these names, which may be separated by commas."""
+    """Return the tasks with these names; a word may hold several names separated by commas."""
     names = [name for word in words or suite.tasks for name in word.split(",")]
     return [suite.task(name) for name in dict.fromkeys(names)]
 
 
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:
-    """Read the programs of sources, by task and with repetitions."""
+    """Read the programs of the sources and group them by task; duplicates are kept."""
     from roboeval.evaluation.runs.completions import name_of
     from roboeval.evaluation.runs.source import open_source
     from roboeval.mutation.mutants import Original
@@ -105,7 +105,7 @@ def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Or
 
 
 def show_scores(scores: Sequence[MutationScore], suite: str, *, brief: bool) -> None:
-    """Print the tables and the survivors, and note warnings."""
+    """Print the tables, the survivors and any warnings."""
     from rich.console import Group
     from rich.text import Text
 
@@ -119,4 +119,4 @@ def show_scores(scores: Sequence[MutationScore], suite: str, *, brief: bool) -> 
         for original, fault in score.wrong:
             if original.claimed:
                 where = f"{fault.world}: {fault.why}"
-                note(f"not mutated, since they are not right: {score.task}, {original.name} ({where})")
+                note(f"not mutated because it is not right: {score.task}, {original.name} ({where})")

@@ -1,4 +1,4 @@
-"""Options that commands share."""
+"""Defines the options that commands share."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from roboeval.cli.output import fail
 
 
 def path_to(what: str) -> Callable[[str], Path]:
-    """Return a parser of paths that refuses an empty string, which would be the current folder."""
+    """Return a path parser that rejects an empty string, which would mean the current folder."""
 
     def path(text: str) -> Path:
         return Path(text) if text else fail(f"the argument is empty; name {what}")
@@ -28,26 +28,26 @@ def path_to(what: str) -> Callable[[str], Path]:
 
 
 SourceArgument = Annotated[
-    str, typer.Argument(help="A run, a .jsonl, a folder or zip of .py completions, or recorded:NAME.")
+    str, typer.Argument(help="A run, a .jsonl file, a folder or zip of .py files, or recorded:NAME.")
 ]
 KeepOption = Annotated[
     Path | None,
-    typer.Option(help="Keep completions and verdicts in this run folder.", parser=path_to("a run")),
+    typer.Option(help="Save completions and verdicts in this run folder.", parser=path_to("a run")),
 ]
 RedoOption = Annotated[
     bool, typer.Option("--redo", help="Discard earlier verdicts and judge everything again.")
 ]
 TaskOption = Annotated[
-    str | None, typer.Option(help="Only completions of this task.", autocompletion=task_names)
+    str | None, typer.Option(help="Only completions for this task.", autocompletion=task_names)
 ]
 InWorldOption = Annotated[
-    str | None, typer.Option(help="Only in this world: its number, from 1, or its description.")
+    str | None, typer.Option(help="Only in the world with this number, from 1, or description.")
 ]
 RunArgument = Annotated[Path, typer.Argument(help="A run folder.", parser=path_to("a run"))]
 SuiteOption = Annotated[
     str,
     typer.Option(
-        help="The name of a built-in or installed suite, or a folder.",
+        help="The name of a built-in or installed suite, or a suite folder.",
         autocompletion=suite_names,
     ),
 ]
@@ -60,7 +60,7 @@ HouseRulesOption = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE",
-        help="A file of house rules; a program that breaks one is stopped and fails.",
+        help="A file of house rules; a program that breaks a rule is stopped and fails.",
         parser=path_to("a file of rules"),
     ),
 ]
@@ -72,27 +72,27 @@ EngineOption = Annotated[
     ),
 ]
 WorkersOption = Annotated[
-    int | None, typer.Option(min=1, help="How many programs to run at the same time; all cores by default.")
+    int | None, typer.Option(min=1, help="Number of programs to run in parallel; one per core by default.")
 ]
 IsolationOption = Annotated[
     bool, typer.Option("--require-isolation", help="Refuse to run programs without full isolation.")
 ]
 ProcessOption = Annotated[
     bool,
-    typer.Option("--one-process-per-run", help="Give every run its own process, which takes longer."),
+    typer.Option("--one-process-per-run", help="Give every run its own process, which is slower."),
 ]
 WorldsOption = Annotated[
     int | None,
-    typer.Option(min=1, max=10_000, help="Draw this many worlds a task, if the suite draws worlds."),
+    typer.Option(min=1, max=10_000, help="Number of worlds per task, if the suite samples worlds."),
 ]
 WorldSeedOption = Annotated[
-    int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")
+    int | None, typer.Option(min=0, help="Random seed for sampling worlds, instead of the suite's own seed.")
 ]
 RequestsOption = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE",
-        help="Ask no model, but write the requests to this file, for a batch endpoint.",
+        help="Write the requests to this file for a batch endpoint; query no model.",
         parser=path_to("a file"),
     ),
 ]
@@ -100,23 +100,19 @@ FamiliesOption = Annotated[
     str | None,
     typer.Option(
         metavar="SPLIT",
-        help="Fresh tasks of families, from train, validation or test; --seed chooses them.",
+        help="Generate new tasks from this split (train, validation or test); --seed varies them.",
         autocompletion=split_names,
     ),
 ]
 NumTasksOption = Annotated[
     int | None,
-    typer.Option(min=1, max=100, help="With --families: how many tasks; by default one of each family."),
+    typer.Option(min=1, max=100, help="With --families: number of tasks; by default one of each family."),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 OutOption = Annotated[
     Path | None, typer.Option(help="The run folder; by default runs/MODEL.", parser=path_to("a run"))
 ]
-NumOption = Annotated[int, typer.Option(min=1, max=10_000, help="Completions for each prompt.")]
-ConcurrencyOption = Annotated[int, typer.Option(min=1, help="Requests under way at the same time.")]
-RateOption = Annotated[
-    float | None, typer.Option(min=0.001, help="Send at most this many requests a minute.")
-]
-BudgetOption = Annotated[
-    int | None, typer.Option(min=1, help="Stop when this command has used this many tokens.")
-]
+NumOption = Annotated[int, typer.Option(min=1, max=10_000, help="Number of completions per prompt.")]
+ConcurrencyOption = Annotated[int, typer.Option(min=1, help="Maximum number of concurrent requests.")]
+RateOption = Annotated[float | None, typer.Option(min=0.001, help="Maximum number of requests per minute.")]
+BudgetOption = Annotated[int | None, typer.Option(min=1, help="Stop after using this many tokens.")]

@@ -1,4 +1,4 @@
-"""Progress and errors of commands."""
+"""Prints the progress and the errors of commands."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from codebotler.core.terminal import QUIET_S, note, print_json, print_rich, prin
 
 __all__ = ["fail", "note", "print_json", "print_rich", "print_text", "progress_meter", "show_progress"]
 
-MIN_DONE_FOR_ESTIMATE = 5  # items before the remaining time is estimated
+MIN_DONE_FOR_ESTIMATE = 5  # the number of items before the remaining time is estimated
 
 Watched = TypeVar("Watched")
 
 
 def show_progress(items: Iterable[Watched], doing: str, total: int) -> Iterator[Watched]:
-    """Pass items on with a progress bar on a terminal, or else a line now and then."""
+    """Pass items through and show progress: a bar on a terminal, otherwise an occasional line."""
     with progress_meter(doing, total) as update:
         for done, item in enumerate(items, 1):
             yield item
@@ -27,7 +27,7 @@ def show_progress(items: Iterable[Watched], doing: str, total: int) -> Iterator[
 
 @contextmanager
 def progress_meter(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, str], None]]:
-    """Show a progress bar, or lines; yield a function of the number done, `before` included, and a remark."""
+    """Show progress; yield a function to call with the number of items done, from `before`, and a remark."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     more_column = TextColumn("{task.fields[more]}", markup=False)
@@ -49,12 +49,12 @@ def progress_meter(doing: str, total: int, before: int = 0) -> Iterator[Callable
 
 
 def _left(done: int, to_do: int, seconds: float) -> str:
-    # The first items are slow, since processes start.
+    # The first items are slow, because processes must start.
     is_reliable = to_do and done >= MIN_DONE_FOR_ESTIMATE and done * 50 >= done + to_do
     return f"{timedelta(seconds=round(seconds * to_do / done))} left" if is_reliable else ""
 
 
 def fail(sentence: str) -> NoReturn:
-    """Exit with status 2 and a sentence about the user's input."""
+    """Print a sentence about the user's input, and exit with status 2."""
     note(f"roboeval: {sentence}")
     raise SystemExit(2)

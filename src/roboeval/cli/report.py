@@ -1,4 +1,4 @@
-"""The command report, which writes figures and a page about runs."""
+"""Defines the command report, which writes figures and a web page about runs."""
 
 from __future__ import annotations
 
@@ -19,38 +19,38 @@ if TYPE_CHECKING:
 
 
 def report(
-    runs: Annotated[list[Path], typer.Argument(help="Runs that were judged.", parser=path_to("a run"))],
+    runs: Annotated[list[Path], typer.Argument(help="Judged runs.", parser=path_to("a run"))],
     out: Annotated[Path, typer.Option(help="The folder to write to.", parser=path_to("a folder"))],
     suite: SuiteOption = "paper",
     published: Annotated[
-        bool, typer.Option("--published", help="Add the paper's published causes of failures.")
+        bool, typer.Option("--published", help="Add the failure causes that the paper published.")
     ] = False,
     price: Annotated[
         list[str] | None,
-        typer.Option(help="MODEL=INPUT/OUTPUT, the prices of a million tokens; may be given several times."),
+        typer.Option(help="MODEL=INPUT/OUTPUT, the prices per million tokens; may be given several times."),
     ] = None,
     label: Annotated[
         list[str] | None,
-        typer.Option(help="RUN=TEXT, how tables and figures name a run; may be given several times."),
+        typer.Option(help="RUN=TEXT, the name of a run in tables and figures; may be given several times."),
     ] = None,
     beside: Annotated[
-        str | None, typer.Option(help="Another suite that judged the runs, to compare verdicts.")
+        str | None, typer.Option(help="Compare with the verdicts of another suite that judged the runs.")
     ] = None,
     check: Annotated[
-        bool, typer.Option(help="Check programs that were not checked, for rejection sampling.")
+        bool, typer.Option(help="Run the check on programs not checked yet, for rejection sampling.")
     ] = True,
     workers: WorkersOption = None,
     rules: HouseRulesOption = None,
 ) -> None:
-    """Write a report: the paper's figures, tables and one page.
+    """Write a report with figures, tables and a web page.
 
-    The page also shows why programs fail, and how sure the numbers are.
+    It has the paper's figures. The page also shows why programs fail and how certain the numbers are.
     """
     import atexit
     import gc
 
-    gc.disable()  # garbage collection would take a fifth of the time,
-    atexit.register(gc.freeze)  # also when Python exits
+    gc.disable()  # garbage collection would take a fifth of the time
+    atexit.register(gc.freeze)  # skip the collection at exit, too
     from codebotler.core.terminal import busy
     from codebotler.simulator.pool import cores
     from roboeval.evaluation.engines import Local
@@ -61,7 +61,7 @@ def report(
     expect_no_others(out)
     prices, labels = read_prices(price or ()), read_labels(label or (), runs)
     if beside == suite:
-        fail(f'--beside needs another suite than "{suite}", which the report itself uses')
+        fail(f'--beside names "{suite}", which the report itself uses; name a different suite')
     opened = [open_current(run, suite, ablated=False) for run in runs]
     expect_same_suite(opened)
     engine = Local(workers or cores()) if check else None
@@ -77,7 +77,7 @@ def report(
     options += [word for text in price or () for word in ("--price", text)]
     options += [word for text in label or () for word in ("--label", text)]
     again = command("report", *runs, *options, suite=suite)
-    with busy("putting together"):
+    with busy("assembling the report"):
         parts = sections(read, with_published=published, prices=prices, command=again)
     written = write_report(*headline(read), parts, out)
     for _ in show_progress(written, "writing", pieces(parts)):
@@ -90,9 +90,9 @@ def report(
 def judged_run(
     results: Results, suite: str, *, beside: str | None, rules: Path | None, engine: OpenEngine | None
 ) -> JudgedRun:
-    """Read a run with its ablation, if that was judged, its verdicts by another suite and with house rules.
+    """Read a run with any verdicts of its ablation, of another suite and with house rules.
 
-    The engine checks programs; without one, earlier results of the check are left out, too.
+    The engine checks programs; without an engine, earlier results of the check are also left out.
     """
     import polars as pl
 

@@ -1,4 +1,4 @@
-"""Further rounds of `roboeval run`, which request rejected programs again and judge all programs."""
+"""Runs further rounds of `roboeval run`, which regenerate rejected programs and judge all programs."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def further_rounds(
     engine: Callable[[], OpenEngine],
     complete: Callable[[RunFolder, GenerationPlan], Path],
 ) -> list[Path]:
-    """Request rejected programs again, in at most `most` rounds, and print the results of each round.
+    """Regenerate or repair rejected programs in up to `most` rounds, and print the results of each round.
 
-    Returns the folders of the rounds, which end when the check accepts all programs.
+    Returns the folders of the rounds. There are no more rounds once the check accepts all programs.
     """
     from roboeval.cli.views.rounds import rounds_view
     from roboeval.evaluation.rounds import RoundPlan

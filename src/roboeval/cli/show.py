@@ -1,4 +1,4 @@
-"""The commands show, export and serve, which present judged runs."""
+"""Defines the commands show, export and serve, which present judged runs."""
 
 from __future__ import annotations
 
@@ -52,17 +52,17 @@ def show(
     run: RunArgument,
     what: Annotated[
         str | None,
-        typer.Argument(help="TASK, TASK/PROMPT or TASK/PROMPT/INDEX.", autocompletion=task_names),
+        typer.Argument(help="Show only TASK, TASK/PROMPT or TASK/PROMPT/INDEX.", autocompletion=task_names),
     ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
     rules: HouseRulesOption = None,
-    k: Annotated[list[int] | None, typer.Option("--k", min=1, help="Also pass@k for this k.")] = None,
+    k: Annotated[list[int] | None, typer.Option("--k", min=1, help="Also show pass@k for this k.")] = None,
     in_full: Annotated[
-        bool, typer.Option("--all", help="Of a completion, show satisfied worlds in full, too.")
+        bool, typer.Option("--all", help="For a completion, also show satisfied worlds in full.")
     ] = False,
     with_reply: Annotated[
-        bool, typer.Option("--reply", help="Of a completion, show the reasoning and the reply as they came.")
+        bool, typer.Option("--reply", help="For a completion, also show the original reasoning and reply.")
     ] = False,
     json: JsonOption = False,
 ) -> None:
@@ -76,7 +76,7 @@ def show(
     is_one = what is not None and names_completion(what)
     if not is_one and (in_full or with_reply):
         option = "--all" if in_full else "--reply"
-        fail(f"{option} applies to one completion; name it as TASK/PROMPT/INDEX, or leave out {option}")
+        fail(f"{option} applies to one completion; give TASK/PROMPT/INDEX, or leave out {option}")
     judged, again = open_run(run, suite, ablated=ablation, rules=rules, completion=what if is_one else None)
     selection = parse_selection(what, judged.known_suite)
     if selection.task is None:
@@ -95,7 +95,7 @@ def show(
 
 
 def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
-    """Count broken house rules, and compare with the evaluation without rules if there is one."""
+    """Count broken house rules; compare with the evaluation without rules if it exists."""
     from roboeval.analysis.broken_rules import count_broken_rules
     from roboeval.evaluation.runs.folder import evaluation_key
     from roboeval.evaluation.runs.results import read_results
@@ -133,7 +133,7 @@ def print_summary(
 
 
 def show_run(results: Results, k: list[int], *, title: str, has_rules: bool, as_json: bool) -> None:
-    """Print the tables of a run."""
+    """Print the tables of a whole run."""
     from roboeval.analysis.counts import tally_of
     from roboeval.analysis.summary import summarise
 
@@ -144,7 +144,7 @@ def show_run(results: Results, k: list[int], *, title: str, has_rules: bool, as_
 
 
 def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool) -> None:
-    """Print a task or a prompt."""
+    """Print the results of a task or a prompt."""
     from roboeval.analysis.tasks import prompt_data, task_data
     from roboeval.cli.views.completions import prompt_view
     from roboeval.cli.views.results import task_view
@@ -165,7 +165,7 @@ def show_completion(
     with_reply: bool,
     as_json: bool,
 ) -> None:
-    """Print a completion, and for one that fails the command that shows the nearest program that passes."""
+    """Print a completion; if it fails, also print the command that shows the nearest passing program."""
     from codebotler.core.words import counted
     from roboeval.analysis.failure_groups import nearest_fix
     from roboeval.cli.views.completions import completion_view
@@ -184,25 +184,25 @@ def show_completion(
         return
     if (fix := nearest_fix(judged, key)) is not None:
         again = command("show", judged.run.path, fix.name, suite=suite, ablated=judged.is_ablated)
-        note(f"the nearest program that passes differs in {counted(fix.changed, 'line')}: `{again}`")
+        note(f"the nearest passing program differs in {counted(fix.changed, 'line')}: `{again}`")
 
 
 def export(
     run: RunArgument,
     format: Annotated[  # noqa: A002 - the option's name
-        str | None, typer.Option(help="csv or parquet; by default the ending of --out, or csv.")
+        str | None, typer.Option(help="csv or parquet; by default the ending of --out, otherwise csv.")
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="The file; by default next to the verdicts.", parser=path_to("a file")),
+        typer.Option(help="The file to write; by default next to the verdicts.", parser=path_to("a file")),
     ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
     price: Annotated[
-        str | None, typer.Option(help="INPUT/OUTPUT, the prices of a million tokens, for the column cost.")
+        str | None, typer.Option(help="INPUT/OUTPUT, the prices per million tokens, for the column `cost`.")
     ] = None,
 ) -> None:
-    """Write a run's verdicts as one flat table."""
+    """Write a run's verdicts to a file as one flat table."""
     from codebotler.core.files import expect_replaceable
     from roboeval.evaluation.runs.table import TABLE_BEGINNINGS, Price, kind_of, with_cost, write_table
 
@@ -210,7 +210,7 @@ def export(
     try:
         cost = None if price is None else Price.read(price)
     except ValueError:
-        fail(f'"{price}" is not a price; write INPUT/OUTPUT, each for a million tokens')
+        fail(f'"{price}" is not a price; write INPUT/OUTPUT, the prices per million tokens')
     results = open_current(run, suite, ablated=ablation).results
     table = results.table if cost is None else with_cost(results.table, cost)
     path = out or results.run.rows(str(results.key)).with_suffix(f".{kind}")
@@ -220,7 +220,7 @@ def export(
 
 
 def serve(
-    runs: Annotated[Path, typer.Argument(help="A folder of runs, or one run.")] = Path("runs"),
+    runs: Annotated[Path, typer.Argument(help="A folder of runs, or a single run.")] = Path("runs"),
     host: HostOption = "127.0.0.1",
     port: PortOption = None,
     name: NameOption = None,
@@ -229,12 +229,12 @@ def serve(
     no_token: NoTokenOption = False,
     suite: Annotated[
         list[str] | None,
-        typer.Option(help="The folder of a suite that judged the runs; may be given several times."),
+        typer.Option(help="A folder with a suite that judged the runs; may be given several times."),
     ] = None,
 ) -> None:
     """Show runs in a browser.
 
-    Compare runs, and look into each completion; Ctrl-C ends it. No robot is needed.
+    You can compare runs and inspect each completion. Ctrl-C stops the server; no robot is needed.
     """
     from codebotler.core.errors import UserError
     from codebotler.web import server
@@ -246,8 +246,8 @@ def serve(
     place = PageAddress(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
     access = Access.from_options(token, None, open_to_all=no_token, is_private=place.is_private)
     if not runs.is_dir():
-        raise UserError("there is no such folder; `roboeval run` creates it with the first run", file=runs)
+        raise UserError("the folder does not exist; `roboeval run` creates it with the first run", file=runs)
     suites = [load(each) for each in suite or ()]
     if not RunStore(runs).names():
-        note(f"{runs} has no runs yet; new ones will appear")
+        note(f"{runs} contains no runs yet; new runs will appear on the page")
     server.serve(None, place, access, (pages(suites),), runs)

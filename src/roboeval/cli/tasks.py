@@ -1,4 +1,4 @@
-"""The command tasks, which lists, shows, lints and starts tasks."""
+"""Defines the command tasks, which lists, shows, lints and creates tasks."""
 
 from __future__ import annotations
 
@@ -18,27 +18,29 @@ if TYPE_CHECKING:
 
 
 def tasks(
-    task: Annotated[str | None, typer.Argument(help="Show this task.", autocompletion=task_names)] = None,
+    task: Annotated[
+        str | None, typer.Argument(help="Show only this task.", autocompletion=task_names)
+    ] = None,
     suite: SuiteOption = "paper",
     lint: Annotated[
-        bool, typer.Option("--lint", help="Look for mistakes; the status is 1 if there are any.")
+        bool, typer.Option("--lint", help="Look for likely mistakes; exit with status 1 if there are any.")
     ] = False,
     accepted: Annotated[
-        bool, typer.Option("--accepted", help="With --lint: also what the task files accept, and why.")
+        bool, typer.Option("--accepted", help="With --lint: also list accepted findings, with the reasons.")
     ] = False,
     clauses: Annotated[
         bool, typer.Option("--clauses", help="Show which checks cover each clause of each prompt.")
     ] = False,
     new: Annotated[
         str | None,
-        typer.Option(help="Start a task of this name in the folder --suite, which is created if needed."),
+        typer.Option(help="Create a task with this name in the folder --suite, which is created if needed."),
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """List a suite's tasks, show one, lint them, start a new one."""
+    """List, show or lint a suite's tasks, or create a new task."""
     if new is not None:
         if task is not None or lint or accepted or clauses or json:
-            fail("--new takes no other option but --suite; leave the rest out")
+            fail("--new can only be combined with --suite; leave out the other options")
         start(new, suite)
         return
     if accepted and not lint:
@@ -61,7 +63,7 @@ def show(suite: Suite, task: str | None, *, clauses: bool) -> None:
     if clauses:
         shown = suite.tasks.values() if task is None else [suite.task(task)]
         if not any(one.covered_by for one in shown):
-            fail(f'the suite "{suite.name}" does not say which checks cover what; add covered_by to a task')
+            fail(f'the suite "{suite.name}" does not list which checks cover facts; add covered_by to a task')
         print_rich(clauses_view(shown))
     elif task is not None:
         print_rich(suite_task_view(suite.task(task)))
@@ -72,7 +74,7 @@ def show(suite: Suite, task: str | None, *, clauses: bool) -> None:
 
 
 def start(task: str, suite: str) -> None:
-    """Start a task in a folder."""
+    """Create a task in the folder of a suite."""
     from roboeval.suites.installed import installed_suites
     from roboeval.suites.load import shipped_suites
     from roboeval.suites.new_task import new_task
@@ -83,11 +85,11 @@ def start(task: str, suite: str) -> None:
         fail(f'the suite "{suite}" {whose} and cannot be changed; name your own folder with --suite')
     path = new_task(Path(suite), task)
     lint = command("tasks", "--lint", suite=suite)
-    note(f"{path} is a complete task; edit it, and check it with `{lint}`")
+    note(f"{path} is a complete task; edit it, then check it with `{lint}`")
 
 
 def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
-    """Print the findings of the linter; exit with status 1 if one is not accepted."""
+    """Print the findings of the linter; exit with status 1 unless all of them are accepted."""
     from codebotler.simulator.pool import cores
     from roboeval.linting.findings import render
     from roboeval.linting.lint import lint
@@ -102,7 +104,7 @@ def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
 
 
 def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
-    """Return the tasks of a suite, or only one, as JSON data."""
+    """Return the tasks of a suite, or a single task, as JSON data."""
     tasks = [
         {
             "task": task.name,
@@ -119,7 +121,7 @@ def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
 
 
 def other_suites(name: str) -> Iterator[str]:
-    """Yield sentences about the other suites that --suite takes, and about installed ones that fail."""
+    """Yield sentences about other suites that --suite accepts, and about installed suites that fail."""
     from codebotler.core.errors import UserError
     from roboeval.suites.installed import installed_suites
     from roboeval.suites.load import load_suite, shipped_suites
@@ -127,7 +129,7 @@ def other_suites(name: str) -> Iterator[str]:
     others = [one for one in shipped_suites() if one != name]
     for suite in installed_suites():
         if suite.name in shipped_suites():
-            yield f'the suite "{suite.name}" of {suite.package} has the name of a built-in suite; rename it'
+            yield f'the suite "{suite.name}" from {suite.package} has the name of a built-in suite; rename it'
             continue
         try:
             load_suite(suite.name)
@@ -136,4 +138,4 @@ def other_suites(name: str) -> Iterator[str]:
         else:
             others += [f"{suite.name} ({suite.package})"] * (suite.name != name)
     if others:
-        yield f"other suites, by --suite: {', '.join(others)}; or your own folder"
+        yield f"other suites for --suite: {', '.join(others)}; or a folder of your own"

@@ -1,4 +1,4 @@
-"""From a reply to a verdict: generates completions, keeps them in a run, simulates and judges them.
+"""Generates completions, saves them in a run, simulates the programs and judges them.
 
-Start with `judge.py`, which decides what is right and wrong; `runs/` describes the folder of a run.
+Start with `judge.py`, which decides whether a program is right; `runs/` describes the folder of a run.
 """

@@ -1,4 +1,4 @@
-"""Batch endpoints: files with the requests of a run, and files of answers."""
+"""Writes the requests of a run for a batch endpoint, and imports the endpoint's answers."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from roboeval.evaluation.runs.source import MAX_ANSWER_BYTES
 from roboeval.suites.load import Suite
 
 BEGINNING = b'{"custom_id": '
-IDENTITY = ("model", "settings", "template", "suite")  # entries of run.json
+IDENTITY = ("model", "settings", "template", "suite")  # the entries of run.json that identify a batch
 REQUEST_ID = re.compile(r"(?P<task>.+)/(?P<prompt>\d{1,9})/(?P<index>\d{1,9})/[0-9a-f]{8}", re.ASCII)
 
 
@@ -54,10 +54,10 @@ def write_requests(
     *,
     progress: Callable[[int], object] = bool,
 ) -> int:
-    """Write requests for the missing completions of a run to a file, start the run, and return their number.
+    """Start a run, write the requests for its missing completions to a file, and return their number.
 
-    `progress` is called with the number of requests so far. Raises UserError if no completion is missing,
-    the run was generated otherwise, or the file is not one of requests.
+    `progress` is called with the number of requests written so far. Raises UserError if no completion is
+    missing, the run was generated differently, or an existing file holds something other than requests.
     """
     expect_replaceable(path, BEGINNING)
     with run.writing():
@@ -65,7 +65,7 @@ def write_requests(
         done = {one.key for one in plan.completed(run)}
         todo = [key for key in keys if key not in done]
         if not todo:
-            raise UserError(f"holds all {how_many(len(keys))} already", file=run.path)
+            raise UserError(f"already holds all {how_many(len(keys))}", file=run.path)
         about["batches"] = with_batch(about["batches"], plan, model.settings)
         with open_replacement(path) as file:
             for number, key in enumerate(todo, 1):
@@ -80,28 +80,25 @@ def write_requests(
 
 
 def request_id(about: Mapping[str, Any], key: CompletionKey, instruction: str) -> str:
-    """Return a name of a request that is unique among runs, by a hash of its instruction and of run.json."""
+    """Return a request name that is unique among runs: a hash of its instruction and of run.json."""
     mark = hashlib.sha256(to_line([*(about.get(name) for name in IDENTITY), instruction])).hexdigest()[:8]
     task, prompt, index = key
     return f"{task}/{prompt}/{index}/{mark}"
 
 
-# --- answers
-
-
 @dataclass(frozen=True)
 class ImportResult:
-    """The state of a run after answers were added."""
+    """The state of a run after an import of answers."""
 
-    new: int  # completions that were added
+    new: int  # completions that the import added
     total: int  # completions that the run should have
-    failed: Mapping[CompletionKey, str] = field(repr=False)  # errors of requests without a completion
-    unanswered: Sequence[CompletionKey] = field(repr=False)  # requests without completion and error
+    failed: Mapping[CompletionKey, str] = field(repr=False)  # errors of the requests that failed
+    unanswered: Sequence[CompletionKey] = field(repr=False)  # requests with neither a completion nor an error
 
 
 @dataclass(frozen=True)
 class _Answer:
-    """An answer of a batch endpoint to a request."""
+    """A batch endpoint's answer to one request."""
 
     key: CompletionKey
     status: int
@@ -113,9 +110,9 @@ def import_answers(
 ) -> ImportResult:
     """Add the completions in a file of answers to the run that `write_requests` started.
 
-    Completions of the run stay; the first reply to a request counts. `progress` is called with the number
-    of answers so far. Raises UserError, and adds nothing, if the run was generated otherwise or a line is
-    not an answer to one of its requests.
+    The run keeps its earlier completions; if a request has several replies, the first one counts.
+    `progress` is called with the number of answers read so far. Raises UserError, and adds nothing, if the
+    run was generated differently or a line is not an answer to one of its requests.
     """
     about = _expect_begun(run, suite)
     plans = [_plan(suite, batch) for batch in batches(about)]
@@ -141,7 +138,7 @@ def import_answers(
     return ImportResult(len(new), len(expected), failed, [key for key in missing if key not in failed])
 
 
-BatchLine: TypeAlias = tuple[bytes, Mapping[str, Any]]  # a line of completions.jsonl, and its tokens
+BatchLine: TypeAlias = tuple[bytes, Mapping[str, Any]]  # a line of completions.jsonl, and its token counts
 
 
 def _add(
@@ -159,17 +156,17 @@ def _add(
 
 @dataclass
 class _Replies:
-    """Collects the replies in answers as lines of completions.jsonl."""
+    """Converts the replies in answers to lines of completions.jsonl."""
 
     model: BatchModel
     plan: GenerationPlan
-    there: set[CompletionKey]  # completions that the run has
+    there: set[CompletionKey]  # the completions already in the run
     lines: dict[CompletionKey, BatchLine] = field(default_factory=dict)
     failed: dict[CompletionKey, str] = field(default_factory=dict)
     refused: dict[CompletionKey, ModelError] = field(default_factory=dict)
 
     def add(self, answer: _Answer) -> None:
-        """Add an answer, unless its request has a reply."""
+        """Add an answer, unless its request already has a reply."""
         key = answer.key
         if key in self.there or key in self.lines:
             return
@@ -187,7 +184,7 @@ class _Replies:
                 self.refused[key] = error
 
     def keep_refused(self) -> None:
-        """Keep requests that the endpoint refused permanently, if it accepted another request."""
+        """Record requests that the endpoint refused permanently, if it accepted at least one other."""
         if self.there or self.lines:
             for key, error in self.refused.items():
                 if key not in self.lines:
@@ -197,19 +194,23 @@ class _Replies:
         row = reply_row(key, self.plan.instruction(key), self.model.name, reply)
         line = to_line(row)
         if len(line) > MAX_ROW:
-            raise ModelError(f"the reply is too long to keep: {len(line):,} bytes", may_pass=False)
+            raise ModelError(f"the reply is too long to save: {len(line):,} bytes", may_pass=False)
         self.lines[key] = line, row["usage"]
         self.failed.pop(key, None)
 
 
 def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:
     if not run.about.is_file():
-        raise UserError("is not the run of `roboeval generate --requests`; name that one", file=run.path)
+        raise UserError(
+            "was not started by `roboeval generate --requests`; name the run that was", file=run.path
+        )
     about = load_json_object(run.about)
     if not isinstance(about.get("settings"), dict) or not batches(about):
-        raise UserError("holds imported completions; name the run of the requests", file=run.path)
+        raise UserError("holds imported completions; name the run that the requests belong to", file=run.path)
     if about.get("suite") != suite.name:
-        raise UserError(f'is of the suite "{about.get("suite")}"; name it with --suite', file=run.path)
+        raise UserError(
+            f'belongs to the suite "{about.get("suite")}"; select that suite with --suite', file=run.path
+        )
     return about
 
 
@@ -231,14 +232,14 @@ def _answers(path: Path, ids: Mapping[str, CompletionKey]) -> Iterator[_Answer]:
 def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> _Answer:
     row = parse_row(line)
     if row is None:
-        raise UserError("this line is not JSON; perhaps the file is incomplete")
+        raise UserError("this line is not JSON; the file may be incomplete")
     name = row.get("custom_id")
     if "response" not in row and "error" not in row:
-        what = "a request" if "method" in row else "not an answer of a batch endpoint"
-        raise UserError(f"this line is {what}; name the file of answers")
+        what = "a request" if "method" in row else "not an answer from a batch endpoint"
+        raise UserError(f"this line is {what}; name the file with the answers")
     if not isinstance(name, str) or name not in ids:
         known = isinstance(name, str) and REQUEST_ID.fullmatch(name)
-        whose = "of another run, or of other settings" if known else "that no run has"
+        whose = "of another run or with other settings" if known else "that belongs to no run"
         raise UserError(f"this line answers a request {whose}: {name!r}")
     response, error = row.get("response"), row.get("error")
     if not isinstance(response, dict):

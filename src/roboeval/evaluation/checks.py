@@ -1,4 +1,4 @@
-"""The check of a run's programs, whose results the run keeps so that each program is checked once."""
+"""Checks the programs of a run and saves the results, so that each program is checked only once."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from roboeval.evaluation.runs.folder import RunFolder, evaluation_key, load_json
 from roboeval.evaluation.runs.rows import read_checks
 from roboeval.suites.load import Suite
 
-ProgramKey: TypeAlias = tuple[str, str]  # a task and the hash of a program
+ProgramKey: TypeAlias = tuple[str, str]  # the name of a task and the hash of a program
 
 
 def check_programs(
@@ -32,9 +32,9 @@ def check_programs(
     samples: int,
     seed: int,
 ) -> Iterator[tuple[ProgramKey, list[str]]]:
-    """Yield the problems of each program; check those that were not checked with these settings before.
+    """Yield the problems of each program; check only those not yet checked with these settings.
 
-    A check knows the rooms of the task's first world, and the suite's house rules.
+    The check uses the rooms of the task's first world and the suite's house rules.
     """
     metadata = {
         "suite": suite.name,

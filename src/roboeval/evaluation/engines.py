@@ -1,4 +1,4 @@
-"""Engines, which run programs on this machine or on a Ray cluster."""
+"""Defines engines, which run programs on this machine or on a Ray cluster."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool, without_filter
 from codebotler.simulator.worker import EngineError, Worker
 
-PYTHON_VERSION = ".".join(platform.python_version_tuple()[:2])  # verdicts depend on it
+PYTHON_VERSION = ".".join(platform.python_version_tuple()[:2])  # verdicts depend on the version
 Work: TypeAlias = tuple[str, str]  # the name of a task, and a program
 RawResult = TypeVar("RawResult")
 WorkResult = TypeVar("WorkResult")
 RunPrograms: TypeAlias = Callable[[Worker, Sequence[Work]], Sequence[RawResult]]
-"""Runs a few programs on a worker and returns a result for each."""
+"""A function that runs a batch of programs on a worker and returns a result for each."""
 
 
 class Engine(Protocol):
-    """Runs programs isolated."""
+    """Runs programs in isolated processes."""
 
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
-        """Run programs, equal ones once, and yield `then` of each result, in their order.
+        """Run each distinct program once, apply `then` to each result, and yield the values in input order.
 
         `function` and its results must be picklable; `then` runs in the main thread of a process if possible.
         """
@@ -37,13 +37,11 @@ class Engine(Protocol):
 OpenEngine = AbstractContextManager[Engine]
 
 
-GC_THRESHOLD = (
-    100_000  # events and the like that are made before garbage is looked for: nearly all live briefly
-)
+GC_THRESHOLD = 100_000  # allocations between garbage collections: nearly all objects are short-lived events
 
 
 class Local:
-    """Engine on this machine: uses a given pool, or one of its own with so many workers."""
+    """Runs programs on this machine, in a given pool or in a new one with the given number of workers."""
 
     def __init__(self, pool: WorkerPool | int, **isolation: bool) -> None:
         self._given, self._isolation = pool, isolation
@@ -74,7 +72,7 @@ class Local:
 
 @cache
 def own_worker(*, require_isolation: bool = False, one_process_per_run: bool = False) -> Worker:
-    """Return the worker of this process, and start it first if need be."""
+    """Return the worker of this process; start it on the first call."""
     worker = Worker(one_process_per_run=one_process_per_run)
     if require_isolation and not worker.has_seccomp:
         worker.close()

@@ -1,4 +1,4 @@
-"""Judges a run's completions, and continues an earlier evaluation if suite and tool are the same."""
+"""Judges a run's completions; continues an earlier evaluation if the suite and the tool are unchanged."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def evaluate_run(
     engine: OpenEngine | None = None,
     completions: Iterable[Completion] | None = None,
 ) -> Iterator[Row]:
-    """Judge the completions of tasks that have no row yet; yield the rows of all completions of the tasks.
+    """Judge the completions that have no row yet; yield the rows of all completions of the selected tasks.
 
-    Rows of other tasks stay. A completion that takes too long to judge has no row, so the next evaluation
-    tries it again. `completions` are those of the run, if they were read before.
+    Rows of other tasks are kept. A completion that takes too long to judge gets no row, so the next
+    evaluation tries it again. Pass `completions` if the run has already been read.
     """
     key = evaluation_key(suite, ablated=ablated)
     with run.writing():
@@ -91,9 +91,9 @@ def _expect_of_run(
     key = key_of(line.row)
     completion = written.get(key)
     if completion is None:
-        sentence = f"judges {name_of(key)}, which is not in the run"
+        sentence = f"this row judges {name_of(key)}, which is not in the run"
     elif key not in left:
-        sentence = f"judges {name_of(key)} again"
+        sentence = f"this row judges {name_of(key)} a second time"
     elif completion.program_sha256 != line.row["program_sha256"]:
         sentence = f"the program of {name_of(key)} has changed since it was judged"
     else:
@@ -101,16 +101,13 @@ def _expect_of_run(
     raise UserError(f"{sentence}; --redo starts over", file=file, line=line.number)
 
 
-# --- the suite and tool of an evaluation
-
-
-WORD_LISTS = ("words_for_people", "words_for_yes", "words_for_no")  # left out if empty
+WORD_LISTS = ("words_for_people", "words_for_yes", "words_for_no")  # left out of KEY.json if empty
 
 
 def evaluation_metadata(
     suite: Suite, *, ablated: bool = False, tasks: frozenset[str] | None = None
 ) -> dict[str, Any]:
-    """Return the content of KEY.json, which identifies what judges the rows of some tasks, or of all."""
+    """Return the content of KEY.json: the suite and tool that judge, and the selected tasks."""
     settings = suite.settings
     return {
         "suite": suite.name,
@@ -146,27 +143,27 @@ def _selected(tasks: frozenset[str] | None, was: Mapping[str, Any] | None) -> fr
 
 
 def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:
-    """Return the content of KEY.json, if any; raise UserError if the suite or the tool has changed."""
+    """Return the content of KEY.json, or None if it is missing; raise UserError if suite or tool differ."""
     key = evaluation_key(suite, ablated=ablated)
     path, rows = run.manifest(key), run.rows(key)
     if not path.exists():
         if rows.exists() and rows.stat().st_size:
             raise UserError(
-                "is missing, so nobody knows how the rows were judged; --redo starts over", file=path
+                "is missing, so it is unknown how the rows were judged; --redo starts over", file=path
             )
         return None
     was = load_json_object(path)
     for name, now in evaluation_metadata(suite, ablated=ablated, tasks=None).items():
         if was.get(name) != now and name != "tasks":
             what = f"{METADATA_NAMES.get(name, name)} ({_brief(was.get(name))}, now {_brief(now)})"
-            raise UserError(f"was judged with another {what}; --redo starts over", file=path)
+            raise UserError(f"was judged with a different {what}; --redo starts over", file=path)
     return was
 
 
 METADATA_NAMES = {
     "version": "version of the suite",
     "digest": "content of the suite",
-    "rules": "set of rules of simulation",
+    "rules": "set of simulation rules",
     "house_rules": "set of house rules",
     "skills": "set of skills",
     "codebotler": "version of this tool",

@@ -1,4 +1,4 @@
-"""Explanations of verdicts: what a program did in each world, and which step broke a requirement."""
+"""Explains verdicts: what a program did in each world, and which step broke a requirement."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from roboeval.evaluation.runs.traces import trace_of
 from roboeval.suites.load import Scenario, Suite
 
 INSTRUCTION_NOT_RECORDED = "instruction not recorded"
-OF_SUITE = "this is the suite's text of the prompt:"
+OF_SUITE = "the suite's current prompt is:"
 PROGRAM_GONE = "the judged program is no longer in this run"
 SUITE_CHANGED = "the suite has changed since this was judged"
-TRACE_CUT = "the trace was too long to keep, so this cannot be explained"
-TRACES_TOO_LONG = "the traces of this program are too long to explain this as well"
+TRACE_CUT = "the trace was too long to save, so this cannot be explained"
+TRACES_TOO_LONG = "the traces of this program are too long to explain this check, too"
 
 LOWERCASED_NOTE = "This suite lower-cases strings before running; shown as judged."
 MAX_PROGRAM_LINES = 1_000
-MAX_EXPLAINED_SIZE = 1_000_000  # of all traces of a completion, with these weights:
-EVENT_WEIGHT, SPOKEN_WEIGHT, OTHER_WEIGHT = 20, 10, 1  # of an event, a spoken character, another character
+MAX_EXPLAINED_SIZE = 1_000_000  # limit on all traces of a completion, measured with these weights
+EVENT_WEIGHT, SPOKEN_WEIGHT, OTHER_WEIGHT = 20, 10, 1  # per event, spoken character, other character
 
 
 def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dict[str, Any]:
-    """Explain why a completion fails: the world that decided, and its error or failed check."""
+    """Explain why a completion fails: the first failing world, and the error or failed check there."""
     why = row["failure"]
     verdict = row["verdicts"][why["world"]]
     ending = {key: verdict[key] for key in ("world", "error", "line")}
@@ -47,7 +47,7 @@ def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dic
 def completion_data(
     row: Mapping[str, Any], completion: Completion | None, suite: Suite | None, *, ablated: bool = False
 ) -> dict[str, Any]:
-    """Describe a completion: its instruction, its program, and each world with steps and failed checks."""
+    """Describe a completion: its instruction, its program, and the steps and failed checks in each world."""
     budget = ExplanationBudget()
     return {
         **{key: row[key] for key in (*KEY, "passed", "failure")},
@@ -63,31 +63,31 @@ def completion_data(
 
 
 def suite_instruction(suite: Suite | None, task: str, prompt: int) -> str | None:
-    """Return the suite's own text of a prompt; None if it has no such prompt."""
+    """Return the suite's own text of a prompt, or None if the suite lacks the prompt."""
     prompts = () if suite is None or task not in suite.tasks else suite.tasks[task].prompts
     return prompts[prompt] if prompt < len(prompts) else None
 
 
 def instruction_shown(recorded: str | None, of_suite: str | None) -> tuple[str | None, str | None]:
-    """Return a note on the origin of the instruction, if needed, and the instruction, if it is known."""
+    """Return the instruction, or None if unknown, preceded by a note on its origin, or None if not needed."""
     if recorded is not None or of_suite is None:
         return INSTRUCTION_NOT_RECORDED if recorded is None else None, recorded
     return f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}", of_suite
 
 
 def failing_first(worlds: Iterable[Mapping[str, Any]]) -> list[tuple[int, Mapping[str, Any]]]:
-    """Number the worlds from 1 and sort those that fail first."""
+    """Number the worlds from 1, and put the failing ones first."""
     return sorted(enumerate(worlds, 1), key=lambda one: bool(one[1]["satisfied"]))
 
 
 class ExplanationBudget:
-    """Limits how much of the traces of one completion is compared with its requirements."""
+    """Limits how much of a completion's traces is analysed to explain failed checks."""
 
     def __init__(self) -> None:
         self._left = MAX_EXPLAINED_SIZE
 
     def covers(self, trace: Trace) -> bool:
-        """Count a trace; return whether to explain a check on it."""
+        """Subtract a trace from the budget; return whether the budget suffices to explain a check on it."""
         self._left -= sum(map(_weight, trace))
         return self._left >= 0
 
@@ -129,29 +129,29 @@ def _explained(
     require = () if scenario is None else scenario.require
     requirement = next((r for r in require if r.text == check), None)
     if requirement is None:
-        return {"explanation": f"{SUITE_CHANGED} and no longer requires this here", "step": None}
+        return {"explanation": f"{SUITE_CHANGED} and no longer has this requirement here", "step": None}
     if not budget.covers(trace):
         return {"explanation": TRACES_TOO_LONG, "step": None}
     why = explain(requirement.formula, trace)
     if why is None:
-        return {"explanation": f"{SUITE_CHANGED}; by now this is satisfied", "step": None}
+        return {"explanation": f"{SUITE_CHANGED}; this requirement is now satisfied", "step": None}
     return {"explanation": why.sentence, "step": None if why.event is None else why.event + 1}
 
 
 def error_sentence(verdict: Mapping[str, Any]) -> str:
-    """Return the line and the message of the error that ended a run, as far as they are known."""
+    """Return the message of the error that ended a run, preceded by its line if the line is known."""
     where = "" if verdict["line"] is None else f"line {verdict['line']}"
     return ": ".join(filter(None, (where, verdict["error"]["message"])))
 
 
 def first_lines(program: str) -> tuple[str, int]:
-    """Shorten a program to be read by people; also return how many lines are left out."""
+    """Shorten a program for display; return it with the number of omitted lines."""
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
     shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MAX_PROGRAM_LINES])
     return shown, max(0, len(lines) - MAX_PROGRAM_LINES)
 
 
 def cut_sentence(cut: Mapping[str, Any]) -> str:
-    """Say how much of a trace was not kept."""
+    """Return a sentence about the number of steps that were not saved."""
     were = "was" if cut["events"] == 1 else "were"
-    return f"{counted(cut['events'], 'more step')} {were} not kept, since the trace is too long"
+    return f"{counted(cut['events'], 'more step')} {were} not saved, because the trace is too long"

@@ -1,4 +1,4 @@
-"""Classes of failures: those of the paper (section V.B) and replies without a program."""
+"""Classifies failures: the paper's classes (section V.B), and replies without a program."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ PYTHON_ERROR_CLASS, ROBOT_ERROR_CLASS, TASK_ERROR_CLASS = (
 
 @dataclass(frozen=True)
 class FailureClass:
-    """A class of failures."""
+    """A class of failures, such as Python errors, with its kinds and its names in tables."""
 
-    name: str  # in rows
-    label: str  # for people
+    name: str  # the name in rows
+    label: str  # the name shown to users
     plural: str
-    kinds: tuple[str, ...]  # tables always show them; other kinds only if they happened
-    ending: str = ""  # how a program ends, for people; by default "in a" and the label
-    is_always_shown: bool = True  # other classes only if they happened
+    kinds: tuple[str, ...]  # kinds that tables always show; other kinds appear only if they occurred
+    ending: str = ""  # how a program of this class ends; by default "in a" and the label
+    is_always_shown: bool = True  # whether tables show the class even if it did not occur
 
 
 FAILURE_CLASSES: Mapping[str, FailureClass] = {
@@ -70,13 +70,13 @@ FAILURE_CLASSES: Mapping[str, FailureClass] = {
                 "PlaceNoObject",
                 "AskNoPerson",
                 "AskEmptyOptions",
-                "AskInvalidOptions",  # beyond the paper's six
+                "AskInvalidOptions",  # not among the paper's six kinds
             ),
         ),
         FailureClass(TASK_ERROR_CLASS, "failed check", "failed checks", get_args(Category)),
     )
 }
-"""All classes; the kind of a failed check is the check's category. `failure` assigns them."""
+"""All classes by name; the kind of a failed check is the check's category."""
 
 
 def label_of(name: str) -> str:
@@ -90,17 +90,17 @@ def plural_of(name: str) -> str:
 
 
 def ending_of(name: str) -> str:
-    """Return how programs of a class end, such as `in a Python error`."""
+    """Return how programs in this class end, such as `in a Python error`."""
     return (FAILURE_CLASSES[name].ending if name in FAILURE_CLASSES else "") or f"in a {label_of(name)}"
 
 
 def classes_to_show(happened: Collection[str]) -> list[str]:
-    """Return the paper's three classes, so that runs can be compared, and those that happened."""
+    """Return the paper's three classes, which make runs comparable, and all other classes that occurred."""
     return [name for name, one in FAILURE_CLASSES.items() if one.is_always_shown or name in happened]
 
 
 def no_program_sentence(failure: Mapping[str, Any]) -> str | None:
-    """Explain in a sentence why a reply held no program; None for other failures."""
+    """Explain in a sentence why a reply contained no program, or return None for other failures."""
     if failure["class"] != NO_PROGRAM_CLASS:
         return None
     return next((words for kind, words in NO_PROGRAM_SENTENCES.items() if kind == failure["kind"]), "")
@@ -110,13 +110,13 @@ def no_program_sentence(failure: Mapping[str, Any]) -> str | None:
 class Verdict:
     """The judgement on a program in one world."""
 
-    world: str  # its description
+    world: str  # the description of the world
     outcome: Outcome
-    failed: tuple[Requirement, ...]  # in the task's order
+    failed: tuple[Requirement, ...]  # failed requirements, in the task's order
     satisfied: bool
 
     def on(self, prompt: int) -> Verdict:
-        """Return the verdict for one prompt, which may ask for less."""
+        """Return the verdict for one prompt, which may have fewer requirements than all prompts together."""
         asked = tuple(requirement for requirement in self.failed if requirement.is_asked_by(prompt))
         if len(asked) == len(self.failed):
             return self
@@ -124,10 +124,10 @@ class Verdict:
 
 
 def failure_of_verdicts(verdicts: Sequence[Verdict]) -> Failure | None:
-    """Return the failure of a completion, which the first unsatisfied world decides; None if it passes.
+    """Return the failure of a completion in its first unsatisfied world, or None if it passes.
 
-    Within that world the error decides, or else the first failed check. In a world that may wait for ever,
-    reaching a limit is no error.
+    The failure is the error in that world, or without an error the first failed check. In a world where
+    programs may wait for ever, reaching a limit is not an error.
     """
     for index, verdict in enumerate(verdicts):
         if not verdict.satisfied:
@@ -140,7 +140,7 @@ def failure_of_verdicts(verdicts: Sequence[Verdict]) -> Failure | None:
                     "world": index,
                     "check": first.text,
                 }
-            assert error is not None, "a world without error and failed checks is satisfied"
+            assert error is not None, "a world with neither an error nor a failed check is satisfied"
             is_robots = verdict.outcome.status is Status.ROBOT_ERROR
             name = ROBOT_ERROR_CLASS if is_robots else PYTHON_ERROR_CLASS
             return {"class": name, "kind": error.kind, "world": index, "check": None}

@@ -1,4 +1,4 @@
-"""Generation of a run's completions, which continues after an interruption."""
+"""Generates the completions of a run, and continues after an interruption."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ from roboeval.evaluation.requests import (
 from roboeval.evaluation.runs.completions import CompletionKey, how_many, reply_row
 from roboeval.evaluation.runs.folder import RunFolder
 
-FAILURES_IN_A_ROW = 3  # stop after so many, or as many as there are concurrent requests
+FAILURES_IN_A_ROW = 3  # stop after this many, or the number of concurrent requests if larger
 
 
 @dataclass(frozen=True)
 class Pace:
-    """Limits on concurrent requests, requests per minute, and tokens in total."""
+    """Limits on concurrent requests, requests per minute, and total tokens."""
 
     concurrency: int = 8
     requests_per_minute: float | None = None
@@ -50,15 +50,15 @@ class Pace:
 
 @dataclass
 class GenerationProgress:
-    """Progress of the generation of a run."""
+    """How far the generation of a run has come."""
 
     total: int
-    found: int  # completions at the start
-    interrupted: int  # pending requests at the last interruption, which may be paid twice
-    usage: Counter[str]  # tokens of all completions
-    under_way: int = 0  # pending requests at the end, after an interruption
-    failures: dict[CompletionKey, str] = field(default_factory=dict)  # error messages
-    stopped: str | None = None  # why no further request is sent
+    found: int  # completions present at the start
+    interrupted: int  # requests pending at the last interruption, which may be billed twice
+    usage: Counter[str]  # token counts of all completions
+    under_way: int = 0  # requests still pending when this generation was interrupted
+    failures: dict[CompletionKey, str] = field(default_factory=dict)  # error messages of failed requests
+    stopped: str | None = None  # why generation stopped early
 
     def __post_init__(self) -> None:
         self.done = self.found
@@ -66,12 +66,12 @@ class GenerationProgress:
 
     @property
     def rate(self) -> float:
-        """Completions per second."""
+        """Return the number of completions per second."""
         return (self.done - self.found) / max(time.monotonic() - self._started, 0.001)
 
     @property
     def missing(self) -> str | None:
-        """A sentence on what is missing at the end, and why; None if nothing is."""
+        """Return a sentence on how many completions are missing, and why, or None if none is."""
         left = self.total - self.done
         reason = self.stopped or next(iter(self.failures.values()), "they were not requested")
         return f"{how_many(left)} {'is' if left == 1 else 'are'} missing: {reason}" if left else None
@@ -85,14 +85,14 @@ def generate_run(
     *,
     on_progress: Callable[[GenerationProgress], None] = lambda _: None,
 ) -> GenerationProgress:
-    """Request the missing completions of a run, save each before it counts, and close the model."""
+    """Request the missing completions of a run, save each as it arrives, and close the model."""
     with run.writing():
         metadata = run_metadata(run, plan, model)
         with contextlib.closing(Appender(run.completions)) as file:
             done, usage = set(), no_usage()
             for completion in plan.completed(run):
                 done.add(completion.key)
-                if plan.mark().items() <= completion.more.items():  # of this round
+                if plan.mark().items() <= completion.more.items():  # written in this round
                     add_usage(usage, completion.more.get("usage"))
             given = [one for one in plan.given() if one.key not in done]
             done |= {one.key for one in given}
@@ -124,7 +124,7 @@ def generate_run(
 
 
 def reply_of_refusal(error: ModelError) -> Reply:
-    """Return the reply to record for a request that the server refuses permanently."""
+    """Return the reply to record for a request that the server refused permanently."""
     return make_reply(error.sentence, Usage(), None, None, known_kind="refusal", has_answer=False)
 
 
@@ -133,7 +133,7 @@ _KEY: ContextVar[CompletionKey] = ContextVar("_KEY")
 
 @dataclass(frozen=True)
 class _LoggedModel:
-    """A model that logs each request before it is sent, also each retry."""
+    """Wraps a model and logs each request, including each retry, before sending it."""
 
     model: Model
     log: RequestLog
@@ -160,7 +160,7 @@ class _LoggedModel:
 
 @dataclass
 class _Generation:
-    """Requests completions concurrently and saves each."""
+    """Requests completions concurrently and saves each as it arrives."""
 
     plan: GenerationPlan
     model: Model
@@ -171,7 +171,7 @@ class _Generation:
     on_progress: Callable[[GenerationProgress], None]
     error: ModelError | None = None
     _failures_in_a_row: int = 0
-    _budget: int | None = None  # set once it is spent
+    _budget: int | None = None  # tokens used when the budget ran out
     _refused: dict[CompletionKey, ModelError] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -185,7 +185,7 @@ class _Generation:
                     group.create_task(self._request_each(waiting))
             if self.progress.stopped is None and self.progress.done:
                 self._keep_refused()
-            if self._budget is not None:  # pending requests have used more since
+            if self._budget is not None:  # the requests that were still pending have used more tokens since
                 self.progress.stopped = BudgetSpentError(self._budget, self._paced.tokens_used).sentence
         except BaseExceptionGroup as errors:
             raise errors.exceptions[0] from None
@@ -217,19 +217,19 @@ class _Generation:
     async def _keep(self, key: CompletionKey, reply: Reply) -> None:
         line = self._line(key, reply)
         if len(line) > MAX_ROW:
-            raise ModelError(f"the reply is too long to keep: {len(line):,} bytes", may_pass=True)
+            raise ModelError(f"the reply is too long to save: {len(line):,} bytes", may_pass=True)
         self.file.append(line)
         self.log.kept(key)
         try:
             await asyncio.to_thread(self.file.sync)
-        finally:  # also after an interrupt, since closing the file syncs it
+        finally:  # also after an interrupt, because closing the file syncs it to disk
             add_usage(self.progress.usage, asdict(reply.usage))
             self.progress.done += 1
         self._failures_in_a_row = 0
         self.on_progress(self.progress)
 
     def _keep_refused(self) -> None:
-        # The server accepts other requests, so these refusals are about the requests themselves.
+        # The server accepted other requests, so these were refused because of their content.
         for key, error in self._refused.items():
             self.file.append(self._line(key, reply_of_refusal(error)))
             del self.progress.failures[key]

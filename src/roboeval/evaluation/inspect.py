@@ -1,4 +1,4 @@
-"""The benchmark as an Inspect task: `inspect eval codebotler/roboeval --model ...`."""
+"""Offers the benchmark as an Inspect task: `inspect eval codebotler/roboeval --model ...`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Registered = TypeVar("Registered", bound=Callable[..., object])
 
 
 def register_as_codebotler(function: Registered) -> Registered:
-    """Make Inspect name a function `codebotler/...`, which it derives from the module."""
+    """Set a function's module so that Inspect registers the function as `codebotler/...`."""
     function.__module__ = "codebotler"
     return function
 
@@ -39,13 +39,13 @@ def roboeval(
     worlds: int | None = None,
     seed: int | None = None,
 ) -> Task:
-    """Programs for service robots, each judged in every world of its task; a sample is a prompt.
+    """Ask for programs for service robots and judge each in every world of its task; a sample is a prompt.
 
     Args:
         suite: the name or folder of a suite.
         tasks: tasks to select; all by default.
-        worlds: how many worlds to draw, 1 to 10,000, if the suite draws worlds.
-        seed: the seed of the drawn worlds.
+        worlds: the number of worlds, 1 to 10,000, if the suite samples worlds.
+        seed: the random seed for sampling worlds.
     """
     our, drawn = SamplingSettings(), _suite(suite, worlds, seed)
     samples = [
@@ -74,7 +74,7 @@ def _suite(name: str, worlds: int | None, seed: int | None) -> Suite:
 @solver
 @register_as_codebotler
 def prompting(suite: str = "paper") -> Solver:
-    """Return a solver that writes the prompt of `roboeval generate`: skills, examples and instruction."""
+    """Return a solver that builds the prompt of `roboeval generate`: skills, examples and instruction."""
     known = load_suite(suite)
     rules = known.house_sentences
 
@@ -91,7 +91,7 @@ def prompting(suite: str = "paper") -> Solver:
 @scorer(metrics=[accuracy(), stderr(cluster="task"), grouped(accuracy(), "task", all=False)])
 @register_as_codebotler
 def verdict(suite: str = "paper", worlds: int | None = None, seed: int | None = None) -> Scorer:
-    """Return a scorer with the verdicts of `roboeval evaluate`, which runs in a thread."""
+    """Return a scorer that judges like `roboeval evaluate`, in a separate thread."""
 
     def judged(state: TaskState) -> Score:
         by, reply = _suite(suite, worlds, seed), state.output.completion
@@ -100,7 +100,7 @@ def verdict(suite: str = "paper", worlds: int | None = None, seed: int | None = 
         completion = Completion(**state.metadata, index=0, program=program_of(reply).source, more=said)
         (row,) = evaluate([completion], by, engine=Local(shared_pool()))
         text = json.dumps(completion_data(row, completion, by), ensure_ascii=False)
-        data = json.loads(text.encode(errors="replace"))  # a log cannot hold lone surrogates
+        data = json.loads(text.encode(errors="replace"))  # logs cannot contain lone surrogates
         return Score(
             value=CORRECT if row["passed"] else INCORRECT,
             answer=data["program"],

@@ -1,4 +1,4 @@
-"""The authority on right and wrong: runs completions in worlds and judges the traces."""
+"""Runs programs in worlds and judges their traces; no other module decides whether a program is right."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ JUDGEMENT_CACHE: ResultCache[tuple[bytes, ...]] = ResultCache()
 
 
 def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
-    """Judge a run in a world, by the requirements of all prompts.
+    """Judge a run in a world by the requirements of all prompts.
 
-    A run that ends in an error fails whatever it did. One that reaches a limit fails, too, except in a world
-    that may wait for ever, where the requirements decide.
+    A run that ends in an error fails, whatever it did before. A run that reaches a limit also fails, except
+    in a world where programs may wait for ever: there the requirements decide.
     """
     if not may_satisfy(outcome, scenario):
         return Verdict(scenario.world.about, outcome, (), satisfied=False)
@@ -46,13 +46,13 @@ def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
 
 
 def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
-    """Whether the requirements decide: the run ended normally, or waits and may do so."""
+    """Whether the requirements decide: the run ended normally, or was allowed to wait for ever."""
     waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
     return waited or outcome.status is Status.FINISHED
 
 
 def are_met(outcome: Outcome, scenario: Scenario) -> tuple[bool, ...]:
-    """Whether the trace of a run satisfies each requirement."""
+    """Return, for each requirement, whether the trace of a run satisfies it."""
 
     def check() -> tuple[bool, ...]:
         return tuple([is_met(one, outcome.trace) for one in scenario.require])
@@ -62,7 +62,7 @@ def are_met(outcome: Outcome, scenario: Scenario) -> tuple[bool, ...]:
 
 
 def is_met(requirement: Requirement, trace: Trace) -> bool:
-    """Whether a trace satisfies a requirement; an inconclusive one does not."""
+    """Whether a trace satisfies a requirement; if that is inconclusive, it does not."""
     try:
         return holds(requirement.formula, trace)
     except Inconclusive:
@@ -78,21 +78,21 @@ def evaluate(
     require_isolation: bool = False,
     engine: OpenEngine | None = None,
 ) -> Iterator[Row]:
-    """Judge completions and yield a row for each, in their order; equal programs of a task run once.
+    """Judge completions and yield a row for each, in input order; equal programs of a task run once.
 
-    A completion that takes more than 60 seconds of processor time to judge has no row, and a warning is
-    logged; this limit applies only in the main thread.
+    A completion that takes more than 60 seconds of processor time to judge gets no row but a logged
+    warning; this limit applies only in the main thread.
 
     Args:
-        completions: completions of tasks of the suite, which are read as needed.
-        suite: tasks and rules.
-        ablated: whether to require common sense only, for which all tasks need an ablation.
-        workers: how many programs to run at the same time.
+        completions: completions for tasks of the suite; an iterator is consumed lazily.
+        suite: the tasks and simulation settings.
+        ablated: whether to require only common sense; then every task needs an ablation.
+        workers: the number of programs to run in parallel.
         require_isolation: whether to raise an error, rather than warn, if programs are not fully isolated.
         engine: the engine that runs programs; by default a pool of workers on this machine.
 
     Raises:
-        UserError: there are no workers, or a completion is not of the suite.
+        UserError: there are no workers, or a completion does not belong to the suite.
         EngineError: no isolated process can be started.
     """
     chosen = engine or Local(workers, require_isolation=require_isolation)
@@ -103,7 +103,7 @@ def evaluate(
 def judgements(
     completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
 ) -> Iterator[tuple[Completion, bytes | None]]:
-    """Yield each completion with its judgement as JSON; None, and a warning, if judging takes too long."""
+    """Yield each completion and its judgement as JSON; None, with a warning, if judging takes too long."""
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[tuple[str, str]]:
@@ -119,7 +119,7 @@ def judgements(
             completion = waiting.popleft()
             if by_prompt is None:
                 _log.warning(
-                    "%s is not judged, since that takes more than %g seconds of processor time; "
+                    "%s was not judged, because that takes more than %g seconds of processor time; "
                     "`roboeval tasks --lint` finds slow regexes",
                     name_of(completion.key),
                     BUDGET,
@@ -130,10 +130,10 @@ def judgements(
 
 
 def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:
-    if not isinstance(completion, Completion):  # a row of a file, perhaps
+    if not isinstance(completion, Completion):  # for example a row of a file
         kind = type(completion).__name__
         what = "make it a Completion(task=..., prompt=..., index=..., program=...)"
-        raise UserError(f"a completion is of the type {kind}; {what}")
+        raise UserError(f"a completion has the type {kind}; {what}")
     if (problem := find_key_fault(completion.key, suite)) is not None:
         raise UserError(problem)
     if ablated and suite.tasks[completion.task].ablation is None:
@@ -143,7 +143,7 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
 def run_in_worlds(
     suite: Suite, worker: Worker, works: Sequence[tuple[str, str]], *, ablated: bool
 ) -> list[tuple[str, Sequence[Outcome]]]:
-    """Run programs in the worlds of their tasks; return the task and the outcomes of each."""
+    """Run programs in the worlds of their tasks; return the task and the outcomes of each program."""
     jobs = [
         (program, [partial(robot_in, one.world, suite) for one in scenarios])
         for task, program in works
@@ -153,7 +153,7 @@ def run_in_worlds(
 
 
 def robot_in(world: World, suite: Suite) -> SimulatedRobot:
-    """Return a robot in a world, with the rules of a suite and its house."""
+    """Return a simulated robot in a world, with the simulation settings and house rules of a suite."""
     guard = None if suite.house is None else RuleGuard(suite.house.rules)
     return SimulatedRobot(world, suite.settings, suite.skills, guard=guard)
 
@@ -161,7 +161,7 @@ def robot_in(world: World, suite: Suite) -> SimulatedRobot:
 def judge_outcomes(
     suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool
 ) -> tuple[bytes, ...] | None:
-    """Judge a program by its outcomes, for each prompt, as JSON; None if that takes too long."""
+    """Return the judgement on a program for each prompt as JSON, or None if judging takes too long."""
     name, outcomes = ran
     task = suite.tasks[name]
     scenarios = task.judged_in(ablated=ablated)

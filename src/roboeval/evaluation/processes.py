@@ -1,4 +1,4 @@
-"""An engine that runs and judges programs in several processes of this machine."""
+"""Runs and judges programs in several processes on this machine."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ JobKey = TypeVar("JobKey")
 
 
 class Processes:
-    """Engine of processes that each have a worker, and replay and judge its programs themselves.
+    """Runs programs in processes that each have a worker, and replay and judge its programs themselves.
 
-    With threads instead, one core would replay and judge for all workers. A process starts when there is work
-    for it. The caller warns if programs are not fully isolated.
+    With threads, a single core would replay and judge for all workers. Each process starts when there is
+    work for it. The caller must warn if programs are not fully isolated.
     """
 
     def __init__(self, workers: int, **isolation: bool) -> None:
@@ -37,7 +37,7 @@ class Processes:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Do nothing: the processes end with the results."""
+        """Do nothing: the processes end when the results are exhausted."""
 
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
@@ -55,9 +55,9 @@ def map_in_processes(
     workers: int,
     name: Callable[[JobKey], bytes],
 ) -> Iterator[WorkResult]:
-    """Call a function with a few keys at a time, in processes, and yield the values in order.
+    """Call a function in worker processes on a few keys at a time, and yield the results in order.
 
-    `name` returns a short unique name of each key; the function gets equal keys once.
+    `name` returns a short, unique name for a key; duplicate keys are passed to the function only once.
     """
     with process_pool(workers) as processes:
 
@@ -68,12 +68,12 @@ def map_in_processes(
         try:
             yield from map_batches(submit, keys, workers=workers, name=name)
         except BrokenExecutor:
-            raise EngineError("a worker process was lost; perhaps it took too much memory") from None
+            raise EngineError("a worker process died; it may have run out of memory") from None
 
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Start processes that end with the block, or with this process."""
+    """Start a process pool that ends with the block, or together with this process."""
     context = get_context("spawn")
     with ExitStack() as held:
         with starting_processes():
@@ -87,18 +87,18 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 @contextmanager
 def starting_processes() -> Iterator[None]:
-    """Let processes that start in the block ignore Ctrl-C; raise EngineError if they cannot start."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # child processes inherit it
+    """Make processes started in the block ignore Ctrl-C; raise EngineError if they cannot start."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # child processes inherit the mask
     try:
         yield
     except OSError as error:
-        raise EngineError(f"no worker process can be started: {error.strerror}") from None
+        raise EngineError(f"cannot start a worker process: {error.strerror}") from None
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def exit_with_parent(pipe: Connection) -> None:
-    """End this process as soon as the other end of a pipe is closed."""
+    """Exit this process as soon as the other end of a pipe is closed."""
     gc.set_threshold(GC_THRESHOLD, *gc.get_threshold()[1:])
 
     def end() -> None:
@@ -116,5 +116,5 @@ def run_batch(functions: bytes, isolation: Mapping[str, bool], works: Sequence[W
 
 @lru_cache(maxsize=1)
 def load_functions(functions: bytes) -> tuple[RunPrograms[Any], Callable[[Any], Any]]:
-    """Unpickle functions once: they hold a whole suite."""
+    """Unpickle functions, cached because they refer to a whole suite."""
     return pickle.loads(functions)  # type: ignore[no-any-return] # noqa: S301 - pickled by our own parent process

@@ -1,4 +1,4 @@
-"""An engine that runs programs on a Ray cluster, in shards that Ray retries if it loses a machine."""
+"""Runs programs on a Ray cluster, in shards that Ray retries if a machine is lost."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ from roboeval.evaluation.engines import PYTHON_VERSION, RawResult, RunPrograms, 
 _log = logging.getLogger("roboeval.ray")
 VERSIONS = f"codebotler {__version__} with Python {PYTHON_VERSION}"
 
-SHARDS_PER_CORE = 2  # submitted shards, so that no core waits for this process
-RETRIES = 20  # of a shard whose machine was lost
-RAY_POLL_SECONDS = 10  # between checks whether the cluster still has cores
+SHARDS_PER_CORE = 2  # submit more shards than cores, so that no core waits for this process
+RETRIES = 20  # attempts to rerun a shard whose machine was lost
+RAY_POLL_SECONDS = 10  # time between checks that the cluster still has cores
 RAY_CONNECT_SECONDS = 5
 
 
 class RayCluster:
-    """Engine on the Ray cluster that RAY_ADDRESS names, or else the one that this machine belongs to.
+    """Runs programs on the Ray cluster at RAY_ADDRESS, or by default on the one this machine belongs to.
 
-    Without a cluster, or if RAY_ADDRESS is "local", it starts one that only this machine reaches, and ends
-    it again. By default it submits two shards per core.
+    Without a cluster, or if RAY_ADDRESS is "local", it starts a cluster that only this machine can reach,
+    and stops it at the end. By default it submits two shards per core.
 
-    Raises UserError if Ray is not installed, or no cluster answers at the address.
+    Raises UserError if Ray is not installed or no cluster answers at the address.
     """
 
     def __init__(self, workers: int | None = None, **isolation: bool) -> None:
         self._workers, self._isolation = workers, isolation
         self._warned = False
         self._address = os.environ.get("RAY_ADDRESS") or "auto"
-        current = Path(os.environ.get("RAY_TMPDIR", "/tmp"), "ray", "ray_current_cluster")  # noqa: S108 - Ray's own
+        current = Path(os.environ.get("RAY_TMPDIR", "/tmp"), "ray", "ray_current_cluster")  # noqa: S108 - the path that Ray uses
         starts = self._address == "local" or (self._address == "auto" and not current.exists())
         if starts:
             os.environ.setdefault("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")  # listen on loopback only
@@ -64,7 +64,7 @@ class RayCluster:
     ) -> Iterator[WorkResult]:
         """See `Engine`.
 
-        It never cancels shards: Ray 2.60 can abort this process if a cancelled shard has just ended.
+        Shards are never cancelled: Ray 2.60 can abort this process if a cancelled shard has just ended.
         """
         remote = self._ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=False)(run_shard)
         functions = self._ray.put((function, then))
@@ -98,21 +98,21 @@ class RayCluster:
     def _wait_for_some(self, shards: Iterable[Any]) -> Iterator[tuple[Any, list[Any]]]:
         ended, _ = self._ray.wait(list(shards), timeout=RAY_POLL_SECONDS)
         if not ended and not self._cores():
-            raise EngineError("the Ray cluster has no free core; start another node and try again")
+            raise EngineError("the Ray cluster has no free core; add a node and try again")
         for shard in ended:
             try:
                 values, warning = self._ray.get(shard)
             except self._ray.exceptions.RayTaskError as error:
                 raise error.cause from None
             except self._ray.exceptions.RayError as error:
-                raise EngineError(f"Ray lost a shard for good: {str(error).splitlines()[0]}") from None
+                raise EngineError(f"Ray gave up on a shard: {str(error).splitlines()[0]}") from None
             if warning and not self._warned:
                 _log.warning(warning)
                 self._warned = True
             yield shard, values
 
     def _expect_listener(self) -> None:
-        # Ray itself would try for half a minute.
+        # Without this check, Ray would try to connect for half a minute.
         host, _, port = self._address.rpartition(":")
         try:
             socket.create_connection((host.strip("[]"), int(port)), RAY_CONNECT_SECONDS).close()
@@ -129,10 +129,10 @@ class RayCluster:
 def run_shard(
     functions: tuple[RunPrograms[RawResult], Callable[[RawResult], WorkResult]],
     works: Sequence[Work],
-    versions: str,  # other versions might judge otherwise
+    versions: str,  # a machine with other versions might judge differently
     isolation: Mapping[str, bool],
 ) -> tuple[list[WorkResult], str | None]:
-    """Run programs in a process of Ray's; return results, and a warning if they were not fully isolated."""
+    """Run programs in a Ray process; return results, and a warning or None if isolation was complete."""
     machine = platform.node()
     if versions != VERSIONS:
         raise EngineError(f"{machine} has {VERSIONS}, not {versions}")
@@ -145,11 +145,9 @@ def run_shard(
     return values, None if worker.has_seccomp else f"{machine}: {NO_SECCOMP}"
 
 
-def _import_ray() -> Any:  # noqa: ANN401 - the extra has no types
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # else it calls home
-    os.environ.setdefault(
-        "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0"
-    )  # suppress its warning about accelerators
+def _import_ray() -> Any:  # noqa: ANN401 - optional, so its types may be missing
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # otherwise Ray sends usage statistics
+    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # suppress a warning about accelerators
     with installed():
-        import ray  # noqa: PLC0415 - an extra, which starts slowly
+        import ray  # noqa: PLC0415 - an optional dependency that is slow to import
     return ray

@@ -1,4 +1,4 @@
-"""Remarks on a run in a world: steps it repeated until a limit, and questions that got wrong answers."""
+"""Remarks on runs that repeated steps until a limit, or whose questions got the wrong answers."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from codebotler.rtl.regex_words import choices, one_of
 from codebotler.rtl.wording import elide_list, quoted, room_name
 from codebotler.simulator.settings import SimulationSettings, choose, finds
 
-MIN_REPETITIONS = 3  # of a cycle
+MIN_REPETITIONS = 3  # fewer repetitions are not called a cycle
 MAX_CYCLE_STEPS = 100
 
 
 def remarks_on(
     verdict: Mapping[str, Any], trace: Trace, world: World | None, settings: SimulationSettings | None
 ) -> list[str]:
-    """Return sentences that explain a run in addition to its failed checks."""
+    """Return sentences that help to explain a run, in addition to its failed checks."""
     remarks = []
     if verdict["status"] == Status.TIMEOUT and (cycle := cycle_at_end(trace)) is not None:
         more = " times: " if verdict.get("cut") is None else " times or more: "
@@ -31,27 +31,24 @@ def remarks_on(
     return remarks
 
 
-# --- cycles
-
-
 @dataclass(frozen=True)
 class Cycle:
-    """Repeated steps at the end of a trace."""
+    """A sequence of steps that is repeated at the end of a trace."""
 
     first: int  # the number of the first step, from 1
-    steps: Trace  # of one repetition
+    steps: Trace  # the steps of one repetition
     times: int
 
     @property
     def sentence(self) -> str:
-        """The repeated steps, the first of them, and how often they were repeated."""
+        """Return a sentence about the repeated steps, where they begin, and how often they were repeated."""
         those = "" if len(self.steps) == 1 else f"{counted(len(self.steps), 'step')} "
         deeds = ", ".join(elide_list([*(phrase(step, "base") for step in self.steps)]))
         return f"From step {self.first} on, it repeated {those}{self.times:,} times: {deeds}."
 
 
 def cycle_at_end(trace: Trace) -> Cycle | None:
-    """Return the cycle that covers most of a trace's end, the shortest of equal ones; None without any."""
+    """Return the cycle that covers most of a trace's end, or None; among equals, return the shortest."""
     numbers: dict[Event, int] = {}
     each = [numbers.setdefault(event, len(numbers)) for event in trace]
     most, found = 0, None
@@ -65,16 +62,13 @@ def cycle_at_end(trace: Trace) -> Cycle | None:
     return found
 
 
-# --- answers in a fixed order
-
-
 def misplaced_questions(trace: Trace, world: World, settings: SimulationSettings) -> Iterator[str]:
-    """Yield a sentence for each room where a question got the answer to another question."""
+    """Yield a sentence for each room where a question got an answer meant for another question."""
     for room in world.rooms:
         match room.people:
             case [Person(answers=[_, _, *_], after_looks=0) as person]:
                 pass
-            case _:  # rows do not say which of several people was asked
+            case _:  # rows do not record which of several people was asked
                 continue
         asked = [
             e for e in trace if e.options and e.place == room.name and not _has_topic(e, person, settings)
@@ -103,7 +97,7 @@ def _misplaced(room: str, person: Person, number: int, question: Event) -> str:
     own = _answer(person.answers[min(number, len(person.answers) - 1)])
     return (
         f"In {room_name(room)}, questions are answered in a fixed order: {listed(elide_list(given))}; "
-        f"the {_ordinal(number + 1)} was {quoted(question.text)}, none of whose options fits {own}."
+        f"the {_ordinal(number + 1)} was {quoted(question.text)}, and none of its options fits {own}."
     )
 
 

@@ -1,4 +1,4 @@
-"""The requests of a run: its completions, its run.json, and the log of pending requests."""
+"""Plans the requests of a run, describes them in run.json, and logs pending requests."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ from roboeval.evaluation.runs.folder import RunFolder, load_json_object
 from roboeval.suites.load import Suite
 
 if TYPE_CHECKING:
-    from codebotler.models.batch import BatchModel  # which imports large libraries
+    from codebotler.models.batch import BatchModel  # importing it at run time would load large libraries
 
 WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change a model's replies
-OPTIONAL_SETTINGS = ("reasoning_effort", "extra_body")  # run.json leaves them out if unset
+OPTIONAL_SETTINGS = ("reasoning_effort", "extra_body")  # left out of run.json if unset
 
 
 @dataclass(frozen=True)
 class GenerationPlan:
-    """The completions that a run should have: a number for each prompt of some tasks, by default of all."""
+    """The completions that a run should have: a fixed number for each prompt of the selected tasks."""
 
     suite: Suite
     tasks: frozenset[str] | None = None
     num_completions: int = 50
 
     def keys(self) -> list[CompletionKey]:
-        """Return the keys: the first completion of each prompt, then the second; a part covers all tasks."""
+        """Return all keys: first the first completion of every prompt, then the second one, and so on."""
         tasks = [task for name, task in self.suite.tasks.items() if self.tasks is None or name in self.tasks]
         prompts = [(task.name, prompt) for task in tasks for prompt in range(len(task.prompts))]
         return [(*prompt, index) for index in range(self.num_completions) for prompt in prompts]
@@ -61,17 +61,19 @@ class GenerationPlan:
         return ()
 
     def mark(self) -> Mapping[str, int]:
-        """Return the entries to add to each row of completions.jsonl."""
+        """Return extra entries to add to each row of completions.jsonl."""
         return {}
 
     def completed(self, run: RunFolder) -> Iterator[Completion]:
-        """Read the completions of a run; raise UserError if one has another instruction than the suite."""
+        """Read the completions of a run; raise UserError if an instruction differs from the suite's."""
         if not run.completions.is_file() or not run.completions.stat().st_size:
             return
         for completion in read_completions(run.completions, self.suite):
             if completion.instruction != self.instruction(completion.key):
-                which = f"{name_of(completion.key)} was generated from another instruction"
-                raise UserError(f"{which} than the suite has now; name another folder", file=run.completions)
+                which = f"{name_of(completion.key)} was generated from a different instruction"
+                raise UserError(
+                    f"{which} than the suite's current one; name another folder", file=run.completions
+                )
             yield completion
 
 
@@ -81,16 +83,13 @@ def no_usage() -> Counter[str]:
 
 
 def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> None:
-    """Add the token counts of a row; they are null if the model does not count tokens."""
+    """Add the token counts of a row to the total; models that do not count tokens record null."""
     for name in total:
         total[name] += (usage or {}).get(name) or 0
 
 
-# --- run.json
-
-
 def run_metadata(run: RunFolder, plan: GenerationPlan, model: Model | BatchModel) -> dict[str, Any]:
-    """Return the content of run.json; raise UserError if the run's completions were generated otherwise."""
+    """Return the content of run.json; raise UserError if existing completions were generated differently."""
     suite = plan.suite
     fixed = {
         "model": model.name,
@@ -108,7 +107,7 @@ def run_metadata(run: RunFolder, plan: GenerationPlan, model: Model | BatchModel
             raise UserError("holds imported completions; name another folder", file=run.path)
         _expect_same(earlier, fixed, run.about)
     elif run.completions.exists() and run.completions.stat().st_size:
-        why = "is missing, so that the settings of the completions are unknown"
+        why = "is missing, so the settings of the completions are unknown"
         raise UserError(f"{why}; name another folder", file=run.about)
     return {
         **fixed,
@@ -130,7 +129,7 @@ def _recorded(settings: SamplingSettings) -> dict[str, Any]:
 def with_batch(
     earlier: list[dict[str, Any]], plan: GenerationPlan, settings: SamplingSettings
 ) -> list[dict[str, Any]]:
-    """Add the batch of a plan, unless the last batch is the same one and was interrupted."""
+    """Append the batch of a plan, unless the last batch is the same one, interrupted."""
     batch = {
         "tasks": None if plan.tasks is None else sorted(plan.tasks),
         "num_completions": plan.num_completions,
@@ -146,13 +145,13 @@ def with_batch(
 
 
 def batches(metadata: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the request batches of a run.json, in order."""
+    """Return the request batches recorded in run.json, in order."""
     found = metadata.get("batches")
     return [dict(one) for one in found if isinstance(one, dict)] if isinstance(found, list) else []
 
 
 def requested_tasks(metadata: Mapping[str, Any]) -> frozenset[str] | None:
-    """Return the tasks whose completions were requested, by a run.json; None for all."""
+    """Return the tasks that run.json says were requested, or None for all."""
     requested: set[str] = set()
     for batch in batches(metadata):
         if not isinstance(batch.get("tasks"), list):
@@ -166,7 +165,7 @@ def _expect_same(earlier: dict[str, Any], fixed: dict[str, Any], file: Path) -> 
     for name, value in now.items():
         if before.get(name) != value:
             what = "prompt template" if name == "template" else name.replace("_", "-")
-            which = f"another {what} ({_brief(before.get(name))}, now {_brief(value)})"
+            which = f"a different {what} ({_brief(before.get(name))}, now {_brief(value)})"
             sentence = f"the completions were generated with {which}; name another folder to start over"
             raise UserError(sentence, file=file)
 
@@ -180,38 +179,37 @@ def timestamp() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-# --- pending requests
-
-
 class RequestLog:
-    """Log of each request before it is sent, and of each failure.
+    """Logs each request before it is sent, and each failure.
 
-    A request without failure and completion was pending when the run was interrupted, and may be paid twice.
-    The first line counts such requests of earlier interruptions, so that none is counted twice. The file is
-    deleted when a run ends normally.
+    A request with neither a failure nor a completion was pending when the run was interrupted, and may be
+    billed twice. The first line counts the requests lost in earlier interruptions, so that each is counted
+    once. The file is deleted when a run ends normally.
     """
 
-    def __init__(self, path: Path, done: set[CompletionKey], lost: int) -> None:  # `lost` is from run.json
+    def __init__(
+        self, path: Path, done: set[CompletionKey], lost: int
+    ) -> None:  # `lost`: the count in run.json
         self.path = path
         lost_before, pending = self._read()
-        self.interrupted = len(pending - done)  # at the last interruption
+        self.interrupted = len(pending - done)  # requests pending at the last interruption
         self.lost = max(lost, lost_before + self.interrupted)
         self.under_way: set[CompletionKey] = set()
 
     def __enter__(self) -> Self:
-        """Start a new file, since run.json now counts the lost requests."""
+        """Start a new file, because run.json now counts the requests lost earlier."""
         write_whole(self.path, to_line({"lost": self.lost}))
         self._file = Appender(self.path)
         return self
 
     def __exit__(self, kind: object, *_: object) -> None:
-        with contextlib.suppress(OSError):  # a full disk was reported before
+        with contextlib.suppress(OSError):  # a full disk has already been reported
             self._file.close()
         if kind is None and not self.under_way:
             self.path.unlink()
 
     def sent(self, key: CompletionKey) -> None:
-        """Log a request before it is sent; on a full disk, the OSError prevents the request."""
+        """Log a request before it is sent; if the disk is full, the OSError prevents the request."""
         self._file.append(to_line({"sent": key}))
         self.under_way.add(key)
 
@@ -222,11 +220,10 @@ class RequestLog:
             self._file.append(to_line({"failed": key}))
 
     def kept(self, key: CompletionKey) -> None:
-        """Forget a request whose completion is in its file."""
+        """Forget a request whose completion has been saved."""
         self.under_way.remove(key)
 
     def _read(self) -> tuple[int, set[CompletionKey]]:
-        """Return how many requests were lost before the file was started, and which are pending in it."""
         lost = 0
         pending: set[CompletionKey] = set()
         for number, row in read_rows(self.path, growing=True) if self.path.exists() else ():

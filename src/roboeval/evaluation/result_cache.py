@@ -1,4 +1,4 @@
-"""A cache of judgements on runs."""
+"""Caches results computed from runs, such as judgements."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from codebotler.core.trace import Outcome
 CachedResult = TypeVar("CachedResult")
 
 
-MAX_RESULTS, MAX_RESULT_EVENTS = 2_048, 128  # results, and events of all runs of one
+MAX_RESULTS, MAX_RESULT_EVENTS = 2_048, 128  # entries, and total events in the runs of an entry
 
 
 class ResultCache(Generic[CachedResult]):
-    """Cache of results for runs: many programs do the same in a world, and in similar worlds."""
+    """Caches results by runs, because many programs behave identically in a world or in similar worlds."""
 
     def __init__(self) -> None:
-        # Keys hold ids, so an entry keeps these objects alive: no other object may get their ids.
+        # Keys contain object ids, which must not be reused, so entries keep the objects alive.
         self._known: dict[tuple[object, ...], tuple[CachedResult, object]] = {}
 
     def of(
@@ -27,8 +27,8 @@ class ResultCache(Generic[CachedResult]):
         runs: Iterable[Outcome],
         compute: Callable[[], CachedResult],
     ) -> CachedResult:
-        """Return the result for runs, computed if the key is new; the entry keeps an object alive."""
-        known = self._known.get(key)  # another thread may clear it at any moment
+        """Return the cached result for the runs, or compute it; the entry keeps `keep_alive` alive."""
+        known = self._known.get(key)  # another thread may clear the cache at any moment
         if known is not None:
             return known[0]
         value = compute()

@@ -1,4 +1,4 @@
-"""Rewards for training: the part of a task that a program does, from 0 to 1."""
+"""Computes rewards for training, from 0 to 1: how much of a task a program does."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from roboeval.evaluation.runs.completions import find_key_fault
 from roboeval.suites.load import Scenario, Suite, load_suite
 
 Judged = TypeVar("Judged")
-ERROR_FACTOR = 0.5  # of a run that ends in an error: returning early would have been better
+ERROR_FACTOR = 0.5  # factor for a run that ends in an error: returning early would have been better
 
-MAX_CACHED_REWARDS = 100_000  # a policy often writes the same program again
+MAX_CACHED_REWARDS = 100_000  # a policy often repeats a program
 
 
 def reward(
@@ -37,27 +37,27 @@ def reward(
     seed: int | None = None,
     suite: Suite | str | PathLike[str] = "paper",
 ) -> list[float]:
-    """Compute the reward of each program: 1 exactly if it passes, 0 if it does nothing.
+    """Compute the reward of each program: 1 if and only if it passes, 0 if it does nothing.
 
-    In each world, the share of satisfied requirements counts, without those that hold before the robot has
-    moved (such as "never say it in the lobby"); the share of these that still hold at the end is a factor.
-    A run that ends in an error counts half. The reward is the mean over the worlds and depends only on the
-    arguments.
+    In each world, the reward is the share of requirements that the program satisfies, not counting those
+    that hold before the robot moves (such as "never say it in the lobby"). It is multiplied by the share of
+    the latter that still hold at the end, and halved if the run ends in an error. The result is the mean
+    over all worlds; it depends only on the arguments.
 
-    Worker processes stay until this process ends. Many threads may call this, and also forked processes,
-    which start their own workers.
+    Worker processes live until this process ends. Calls from many threads are safe; forked processes start
+    their own workers.
 
     Args:
         task: the name of the task.
-        prompt: the phrasing for which the programs were written, counted from 0.
-        programs: their sources, which need not parse; equal ones are judged once.
-        worlds: how many worlds to draw, 1 to 10,000, if the suite draws worlds.
-        seed: the seed of the drawn worlds.
-        suite: a suite, or its name or folder.
+        prompt: the number of the phrasing that the programs were written for, from 0.
+        programs: source texts, which need not parse; equal programs are judged once.
+        worlds: the number of worlds, 1 to 10,000, if the suite samples worlds.
+        seed: the random seed for sampling worlds.
+        suite: a suite, or the name or folder of a suite.
 
     Raises:
-        UserError: there is no such suite, task or prompt, its worlds are written by hand or too many, or
-            a program is not a string.
+        UserError: the suite, task or prompt does not exist, its worlds are not sampled or are too many,
+            or a program is not a string.
         EngineError: no isolated process could be started.
     """
     expect_list(programs, "the programs")
@@ -71,14 +71,14 @@ def reward(
 
 @dataclass(frozen=True)
 class Share:
-    """The share of satisfied requirements in one world."""
+    """The share of requirements that a run satisfies in one world."""
 
-    gained: float | None  # of those that did not hold at the start; None without any
-    kept: float  # of the others, halved by an error
+    gained: float | None  # satisfied share of the requirements not met at the start, or None
+    kept: float  # share of the other requirements still met, halved by an error
 
     @classmethod
     def of(cls, outcome: Outcome, scenario: Scenario, at_start: Sequence[bool]) -> Share:
-        """Compute the share of a run, given which requirements held at the start."""
+        """Compute the share for a run, given which requirements held at the start."""
         gained: list[bool] = []
         kept: list[bool] = []
         for is_now, was_met in zip(are_met(outcome, scenario), at_start, strict=True):
@@ -87,9 +87,9 @@ class Share:
         return cls(fmean(gained) if gained else None, whole * (fmean(kept) if kept else 1.0))
 
 
-@lru_cache(maxsize=160)  # prompts of a suite, twice
+@lru_cache(maxsize=160)  # twice the number of prompts in a suite
 def first_equal_prompt(suite: Suite, task: str, prompt: int) -> int:
-    """Return the first prompt with the same requirements."""
+    """Return the number of the first prompt with the same requirements."""
     scenarios = suite.tasks[task].scenarios
     asked = [[scenario.asked_by(number) for scenario in scenarios] for number in range(prompt + 1)]
     return asked.index(asked[prompt])
@@ -105,7 +105,7 @@ def requirements_of(suite: Suite, task: str, prompt: int) -> list[tuple[Scenario
 def total(shares: Sequence[Share]) -> float:
     """Compute the reward over all worlds of a task.
 
-    A world with nothing to gain counts as much as the mean of the others; if no world has anything to gain,
+    A world with nothing to gain counts like the mean of the others; if no world has anything to gain,
     doing nothing is right.
     """
     earned = [share.gained * share.kept for share in shares if share.gained is not None]
@@ -114,7 +114,7 @@ def total(shares: Sequence[Share]) -> float:
 
 
 class RewardCache(Generic[Judged]):
-    """A cache of the latest results, by name, so that equal programs are judged once."""
+    """Caches the most recently used results by name, so that equal programs are judged once."""
 
     def __init__(self) -> None:
         self._known: OrderedDict[bytes, Judged] = OrderedDict()
@@ -123,7 +123,7 @@ class RewardCache(Generic[Judged]):
         os.register_at_fork(before=self._lock.acquire, after_in_parent=release, after_in_child=release)
 
     def among(self, names: Iterable[bytes]) -> dict[bytes, Judged]:
-        """Return the known results of these names."""
+        """Return the cached results for these names."""
         with self._lock:
             return {name: self._known[name] for name in names if name in self._known}
 
@@ -138,13 +138,13 @@ class RewardCache(Generic[Judged]):
 
 
 class Rewards:
-    """The rewards of programs, cached so that each is judged once."""
+    """Computes rewards of programs, with a cache so that each program is judged once."""
 
     def __init__(self) -> None:
         self._known: RewardCache[float] = RewardCache()
 
     def of(self, suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
-        """Compute the rewards of programs, in their order."""
+        """Return the reward of each program, in input order."""
         names = [digest(suite.digest, task, str(prompt), program) for program in programs]
         rewards = self._known.among(names)
         new = {name: program for name, program in zip(names, programs, strict=True) if name not in rewards}
@@ -157,7 +157,7 @@ class Rewards:
             )
             found = chain.from_iterable(future.result() for future in futures)
             rewards.update(zip(new, found, strict=True))
-        finally:  # after an interrupt, the rest is not needed
+        finally:  # after an interrupt, cancel the rest
             for future in futures:
                 future.cancel()
         self._known.add(rewards)
@@ -165,13 +165,13 @@ class Rewards:
 
 
 def split_programs(programs: Sequence[str], workers: int) -> list[Sequence[str]]:
-    """Split programs into batches, enough for all workers."""
+    """Split programs into enough batches to keep all workers busy."""
     size = max(1, min(MAX_BATCH_KEYS, -(-len(programs) // (CALLS_PER_THREAD * workers))))
     return [programs[start : start + size] for start in range(0, len(programs), size)]
 
 
 def judge_programs(suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
-    """Compute the rewards of programs, in a thread that has a worker."""
+    """Compute the rewards of programs; call this in a thread with a worker."""
     asked = requirements_of(suite, task, prompt)
     robots = [partial(robot_in, scenario.world, suite) for scenario, _ in asked]
     ran = shared_pool().here().run_all([(program, robots) for program in programs])

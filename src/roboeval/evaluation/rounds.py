@@ -1,6 +1,7 @@
-"""Further rounds of a run, which request or repair rejected programs again (paper, section VI).
+"""Plans further rounds of a run, which regenerate or repair rejected programs (paper, section VI).
 
-Each round is a run in its own folder: it copies the programs that the check accepts and requests the others.
+Each round is a run in its own folder: it copies the programs that the check accepts and requests new versions
+of the others.
 """
 
 from __future__ import annotations
@@ -13,19 +14,19 @@ from roboeval.evaluation.requests import GenerationPlan
 from roboeval.evaluation.runs.completions import Completion, CompletionKey
 from roboeval.evaluation.runs.folder import RunFolder
 
-ROUND = "round"  # entry of rows: the round of the program; missing in the first round
-SAMPLE_STRIDE = 1_000_000  # between the sample numbers of two rounds, so that all seeds differ
+ROUND = "round"  # the entry in rows with a program's round; missing in the first round
+SAMPLE_STRIDE = 1_000_000  # offset of sample numbers between rounds, so that all seeds differ
 
 
 @dataclass(frozen=True, kw_only=True)
 class RoundPlan(GenerationPlan):
-    """The completions of a round after the first.
+    """Plans the completions of a round after the first.
 
     Args:
-        number: the round, at least 1; round 0 wrote the first programs.
+        number: the round, from 1; round 0 wrote the first programs.
         repairs: whether the model sees the rejected program and its problems.
         earlier: the completions of the previous round.
-        problems: the problems of each rejected program, by its key.
+        problems: the problems of each rejected program, by completion key.
     """
 
     number: int
@@ -34,24 +35,24 @@ class RoundPlan(GenerationPlan):
     problems: Mapping[CompletionKey, Sequence[str]] = field(repr=False)
 
     def prompt(self, key: CompletionKey) -> Prompt:
-        """Return the prompt for a completion, which includes the program to repair if there is one."""
+        """Return the prompt for a completion; when repairing, it includes the rejected program."""
         first, program = super().prompt(key), self.earlier[key].program
         return first.after(program, self.problems[key]) if self.repairs and program.strip() else first
 
     def sample(self, key: CompletionKey) -> int:
-        """Return the number of the sample, which determines its seed."""
+        """Return the number of the sample, which determines its random seed."""
         return key[2] + self.number * SAMPLE_STRIDE
 
     def given(self) -> Iterator[Completion]:
-        """Return the completions that the check accepted."""
+        """Return the completions of the previous round that the check accepted."""
         return (one for key, one in self.earlier.items() if key not in self.problems)
 
     def mark(self) -> Mapping[str, int]:
-        """Return the entry that marks rows of this round."""
+        """Return the entry that marks the rows of this round."""
         return {ROUND: self.number}
 
     def folder(self, run: RunFolder) -> RunFolder:
-        """Return the run of this round, a folder within the first run."""
+        """Return the run of this round, a subfolder of the first run."""
         return RunFolder(run.path / f"{'repair' if self.repairs else 'retry'}-{self.number}")
 
 

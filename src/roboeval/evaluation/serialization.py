@@ -1,4 +1,4 @@
-"""Serialization of verdicts as the JSON of rows, whose size is limited."""
+"""Serializes verdicts as JSON for rows, whose size is limited."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from roboeval.evaluation.failures import NO_PROGRAM_CLASS, Verdict, failure_of_v
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, first_events
 
-ROW_BYTES = 1_000_000  # of a row, unless it has very many worlds
-WORLD_BYTES = 20_000  # of each world in that case
-ROW_HEADER_BYTES = 2_000  # for the key and the hash
-SEPARATOR_BYTES = 2  # between two events
+ROW_BYTES = 1_000_000  # limit for a row, unless it has very many worlds
+WORLD_BYTES = 20_000  # limit per world in that case
+ROW_HEADER_BYTES = 2_000  # space for the key and the hash
+SEPARATOR_BYTES = 2  # the separator between two events
 HASH_PLACEHOLDER = "0" * 64
 
-FAILED_PREFIX = b'{"passed": false, '  # as `judgement` writes it
+FAILED_PREFIX = b'{"passed": false, '  # how `judgement` starts a failed judgement
 
 
 def add_reply_fault(completion: Completion, judgement_json: bytes) -> bytes:
-    """Replace the failure in a judgement, given as JSON, if the reply held no program.
+    """If the reply contained no program, make that the failure in a judgement, which is given as JSON.
 
-    Text that is no program ends in an error, and half a program fails a check, but neither is the cause.
+    Running such a reply ends in an error or a failed check, but that is not why the completion fails.
     """
     if not judgement_json.startswith(FAILED_PREFIX) or (kind := completion.no_program) is None:
         return judgement_json
@@ -36,7 +36,7 @@ def add_reply_fault(completion: Completion, judgement_json: bytes) -> bytes:
 
 
 def row_line(completion: Completion, judgement_json: bytes) -> bytes:
-    """Return the row of a completion, whose judgement is given as JSON, as a line."""
+    """Return the row of a completion as a line, given its judgement as JSON."""
     identity = {
         "task": completion.task,
         "prompt": completion.prompt,
@@ -73,7 +73,7 @@ def judgement(verdicts: list[Verdict]) -> bytes:
 
 
 def verdict_data(verdict: Verdict) -> dict[str, Any]:
-    """Return a verdict as data of a row."""
+    """Convert a verdict to an entry of a row."""
     outcome = outcome_data(verdict.outcome)
     return {
         "world": verdict.world,
@@ -85,11 +85,8 @@ def verdict_data(verdict: Verdict) -> dict[str, Any]:
     }
 
 
-# --- the size of rows
-
-
 def limit_size(judgement: Mapping[str, Any]) -> bytes:
-    """Return a judgement as JSON that fits into a row; traces are cut to an equal share for each world."""
+    """Return a judgement as JSON that fits into a row; each world's trace is cut to an equal share."""
     whole = _json(judgement)
     verdicts = judgement["verdicts"]
     most = max(ROW_BYTES, WORLD_BYTES * len(verdicts)) - ROW_HEADER_BYTES

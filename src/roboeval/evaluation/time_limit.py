@@ -1,4 +1,4 @@
-"""A limit on the processor time of a block of code."""
+"""Limits the processor time of a block of code."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import time
 from collections.abc import Iterator
 from types import FrameType
 
-CLOCK_CHECKS = 100  # within a limit; each also lets other threads run
+CLOCK_CHECKS = 100  # clock checks per limit; each also lets other threads run
 
 
 class TimeLimitExceeded(Exception):  # noqa: N818 - a signal, not an error
-    """The limit was reached."""
+    """Raised in the block when the limit is reached."""
 
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Limit the processor time of the block, in seconds of this thread, if it is the main one."""
-    if threading.current_thread() is not threading.main_thread():  # signals reach the main thread only
+    """Limit the seconds of processor time that this thread spends in the block; only in the main thread."""
+    if threading.current_thread() is not threading.main_thread():  # only the main thread receives signals
         yield
         return
     end = time.thread_time() + seconds
@@ -27,7 +27,7 @@ def time_limit(seconds: float) -> Iterator[None]:
     def check_clock(_signal: int, _frame: FrameType | None) -> None:
         if time.thread_time() > end:
             raise TimeLimitExceeded
-        time.sleep(0)  # a regex search would let no other thread run
+        time.sleep(0)  # a regex search would not let other threads run
 
     before = signal.signal(signal.SIGVTALRM, check_clock)
     try:
@@ -36,7 +36,7 @@ def time_limit(seconds: float) -> Iterator[None]:
             yield
         finally:
             signal.signal(signal.SIGVTALRM, signal.SIG_IGN)
-    finally:  # even if the limit is reached just after the work is done
+    finally:  # even if the limit is reached just as the work ends
         signal.signal(signal.SIGVTALRM, signal.SIG_IGN)
         signal.setitimer(signal.ITIMER_VIRTUAL, 0)
         signal.signal(signal.SIGVTALRM, before)

@@ -1,4 +1,4 @@
-"""Rooms, things and people that a requirement names and its world lacks."""
+"""Finds rooms, things and people that a requirement names but its world lacks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WORDS_FOR_ANYBODY = ("person", "people", "human", "anybody", "anyone", "somebody
 
 
 def absent_names(requirement: Requirement, scenario: Scenario, task: Task) -> Iterator[tuple[str, str]]:
-    """Yield the category and name of everything that a requirement names and its world lacks."""
+    """Yield the category and name of everything that a requirement names but its world lacks."""
     for category, name, known in _names(requirement, scenario.world.rooms, task):
         if not may_mean(name, known):
             yield category, name
@@ -28,7 +28,7 @@ def absent_names(requirement: Requirement, scenario: Scenario, task: Task) -> It
 def _names(
     requirement: Requirement, rooms: Sequence[Room], task: Task
 ) -> Iterator[tuple[str, str, Sequence[str]]]:
-    """Yield the category and name of everything that a requirement names, and all known names of it."""
+    """Yield the category and name of everything that a requirement names, and the category's known names."""
     objects = [label for room in rooms for label in room.objects]
     people = [person.name for room in rooms for person in room.people]
     known_names = {
@@ -57,9 +57,6 @@ def _names(
             yield "person", argument, people
 
 
-# --- people
-
-
 def _mentioned(element: EventPattern, task: Task) -> Iterator[str]:
     texts = (text for text in (element.text, element.options) if text is not None)
     found = " | ".join(pattern for text in texts for pattern in patterns(text)).lower()
@@ -70,7 +67,7 @@ def _mentioned(element: EventPattern, task: Task) -> Iterator[str]:
 
 
 def _people(task: Task) -> set[str]:
-    """The lower-case names of people in all worlds of a task, and of owners of offices and labs."""
+    """Return the lower-case names of people in a task's worlds, and of the owners of offices and labs."""
     scenarios = (*task.scenarios, *(task.ablation or ()))
     rooms = [room for scenario in scenarios for room in scenario.world.rooms]
     names = [*(person.name for room in rooms for person in room.people), *_owners(rooms)]
@@ -96,7 +93,7 @@ _CHOICE = re.compile(r"(?<!\\)\((?:\?:)?([\w' ]+(?:\|[\w' ]+)+)\)(?![?*+{])")
 
 
 def _alternatives(pattern: str) -> Iterator[str]:
-    """Expand the alternatives of a regex; yield it unchanged if it has none, or has backreferences."""
+    """Yield the alternatives of a regex; yield a regex with backreferences or no alternatives unchanged."""
     if _BACKREFERENCE.search(pattern):
         yield pattern
         return
@@ -110,7 +107,7 @@ def _alternatives(pattern: str) -> Iterator[str]:
 
 
 def _branches(pattern: str) -> list[str]:
-    """Split a regex at the bars outside of groups and sets."""
+    """Split a regex at the bars outside of groups and character sets."""
     branches, depth = [""], 0
     for piece in _PIECE.findall(pattern):
         depth += (piece == "(") - (piece == ")")

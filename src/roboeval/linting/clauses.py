@@ -1,4 +1,4 @@
-"""The clauses of prompts, each with the checks that cover it or the reason why none does."""
+"""Splits prompts into clauses, each with the checks that cover it or the reason why none does."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from roboeval.suites.load import Task
 
-MIN_CLAUSE_WORDS = 4  # words; a shorter clause is merged with its neighbour in the same sentence
+MIN_CLAUSE_WORDS = 4  # shorter clauses are merged with a neighbour in the same sentence
 _SENTENCE = re.compile(r"(?:[!?]|(?<!\w\.\w)\.)[\"”)]*\s+")  # but not within "e.g. a cup" or "5 p.m. sharp"
 _JOINT = re.compile(r"[,;:]+[\"”]?\s+|\s+(?=(?:and|but)\s)")
 _WORD = re.compile(r"\w+")
@@ -19,24 +19,24 @@ Span = tuple[int, int]
 
 @dataclass(frozen=True)
 class Clause:
-    """A clause of a prompt."""
+    """A clause of a prompt, with the checks that cover it."""
 
-    prompt: int  # from 0
+    prompt: int  # the number of the prompt, from 0
     text: str
-    checks: tuple[str, ...]  # that cover it
-    because: tuple[str, ...]  # reasons in the task file why no check covers it
+    checks: tuple[str, ...]  # the checks that cover the clause
+    because: tuple[str, ...]  # reasons from the task file why no check covers the clause
 
     @property
     def is_covered(self) -> bool:
-        """Whether a check covers it, or the task file gives a reason why none does."""
+        """Whether a check covers the clause, or the task file gives a reason why none does."""
         return bool(self.checks or self.because)
 
 
 def clauses_of(task: Task) -> Iterator[Clause]:
-    """The clauses of all prompts, in order.
+    """Yield the clauses of all prompts, in order.
 
-    A check covers a clause that shares a word with a fact that the task lists for the check, or with the
-    quoted words of one of its requirements. Text that matches `.*` in a fact's regex does not count.
+    A check covers a clause if they share a word: the task lists a fact for the check and the fact's regex
+    matches the word, except by `.*`, or a requirement with the check quotes the word.
     """
     for number, prompt in enumerate(task.prompts):
         text = " ".join(prompt.split())
@@ -67,7 +67,7 @@ def _covering(task: Task, number: int, text: str) -> Iterator[tuple[Span, tuple[
 
 
 def _find(words: str, text: str) -> Iterator[Span]:
-    """The spans that a regex matches, without the parts that match any words."""
+    """Yield the spans that a regex matches, except for parts such as `.*` that match any words."""
     marked = _SKIP.sub(lambda skip: f"(?P<skip{skip.start()}>{skip[0]})", words)
     for match in re.finditer(marked, text, re.IGNORECASE):
         skipped = (match.span(name) for name in match.re.groupindex if name.startswith("skip"))

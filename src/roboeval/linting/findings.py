@@ -1,4 +1,4 @@
-"""Findings of the linter, and their format."""
+"""Defines the findings of the linter, and formats them."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ class Finding:
     """A likely mistake in a task."""
 
     kind: FindingKind
-    subject: str  # identifies the finding, together with its kind
+    subject: str  # identifies the finding among those of its kind
     message: str
     path: Path
     line: int | None
-    accepted: str | None = None  # why it is intended; None if it is open
+    accepted: str | None = None  # why the finding is intended, or None if it is not accepted
 
     @property
     def name(self) -> str:
-        """The name under which a task file accepts it, such as `implied: comes_back`."""
+        """Return the name that a task file accepts the finding by, such as `implied: comes_back`."""
         return f"{self.kind}: {self.subject}"
 
     def rendered(self) -> str:
-        """Format the finding as a line, with its path relative to the current folder."""
+        """Format the finding as a line with a path relative to the current folder."""
         here = Path.cwd()
         path = self.path.relative_to(here) if self.path.is_relative_to(here) else self.path
         what, why = ("warning", "") if self.accepted is None else ("accepted", f": {self.accepted}")
@@ -56,5 +56,5 @@ def render(findings: Iterable[Finding], *, accepted: bool = False) -> str:
     every = [*findings]
     lines = [one.rendered() for one in every if accepted or one.accepted is None]
     if hidden := len(every) - len(lines):
-        lines.append(f"{counted(hidden, 'accepted finding')} not shown; list with --accepted")
+        lines.append(f"{counted(hidden, 'accepted finding')} not shown; use --accepted to list")
     return "\n".join(lines) or "no findings"

@@ -1,4 +1,4 @@
-"""Findings about a whole task: its checks, facts, regexes and solutions."""
+"""Finds likely mistakes in a task as a whole: in its checks, facts, regexes and solutions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from roboeval.suites.task import check_label
 
 
 def task_findings(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """All findings that do not concern a single world."""
+    """Yield all findings that do not concern a single world."""
     yield from (*_unused(task), *_unsaid(task), *_uncovered(task), *_slow(task), *_unworded(task))
     yield from (*_misjudged(task, verdicts), *_untripped(task, verdicts))
 
@@ -46,16 +46,18 @@ def _unused(task: Task) -> Iterator[Finding]:
 
 
 def _unsaid(task: Task) -> Iterator[Finding]:
-    """Facts of the task's own file that a prompt omits, or mentions although they are common sense."""
+    """Yield a finding for each fact that a prompt omits, or mentions although it is common sense."""
     file = YamlFile.read(task.path)
     own = len(file.data.get("facts", ())) if isinstance(file.data, dict) else 0
     for number, fact in enumerate(task.facts[len(task.facts) - own :]):
         for prompt, text in enumerate(task.prompts):
             word = next((word for word in fact.words if re.search(word, text, re.IGNORECASE)), None)
             if word is None and not fact.commonsense:
-                wrong = f'does not mention "{fact.fact}" in any of its words; add it'
+                wrong = f'does not mention "{fact.fact}" by any of its words; add one of these'
             elif word is not None and fact.commonsense:
-                wrong = f'mentions "{fact.fact}" by "{word}", but it is marked as common sense; remove it'
+                wrong = (
+                    f'mentions "{fact.fact}" by "{word}", but it is marked as common sense; remove the words'
+                )
             else:
                 continue
             line = file.line(("facts", number))
@@ -63,7 +65,7 @@ def _unsaid(task: Task) -> Iterator[Finding]:
 
 
 def _uncovered(task: Task) -> Iterator[Finding]:
-    """Facts and clauses that no check covers, for tasks with `covered_by`."""
+    """Yield a finding for each fact or clause that no check covers, for tasks with `covered_by`."""
     if not task.covered_by:
         return
     line = YamlFile.read(task.path).line(("covered_by",))
@@ -93,13 +95,12 @@ def _unworded(task: Task) -> Iterator[Finding]:
             yield Finding("unworded", check.name, message, task.path, check.line)
 
 
-# --- solutions
-
-
 def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    if task.borrows:  # its programs were written for other requirements
+    if task.borrows:  # these programs were written for other requirements
         return
-    for solution, judged in zip(solutions(task), verdicts, strict=False):  # verdicts on an ablation follow
+    for solution, judged in zip(
+        solutions(task), verdicts, strict=False
+    ):  # ignore the verdicts on an ablation, which follow
         failed = _by_some_prompt(judged, len(task.prompts))
         if (None if failed is None else failed["kind"]) == solution.fails:
             continue
@@ -119,7 +120,7 @@ def _why(failed: Failure, judged: Verdicts) -> str:
 
 
 def _by_some_prompt(verdicts: Verdicts, prompts: int) -> Failure | None:
-    """The failure of a program; None if it satisfies at least one prompt."""
+    """Return the failure of a program, or None if the program satisfies at least one prompt."""
     failures = [
         failure_of_verdicts([verdict.on(prompt) for verdict in verdicts]) for prompt in range(prompts)
     ]
@@ -127,10 +128,10 @@ def _by_some_prompt(verdicts: Verdicts, prompts: int) -> Failure | None:
 
 
 def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """Checks, with or without `not`, that no wrong solution fails."""
+    """Yield a finding for each check, with or without `not`, that no wrong solution fails."""
     wrong = [one for one in verdicts if not all(verdict.satisfied for verdict in one)]
     if not wrong:
-        message = f'"{task.name}" has no wrong solution that shows that its checks can fail; add one'
+        message = f'"{task.name}" has no wrong solution to show that its checks can fail; add one'
         yield Finding("untripped", task.name, message, task.path, 1)
         return
     tripped = {_side(requirement) for one in wrong for verdict in one for requirement in verdict.failed}
@@ -140,7 +141,7 @@ def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
     for side, requirement in sides.items():
         if side not in tripped:
             meant = ' without "not"' if f"not {side}" in sides else ""
-            message = f'{no_program} "{side}"{meant}; add one that does'
+            message = f'{no_program} "{side}"{meant}; add a wrong program that does'
             yield Finding("untripped", side, message, task.path, lines[requirement.check])
 
 
@@ -148,11 +149,8 @@ def _side(requirement: Requirement) -> str:
     return f"not {requirement.check}" if requirement.text.strip().startswith("not ") else requirement.check
 
 
-# --- slow regexes
-
-
 class SearchedRegex(NamedTuple):
-    """A regex that the judge searches for."""
+    """A regex that judging searches for."""
 
     pattern: str
     where: str  # the requirement or the world that contains it
@@ -170,7 +168,7 @@ def _slow(task: Task) -> Iterator[Finding]:
 
 
 def searched_regexes(task: Task) -> Iterator[SearchedRegex]:
-    """The regexes in the requirements of a task, and for the labels and answers in its worlds."""
+    """Yield the regexes in a task's requirements, and those that match labels and answers in its worlds."""
     lines = {check.name: check.line for check in task.checks}
     for requirement in {one.text: one for one in _required(task)}.values():
         for element in elements(requirement.formula):

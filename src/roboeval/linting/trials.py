@@ -13,11 +13,11 @@ from roboeval.evaluation.judge import judge, robot_in
 from roboeval.suites.load import Scenario, Suite, Task
 from roboeval.suites.solutions import solutions
 
-Verdicts: TypeAlias = Sequence[Verdict]  # on a program in all worlds of a task, or of its ablation
+Verdicts: TypeAlias = Sequence[Verdict]  # on one program, in all worlds of a task or of its ablation
 
 
 def judge_solutions(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdicts]:
-    """Judge the solutions of a task in its worlds, then in those of its ablation, by all requirements."""
+    """Judge a task's solutions by all requirements, first in its worlds, then in those of its ablation."""
     judges = [worlds for worlds in (task.scenarios, task.ablation) if worlds]
     runs = [(solution.program, worlds) for worlds in judges for solution in solutions(task)]
     with WorkerPool(workers) as pool:

@@ -1,7 +1,7 @@
-"""Findings about the requirements of one world: conflicts, implications and dead regexes.
+"""Finds likely mistakes in the requirements of one world: conflicts, implications and dead regexes.
 
-`unsatisfiable` and `implied` are decided by `codebotler.rtl.reasoning`, first for visits that each
-name one room of the world, then for any visits.
+`codebotler.rtl.reasoning` decides `unsatisfiable` and `implied`, first for visits that each name one room of
+the world, then for any visits.
 """
 
 from __future__ import annotations
@@ -30,31 +30,31 @@ class JudgedWorld:
     """A world of a task, or of its ablation, with its requirements."""
 
     task: Task
-    number: int  # from 1
+    number: int  # the number of the world, from 1
     scenario: Scenario
     ablated: bool
 
     @property
     def name(self) -> str:
-        """The name of the world in messages."""
+        """Return the name of the world for messages."""
         return f"{'the ablation of ' if self.ablated else ''}world {self.number}"
 
     @property
     def require(self) -> tuple[Requirement, ...]:
-        """The requirements of the world."""
+        """Return the requirements of the world."""
         return self.scenario.require
 
     @property
     def line(self) -> int | None:
-        """The line of the world in the task file."""
+        """Return the line of the world in the task file."""
         return YamlFile.read(self.task.path).line(("worlds", self.number - 1))
 
     def finding(self, kind: FindingKind, subject: str, message: str, line: int | None) -> Finding:
-        """Create a finding in the task file."""
+        """Create a finding with the path of the task file."""
         return Finding(kind, subject, message, self.task.path, line)
 
     def findings(self) -> Iterator[Finding]:
-        """All findings about this world alone."""
+        """Yield all findings about this world alone."""
         for requirement in self.require:
             yield from self.dead_regexes(requirement)
             for what, name in absent_names(requirement, self.scenario, self.task):
@@ -62,10 +62,8 @@ class JudgedWorld:
                 yield self.finding("absent", f"{name} in {requirement.text}", message, requirement.line)
         yield from self.logic()
 
-    # --- conflicts and implications
-
     def logic(self) -> Iterator[Finding]:
-        """Find requirements that cannot hold, or follow from others."""
+        """Yield findings about requirements that cannot hold, or that follow from others."""
         rest = [*self.require]
         try:
             while (conflict := self._conflict([r.formula for r in rest])) is not None:
@@ -106,7 +104,7 @@ class JudgedWorld:
         return self.finding("undecided", subject, f"{what} takes too long to decide", line)
 
     def _line_of_fault(self, requirement: Requirement) -> int | None:
-        """The line to fix: that of the check if it has no parameters, since the mistake is in every world."""
+        """Return the line to fix: the check's if it has no parameters, since every world has the mistake."""
         check = self._check(requirement)
         return requirement.line if check.parameters else check.line
 
@@ -116,7 +114,7 @@ class JudgedWorld:
     def _conflict(
         self, formulas: Sequence[Formula], denied: Formula | None = None
     ) -> tuple[list[Formula], str] | None:
-        """Find formulas that conflict or imply the denied one, and the condition for it."""
+        """Return formulas that conflict, or that imply the denied one, and the condition for that."""
         conflict = self._plain_moves.conflict(formulas, denied)
         if conflict is None:
             return None
@@ -138,27 +136,25 @@ class JudgedWorld:
 
     @cached_property
     def _requests(self) -> list[str]:
-        """For each room, a short request that leads there."""
+        """Return a short request for each room that leads there."""
         rooms = self._rooms
         return [next((t for t in samples(r) if resolve_room(rooms, t) == r), r) for r in rooms]
 
-    # --- regexes
-
     def dead_regexes(self, requirement: Requirement) -> Iterator[Finding]:
-        """Find regexes of a requirement that match nothing, and visits that lead nowhere."""
+        """Yield findings about a requirement's regexes that match nothing, and visits that lead nowhere."""
         line = self._check(requirement).line
         for element in dict.fromkeys(elements(requirement.formula)):
             for text in [element.text] if element.options is None else [element.text, element.options]:
                 subject = f"{text} in {requirement.check}"
                 if not can_match(text, outer=text is element.options):
-                    message = f'nothing was found that matches {text} in "{requirement.check}"'
+                    message = f'no text was found that matches {text} in "{requirement.check}"'
                     yield self.finding("dead-regex", subject, message, line)
                 elif element.kind == "goto" and not self._leads_somewhere(text):
                     message = f'no room of {self.name} was found that matches {text} in "{requirement.check}"'
                     yield self.finding("dead-regex", subject, message, line)
 
     def by_prompt(self) -> list[JudgedWorld]:
-        """The world with the requirements of each prompt; equal ones only once."""
+        """Return the world once for each distinct set of requirements that a prompt has."""
         asked = {self.scenario.asked_by(prompt): None for prompt in range(len(self.task.prompts))}
         return [replace(self, scenario=scenario) for scenario in asked]
 
@@ -170,7 +166,7 @@ class JudgedWorld:
 
 
 def judged_worlds(task: Task) -> Iterator[JudgedWorld]:
-    """The worlds of a task, then those of its ablation."""
+    """Yield the worlds of a task, then those of its ablation."""
     for ablated in (False, True):
         for number, scenario in enumerate(task.judged_in(ablated=ablated), 1):
             yield JudgedWorld(task, number, scenario, ablated)

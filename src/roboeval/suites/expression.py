@@ -1,4 +1,4 @@
-"""Expressions in task files: a small subset of Python's, interpreted and never executed."""
+"""Evaluates expressions in task files: a small subset of Python that is interpreted, never executed."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Names = Mapping[str, Any]  # strings, numbers, lists, and namespaces for people 
 
 
 class ExpressionError(ValueError):
-    """The expression is not valid, or refers to an unknown name."""
+    """Raised if an expression is not valid or refers to an unknown name."""
 
 
 def _product(one: object, other: object) -> int:
     if isinstance(one, int) and isinstance(other, int):
         return one * other
-    raise TypeError("only whole numbers are multiplied")
+    raise TypeError("only whole numbers can be multiplied")
 
 
 _OPERATORS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
@@ -54,7 +54,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 
 @cache  # many worlds use the same few expressions
 def parse_cached(text: str) -> ast.expr:
-    """Parse an expression."""
+    """Parse an expression into a syntax tree; raise ExpressionError if the syntax is invalid."""
     try:
         return parse_expression(text.strip())
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -62,7 +62,7 @@ def parse_cached(text: str) -> ast.expr:
 
 
 def evaluate(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - strings, numbers, lists of them
-    """Compute the value of an expression."""
+    """Compute the value of an expression; raise ExpressionError if that is not possible."""
     try:
         return _checked_value(node, names)
     except ExpressionError:
@@ -83,7 +83,7 @@ def _checked_value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - as `e
 
 
 def _size(found: object) -> int:
-    """Count the characters, digits or entries of a value, but only until there are too many."""
+    """Count the characters, digits or entries of a value; stop once the limit is exceeded."""
     if isinstance(found, int):
         return found.bit_length() // 4
     if not isinstance(found, list | tuple):
@@ -102,7 +102,7 @@ def _compute(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR091
             return constant
         case ast.Name(name):
             if name not in names:
-                raise ExpressionError(f'there is no name "{name}"; known are {", ".join(names)}')
+                raise ExpressionError(f'unknown name "{name}"; the known names are {", ".join(names)}')
             return names[name]
         case ast.Attribute(inner, name):
             return _attribute(_checked_value(inner, names), name)
@@ -132,14 +132,14 @@ def _compute(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR091
             return _FUNCTIONS[name](_checked_value(argument, names))
     known = ""
     if isinstance(node, ast.Call):
-        known = f"; the functions are {', '.join(_FUNCTIONS)}, with one argument"
+        known = f"; the only functions are {', '.join(_FUNCTIONS)}, with one argument"
     raise ExpressionError(f'"{ast.unparse(node)}" is not allowed in an expression here{known}')
 
 
 def _attribute(whole: Any, name: str) -> Any:  # noqa: ANN401 - as `evaluate`
     if isinstance(whole, SimpleNamespace) and name in vars(whole):
         return getattr(whole, name)
-    raise ExpressionError(f'".{name}" is not an attribute; people and things have a name and a room')
+    raise ExpressionError(f'".{name}" is not an attribute; people and things have only a name and a room')
 
 
 def iterate_loop(loop: ast.comprehension, names: Names) -> Iterator[Names]:

@@ -1,4 +1,4 @@
-"""House rules of an evaluation: a program that breaks one is stopped and fails."""
+"""Reads house rules for evaluations; a program that breaks a rule is stopped and fails."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from codebotler.simulator.house_rule import Rule
 
 @dataclass(frozen=True)
 class HouseRules:
-    """The house rules of a file."""
+    """The house rules in a file."""
 
-    name: str  # the file's name without its ending, part of an evaluation's name; empty for rules of a suite
-    rules: tuple[Rule, ...]  # the rules in the order of the file
-    digest: str  # the SHA-256 of the file, in hexadecimal
+    name: str  # the file name without its ending, used in evaluation names; empty for a suite's own rules
+    rules: tuple[Rule, ...]  # the rules, in file order
+    digest: str  # the file's SHA-256 in hexadecimal
 
     def __post_init__(self) -> None:
         for rule in self.rules:
             if rule.inside:
                 raise UserError(
-                    f'the rule "{rule.name}" uses "inside", which benchmarks do not support; remove it'
+                    f'the rule "{rule.name}" uses "inside", which evaluations do not support; remove the rule'
                 )
 
     @classmethod
     def read(
         cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (), *, of_suite: bool = False
     ) -> HouseRules:
-        """Read a file of rules, for these rooms if they are known; raises UserError if it is not valid."""
+        """Read a rules file, validated against the given rooms if any; raise UserError if it is invalid."""
         rules = read_rules(path, skills, rooms)
         if not of_suite and not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
             raise UserError(

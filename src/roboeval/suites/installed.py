@@ -1,4 +1,4 @@
-"""Suites of other packages, found by entry points in the group `roboeval.suites`."""
+"""Finds suites in other packages, by entry points in the group `roboeval.suites`."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ class InstalledSuite(NamedTuple):
     """A suite that an installed package declares."""
 
     name: str
-    package: str  # with its version
+    package: str  # the package's name and version
     place: str  # `package` or `package.folder.folder`
 
     def folder(self) -> Path:
-        """Find the folder of its suite.yaml without running code of the package."""
+        """Find the folder that contains the suite.yaml, without running any of the package's code."""
         top, *below = self.place.split(".")
         try:
             spec = find_spec(top)
@@ -36,7 +36,7 @@ class InstalledSuite(NamedTuple):
 
 
 def installed_suites() -> list[InstalledSuite]:
-    """The suites of installed packages, sorted by name; names need not be unique."""
+    """Return the suites of installed packages, sorted by name; several may have the same name."""
     suites = []
     for point in entry_points(group="roboeval.suites"):
         package = "of unknown name" if point.dist is None else f"{point.dist.name} {point.dist.version}"
@@ -45,7 +45,7 @@ def installed_suites() -> list[InstalledSuite]:
 
 
 def installed_folder(name: str) -> Path | None:
-    """Find the folder of a suite in an installed package; None if no package has it.
+    """Find the folder of a suite in an installed package; return None if no package has the suite.
 
     Raises UserError if several packages have it, or if a local folder has the same name.
     """
@@ -55,12 +55,12 @@ def installed_folder(name: str) -> Path | None:
     if len(suites) > 1:
         packages = " and ".join(f"{suite.package} ({suite.place})" for suite in suites)
         raise UserError(
-            f'several packages have a suite "{name}": {packages}; keep only one installed, '
+            f'several packages have a suite "{name}": {packages}; uninstall all but one, '
             "or name a folder with --suite"
         )
     if (Path(name) / "suite.yaml").is_file():
         raise UserError(
-            f'"{name}" is a suite of the package {suites[0].package} and a local folder; '
-            f"write ./{name} for the folder, or change the directory to use the package"
+            f'"{name}" is both a suite in the package {suites[0].package} and a local folder; '
+            f"write ./{name} for the folder, or run the command in another folder to use the package"
         )
     return suites[0].folder()

@@ -1,4 +1,4 @@
-"""Finds a suite by its name: one that ships, that a package brings, in a folder, or made of families."""
+"""Finds a suite by name: built-in, from an installed package, in a folder, or generated from families."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
 
     Args:
         name: a suite that ships with RoboEval or with an installed package, or a folder; or
-            `families-SPLIT-SEED`, such as `families-test-7`: a new task of each family, or N tasks with `-N`
-            at the end.
-        skills: the skills that formulas may use, in addition to those in files of the suite.
+            `families-SPLIT-SEED`, such as `families-test-7`, for a new task from each family; append `-N`
+            for N tasks.
+        skills: the skills that formulas may use, in addition to skills declared in the suite's files.
 
     Raises:
         UserError: the suite does not exist, or one of its files is not valid.
@@ -59,12 +59,14 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     folder = suite_folder(name)
     suite = read_suite(folder, skills)
     if suite.name != name and not (Path(name) / "suite.yaml").is_file():
-        sentence = f'the suite is named "{suite.name}", but its package calls it "{name}"; use one name'
+        sentence = (
+            f'the suite is named "{suite.name}", but its package calls it "{name}"; use the same name in both'
+        )
         raise YamlFile.read(folder / "suite.yaml").wrong(sentence, "name")
     return suite
 
 
 def has_suite(name: str) -> bool:
-    """Whether a suite ships with RoboEval, is installed, or consists of families; folders do not count."""
+    """Whether a suite is built in, installed, or generated from families; folders do not count."""
     known = {*shipped_suites(), *(suite.name for suite in installed_suites())}
     return name in known or family_tasks_named(name) is not None

@@ -1,4 +1,4 @@
-"""Templates for a new task and its suite."""
+"""Creates the files of a new task, and of a new suite if needed."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ _TEMPLATE = Path(__file__).parent / "template"
 
 
 def new_task(folder: Path, name: str) -> Path:
-    """Write the files of a new task, and of a new suite if needed; existing files stay."""
+    """Write the files of a new task, and of a new suite if needed; existing files are not changed."""
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name):
         raise UserError(f'"{name}" is not a task name; join capitalised words, as in WaterPlants')
     if (folder.resolve().parent / "suite.yaml").exists():
-        raise UserError("is inside a suite; name the suite's own folder", file=folder)
+        raise UserError("is a subfolder of a suite; name the folder of the suite", file=folder)
     path = folder / "tasks" / f"{name}.yaml"
     if path.exists():
         raise UserError("already exists; choose another name or edit it", file=path)

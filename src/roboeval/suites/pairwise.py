@@ -1,4 +1,4 @@
-"""Pairwise testing: a small set of combinations that covers every pair of values."""
+"""Generates combinations for pairwise testing: a small set that covers every pair of values."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from itertools import combinations
 from random import Random
 from typing import TypeAlias
 
-Combination: TypeAlias = dict[str, int]  # the index of the value of each factor
+Combination: TypeAlias = dict[str, int]  # for each factor, the index of its value
 Pair: TypeAlias = tuple[int, int]  # the numbers of two values, in ascending order
 
-_TRIES = 12  # candidates for each combination
+_TRIES = 12  # number of candidates tried for each combination
 
 
 def number_values(sizes: Mapping[str, int]) -> dict[str, range]:
-    """Number the values of all factors consecutively; return the numbers of each factor."""
+    """Number the values of all factors consecutively; return the range of numbers for each factor."""
     numbers: dict[str, range] = {}
     start = 0
     for factor in sorted(sizes):
@@ -32,7 +32,7 @@ def sample_combinations(sizes: Mapping[str, int], count: int, random: Random) ->
 
 
 def cover_pairs(sizes: Mapping[str, int], random: Random) -> list[Combination]:
-    """Combinations that contain every pair of values; greedy, so their number is small but not minimal."""
+    """Return few combinations that cover every pair of values; the greedy choice is not always minimal."""
     if len(sizes) == 1:
         return [{factor: value} for factor, size in sizes.items() for value in range(size)]
     numbers = number_values(sizes)
@@ -50,12 +50,12 @@ def cover_pairs(sizes: Mapping[str, int], random: Random) -> list[Combination]:
 
 
 def pairs_in(row: Mapping[str, int]) -> set[Pair]:
-    """The pairs of numbers in a combination."""
+    """Return the pairs of value numbers in a combination."""
     return set(combinations(sorted(row.values()), 2))
 
 
 def partners_of(pairs: Iterable[Pair]) -> Mapping[int, int]:
-    """For each number, the numbers that it forms a pair with, as bits of an integer."""
+    """Map each number to the numbers it forms a pair with, as bits of an integer."""
     partners: dict[int, int] = defaultdict(int)
     for a, b in pairs:
         partners[a] |= 1 << b

@@ -1,4 +1,4 @@
-"""The schema of suite.yaml and of task files."""
+"""Defines the schema of suite.yaml and of task files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from codebotler.core.labels import check_regex
 from codebotler.core.world_file import AnswerFile, Name, NamePattern, PersonFile, WorldFile, YamlText
 from codebotler.simulator.settings import WORDS_FOR_PEOPLE, Limits, SimulationSettings
 
-MAX_WORLDS = 10_000  # per task; a suite then takes a gigabyte of memory, and minutes to sample
+MAX_WORLDS = 10_000  # per task; this many worlds already need a gigabyte of memory and minutes to sample
 
 Category = Literal[
     "SayAtLocation",
@@ -37,7 +37,7 @@ Ability = Literal[
 
 
 class StrictForm(BaseModel):
-    """Content of a file, without unknown keys."""
+    """Base class for file contents; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -50,35 +50,35 @@ class CheckFile(StrictForm):
     """A check in a task file.
 
     Args:
-        means: descriptions of its texts for explanations, by kind of event; a single one is for `say`.
+        means: how explanations describe the check's texts, by kind of event; a single string is for `say`.
     """
 
-    category: Category  # the kind of failure
-    commonsense: bool = False  # whether it tests something that no prompt mentions
-    rtl: YamlText  # the formula
+    category: Category  # the kind of failure if the check fails
+    commonsense: bool = False  # whether the check tests something that no prompt mentions
+    rtl: YamlText  # the formula in RTL
     means: Annotated[dict[str, Name], BeforeValidator(_default_to_say)] = {}
 
 
 class TaskFact(StrictForm):
-    """A fact that the requirements of a task depend on.
+    """A fact about an instruction that the requirements of its task depend on.
 
     Args:
-        words: regexes; every prompt matches at least one, or none if it is common sense.
+        words: regexes; every prompt must match at least one of them, or none if the fact is common sense.
     """
 
-    fact: YamlText  # the fact in a sentence
+    fact: YamlText  # a sentence that states the fact
     words: Annotated[tuple[Annotated[YamlText, AfterValidator(check_regex)], ...], Field(min_length=1)]
-    commonsense: bool = False  # whether the model must know it although no prompt mentions it
+    commonsense: bool = False  # whether the model must know the fact although no prompt mentions it
 
 
 class RequirementFile(StrictForm):
     """A requirement in a task file: a string, or a mapping if only some prompts ask for it.
 
     Args:
-        prompts: the words that ask for it, by the number of the prompt, from 0.
+        prompts: for each prompt, by number from 0, the words in it that ask for the requirement.
     """
 
-    check: YamlText  # the check, optionally with `not`, and for sampled worlds with `for` or `if`
+    check: YamlText  # the check, optionally with `not`; in sampled worlds also with `for` or `if`
     prompts: Annotated[dict[Annotated[int, Field(ge=0, lt=10_000)], Name], Field(min_length=1)] | None = None
 
     @model_validator(mode="before")
@@ -91,14 +91,14 @@ Require = Annotated[list[RequirementFile], Field(min_length=1)]
 
 
 class AcceptedFinding(StrictForm):
-    """A finding of the linter that is intended, and the reason."""
+    """A linter finding that is intended, with the reason."""
 
     finding: YamlText
     because: YamlText
 
 
 class ScenarioFile(WorldFile):
-    """A world with its requirements in a task file."""
+    """A world in a task file, with its requirements."""
 
     about: Name
     require: Require
@@ -113,7 +113,7 @@ Looks = Annotated[int, Field(strict=True, ge=0, le=1_000)]
 
 
 class SampledPersonFile(StrictForm):
-    """A person who may be in sampled worlds; each list is sampled for each world."""
+    """A person who may be in sampled worlds; each world samples one entry from each list."""
 
     name: NamePattern | None = None
     where: Levels = Field(alias="in")
@@ -131,14 +131,14 @@ class SampledThingFile(StrictForm):
 
 
 class CornerFile(StrictForm):
-    """A world with values set by hand; the others default to the first entry of their list."""
+    """A world with some values set by hand; the other values default to the first entry of their list."""
 
     about: Name
     set: dict[Name, AnswerFile | Annotated[int, Field(strict=True)]] = {}
 
 
 class SampledWorldsFile(StrictForm):
-    """The description from which the worlds of a task are sampled."""
+    """Describes the worlds of a task, which are sampled from this description."""
 
     robot: Levels
     rooms: Annotated[list[NamePattern], Field(min_length=1)]
@@ -160,13 +160,13 @@ class _AnyTaskFile(StrictForm):
 
 
 class TaskFile(_AnyTaskFile):
-    """A task file with listed worlds."""
+    """A task file that lists its worlds."""
 
     worlds: Annotated[list[ScenarioFile], Field(min_length=1)]
 
 
 class SampledTaskFile(_AnyTaskFile):
-    """A task file with sampled worlds."""
+    """A task file whose worlds are sampled."""
 
     worlds: SampledWorldsFile
     let: dict[Name, Annotated[str, BeforeValidator(str)]] = {}
@@ -183,7 +183,7 @@ class LimitsFile(StrictForm):
 
 
 def _moment(value: object) -> object:
-    if isinstance(value, datetime) and value.tzinfo is not None and 1970 <= value.year < 2100:  # noqa: PLR2004 - the years in the message
+    if isinstance(value, datetime) and value.tzinfo is not None and 1970 <= value.year < 2100:  # noqa: PLR2004 - the message names these years
         return value
     raise ValueError(
         "it should be a time from 1970 to 2099 with an offset, such as 2024-01-01T12:00:00+00:00"
@@ -212,7 +212,7 @@ class SimulationFile(StrictForm):
         return data
 
     def settings(self) -> SimulationSettings:
-        """Convert to simulation settings."""
+        """Convert the file content to simulation settings."""
         values = {name: value for name, value in self if name != "skill_seconds"}
         return SimulationSettings(**values | {"limits": Limits(**dict(self.limits))})
 
@@ -227,5 +227,5 @@ class SuiteFile(StrictForm):
     worlds: Annotated[int, Field(strict=True, ge=1, le=MAX_WORLDS)] = 30
     seed: Annotated[int, Field(strict=True, ge=0)] = 1
     rules: SimulationFile = SimulationFile()
-    house_rules: Name | None = None  # a file of the suite with rules that stop programs
-    skills: list[Name] = []  # files of the suite that declare additional skills
+    house_rules: Name | None = None  # a file in the suite with rules that stop programs
+    skills: list[Name] = []  # files in the suite that declare additional skills

@@ -1,4 +1,4 @@
-"""Reference solutions in `solutions/TASK.yaml`: right and wrong programs, and equivalent mutants."""
+"""Reads reference solutions from `solutions/TASK.yaml`: right and wrong programs, and equivalent mutants."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from codebotler.models.recorded import RECORDED_NAMES, InstructionSolutions, Sol
 from roboeval.suites.load import Task
 from roboeval.suites.schema import StrictForm
 
-LENDING_SUITE = Path(__file__).with_name("paper")  # the suite that others borrow instructions from
+LENDING_SUITE = Path(__file__).with_name("paper")  # the suite whose instructions other suites borrow
 
 
 class EquivalentMutantFile(StrictForm):
-    """A mutant that behaves differently but is still right."""
+    """A mutant that behaves differently from the original but is still right."""
 
     operator: Name
-    diff: YamlText  # printed by `roboeval mutate`
+    diff: YamlText  # the diff that `roboeval mutate` prints
     because: Name
 
 
 class SolutionsFile(StrictForm):
-    """A file of solutions."""
+    """The content of a file of solutions."""
 
     recorded: tuple[InstructionSolutions, ...] = ()  # replies of the recorded models
     programs: tuple[Solution, ...] = ()
@@ -31,7 +31,7 @@ class SolutionsFile(StrictForm):
 
 
 def solutions(task: Task) -> tuple[Solution, ...]:
-    """The distinct solutions of a task, including those of the suite whose instruction it borrows."""
+    """Return the distinct solutions of a task, including those of a suite it borrows its instruction from."""
     folders = [task.path.parents[1], *([LENDING_SUITE] if task.borrows else [])]
     distinct: dict[str, Solution] = {}
     for form in (_read(folder, task) for folder in folders):
@@ -47,7 +47,7 @@ def solutions(task: Task) -> tuple[Solution, ...]:
 
 
 def locate_solution(task: Task, solution: Solution) -> tuple[Path, int | None]:
-    """The file and line of a solution; the task file if another suite has it."""
+    """Return the file and line of a solution; return the task file if the solution is in another suite."""
     path = task.path.parents[1] / "solutions" / task.path.name
     programs = _read(task.path.parents[1], task).programs
     if solution not in programs:
@@ -56,7 +56,7 @@ def locate_solution(task: Task, solution: Solution) -> tuple[Path, int | None]:
 
 
 def equivalent_mutants(task: Task) -> Mapping[tuple[str, str], str]:
-    """The reasons why mutants of a task are right, by operator and diff."""
+    """Return the reasons why a task's equivalent mutants are right, by operator and diff."""
     listed = _read(task.path.parents[1], task).equivalent_mutants
     return {(one.operator, bare_diff(one.diff)): one.because.strip() for one in listed}
 

@@ -1,4 +1,4 @@
-"""A suite: tasks with the settings by which they are judged, read from a folder."""
+"""Reads suites from folders; a suite consists of tasks and the settings for judging them."""
 
 from __future__ import annotations
 
@@ -27,64 +27,62 @@ from roboeval.suites.taskfile import read_task
 if TYPE_CHECKING:
     from codebotler.models.recorded import InstructionSolutions
 
-ABLATED = "-ablation"  # suffix of the files of an ablation, forbidden in names of suites
+ABLATED = "-ablation"  # file suffix of ablations; suite names may not end like this
 SUITES = Path(__file__).parent
 SUITE_NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 
 @dataclass(frozen=True)
 class Suite:
-    """Tasks with the settings by which they are judged.
+    """Tasks with the settings for judging them.
 
     Args:
-        worlds: the least number of worlds per task, if they are sampled; None if written by hand.
-        recorded: the programs of the recorded models, if they are not in files.
+        worlds: the minimum number of worlds per task if they are sampled; None if they are written by hand.
+        recorded: the programs of the recorded models, unless they are in files.
     """
 
-    name: str  # the name in evaluations
-    version: int  # increases when a verdict may change
-    about: str  # a description in a sentence
+    name: str  # the name, which evaluations record
+    version: int  # increased when verdicts may change
+    about: str  # a one-sentence description
     settings: SimulationSettings  # how worlds are simulated
-    tasks: Mapping[str, Task]  # the tasks by name, sorted
+    tasks: Mapping[str, Task]  # the tasks, sorted by name
     digest: str  # a hash of everything that verdicts and prompts depend on
     folder: Path | None = None  # the folder of its files
     worlds: int | None = None
     seed: int | None = None  # the random seed of sampled worlds
     skills: SkillTable = SKILLS  # the skills that formulas may use
     house: HouseRules | None = None  # rules that stop a program
-    families: Mapping[str, object] | None = (
-        None  # the split, seed and number of its tasks, if families make them
-    )
+    families: Mapping[str, object] | None = None  # split, seed and number of the tasks if they are generated
     recorded: tuple[InstructionSolutions, ...] = field(default=(), repr=False)
 
     def __hash__(self) -> int:
-        return hash(self.digest)  # a dictionary such as `tasks` has no hash
+        return hash(self.digest)  # needed because dictionaries such as `tasks` are not hashable
 
     def __repr__(self) -> str:
         return f"Suite({self.name!r}, {counted(len(self.tasks), 'task')})"
 
     @property
     def house_sentences(self) -> list[str]:
-        """The sentences of the house rules, for the prompt."""
+        """Return the house rules as sentences for the prompt."""
         return [] if self.house is None else [rule.says for rule in self.house.rules]
 
     def with_house_rules(self, house: HouseRules | None) -> Suite:
-        """Return the suite with these house rules instead of its own, or without any."""
+        """Return the suite with these house rules instead of its own, or without house rules if None."""
         return replace(self, house=house)
 
     def with_worlds(self, count: int | None = None, seed: int | None = None) -> Suite:
         """Return the suite with other worlds, sampled from the same descriptions.
 
         Args:
-            count: worlds per task, 1 to 10,000; by default, the current number.
-            seed: the random seed; by default, the current one.
+            count: the number of worlds per task, 1 to 10,000; by default the current number.
+            seed: the random seed; by default the current seed.
 
         Raises:
-            UserError: the worlds are not sampled or follow from the suite's name, or there are too many.
+            UserError: the worlds are not sampled, are determined by the suite's name, or are too many.
         """
         if self.worlds is None or self.folder is None:
-            why = "are written by hand" if self.families is None else "follow from its name"
-            raise UserError(f'the worlds of the suite "{self.name}" {why}; omit --worlds and --seed')
+            why = "are written by hand" if self.families is None else "are determined by its name"
+            raise UserError(f'the worlds of the suite "{self.name}" {why}; leave out --worlds and --seed')
         if count is not None and not 1 <= count <= MAX_WORLDS:
             raise UserError(f"the number of worlds is {count}, but it must be from 1 to {MAX_WORLDS:,}")
         return read_suite(self.folder, self.skills, count or self.worlds, self.seed if seed is None else seed)
@@ -96,7 +94,7 @@ class Suite:
         return read_suite(self.folder, self.skills)
 
     def task(self, name: str) -> Task:
-        """Return a task by name; raises UserError if there is none."""
+        """Return the task with this name; raise UserError if there is none."""
         if name not in self.tasks:
             known = ", ".join(self.tasks)
             raise UserError(f'the suite "{self.name}" has no task "{name}"; its tasks are {known}')
@@ -104,12 +102,12 @@ class Suite:
 
 
 def shipped_suites() -> tuple[str, ...]:
-    """The names of the suites that ship with RoboEval."""
+    """Return the names of the suites that ship with RoboEval."""
     return tuple(sorted(path.parent.name for path in SUITES.glob("*/suite.yaml")))
 
 
 def suite_folder(name: str) -> Path:
-    """Find the folder of a suite that ships with RoboEval or with a package; or check that it is a folder."""
+    """Return the folder of a built-in or installed suite, or a folder's path; otherwise raise UserError."""
     if name in shipped_suites():
         return SUITES / name
     if SUITE_NAME.fullmatch(name) and (installed := installed_folder(name)) is not None:
@@ -117,27 +115,24 @@ def suite_folder(name: str) -> Path:
     folder = Path(name)
     if not (folder / "suite.yaml").is_file():
         known = ", ".join(dict.fromkeys([*shipped_suites(), *(suite.name for suite in installed_suites())]))
-        raise UserError(f'there is no suite "{name}"; name one of {known}, or a folder with a suite.yaml')
+        raise UserError(f'unknown suite "{name}"; use one of {known}, or a folder with a suite.yaml')
     return folder.resolve()
 
 
 def task_files(folder: Path) -> list[Path]:
-    """The task files in a suite's folder, sorted."""
+    """Return the sorted paths of the task files in a suite's folder."""
     return sorted((folder / "tasks").glob("*.yaml"))
 
 
-# --- reading
-
-
 def read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed: int | None = None) -> Suite:
-    """Read the suite in a folder, or reuse it if no file has changed."""
+    """Read the suite in a folder, or return the cached suite if no file has changed."""
     files = [*sorted(folder.glob("*.yaml")), *sorted(folder.glob("*.py")), *task_files(folder)]
     stats = [(file.name, file.stat()) for file in files if file.is_file()]
     versions = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
     return _build_suite(folder, skills, count, seed, versions)
 
 
-@lru_cache(maxsize=8)  # limited, since a training loop may sample new worlds at each step
+@lru_cache(maxsize=8)  # limited because a training loop may sample new worlds at each step
 def _build_suite(
     folder: Path,
     skills: SkillTable,
@@ -185,13 +180,13 @@ def _build_suite(
 
 
 def rooms_in(tasks: Iterable[Task]) -> list[str]:
-    """The names of all rooms in the worlds of the tasks."""
+    """Return the names of all rooms in the worlds of the tasks."""
     worlds = (scenario.world for task in tasks for scenario in task.scenarios)
     return list(dict.fromkeys(room.name for world in worlds for room in world.rooms))
 
 
 def _lender(file: YamlFile, suite: str, path: Path) -> YamlFile:
-    """Read the task file of the suite that a task borrows its instruction from."""
+    """Read the task file whose instruction a task borrows from another suite."""
     lender = SUITES / suite / "tasks" / path.name
     if not lender.is_file():
         sentence = f'the suite "{suite}" has no task "{path.stem}" to borrow instructions from'
@@ -200,7 +195,7 @@ def _lender(file: YamlFile, suite: str, path: Path) -> YamlFile:
 
 
 def _without_meanings(data: object) -> object:
-    """Remove the texts for explanations from the content of a file: no verdict depends on them."""
+    """Remove the texts that only explanations use, and no verdict depends on, from a file's content."""
     if not isinstance(data, dict) or not isinstance(data.get("checks"), dict):
         return data
     checks = {

@@ -1,4 +1,4 @@
-"""Tasks: prompts, worlds, and requirements."""
+"""Defines tasks, which consist of prompts, worlds and requirements."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ class Requirement:
     """A formula that the trace of a program must satisfy in a world (paper, section IV.B).
 
     Args:
-        words: the number of each prompt that asks for it, and its words; empty if all prompts do.
+        words: the prompts that ask for it, as pairs of number and words; empty if all prompts do.
     """
 
-    text: str  # the text in the task file, such as `not greets("amy")`
-    check: str  # the name of the check that it applies
-    formula: Formula = field(repr=False)  # the formula, negated if the text starts with `not`
-    category: Category  # the kind of failure if it does not hold
+    text: str  # the requirement in the task file, such as `not greets("amy")`
+    check: str  # the name of the check
+    formula: Formula = field(repr=False)  # the check's formula, negated if the text starts with `not`
+    category: Category  # the kind of failure if the formula does not hold
     line: int | None = None  # the line in the task file
     words: tuple[tuple[int, str], ...] = field(default=(), repr=False)
 
     def is_asked_by(self, prompt: int) -> bool:
-        """Whether a prompt asks for it."""
+        """Whether a prompt asks for this requirement."""
         return not self.words or any(number == prompt for number, _ in self.words)
 
 
@@ -46,7 +46,7 @@ class Scenario:
     require: tuple[Requirement, ...]
 
     def asked_by(self, *prompts: int) -> Scenario:
-        """Keep only the requirements that one of these prompts asks for."""
+        """Return the scenario with only the requirements that at least one of these prompts asks for."""
         return replace(self, require=tuple(one for one in self.require if any(map(one.is_asked_by, prompts))))
 
     def __repr__(self) -> str:
@@ -55,35 +55,35 @@ class Scenario:
 
 @dataclass(frozen=True)
 class TaskCheck:
-    """A named formula of a task that requirements apply.
+    """A named formula in a task that requirements refer to.
 
     Args:
-        means: descriptions of its texts for explanations, by kind of event, with `{parameter}` as in `rtl`.
+        means: how explanations describe its texts, by kind of event, with `{parameter}` as in `rtl`.
     """
 
-    name: str  # the name in requirements
-    parameters: tuple[str, ...]  # the names of its parameters
+    name: str  # the name that requirements use
+    parameters: tuple[str, ...]  # the names of the parameters
     category: Category  # the kind of failure if it does not hold
-    rtl: str  # the formula, with `{parameter}` in place of arguments
-    commonsense: bool  # whether it tests something that no prompt mentions
+    rtl: str  # the formula with `{parameter}` in place of arguments
+    commonsense: bool  # whether the check tests something that no prompt mentions
     line: int | None = None  # the line in the task file
     means: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Task:
-    """One task of a suite: prompts, worlds, requirements (paper, section IV).
+    """A task of a suite: prompts, worlds and requirements (paper, section IV).
 
     Args:
         covered_by: the checks that cover each fact, or the reason why none does.
-        scenarios: the worlds with all requirements, including those that only some prompts ask for.
-        ablation: the worlds with common-sense requirements only; None if the task has none.
-        phrases: regexes for equivalent phrasings, by their name in checks.
+        scenarios: the worlds with all requirements, including requirements of only some prompts.
+        ablation: the worlds with only common-sense requirements, or None if the task has no ablation.
+        phrases: regexes for equivalent phrasings, by the name that checks use.
     """
 
-    name: str  # the name in rows of completions
-    summary: str  # a description in a sentence
-    abilities: tuple[Ability, ...]  # the abilities that a robot needs
+    name: str  # the name in completions
+    summary: str  # a one-sentence description
+    abilities: tuple[Ability, ...]  # the abilities a robot needs for the task
     prompts: tuple[str, ...]  # phrasings of the same instruction
     facts: tuple[TaskFact, ...]  # the facts that requirements depend on
     checks: tuple[TaskCheck, ...]  # the named formulas
@@ -91,8 +91,8 @@ class Task:
     ablation: tuple[Scenario, ...] | None
     accepted: tuple[AcceptedFinding, ...]  # intended findings of the linter
     path: Path  # the task file
-    borrows: bool = False  # whether its instruction comes from a task of another suite
-    is_sampled: bool = False  # whether its worlds are sampled from a description
+    borrows: bool = False  # whether the instruction is borrowed from another suite
+    is_sampled: bool = False  # whether the worlds are sampled from a description
     phrases: tuple[tuple[str, tuple[str, ...]], ...] = ()
     covered_by: tuple[tuple[str, tuple[str, ...] | str], ...] = ()
 
@@ -101,24 +101,24 @@ class Task:
         return f"Task({self.name!r}, {prompts}, {worlds})"
 
     def judged_in(self, *, ablated: bool = False) -> tuple[Scenario, ...]:
-        """The worlds and requirements that judge programs; empty if an ablation is missing."""
+        """Return the worlds and requirements for judging programs; empty if there is no ablation."""
         return (self.ablation or ()) if ablated else self.scenarios
 
 
 def check_label(text: str) -> str:
-    """Shorten a requirement for people: replace regexes by an example, as in `offers("bread")`."""
+    """Shorten a requirement for display: replace regexes by examples, as in `offers("bread")`."""
     return _STRINGS.sub(
         lambda found: json.dumps(first_choice(literal_eval(found[0])), ensure_ascii=False), text
     )
 
 
 def world_title(number: int, of: str, about: str) -> str:
-    """The title of a world; the number at the start of a sampled world's description is dropped."""
+    """Return the title of a world; the number that starts a sampled world's description is dropped."""
     return f"World {number}{of}: {about.removeprefix(f'{number}: ')}"
 
 
 def describe_person(person: Person) -> str:
-    """Describe a person: name, answers, and when they arrive and leave."""
+    """Describe a person: their name, their answers, and when they arrive and leave."""
     parts = [f"answers {', then '.join(map(_answer, person.answers)) or 'nothing'}"]
     parts += [f"{topic}: {_answer(answer)}" for topic, answer in person.topics]
     if person.after_looks:

@@ -23,8 +23,8 @@ from roboeval.suites.task import Requirement, Scenario, Task, TaskCheck
 from roboeval.suites.worlds import WorldSampler
 
 BORROWED_FIELDS = ("summary", "abilities", "prompts")
-PEOPLE_PLACEHOLDER = "people"  # in checks for sampled worlds: any name of a person or word for people
-START = "start"  # in checks: the room in which the robot starts
+PEOPLE_PLACEHOLDER = "people"  # in checks for sampled worlds: matches any person's name or word for people
+START = "start"  # in checks: the room where the robot starts
 
 _PARAMETER = r" *[^\W\d]\w* *"
 _USED = re.compile(r"\{([^\W\d]\w*)\}")
@@ -41,16 +41,16 @@ def read_task(
     seed: int = 1,
     words: Sequence[str] = (),
 ) -> Task:
-    """Turn a task file into a task.
+    """Convert a task file to a task.
 
     Args:
         file: the task file.
         path: its path.
         skills: the skills that formulas may use.
-        lender: the file of another task to borrow the instruction from.
-        count: the least number of worlds to sample.
+        lender: the task file to borrow the instruction from, if any.
+        count: the minimum number of worlds to sample.
         seed: the random seed of sampled worlds.
-        words: words for people, which `{people}` in a check matches in addition to names.
+        words: words for people that `{people}` in a check matches in addition to names.
 
     Raises:
         UserError: the file is not valid; the message names the line.
@@ -59,7 +59,9 @@ def read_task(
     is_sampled = isinstance(data, dict) and isinstance(data.get("worlds"), dict)
     form = file.validate(SampledTaskFile, data) if is_sampled else file.validate(TaskFile, data)
     if form.name != path.stem:
-        raise file.wrong(f'the task is named "{form.name}", but its file "{path.name}"; use one name', "name")
+        raise file.wrong(
+            f'the task is named "{form.name}", but its file "{path.name}"; use the same name', "name"
+        )
     ablation = None
     if isinstance(form, SampledTaskFile):
         reader = _Reader(form, file, skills, _phrases(form, file, words))
@@ -89,7 +91,7 @@ def read_task(
 
 
 def _with_borrowed(file: YamlFile, lender: YamlFile | None) -> object:
-    """Add the instruction and facts of the lender to the content of a task file."""
+    """Return the content of a task file, with the instruction and facts of the lender if there is one."""
     if lender is None or not isinstance(file.data, dict) or not isinstance(lender.data, dict):
         return file.data
     borrowed = {name: lender.data[name] for name in BORROWED_FIELDS if name in lender.data}
@@ -121,7 +123,7 @@ def _expect_different_worlds(form: TaskFile, file: YamlFile) -> None:
 
 
 def _phrases(form: SampledTaskFile, file: YamlFile, words: Sequence[str]) -> dict[str, str]:
-    """Regexes that checks may use by name: for people, and the phrases of the task."""
+    """Return the regexes that checks may use by name: for people, and the phrases of the task."""
     names = [person.name or key for key, person in form.worlds.people.items()]
     phrases = {PEOPLE_PLACEHOLDER: rf"(?:{'|'.join(map(scope_flags, [*words, *names]))})s?"}
     for name, regexes in form.phrases.items():
@@ -139,7 +141,7 @@ def _fill(text: str, values: Mapping[str, str]) -> str:
 
 @dataclass(frozen=True)
 class _Reader:
-    """Builds checks, requirements and worlds from a task file."""
+    """Builds the checks, requirements and worlds of a task file."""
 
     form: TaskFile | SampledTaskFile
     file: YamlFile
@@ -180,11 +182,9 @@ class _Reader:
                 sentence = f'there is no kind of event "{kind}"; use {kinds}'
                 raise self.file.wrong(sentence, "checks", head, "means", kind)
             if unknown := {*_USED.findall(meaning)} - {*parameters, START}:
-                sentence = f'"{min(unknown)}" is not a parameter of the check; replace it by words'
+                sentence = f'"{min(unknown)}" is not a parameter of the check; write a description instead'
                 raise self.file.wrong(sentence, "checks", head, "means", kind)
         return {**({"check": "a person"} if f"{{{PEOPLE_PLACEHOLDER}}}" in body.rtl else {}), **body.means}
-
-    # --- worlds
 
     def read_worlds(self, worlds: Sequence[ScenarioFile]) -> Iterator[Scenario]:
         for number, form in enumerate(worlds):
@@ -209,7 +209,7 @@ class _Reader:
 
     def sample(self, sampler: WorldSampler, count: int, seed: int) -> Iterator[Scenario]:
         known: dict[tuple[str, int, str], Requirement] = {}
-        for number, form in enumerate(sampler.form.require):  # include requirements that no world has
+        for number, form in enumerate(sampler.form.require):  # also validate requirements that no world has
             self._words(form.prompts or {}, ("require", number, "prompts"))
         for setting in sampler.settings(count, seed):
             require = [(text, number, setting.start) for text, number in sampler.requirements(setting)]
@@ -218,8 +218,6 @@ class _Reader:
                     at, form = ("require", number), sampler.form.require[number]
                     known[text, number, start] = self._requirement(text, form.prompts, start, at)
             yield Scenario(sampler.world(setting), tuple(known[one] for one in require))
-
-    # --- requirements
 
     def _requirement(
         self, text: str, prompts: Mapping[int, str] | None, start: str, at: YamlPath
@@ -247,7 +245,7 @@ class _Reader:
         return Requirement(text, name, formula, check.category, self.file.line(at), words)
 
     def _words(self, prompts: Mapping[int, str], at: YamlPath) -> tuple[tuple[int, str], ...]:
-        """Check that the prompts contain the words that ask for a requirement."""
+        """Return the words that ask for a requirement, after checking that the prompts contain them."""
         known = self.form.prompts
         for number, words in prompts.items():
             if not 0 <= number < len(known):

@@ -1,4 +1,4 @@
-"""Samples worlds from the description in a task file, with the requirements of each."""
+"""Samples worlds, with their requirements, from the description in a task file."""
 
 from __future__ import annotations
 
@@ -31,25 +31,25 @@ _TRIES = 50  # attempts to sample a new world
 
 @dataclass(frozen=True)
 class Setting:
-    """The levels of all factors of one world."""
+    """The level of each factor in one world."""
 
     about: str
     chosen: Mapping[str, FactorLevel]
-    rooms: tuple[str, ...]  # in the order of the robot's list
+    rooms: tuple[str, ...]  # all rooms, in the order the robot lists them
 
     def room(self, name: str) -> str:
-        """The room of a person or thing; empty if nowhere."""
+        """Return the room of a person or thing, or an empty string if absent."""
         room = str(self.chosen[f"{name}.in"])
         return "" if room == IN_NO_ROOM else room
 
     @property
     def start(self) -> str:
-        """The room in which the robot starts."""
+        """Return the room where the robot starts."""
         return str(self.chosen[ROBOT_FACTOR])
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """The part that makes a world distinct; answers of absent people do not count."""
+        """Return a key that is equal for equivalent worlds; the answers of absent people are ignored."""
         absent = {_owner(factor) for factor, level in self.chosen.items() if level == IN_NO_ROOM}
         chosen = self.chosen.items()
         return self.rooms, *(one for one in chosen if one[1] == IN_NO_ROOM or _owner(one[0]) not in absent)
@@ -64,12 +64,12 @@ class WorldSampler:
 
     @property
     def described(self) -> SampledWorldsFile:
-        """The description of the worlds."""
+        """Return the description of the worlds."""
         return self.form.worlds
 
     @cached_property
     def factors(self) -> dict[str, tuple[FactorLevel, ...]]:
-        """The levels of each factor, such as `alice.in` and `alice.answer 1`."""
+        """Return the levels of each factor; factors are named like `alice.in` and `alice.answer 1`."""
         found = {ROBOT_FACTOR: self._rooms(self.described.robot, ROBOT_FACTOR)}
         for name, person in self.described.people.items():
             found[f"{name}.in"] = self._rooms(person.where, "people", name, "in")
@@ -94,12 +94,10 @@ class WorldSampler:
                 raise self.file.wrong(sentence, "worlds", *place)
         return _levels(where)
 
-    # --- sampling
-
     def settings(self, count: int, seed: int) -> Iterator[Setting]:
         """Yield the corners, then worlds that cover all pairs of levels.
 
-        There are at least `count`, unless fewer exist.
+        At least `count` worlds are yielded, unless fewer exist.
         """
         random = Random(f"{self.form.name} {seed}")  # noqa: S311 - not for cryptography
         corners = [self._corner(corner, number) for number, corner in enumerate(self.described.corners)]
@@ -132,7 +130,7 @@ class WorldSampler:
             ]
             if not fitting:
                 known = ", ".join(self._free)
-                sentence = f'nothing that "{pattern}" matches can be "{level}"; choose from {known}'
+                sentence = f'no factor that matches "{pattern}" can be "{level}"; the factors are {known}'
                 raise self.file.wrong(sentence, "worlds", "corners", number, "set")
             chosen.update(dict.fromkeys(fitting, level))
         return Setting(corner.about, chosen, tuple(self.described.rooms))
@@ -153,10 +151,8 @@ class WorldSampler:
             parts.append(f"robot in {chosen[ROBOT_FACTOR]}")
         return "; ".join(parts) or "different order of rooms"
 
-    # --- worlds and requirements
-
     def world(self, setting: Setting) -> World:
-        """Build the world of a setting."""
+        """Build the world that a setting describes."""
         things = self._things(setting)
         rooms = []
         for room in setting.rooms:
@@ -226,7 +222,7 @@ def _detail(factor: str, level: FactorLevel) -> str:
 
 
 def _expand(text: str, names: Names) -> Iterator[str]:
-    """Expand an entry: `check(x)`, `... if CONDITION` or `... for NAME in LIST`."""
+    """Yield the requirements of an entry: `check(x)`, `... if CONDITION` or `... for NAME in LIST`."""
     match _entry(text):
         case ast.IfExp(test, body, ast.Constant(None)):
             if evaluate(test, names):

@@ -1,4 +1,4 @@
-"""Training: prompts, and rewards with their components.
+"""Supports training with prompts, and with rewards and their components.
 
 Start with `prompts.py`. Tasks come from families, never from the suites that ship with RoboEval.
 """

@@ -1,4 +1,4 @@
-"""Training prompts as rows of a data set, and the program in a policy's completion."""
+"""Generates training prompts as rows of a data set, and extracts programs from a policy's completions."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ def load_prompts(
     Args:
         split: `train`, `validation` or `test`, which share no task.
         count: the number of prompts.
-        seed: another seed gives entirely different tasks.
-        only: families or `.yaml` files of families; by default, all families that ship with RoboEval.
-        form: `chat` for messages, `text` for a single text that base models continue.
+        seed: each seed, from 0, gives entirely different tasks.
+        only: names or `.yaml` files of families; by default all families that ship with RoboEval.
+        form: `chat` for messages, or `text` for a single text that a base model continues.
         progress: called with the number of prompts so far.
 
     Returns:
-        rows with `prompt` (messages with `role` and `content`, or a text); `family`, `seed` and
-        `prompt_index` of its task; and `opening`, the first line of the program if the prompt ends with it.
+        Rows with `prompt` (messages with `role` and `content`, or a text); `family`, `seed` and
+        `prompt_index`, which identify the task; and `opening`, the program's first line if the prompt has it.
 
     Raises:
-        UserError: the split or a family does not exist, or the count or the seed is out of range.
+        UserError: the split or a family does not exist, or the count or seed is out of range.
     """
     first = first_seed(split, seed, count, "prompt")
     expect_list(only, "the families")
@@ -49,7 +49,7 @@ def load_prompts(
     names = tuple(only) or family_names()
     rows: list[dict[str, Any]] = []
     for number in range(first, first + count):
-        if len(rows) < len(names):  # validates the file of each family once
+        if len(rows) < len(names):  # validate the file of each family once
             trained_task(names[number % len(names)], number)
         rows.append(_row(names, number, form))
         if progress is not None:
@@ -58,7 +58,7 @@ def load_prompts(
 
 
 def _row(families: Sequence[str], seed: int, form: PromptForm) -> dict[str, Any]:
-    """The row of a seed; families and their prompts take turns."""
+    """Return the row for a seed; families and their prompts take turns."""
     turn, number = divmod(seed, len(families))
     family = families[number]
     prompts = trained_prompts(family, seed)
@@ -78,7 +78,7 @@ def program_in(completion: PolicyReply, opening: str = "") -> str:
     """Extract the program from a policy's completion.
 
     Args:
-        completion: a string, or messages, of which the last is the policy's.
+        completion: a string, or messages that end with the policy's message.
         opening: the last line of the prompt, if the completion continues it.
 
     Raises:
@@ -91,9 +91,9 @@ def program_in(completion: PolicyReply, opening: str = "") -> str:
 
 
 def _last_text(messages: Sequence[Mapping[str, Any]]) -> str:
-    """The text of the last message, whose content may be a list of parts."""
+    """Return the text of the last message, whose content may be a list of parts."""
     if not messages or "content" not in messages[-1]:
-        raise UserError("a completion has no message with content; pass a string or messages")
+        raise UserError("a completion has no message with content; pass a string or a list of messages")
     content = messages[-1]["content"]
     if isinstance(content, str) or content is None:
         return content or ""

@@ -1,4 +1,4 @@
-"""Judges rollouts of a policy: the reward of each program and its components."""
+"""Judges a policy's rollouts: computes the reward of each program and its components."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Rollout:
 
     family: str  # the family of the task
     seed: int  # the seed of the task
-    prompt_index: int  # the phrasing, from 0
-    program: str  # the source, which need not parse
+    prompt_index: int  # the number of the phrasing, from 0
+    program: str  # the source text, which need not parse
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Components:
     Args:
         reward: the value of `roboeval.reward`: 1 if and only if the program passes, 0 if it does nothing.
         passed: 1 if all requirements hold in all worlds.
-        requirements: the share of requirements that hold, averaged over worlds. It is no reward by itself,
-            since some requirements hold for a program that does nothing.
-        without_errors: the share of worlds in which the program ends without an error.
+        requirements: the share of requirements that hold, averaged over worlds; not a reward by itself,
+            because some requirements hold for a program that does nothing.
+        without_errors: the share of worlds where the program ends without an error.
         parses: 1 if the program is valid Python.
-        rules_kept: the share of worlds in which it breaks no house rule.
+        rules_kept: the share of worlds where the program breaks no house rule.
     """
 
     reward: float
@@ -59,17 +59,17 @@ def judge(
     house: HouseRules | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> list[Components]:
-    """Judge programs of a policy in the worlds of their tasks, a few batches at a time.
+    """Judge a policy's programs in the worlds of their tasks, a few batches at a time.
 
     Args:
-        rollouts: the programs; equal ones are judged once.
-        worlds: the least number of worlds per task, 1 to 10,000.
-        house: rules that stop a program that breaks one.
+        rollouts: the programs; equal programs are judged once.
+        worlds: the minimum number of worlds per task, 1 to 10,000.
+        house: house rules; a program that breaks a rule is stopped.
         progress: called with the number of distinct rollouts judged so far.
 
     Raises:
         UserError: a family or prompt does not exist.
-        EngineError: the engine failed, which is not the fault of a program.
+        EngineError: the engine failed, for a reason unrelated to the programs.
     """
     names = {one: _key(one, worlds, house) for one in rollouts}
     known = COMPONENT_CACHE.among(names.values())
@@ -104,7 +104,7 @@ def _key(one: Rollout, worlds: int, house: HouseRules | None) -> bytes:
 
 
 def _judge_batch(worlds: int, house: HouseRules | None, batch: Sequence[Rollout]) -> list[Components]:
-    """Judge programs for the same prompt; runs in a thread with a worker."""
+    """Judge programs for one prompt; call this in a thread with a worker."""
     first = batch[0]
     task = trained_task(first.family, first.seed, worlds=worlds)
     task.expect_prompt(first.prompt_index)

@@ -118,7 +118,7 @@ def test_of_a_single_program_only_what_happened_is_told() -> None:
     counts = summary([row(0, 0, ("PythonError", "NameError"))], replace(SUITE, tasks=tasks))
     text = printed(summary_view(counts, title="mine"), 100)
     assert text.rstrip().endswith("Python errors  1  100.0%\n  NameError    1  100.0%")
-    assert "\nno completions of 4 tasks\n" in text
+    assert "\nno completions for 4 tasks\n" in text
 
 
 @pytest.mark.parametrize(
@@ -161,7 +161,7 @@ def test_tasks_without_a_score_are_told_apart() -> None:
 
 def test_rows_whose_completions_are_gone_are_told() -> None:
     text = printed(summary_view(summary(ROWS, SUITE, scope=JudgingScope({"Visit": 3})), title="x"))
-    assert re.search(r"\n4 completions, of which only 3 .*\n", text)
+    assert re.search(r"\n4 completions, but only 3 .*\n", text)
 
 
 def test_requested_completions_that_are_missing_are_counted() -> None:
@@ -174,7 +174,9 @@ def test_requested_completions_that_are_missing_are_counted() -> None:
     text = printed(summary_view(counted, title="x"), 200)
     assert "\n3 of 6 completions (2 missing, 1 not judged)," in text
     assert re.search(r"\nVisit +3 of 6 ", text)
-    assert re.search(r"\n3 of 4 replies \(75\.0%\) .*512 tokens, 3 .* whole program; .*--max-tokens\n", text)
+    assert re.search(
+        r"\n3 of 4 replies \(75\.0%\) .*512 tokens, 3 .* complete program; .*--max-tokens\n", text
+    )
 
 
 @pytest.mark.parametrize(("cut_off", "is_said"), [(2, False), (3, True)])

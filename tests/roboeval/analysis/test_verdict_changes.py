@@ -242,7 +242,7 @@ def test_what_is_refused(judged_twice: Path) -> None:
     def told(*words: str) -> Ended:
         return roboeval(*words, cwd=judged_twice)
 
-    assert "rather than 1" in refused("compare", judged_twice / "hasty").sentence
+    assert "two runs, not 1" in refused("compare", judged_twice / "hasty").sentence
     assert 'not "paper"' in refused("compare", judged_twice / "hasty", "--suites", "paper").sentence
     assert "comma" in refused("compare", judged_twice / "hasty", "--suites", "plus,plus").sentence
     assert "twice" in told("compare", "hasty", "./hasty", "--suites", "paper,plus").err

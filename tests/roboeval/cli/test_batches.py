@@ -160,7 +160,7 @@ def test_rows_are_those_of_generate(tmp_path: Path, model: str) -> None:
     assert about["usage"]["output_tokens"] == sum(used)
     assert about["batches"][0]["ended"] is not None
     again = roboeval(*words, "--out", "run", cwd=tmp_path)
-    assert f"{COUNT} of {COUNT} completions were there already" in again.err
+    assert f"{COUNT} of {COUNT} completions already exist" in again.err
 
 
 @pytest.mark.parametrize(
@@ -250,7 +250,7 @@ def test_failed_and_missing_answers_are_named_and_asked_for_again(tmp_path: Path
     ended = take(tmp_path, "answers.jsonl")
     assert ended.status == 1
     said = ended.err.splitlines()
-    for request, why in ((one, "This request expired"), (two, "It died"), (four, "without an answer")):
+    for request, why in ((one, "This request expired"), (two, "It died"), (four, "not answered")):
         name = request["custom_id"].rpartition("/")[0]
         assert sum(why in line and name in line for line in said) == 1, ended.err
     kept = {row["raw_reply"]: row["no_program"] for row in lines(tmp_path / "run" / "completions.jsonl")}

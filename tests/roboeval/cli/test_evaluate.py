@@ -40,7 +40,7 @@ def test_a_missing_file(tmp_path: Path) -> None:
 
 def test_an_empty_name() -> None:
     for verb in (("evaluate",), ("import", "--out", "run")):
-        assert "a run, a .jsonl, or a folder or zip of .py" in refused(*verb, "").sentence
+        assert "a run, a .jsonl file, or a folder or zip of .py files" in refused(*verb, "").sentence
     for words in (("show",), ("export",), ("import", "a.jsonl", "--out"), ("evaluate", "a.jsonl", "--out")):
         assert refused(*words, "").sentence.endswith("a run")
     assert refused("export", "run", "--out", "").sentence.endswith("a file")
@@ -485,9 +485,7 @@ def test_a_failure_names_the_nearest_program_that_passes(tmp_path: Path) -> None
     assert False in passed
     (first,) = re.findall(r"`roboeval show run (SayGoodDay/\d/\d)`", made.err)
     failed = roboeval("show", "run", first, cwd=tmp_path)
-    (again,) = re.findall(
-        r"the nearest program that passes differs in \d+ lines?: `roboeval (.*)`", failed.err
-    )
+    (again,) = re.findall(r"the nearest passing program differs in \d+ lines?: `roboeval (.*)`", failed.err)
     shown = roboeval(*shlex.split(again), cwd=tmp_path)
     assert re.match(r"SayGoodDay/\d/\d  passed\n", shown.out)
     assert "nearest" not in shown.err
@@ -665,7 +663,7 @@ def test_a_row_that_is_none_gets_a_sentence(tmp_path: Path) -> None:
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
     rows = tmp_path / "run" / "evaluations" / "paper.jsonl"
     for line, fault in [
-        ('{"task": "SayGoodDay"}', "row of an evaluation"),
+        ('{"task": "SayGoodDay"}', "evaluation row"),
         ("?", "JSON is malformed"),
         ("[]", "Expected `object`"),
     ]:

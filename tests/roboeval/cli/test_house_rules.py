@@ -40,9 +40,9 @@ def test_verdicts_with_rules_stand_beside_those_without(folder: Path) -> None:
     assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
     plain = (folder / "run" / "evaluations" / "paper.jsonl").read_bytes()
     ended = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)
-    assert "of the programs of a prompt break a rule of the house, on average (95% interval" in ended.out
+    assert "of a prompt's programs break a house rule (95% interval" in ended.out
     assert "knock" in ended.out
-    assert "pass@1 with the rules less pass@1 without: -" in ended.out
+    assert "pass@1 with the rules minus pass@1 without: -" in ended.out
     assert re.search(r"show run \w+/\d/\d --rules house.yaml", ended.err)
     evaluations = folder / "run" / "evaluations"
     assert (evaluations / "paper.jsonl").read_bytes() == plain
@@ -67,10 +67,10 @@ def test_where_rules_are_not_named_their_verdicts_are_told_of(folder: Path) -> N
         told = refused("show", "run", *more, cwd=folder)
         assert told.file == "run"
         assert told.sentence.startswith(
-            "was judged with house rules only (house); name their file with --rules, or run"
+            "was judged only with house rules (house); give their file with --rules, or run"
         )
     assert roboeval("evaluate", "run", *TASKS, cwd=folder).status == 0
-    hint = "judged with house rules, too; --rules house.yaml shows that"
+    hint = "also judged with house rules; --rules house.yaml shows those verdicts"
     for command in (("show", "run"), ("report", "run", "--out", "report", "--no-check")):
         assert hint in roboeval(*command, cwd=folder).err
     assert hint not in roboeval("show", "run", "--rules", "house.yaml", cwd=folder).err
@@ -99,7 +99,7 @@ def test_an_interval_of_what_is_alike_everywhere_is_unknown(folder: Path) -> Non
     (folder / "house.yaml").write_text(rule)
     assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
     shown = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder).out
-    assert "100.0% of the programs" in shown
+    assert "100.0% of a prompt's programs" in shown
     assert "(95% interval over tasks unknown: no variation between tasks)" in " ".join(shown.split())
     reported = roboeval("report", "run", "--rules", "house.yaml", "--out", "report", "--no-check", cwd=folder)
     assert reported.status == 0, reported.err
@@ -122,7 +122,7 @@ def test_other_rules_do_not_go_on_with_an_evaluation(folder: Path) -> None:
     judged(folder)
     (folder / "house.yaml").write_text(RULES.replace("3)", "4)"))
     told = refused("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)
-    assert "judged with another set of house rules" in told.sentence
+    assert "judged with a different set of house rules" in told.sentence
     assert "--redo starts over" in told.sentence
     for command in (("show", "run"), ("report", "run", "--out", "report")):
         told = refused(*command, "--rules", "house.yaml", cwd=folder)

@@ -292,8 +292,8 @@ def test_a_suite_that_has_changed_since_is_named() -> None:
     gone = replace(SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WORLD, (VISITS,)),))})
     met = replace(TASK, scenarios=(Scenario(WORLD, (replace(VISITS, text='greets("amy")'),)),))
     cases = [
-        (gone, "the suite has changed .* no longer requires this"),
-        (replace(SUITE, tasks={"Visit": met}), "the suite has changed .* by now"),
+        (gone, "the suite has changed .* no longer has this requirement"),
+        (replace(SUITE, tasks={"Visit": met}), "the suite has changed .* now satisfied"),
     ]
     for suite, sentence in cases:
         text = printed(completion_view(row(completion(), MUTE), completion(), suite), 160)

@@ -103,7 +103,7 @@ def test_nobody_waits_for_what_is_no_longer_wanted() -> None:
 
 
 def test_a_lost_process_is_one_sentence() -> None:
-    with pytest.raises(EngineError, match="was lost"):
+    with pytest.raises(EngineError, match="worker process died"):
         list(Processes(2).map_distinct(dies, numbered(3), abs))
 
 
@@ -117,7 +117,7 @@ def ends_at_the_last(worker: Worker, works: Sequence[Work]) -> list[int]:
 def test_what_was_done_before_a_process_was_lost_has_results() -> None:
     results = Processes(1).map_distinct(ends_at_the_last, numbered(100), abs)
     assert next(results)
-    with pytest.raises(EngineError, match="was lost"):
+    with pytest.raises(EngineError, match="worker process died"):
         list(results)
 
 

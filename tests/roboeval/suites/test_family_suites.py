@@ -57,14 +57,14 @@ def test_seeds_and_splits_share_no_task() -> None:
 )
 def test_a_suite_has_one_name(name: str) -> None:
     assert not has_suite(name)
-    with pytest.raises(UserError, match="there is no suite"):
+    with pytest.raises(UserError, match="unknown suite"):
         load_suite(name)
 
 
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [
-        (("exam",), 'no split "exam"; .*train, validation and test'),
+        (("exam",), 'unknown split "exam"; .*train, validation and test'),
         (("test", -1), "the seed is -1, but with 17 tasks it must be from 0 to"),
         (("test", 1_000_000_000), "the seed is 1000000000"),
         (("test", 0, 0), "the number of tasks is 0"),
@@ -77,7 +77,7 @@ def test_mistakes_are_refused(wrong: tuple[str, int, int], sentence: str) -> Non
 
 
 def test_its_worlds_cannot_be_drawn_again() -> None:
-    with pytest.raises(UserError, match=f'"{SMALL}" follow from its name'):
+    with pytest.raises(UserError, match=f'"{SMALL}" are determined by its name'):
         load_suite(SMALL).with_worlds(4)
 
 

@@ -255,7 +255,7 @@ def test_a_new_suite_is_named_after_its_folder_as_far_as_that_can_be(
 
 def test_a_suite_is_not_started_within_another(tmp_path: Path) -> None:
     new_task(tmp_path / "lab", "MakeTea")
-    with pytest.raises(UserError, match="inside a suite") as error:
+    with pytest.raises(UserError, match="subfolder of a suite") as error:
         new_task(tmp_path / "lab" / "tasks", "MakeCoffee")
     assert error.value.file == tmp_path / "lab" / "tasks"
     assert [path.name for path in (tmp_path / "lab" / "tasks").iterdir()] == ["MakeTea.yaml"]

@@ -100,7 +100,7 @@ def test_a_family_of_ones_own_is_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("right", "wrong", "told"),
     [
-        ("spare: rooms", "spare: planets", r', line 3: there is no pool "planets"; use rooms, people'),
+        ("spare: rooms", "spare: planets", r', line 3: unknown pool "planets"; use rooms, people'),
         ("tr.Exists(goto", "tr.Exist(goto", r", line 9: .*Exist"),
         ('go_to("$room")', 'go_to("$rom")', r', line 13: "\$rom" .*; write \$\$'),
         ("Go to the $room., Please", "Go for $ 5., Please", r", line 7: .*; write \$\$"),
@@ -234,5 +234,5 @@ def test_seeds_are_whole_numbers_from_0(seed: int) -> None:
 
 
 def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(UserError, match=r'there is no family "Fly"; .*AnnounceInOrder'):
+    with pytest.raises(UserError, match=r'unknown family "Fly"; .*AnnounceInOrder'):
         trained_task("Fly", 1)

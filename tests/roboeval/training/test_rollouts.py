@@ -159,8 +159,8 @@ def test_a_completion_without_content_is_refused(completion: list[dict[str, Any]
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [
-        ({"split": "exam"}, 'there is no split "exam"; .*train, validation and test'),
-        ({"only": ["Fly"]}, 'there is no family "Fly"'),
+        ({"split": "exam"}, 'unknown split "exam"; .*train, validation and test'),
+        ({"only": ["Fly"]}, 'unknown family "Fly"'),
         ({"only": "BringThing"}, "the families .* list"),
         ({"count": 0}, "the number of prompts is 0, but it must be at least 1"),
         ({"seed": 1_000_000}, "the seed is 1000000, but with 1,000 prompts it must be from 0 to 999,999"),

@@ -365,7 +365,7 @@ def test_the_link_of_a_face_opens_no_run(tmp_path: Path, runs: Path) -> None:
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
     refusal = refused("serve", tmp_path / "none")
     assert refusal.at == (str(tmp_path / "none"), None)
-    assert "no such folder" in refusal.sentence
+    assert "does not exist" in refusal.sentence
     assert refusal.commands == ["roboeval run"]
 
 

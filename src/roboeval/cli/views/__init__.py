@@ -1,1 +1,1 @@
-"""Tables and texts for a terminal, drawn from the numbers of `analysis`."""
+"""Formats the results of `analysis` as tables and texts for a terminal."""

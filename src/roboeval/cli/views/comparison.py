@@ -1,4 +1,4 @@
-"""Views of a comparison of two runs, and of two suites."""
+"""Formats comparisons of two runs and of two suites."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
     rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}", str(runs[1].coverage))
     over = f"over {counted(comparison.prompts, 'prompt')} that both have"
     rows.add_row("difference, second minus first", f"{comparison.over_tasks.mean:+.3f}", over)
-    few = "too narrow for so few tasks" * (1 < len(comparison.tasks) < MIN_CLUSTERS)
+    few = "too narrow with so few tasks" * (1 < len(comparison.tasks) < MIN_CLUSTERS)
     for name, estimate, remark in (
         ("over tasks", comparison.over_tasks, p_text(comparison.p_tasks)),
         ("over prompts", comparison.over_prompts, p_text(comparison.p_prompts)),
@@ -69,7 +69,7 @@ def _ends(runs: tuple[ComparedRun, ComparedRun]) -> Table:
 
 
 def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableType:
-    """Show what a second suite changes, with at most `most` groups for each run and direction."""
+    """Show which verdicts a second suite changes, with at most `most` groups per run and direction."""
     parts: list[RenderableType] = [Text(visible(sentence), "bold") for sentence in sentences(found)]
     parts += [Text(), _scores(found)]
     for one in found:

@@ -1,4 +1,4 @@
-"""Views of a prompt's programs, with reasons why they fail, and of one completion."""
+"""Formats a prompt's programs with the reasons why they fail, and a single completion."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ MAX_EXPLANATION = 2_000  # characters
 ALL_GONE = "the judged programs are no longer in this run"
 ALL_STEPS = "--all shows what the robot did in satisfied worlds."
 SHOW_REPLY = "--reply shows them."
-SHOWN_REPLY_CHARACTERS = 100_000  # characters of a text of a reply
+SHOWN_REPLY_CHARACTERS = 100_000  # the most characters of a reply or its reasoning to print
 
 
 def prompt_view(data: Mapping[str, Any]) -> RenderableType:
-    """Show the programs of a prompt, given `prompt_data`."""
+    """Show the programs of a prompt, given its `prompt_data`."""
     table = grid("right", "left")
     for program in data["programs"]:
         table.add_row(f"  {program['indices'][0]}", _program_line(program))
@@ -66,9 +66,9 @@ def _program_line(program: Mapping[str, Any]) -> Text:
 def completion_view(
     data: Mapping[str, Any], *, in_full: bool = False, with_reply: bool = False
 ) -> RenderableType:
-    """Show a completion, given `completion_data`: its program, and what the robot did in each world.
+    """Show a completion's program and what the robot did in each world, given its `completion_data`.
 
-    `in_full` also shows satisfied worlds in full, `with_reply` the unchanged reasoning and reply.
+    `in_full` also shows satisfied worlds in full; `with_reply` adds the original reasoning and reply.
     """
     failure = data["failure"]
     why_none = None if failure is None else no_program_sentence(failure)
@@ -77,7 +77,7 @@ def completion_view(
     if data["program"] is not None:
         parts += [Text(), *_program(data["program"], lines)]
     parts += _reply(data["reply"], with_texts=with_reply)
-    if why_none is not None:  # no robot did anything
+    if why_none is not None:  # without a program, there are no steps to show
         return Group(*parts, Text(), Text(why_none, "red"))
     worlds = data["worlds"]
     if data["lowered"]:
@@ -194,5 +194,5 @@ def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
 
 
 def kind_view(failure: Mapping[str, Any]) -> Text:
-    """Show the class and the kind of a failure."""
+    """Show the class and the kind of a failure in red."""
     return Text.assemble((f"{visible(label_of(failure['class']))}: {visible(failure['kind'])}", "red"))

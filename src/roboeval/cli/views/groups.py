@@ -1,4 +1,4 @@
-"""Views of completions found, of groups of failures, and of rejection sampling."""
+"""Formats found completions, groups of failures, and the results of rejection sampling."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from roboeval.evaluation.runs.completions import how_many, name_of
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.suites.task import check_label
 
-MAX_PRINTED_CHANGES = 60  # of a difference between programs
+MAX_PRINTED_CHANGES = 60  # lines of a diff between programs
 
 
 def found_view(
@@ -34,7 +34,7 @@ def found_view(
     groups: int,
     is_search: bool,
 ) -> RenderableType:
-    """Show groups of failures, after a search below the completions found in each task."""
+    """Show groups of failures; after a search, list the completions found in each task first."""
     failed = len(found) - int(counts["passed"].sum())
     parts: list[RenderableType] = []
     if is_search:
@@ -62,7 +62,7 @@ def _by_task(found: Sequence[TraceMatch], counts: pl.DataFrame) -> Table:
 
 
 def failure_group_view(group: FailureGroup) -> RenderableType:
-    """A group of failures: their number, the reason, and the nearest program that passes."""
+    """Show a group of failures: its size, the reason, and the nearest passing program."""
     size = how_many(len(group.members))
     name = visible(name_of(group.representative))
     head = Text.assemble((size, "bold"), f" of {visible(group.task)}, ", kind_view(group.failure))
@@ -86,7 +86,7 @@ def failure_group_view(group: FailureGroup) -> RenderableType:
 def resample_view(
     prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, title: str, coverage: Coverage
 ) -> RenderableType:
-    """Show the results of rejection sampling, by limit of retries."""
+    """Show the results of rejection sampling for each limit of retries."""
     reaching = (f"pass@1\n≥ {t:g}" for t in THRESHOLDS)
     table = ruled("retries", "pass@1", *reaching, "accepted", "run at all", first="right")
     for limit in (resample(prompts, retries) for retries in limits):
@@ -96,13 +96,16 @@ def resample_view(
     of = "prompt" if hopeless == 1 else "prompts"
     return Group(
         Text(visible(title), style="bold"),
-        Text("results if each program that the check rejects is requested again:"),
+        Text("results if each program that the check rejects is regenerated:"),
         Text(),
         table,
         Text(),
         Text(f"over {coverage}", "" if coverage.is_whole else "yellow"),
-        Text("pass@1 ≥ x: the share of prompts whose pass@1 is x or better", style="dim"),
+        Text("pass@1 ≥ x: the share of prompts with a pass@1 of at least x", style="dim"),
         Text("accepted: the share of final programs that the check accepts", style="dim"),
-        Text("run at all: the share that runs without an error in all worlds of its task", style="dim"),
+        Text(
+            "run at all: the share of programs that run without an error in all worlds of their task",
+            style="dim",
+        ),
         *([Text(f"no completion of {hopeless} {of} is accepted")] if hopeless else []),
     )

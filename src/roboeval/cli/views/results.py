@@ -1,4 +1,4 @@
-"""Views of a run and of one of its tasks."""
+"""Formats the results of a run and of one of its tasks."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from roboeval.evaluation.runs.completions import how_many, recorded_suffix
 if TYPE_CHECKING:
     from roboeval.analysis.broken_rules import BrokenRules
 
-MAX_TASKS_NAMED = 3  # with more tasks, show their number
+MAX_TASKS_NAMED = 3  # for more tasks, only their number is shown
 
 
 def ruled(*heads: str, first: JustifyMethod = "left") -> Table:
-    """Create a table with a line below its heads; all columns but the first are right-aligned."""
+    """Create a table with a line below its header; all columns but the first are right-aligned."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for number, head in enumerate(heads):
         table.add_column(Text(head), justify="right" if number else first, overflow="fold")
@@ -56,24 +56,24 @@ def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
 
 
 def house_view(found: BrokenRules) -> RenderableType:
-    """Show how often rules were broken, and the effect on pass@1."""
+    """Show how often house rules were broken, and their effect on pass@1."""
     table = grid("right", "left")
     for rule, count in found.by_rule.items():
         table.add_row(f"{count:,}", Text(visible(rule)))
-    share = f"{found.broken.mean:.1%} of the programs of a prompt break a rule of the house, on average"
+    share = f"on average, {found.broken.mean:.1%} of a prompt's programs break a house rule"
     share += f" ({found.broken.interval})"
     parts: list[RenderableType] = [Text(), Text(share, "bold"), table]
     if found.cost is None:
-        parts.append(Text("evaluate the run without --rules, too, to see what the rules cost", "dim"))
+        parts.append(Text("to see what the rules cost, also evaluate the run without --rules", "dim"))
     else:
-        less = f"pass@1 with the rules less pass@1 without: {found.cost.mean:+.3f}"
+        less = f"pass@1 with the rules minus pass@1 without: {found.cost.mean:+.3f}"
         parts.append(Text(f"{less} ({found.cost.interval})"))
     return Group(*parts)
 
 
 def _missed(missing: Missing) -> Iterator[Text]:
     for reason, tasks in [
-        ("no completions of", missing.no_completions),
+        ("no completions for", missing.no_completions),
         ("not judged yet:", missing.not_judged),
         ("not selected:", missing.not_selected),
     ]:
@@ -88,7 +88,7 @@ def _missed(missing: Missing) -> Iterator[Text]:
 
 @dataclass(frozen=True)
 class _TaskTable:
-    """The scores of tasks, with fewer columns if the names of tasks would not fit otherwise."""
+    """A table of task scores, with fewer columns if task names would not fit otherwise."""
 
     summary: EvaluationSummary
 
@@ -142,7 +142,7 @@ def _failure_table(failures: Failures) -> Table:
 
 
 def task_view(data: Mapping[str, Any]) -> RenderableType:
-    """Show a task by prompts, given `task_data`."""
+    """Show the results of a task for each prompt, given its `task_data`."""
     task = data["task"]
     models = {model for prompt in data["prompts"] for model in prompt["models"]}
     parts: list[RenderableType] = [Text(visible(task) + recorded_suffix(models), style="bold")]

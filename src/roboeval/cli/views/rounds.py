@@ -1,4 +1,4 @@
-"""A table of the rounds of a run: the effect and the cost of requesting rejected programs again."""
+"""Formats the rounds of a run: the effect and the cost of regenerating rejected programs."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Round:
-    """The result of a round of a run."""
+    """The result of one round of a run."""
 
-    number: int  # from 0, for the first programs
-    summary: EvaluationSummary  # of all programs after the round
+    number: int  # the round; 0 is the first generation
+    summary: EvaluationSummary  # results of all programs after the round
     requests: int  # programs requested in the round
     accepted: int  # programs that the check accepts after the round
-    tokens: int  # of the requests of the round, if the model counts tokens
+    tokens: int  # tokens used in the round; 0 if the model does not count them
 
 
 def rounds_view(rounds: Sequence[Round], *, repairs: bool) -> RenderableType:
-    """Show the rounds of a run in a table, with cumulative requests and tokens."""
+    """Show the rounds of a run in a table with cumulative requests and tokens."""
     table = ruled("programs", "pass@1", "95% over tasks", "judged", "accepted", "requests", "tokens")
     requests = tokens = 0
     for one in rounds:
@@ -43,8 +43,8 @@ def rounds_view(rounds: Sequence[Round], *, repairs: bool) -> RenderableType:
             f"{requests:,}",
             f"{tokens:,}" if tokens else "unknown",
         )
-    what = "repairing" if repairs else "requesting again"
-    return Group(Text(), Text(f"The effect of {what} what the check rejects", "bold"), Text(), table)
+    what = "repairing" if repairs else "regenerating"
+    return Group(Text(), Text(f"The effect of {what} rejected programs", "bold"), Text(), table)
 
 
 def _name(number: int, *, repairs: bool) -> str:

@@ -1,4 +1,4 @@
-"""Views of a suite's tasks, and of one task with its checks and worlds."""
+"""Formats a suite's tasks, and a single task with its checks and worlds."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def suite_task_view(task: Task) -> RenderableType:
     """Show a task: its prompts, its checks, and the requirements of each world."""
     parts: list[RenderableType] = [
         Text.assemble((task.name, "bold"), f"  {task.summary}"),
-        Text(f"takes {', '.join(task.abilities)}", "dim"),
+        Text(f"needs {', '.join(task.abilities)}", "dim"),
     ]
-    common = " (common sense: no prompt says it)"
+    common = " (common sense: no prompt states it)"
     parts += _section("Prompts", [Text(f"{n}  {prompt}") for n, prompt in enumerate(task.prompts)])
     parts += _section("Facts", [Text(fact.fact + common * fact.commonsense) for fact in task.facts])
     parts += _section("Checks", [*map(_check_view, task.checks)])
@@ -46,7 +46,7 @@ def suite_task_view(task: Task) -> RenderableType:
 
 
 def clauses_view(tasks: Iterable[Task]) -> RenderableType:
-    """Show the clauses of each prompt, with the checks that cover each or the reason why none does."""
+    """Show each prompt's clauses, each with the checks that cover it or the reason why none does."""
     parts: list[RenderableType] = []
     for task in tasks:
         table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
@@ -84,7 +84,7 @@ def _world_lines(scenario: Scenario) -> Iterator[RenderableType]:
         there += ["the robot"] if room.name == world.robot else []
         yield Text(f"{room.name}: {', '.join(there) or 'empty'}")
     if world.may_wait_forever:
-        yield Text("a program may wait here for ever", "italic")
+        yield Text("a program may wait for ever in this world", "italic")
     for requirement in scenario.require:
         asked = listed([str(prompt) for prompt, _ in requirement.words], "or")
         yield Text(f"requires {requirement.text}{asked and f' for prompt {asked}'}")

@@ -1,4 +1,4 @@
-"""The folder of a run: completions, rows of evaluations, and the table of both.
+"""Reads and writes the folder of a run: its completions, its evaluations, and the table of both.
 
 Start with `results.py`; `rows.py` describes a row, `folder.py` the files.
 """

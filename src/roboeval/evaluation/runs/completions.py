@@ -1,4 +1,4 @@
-"""Completions, and the files of JSON lines that hold them."""
+"""Defines completions, and reads them from files of JSON lines."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ EXAMPLE = '{"task": "LunchTime", "prompt": 0, "index": 0, "program": "def task_p
 
 NUMBER_LIMIT = 1_000_000_000
 CompletionKey: TypeAlias = tuple[str, int, int]
-KEY = ("task", "prompt", "index")  # as columns of tables and names in rows
+KEY = ("task", "prompt", "index")  # names of the key's parts in tables and rows
 REQUIRED = (*KEY, "program")
 FIELDS = (*REQUIRED, "instruction", "model")
-NO_PROGRAM_COLUMN = "no_program"  # its column
+NO_PROGRAM_COLUMN = "no_program"  # the table column for replies without a program
 
 
 @dataclass(frozen=True, kw_only=True)
 class Completion:
-    """One row of completions.jsonl: a program that a model wrote for an instruction.
+    """A row of completions.jsonl: a program that a model wrote for an instruction.
 
     Args:
         task: the task's name.
-        prompt: which phrasing, counted from 0, below a billion.
-        index: which sample, counted from 0, below a billion.
-        program: the cleaned source, which is judged unchanged.
-        instruction: the instruction of the prompt; None if it was not recorded.
+        prompt: the number of the phrasing, from 0, below a billion.
+        index: the number of the sample, from 0, below a billion.
+        program: the cleaned source text, which is judged unchanged.
+        instruction: the instruction in the prompt, or None if it was not recorded.
         model: the name of the model.
         more: other entries of the row, such as `usage`, `raw_reply` and `finish_reason`.
 
     Raises:
-        UserError: an argument has a wrong type or is out of range.
+        UserError: an argument has the wrong type or is out of range.
     """
 
     task: str
@@ -58,7 +58,7 @@ class Completion:
         for name, number in (("prompt", self.prompt), ("index", self.index)):
             if type(number) is not int or not 0 <= number < NUMBER_LIMIT:
                 raise UserError(
-                    f"the {name} is {number!r}, but must be a whole number from 0 to {NUMBER_LIMIT - 1:,}"
+                    f"the {name} is {number!r}, but it must be a whole number from 0 to {NUMBER_LIMIT - 1:,}"
                 )
         for name in ("task", "program", "instruction", "model"):
             text = getattr(self, name)
@@ -71,7 +71,7 @@ class Completion:
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Completion:
-        """Read a row of completions.jsonl; raise UserError if an entry is missing or invalid."""
+        """Create a completion from a row; raise UserError if an entry is missing or invalid."""
         more = dict(row)
         known = {name: more.pop(name) for name in FIELDS if name in more}
         for name in REQUIRED:
@@ -81,32 +81,32 @@ class Completion:
 
     @property
     def row(self) -> dict[str, Any]:
-        """Its row of completions.jsonl."""
+        """Return the completion as a row of completions.jsonl."""
         known = {name: getattr(self, name) for name in FIELDS}
         return {name: value for name, value in known.items() if value is not None} | dict(self.more)
 
     @property
     def key(self) -> CompletionKey:
-        """Its unique key in a run."""
+        """Return the task, prompt and index, which are unique in a run."""
         return self.task, self.prompt, self.index
 
     @property
     def finish_reason(self) -> str | None:
-        """Why the reply ended, in the server's words; None if it was not recorded."""
+        """Return why the reply ended, in the server's words, or None if that was not recorded."""
         reason = self.more.get("finish_reason")
         return reason if isinstance(reason, str) else None
 
     @property
     def is_cut_off(self) -> bool:
-        """Whether the reply ended at the limit of tokens, even if the program is complete."""
+        """Whether the reply ended at the token limit, even if the program is complete."""
         return is_cut_off(self.finish_reason)
 
     @property
     def no_program(self) -> NoProgram | None:
-        """Why the reply held no program; None if it held one, or if that is unknown.
+        """Return why the reply contained no program, or None if it contained one or this is unknown.
 
-        Rows of other tools are classified like new replies. Raises EngineError if no isolated process can
-        be started for that.
+        Rows written by other tools are classified like new replies. Raises EngineError if this needs an
+        isolated process and none can be started.
         """
         if NO_PROGRAM_COLUMN in self.more:
             kind: NoProgram | None = self.more[NO_PROGRAM_COLUMN]
@@ -119,7 +119,7 @@ class Completion:
 
     @property
     def program_sha256(self) -> str:
-        """The SHA-256 of the program, lone surrogates included, in hexadecimal digits."""
+        """Return the SHA-256 of the program, including lone surrogates, in hexadecimal."""
         return hashlib.sha256(self.program.encode(errors="surrogatepass")).hexdigest()
 
 
@@ -141,17 +141,17 @@ def read_completions(
 
     Args:
         path: the file.
-        suite: the suite of their tasks and prompts; any by default.
-        growing: whether to ignore a torn last line, as in a run.
-        name: the name of the file in error messages; its path by default.
-        faults: collects errors, whose lines are left out; by default they are raised.
+        suite: the suite whose tasks and prompts are allowed; any by default.
+        growing: whether to ignore an incomplete last line, because the file is still being written.
+        name: the file name for error messages; by default its path.
+        faults: a list that collects errors while invalid lines are skipped; by default, errors are raised.
 
     Raises:
-        UserError: the file is missing or empty, or a row is invalid, unknown to the suite, or repeated.
+        UserError: the file is missing or empty, or a row is invalid, unknown to the suite, or a duplicate.
     """
     path = Path(path)
     name = name or path
-    seen: dict[CompletionKey, int] = {}  # the lines
+    seen: dict[CompletionKey, int] = {}  # line numbers
     try:
         for number, line in read_lines(path, name=name):
             try:
@@ -173,7 +173,7 @@ def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completio
             return None
         raise UserError(f"this line is not JSON; a row looks like {EXAMPLE}")
     completion = Completion.of(row)
-    if 2 * len(line) > MAX_ROW:  # shorter rows cannot become too long
+    if 2 * len(line) > MAX_ROW:  # shorter rows cannot grow beyond the limit
         check_length(row, None)
     if suite is not None and (
         problem := find_key_fault(completion.key, suite) or _is_of_other(completion, suite)
@@ -183,21 +183,21 @@ def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completio
 
 
 def _is_of_other(completion: Completion, suite: Suite) -> str | None:
-    """Return an error if a completion is for another seed or version of families."""
+    """Return an error if a completion belongs to another seed or version of task families."""
     if suite.families is None or completion.instruction is None:
         return None
     if completion.instruction == suite.tasks[completion.task].prompts[completion.prompt]:
         return None
     return (
-        f'{name_of(completion.key)} is for another instruction than "{suite.name}" has; '
-        "run.json names its suite and version"
+        f'{name_of(completion.key)} has a different instruction than "{suite.name}"; '
+        "see run.json for the right suite and version"
     )
 
 
 def _expect_new(key: CompletionKey, seen: dict[CompletionKey, int], number: int) -> None:
     first_line = seen.setdefault(key, number)
     if first_line != number:
-        raise UserError(f"repeats {name_of(key)} of line {first_line}; remove one")
+        raise UserError(f"duplicates {name_of(key)} on line {first_line}; remove one of the two")
 
 
 def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:
@@ -208,13 +208,13 @@ def check_length(row: Mapping[str, Any], file: object, line: int | None = None) 
 
 
 def find_key_fault(key: CompletionKey, suite: Suite) -> str | None:
-    """Return an error if a task or prompt, perhaps of a wrong type, is unknown to a suite."""
+    """Return an error if a suite lacks a task or prompt, whose types may also be wrong; otherwise None."""
     task = suite.tasks.get(str(key[0]))
     if task is None:
         return f'the suite "{suite.name}" has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
     there_are = f"the task has prompts 0 to {len(task.prompts) - 1}"
     prompt: object = key[1]
-    if isinstance(prompt, bool) or not hasattr(prompt, "__index__"):  # NumPy integers are fine
+    if isinstance(prompt, bool) or not hasattr(prompt, "__index__"):  # NumPy integers are allowed
         return f"the prompt is {prompt!r}, not a whole number; {there_are}"
     return None if 0 <= key[1] < len(task.prompts) else f"{name_of(key)}: {there_are}"
 
@@ -230,7 +230,7 @@ def how_many(count: int) -> str:
 
 
 def recorded_suffix(models: Collection[str | None]) -> str:
-    """Return a suffix for titles if models are recorded programs rather than language models."""
+    """Return a suffix for titles that marks programs written by hand, or an empty string."""
     recorded = [model for model in models if model is not None and model.startswith("recorded:")]
     if not recorded:
         return ""

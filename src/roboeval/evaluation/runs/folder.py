@@ -1,4 +1,4 @@
-"""The folder of a run, with completions and evaluations that survive every interruption."""
+"""Manages the folder of a run, whose completions and evaluations survive every interruption."""
 
 from __future__ import annotations
 
@@ -18,63 +18,63 @@ from codebotler.core.files import open_replacement, read_text, sync_folder, to_l
 from roboeval.evaluation.runs.completions import COMPLETIONS, Completion, read_completions
 from roboeval.suites.load import ABLATED, Suite
 
-RULES_INFIX = "-rules-"  # between the suite and house rules in the name of an evaluation
+RULES_INFIX = "-rules-"  # separates the suite and the house rules in an evaluation's name
 
 
 @dataclass(frozen=True)
 class RunFolder:
-    """The folder of a run."""
+    """The folder of a run, with the paths of its files."""
 
     path: Path
 
     @property
     def completions(self) -> Path:
-        """The file of completions."""
+        """Return the path of the completions."""
         return self.path / COMPLETIONS
 
     @property
     def about(self) -> Path:
-        """The file with the model and how it was prompted."""
+        """Return the path of run.json, which describes the model and its prompts."""
         return self.path / "run.json"
 
     @property
     def in_flight(self) -> Path:
-        """The log of pending requests."""
+        """Return the path of the log of pending requests."""
         return self.path / "inflight.jsonl"
 
     def rows(self, key: str) -> Path:
-        """Return the file of rows of an evaluation, by its `evaluation_key`."""
+        """Return the path of an evaluation's rows, given its `evaluation_key`."""
         return self.path / "evaluations" / f"{key}.jsonl"
 
     def manifest(self, key: str) -> Path:
-        """Return the file that names the suite and tool of an evaluation."""
+        """Return the path of KEY.json, which records the suite and tool of an evaluation."""
         return self.path / "evaluations" / f"{key}.json"
 
     def checks(self, key: str) -> Path:
-        """Return the file of problems that the check found, by the key of the evaluation."""
+        """Return the path of the problems that the check found, given the key of an evaluation."""
         return self.path / "checks" / f"{key}.jsonl"
 
     def checks_manifest(self, key: str) -> Path:
-        """Return the file that names the suite and settings of the check."""
+        """Return the path of the file that records the suite and settings of the check."""
         return self.path / "checks" / f"{key}.json"
 
     def judged_by(self) -> list[str]:
-        """Return the sorted names of the evaluations, without ablations."""
+        """Return the sorted names of the evaluations, except ablations."""
         keys = (path.stem for path in self.rows("").parent.glob("*.jsonl"))
         return sorted({key.removesuffix(ABLATED) for key in keys})
 
     def houses(self, suite: str) -> list[str]:
-        """Return the sorted names of house rules with which a suite judged it."""
+        """Return the sorted names of the house rules that were used to judge the run with a suite."""
         before = f"{suite}{RULES_INFIX}"
         return [key.removeprefix(before) for key in self.judged_by() if key.startswith(before)]
 
     def read(self, suite: Suite | None = None) -> Iterator[Completion]:
-        """Read its completions, which must be of the suite if there is one."""
+        """Read the completions; if a suite is given, they must belong to it."""
         return read_completions(self.completions, suite, growing=True)
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Lock this run against other processes; raise UserError if one is writing it."""
+        """Lock this run so that no other process can write to it; raise UserError if one already does."""
         self._expect_no_others()
         made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         lock = self.path / ".lock"
@@ -82,12 +82,14 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
             descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         except FileExistsError:
-            raise UserError("is a file, but a run is a folder; name another", file=self.path) from None
+            raise UserError("is a file, but a run is a folder; name a folder", file=self.path) from None
         except OSError as error:
             raise UserError(f"cannot be written ({error.strerror})", file=self.path) from None
         if not _locked(descriptor):
             os.close(descriptor)
-            raise UserError("another process is writing this run; wait until it has finished", file=self.path)
+            raise UserError(
+                "another process is writing to this run; wait until it has finished", file=self.path
+            )
         try:
             for folder in made:
                 sync_folder(folder.parent)
@@ -104,7 +106,7 @@ class RunFolder:
 
     @property
     def is_being_written(self) -> bool:
-        """Whether a process is writing it. This locks it for a moment, which writers wait out."""
+        """Whether a process is writing to this run. Checking takes the lock briefly; writers wait for it."""
         flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
         try:
             descriptor = os.open(self.path / ".lock", flags)
@@ -119,18 +121,18 @@ class RunFolder:
         return False
 
     def _expect_no_others(self) -> None:
-        """Raise UserError if the folder holds files but is not a run."""
+        """Raise UserError if the folder contains files but is not a run."""
         if self.completions.exists() or self.about.exists() or not self.path.is_dir():
             return
         others = sorted(one.name for one in self.path.iterdir() if not one.name.startswith("."))
         if others:
             raise UserError(
-                f'is not a run but contains other files such as "{others[0]}"; name a new folder',
+                f'is not a run, but contains other files such as "{others[0]}"; name a new folder',
                 file=self.path,
             )
 
     def keep(self, completions: Sequence[Completion]) -> None:
-        """Copy completions into this run; raise UserError, and change nothing, if it holds others."""
+        """Copy completions into this run; raise UserError and change nothing if it holds different ones."""
         models = {completion.model for completion in completions}
         lines = (to_line(completion.row) for completion in completions)
         with self.writing():
@@ -139,8 +141,8 @@ class RunFolder:
                     same = all(file.read(len(line)) == line for line in lines)
                     if not same or file.read(1):
                         other = (
-                            "this run holds other completions; name another folder, or copy the new ones to "
-                            f"{self.completions} and run `roboeval evaluate {self.path} --redo`"
+                            "this run holds different completions; name another folder, or copy the new ones "
+                            f"to {self.completions} and run `roboeval evaluate {self.path} --redo`"
                         )
                         raise UserError(other, file=self.path)
                 return
@@ -159,7 +161,7 @@ LOCK_PAUSE_SECONDS = 0.05
 
 
 def _locked(descriptor: int) -> bool:
-    """Lock a file; children of a killed process may hold the lock for a moment."""
+    """Try to lock a file; retry briefly, because children of a killed process may still hold the lock."""
     for _ in range(LOCK_ATTEMPTS):
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -171,7 +173,7 @@ def _locked(descriptor: int) -> bool:
 
 
 def load_json_object(path: Path) -> dict[str, Any]:
-    """Read a KEY.json or run.json."""
+    """Read a JSON object from a file such as run.json."""
     text = read_text(path)
     try:
         data = json.loads(text)
@@ -183,18 +185,18 @@ def load_json_object(path: Path) -> dict[str, Any]:
 
 
 def selected_tasks(manifest: Mapping[str, Any]) -> frozenset[str] | None:
-    """Return the tasks of a KEY.json; None for all."""
+    """Return the tasks selected in the content of KEY.json, or None for all."""
     tasks = manifest.get("tasks")
     return None if tasks is None else frozenset(tasks)
 
 
 def about_of(run: RunFolder) -> dict[str, Any]:
-    """Return the content of a run's run.json, which is empty if there is none."""
+    """Return the content of run.json, or an empty dictionary if the file is missing."""
     return load_json_object(run.about) if run.about.exists() else {}
 
 
 def evaluation_key(suite: Suite, *, ablated: bool) -> str:
-    """Return the name of an evaluation's files."""
+    """Return the name that an evaluation's files start with."""
     named = suite.house is not None and suite.house.name
     rules = f"{RULES_INFIX}{named}" if named else ""
     return suite.name + rules + ABLATED * ablated
@@ -203,7 +205,7 @@ def evaluation_key(suite: Suite, *, ablated: bool) -> str:
 def tasks_to_judge(
     suite: Suite, names: str | None, *, ablated: bool
 ) -> tuple[frozenset[str] | None, tuple[str, ...]]:
-    """Return the tasks of a comma-separated list, None for all, and those that lack an ablation."""
+    """Parse a list of task names; return the tasks to judge, None for all, and those without an ablation."""
     wanted = [*suite.tasks] if names is None else [suite.task(name.strip()).name for name in names.split(",")]
     if not ablated:
         return (None if names is None else frozenset(wanted)), ()
@@ -215,7 +217,7 @@ def tasks_to_judge(
 
 
 def with_judged_worlds(run: RunFolder, suite: Suite, *, ablated: bool) -> Suite:
-    """Return the suite with the drawn worlds in which a run was judged."""
+    """Return the suite with the same sampled worlds as when the run was judged."""
     path = run.manifest(evaluation_key(suite, ablated=ablated))
     drawn = suite.worlds, suite.seed
     if suite.worlds is None or not path.is_file():
@@ -229,23 +231,25 @@ def with_judged_worlds(run: RunFolder, suite: Suite, *, ablated: bool) -> Suite:
 def evaluation_of(
     path: Path, suite: Suite, *, ablated: bool, again: str = "roboeval evaluate"
 ) -> tuple[RunFolder, str, Suite]:
-    """Return a run, the key of its evaluation by a suite, and the suite with the worlds of that evaluation.
+    """Return a run, the key of its evaluation by a suite, and the suite with that evaluation's worlds.
 
-    Raises UserError if the suite has not judged the run, and names `again` as the command for that.
+    Raises UserError if the suite has not judged the run; the message suggests the command `again`.
     """
     run = RunFolder(path)
     suite = with_judged_worlds(run, suite, ablated=ablated)
     key = evaluation_key(suite, ablated=ablated)
     if not run.completions.is_file():
-        raise UserError("is not a run: it has no completions.jsonl", file=path)
+        raise UserError("is not a run, because it has no completions.jsonl", file=path)
     if not run.rows(key).is_file():
         others, houses = run.judged_by(), run.houses(suite.name)
         if houses and suite.name not in others:
             named = ", ".join(houses)
-            mend = f"name their file with --rules, or run `{again}`"
-            raise UserError(f"was judged with house rules only ({named}); {mend}", file=path)
+            mend = f"give their file with --rules, or run `{again}`"
+            raise UserError(f"was judged only with house rules ({named}); {mend}", file=path)
         if not others or suite.name in others:
             raise UserError(f"has not been judged; run `{again}`", file=path)
         judges, ours = " and ".join(f'"{name}"' for name in others), f'"{suite.name}"'
-        raise UserError(f"was judged by the suite {judges}, not by {ours}; name it with --suite", file=path)
+        raise UserError(
+            f"was judged by the suite {judges}, not by {ours}; select the right suite with --suite", file=path
+        )
     return run, key, suite

@@ -1,4 +1,4 @@
-"""Completions in the format of the paper's authors: a folder or zip of small Python files."""
+"""Reads completions in the format of the paper's authors: a folder or zip of small Python files."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ File: TypeAlias = tuple[str, Callable[[], str]]  # the name of a file, and a fun
 
 
 def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Completion]:
-    """Read the completions in a folder or zip of `TASK_PROMPT_INDEX.py`.
+    """Read the completions in a folder or zip of files named `TASK_PROMPT_INDEX.py`.
 
-    The files assign strings to `prompt` and `completion`; they are parsed and never imported. Raises
-    UserError if there is none, one is invalid or unknown to the suite, or a zip is damaged or too large.
+    The files assign strings to `prompt` and `completion`; they are parsed but never imported. Raises
+    UserError if there are none, one is invalid or unknown to the suite, or a zip is damaged or too large.
     """
     with _files(path) as files:
         for key, (name, read) in sorted(_by_key(files, path).items()):
@@ -55,13 +55,18 @@ def _by_key(files: Iterator[File], path: Path) -> dict[CompletionKey, File]:
     by_key: dict[CompletionKey, File] = {}
     for file in files:
         name = PurePosixPath(file[0]).name
-        if name.startswith("."):  # macOS adds such files to zips
+        if name.startswith("."):  # macOS adds hidden files to zips
             continue
         if (match := PROGRAM_FILE_NAME.fullmatch(name)) is None:
-            raise UserError(f"a completion is named {NAMED}; rename or remove this file", file=file[0])
+            raise UserError(
+                f"the name of a completion must be {NAMED}; rename or remove this file", file=file[0]
+            )
         key = match["task"], int(match["prompt"]), int(match["index"])
         if key in by_key:
-            raise UserError(f"repeats {name_of(key)} of {by_key[key][0]}; remove one", file=file[0])
+            raise UserError(
+                f"duplicates {name_of(key)}, already defined in {by_key[key][0]}; remove one of the two",
+                file=file[0],
+            )
         by_key[key] = file
     if not by_key:
         raise UserError(f"contains no file named {NAMED}", file=path)
@@ -86,10 +91,10 @@ def _members(path: Path, archive: zipfile.ZipFile) -> Iterator[File]:
     unpacked = 0
 
     def read(member: zipfile.ZipInfo, name: str) -> str:
-        # A zip may lie about sizes, so unpack no more than the longest text.
+        # A zip may declare wrong sizes, so read at most the longest allowed text.
         nonlocal unpacked
         if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            # Other methods may unpack pieces of any size.
+            # Other compression methods may unpack chunks of any size.
             raise UserError('uses an unusual compression; use "deflate"', file=name)
         try:
             with archive.open(member) as file:
@@ -113,7 +118,7 @@ def _assigned(text: str, name: str) -> dict[str, str]:
     except SyntaxError as error:
         raise UserError(f"is not Python ({error.msg})", file=name, line=error.lineno) from None
     except (ValueError, RecursionError, MemoryError):
-        raise UserError("is not readable Python; write plain assignments", file=name) from None
+        raise UserError("cannot be parsed as Python; write plain assignments", file=name) from None
     texts = {
         target.id: _text(statement.value, target.id, name)
         for statement in statements
@@ -129,6 +134,8 @@ def _assigned(text: str, name: str) -> dict[str, str]:
 def _text(written: ast.expr, what: str, name: str) -> str:
     match written:
         case ast.Constant(str(text)):
-            # Join surrogate pairs, as JSON does.
+            # Join surrogate pairs like JSON does.
             return text.encode("utf-16", errors="surrogatepass").decode("utf-16", errors="surrogatepass")
-    raise UserError(f"`{what}` is not a plain string; write it out", file=name, line=written.lineno)
+    raise UserError(
+        f"`{what}` is not a plain string; write a single string literal", file=name, line=written.lineno
+    )

@@ -1,4 +1,4 @@
-"""The replies recorded in rows of completions.jsonl."""
+"""Extracts what rows of completions.jsonl recorded about replies."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from roboeval.evaluation.runs.completions import Completion
 
 TOKENS = ("input_tokens", "output_tokens", "reasoning_tokens")
 REPLY_TEXTS = ("reasoning", "raw_reply")
-MAX_RECORDED = 10**12  # tokens or seconds; larger numbers are not measurements
+MAX_RECORDED = 10**12  # tokens or seconds; larger numbers cannot be measurements
 
 
 def reply_data(completion: Completion | None) -> dict[str, Any] | None:
-    """Return what was recorded of a completion's reply; None if nothing was.
+    """Return what was recorded about a completion's reply, or None if nothing was.
 
-    It has `finish_reason` in the server's words, `cut_off`, `input_tokens`, `output_tokens`,
+    The entries are `finish_reason` in the server's words, `cut_off`, `input_tokens`, `output_tokens`,
     `reasoning_tokens`, `latency_s`, `reasoning` and `raw_reply`; each may be None.
     """
     more = {} if completion is None else completion.more
@@ -37,8 +37,8 @@ def reply_data(completion: Completion | None) -> dict[str, Any] | None:
 
 
 def reply_facts(reply: Mapping[str, Any]) -> list[str]:
-    """Describe how a reply ended, its tokens and its latency."""
-    named = zip(TOKENS, ("of the prompt", "of the reply", "of its reasoning"), strict=True)
+    """Describe why a reply ended, its token counts and its latency."""
+    named = zip(TOKENS, ("in the prompt", "in the reply", "in its reasoning"), strict=True)
     tokens = [f"{reply[name]:,} {of}" for name, of in named if reply[name] is not None]
     facts = []
     if reply["finish_reason"] is not None:
@@ -49,6 +49,6 @@ def reply_facts(reply: Mapping[str, Any]) -> list[str]:
 
 
 def number_or_none(value: Any, kind: type | UnionType) -> float | None:  # noqa: ANN401 - JSON has no types
-    """Return a nonnegative number of a row; None for anything else."""
+    """Return a value from a row if it is a nonnegative number, or None."""
     is_number = isinstance(value, kind) and not isinstance(value, bool)
     return value if is_number and 0 <= value <= MAX_RECORDED else None

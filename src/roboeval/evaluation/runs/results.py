@@ -1,4 +1,4 @@
-"""A judged run as one table: a row for each completion and world, from which all numbers are counted."""
+"""Loads a judged run as one table, with a row per completion and world, for all statistics."""
 
 from __future__ import annotations
 
@@ -31,26 +31,26 @@ def load_results(
     ablation: bool = False,
     price: tuple[float, float] | None = None,
 ) -> pl.DataFrame:
-    """Read the verdicts of a judged run as one table, with a row for each completion and world.
+    """Read the verdicts of a judged run as one table with a row for each completion and world.
 
     Args:
         run: the folder of the run.
         suite: the name or folder of the suite that judged it.
-        ablation: whether to read the verdicts on common sense only.
-        price: the cost of a million tokens of input and of output, for the column `cost`.
+        ablation: whether to read the verdicts of the ablation, which requires only common sense.
+        price: the prices of a million input and output tokens, for the column `cost`.
 
     Returns:
-        a table in the order of completions and worlds. These columns are the same for all worlds: `task`,
+        A table sorted by completion and world. These columns repeat in all rows of a completion: `task`,
         `prompt`, `index`, `model`, `program_sha256`, `passed`, the first failure (`failure_class`,
-        `failure_kind`, `failure_world`, `failure_check`), `stale` (whether the run now has another program;
-        then `instruction`, `program`, `no_program`, `finish_reason` and `cut_off` are null),
+        `failure_kind`, `failure_world`, `failure_check`), `stale` (whether the run now has a different
+        program; then `instruction`, `program`, `no_program`, `finish_reason` and `cut_off` are null),
         `input_tokens`, `output_tokens`, `reasoning_tokens`, `latency_s`, `cost` and `accepted` (whether the
-        check found no problem; null if it was not checked). `world_number`, `world`, `satisfied`, `status`,
-        `error_kind`, `error_message`, `line`, `failed_checks` (joined by "; "), `category` (of the first
-        failed check) and `events` are about the world. Numbers count from 0.
+        check found no problem; null if the program was not checked). These columns describe a world:
+        `world_number`, `world`, `satisfied`, `status`, `error_kind`, `error_message`, `line`, `failed_checks`
+        (joined by "; "), `category` (of the first failed check) and `events`. Numbers count from 0.
 
     Raises:
-        UserError: there is no such run or suite, the suite has not judged it, or one of its files is damaged.
+        UserError: the run or suite does not exist, the suite has not judged the run, or a file is damaged.
     """
     known = load_suite(suite)
     table = read_results(*evaluation_of(Path(run), known, ablated=ablation), keep_failed=False).table
@@ -59,32 +59,32 @@ def load_results(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Results:
-    """One evaluation of a run, with its table."""
+    """One evaluation of a run, with its table of verdicts."""
 
     run: RunFolder
     key: str | None
-    suite: Suite | None  # None if it is not available
-    manifest: Mapping[str, Any]  # KEY.json
-    about: Mapping[str, Any]  # run.json
-    completions: Mapping[CompletionKey, Completion]  # those in the run now, in order
+    suite: Suite | None  # the suite that judged, or None if it is not available
+    manifest: Mapping[str, Any]  # the content of KEY.json
+    about: Mapping[str, Any]  # the content of run.json
+    completions: Mapping[CompletionKey, Completion]  # the completions now in the run, in order
     places: Mapping[CompletionKey, tuple[int, int]] = field(
         repr=False
-    )  # first byte and size of each row in the file
+    )  # the offset and size of each row in the file, in bytes
     passed: Sequence[CompletionKey] = field(repr=False)
-    stale: Sequence[CompletionKey]  # their programs have changed since
-    table: pl.DataFrame  # as `load_results` gives it
-    failed: Mapping[CompletionKey, bytes] = field(repr=False)  # rows as JSON, see `failed_row`
+    stale: Sequence[CompletionKey]  # completions whose programs have changed since the evaluation
+    table: pl.DataFrame  # the table that `load_results` returns
+    failed: Mapping[CompletionKey, bytes] = field(repr=False)  # failed rows as JSON, for `failed_row`
     faults: tuple[UserError, ...] = ()
 
     @property
     def known_suite(self) -> Suite:
-        """Its suite, if it was read with one."""
-        assert self.suite is not None, "only pages show runs without their suite"
+        """Return the suite; call this only if the evaluation was read with one."""
+        assert self.suite is not None, "only web pages show runs without their suite"
         return self.suite
 
     @property
     def tasks(self) -> frozenset[str] | None:
-        """The tasks that were selected or requested since; None for all."""
+        """Return the tasks that were selected for the evaluation or requested since, or None for all."""
         selected, requested = selected_tasks(self.manifest), requested_tasks(self.about)
         if self.is_ablated or selected is None:
             return selected
@@ -92,22 +92,22 @@ class Results:
 
     @property
     def scope(self) -> JudgingScope:
-        """The completions to judge."""
+        """Return the completions that the evaluation should judge."""
         return JudgingScope.of(self.completions.values(), self.tasks, self.about, self.suite)
 
     @property
     def is_ablated(self) -> bool:
-        """Whether it required common sense only."""
+        """Whether the evaluation required only common sense."""
         return (self.key or "").endswith(ABLATED)
 
     @property
     def programs(self) -> Mapping[CompletionKey, str]:
-        """The judged programs that are still in the run."""
+        """Return the judged programs that are still in the run."""
         stale = set(self.stale)
         return {key: c.program for key, c in self.completions.items() if key not in stale}
 
     def row(self, key: CompletionKey) -> Row:
-        """Read a row again, with all its traces; raise UserError if the file was replaced."""
+        """Read a row from the file, with all its traces; raise UserError if the file was replaced."""
         at, size = self.places[key]
         path = self.run.rows(self.key or "")
         try:
@@ -118,16 +118,16 @@ class Results:
                 return row
         except (OSError, ValueError, LookupError, TypeError, RecursionError):
             pass
-        raise UserError("was replaced meanwhile; try again", file=path)
+        raise UserError("was replaced in the meantime; try again", file=path)
 
     def failed_row(self, key: CompletionKey) -> Row:
-        """Return the row of a completion that failed, with the trace of the deciding world only."""
+        """Return the row of a failed completion, with only the trace of the first failing world."""
         row: Row = json.loads(self.failed[key])
         return row
 
 
 ShowProgress: TypeAlias = Callable[[Iterator[LocatedRow], int], Iterable[LocatedRow]]
-"""Passes rows on; the second argument is their number."""
+"""A function that passes rows through and shows progress; the second argument is the number of rows."""
 
 
 def read_results(
@@ -142,18 +142,18 @@ def read_results(
     on_line: Callable[[bytes], None] | None = None,
     progress: ShowProgress = lambda lines, _: lines,
 ) -> Results:
-    """Read an evaluation of a run, each file once.
+    """Read an evaluation of a run; each file is read once.
 
     Args:
         run: the run.
-        key: the name of the evaluation; None if there is none.
-        suite: the suite that judged it; None if it is not at hand.
-        task: the task whose rows to read; by default all.
-        reuse_from: another evaluation of the run, whose completions are not read again.
-        keep_failed: whether to keep the rows that failed, which may take much memory.
-        faults: collects errors in files, which are raised otherwise.
+        key: the name of the evaluation, or None if the run has not been judged.
+        suite: the suite that judged the run, or None if it is not available.
+        task: the only task to read rows for; all by default.
+        reuse_from: another evaluation of the same run whose completions can be reused.
+        keep_failed: whether to keep the failed rows, which may need much memory.
+        faults: a list that collects errors in files; by default, they are raised.
         on_line: called with the line of each row.
-        progress: passes rows on and shows progress.
+        progress: a function that passes rows through and shows progress.
     """
     if reuse_from:
         about, completions = reuse_from.about, reuse_from.completions
@@ -193,7 +193,7 @@ def read_results(
 
 
 def without_other_traces(row: Row, world: int) -> bytes:
-    """Encode a row with the trace of one world only, to save memory."""
+    """Encode a row with the trace of a single world, to save memory."""
     verdicts = [
         verdict if number == world else without_trace(verdict)
         for number, verdict in enumerate(row["verdicts"])

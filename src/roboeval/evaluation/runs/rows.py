@@ -1,4 +1,4 @@
-"""The rows of an evaluation, and the seal of a finished file."""
+"""Defines and reads the rows of an evaluation, and the seal of a finished file."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Status
 
-MAX_LINE_BYTES = 1_000_000_000  # more than any row of many worlds
+MAX_LINE_BYTES = 1_000_000_000  # longer than any row with many worlds
 EVENT_KINDS = frozenset(SKILLS.recordings)
-NO_ROW = "this line is not a row of an evaluation"
+NO_ROW = "this line is not an evaluation row"
 BROKEN = "was damaged or changed after the evaluation was finished"
 # The group matches escapes of lone surrogates; the rest matches similar text.
 ESCAPES = re.compile(rb"\\\\|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(\\u[dD][89a-fA-F]..)")
 
 
 Failure = TypedDict("Failure", {"class": str, "kind": str, "world": int, "check": str | None})
-"""The one reason for which a completion fails (paper, section V.B).
+"""Why a completion fails (paper, section V.B).
 
-`class` is one of `CLASSES`, `world` is the first unsatisfied one, from 0, `check` is None for an error.
+`class` is one of `CLASSES`, `world` is the first unsatisfied world, from 0, and `check` is None for an error.
 """
 
 
 class ErrorOfRun(TypedDict):
-    """The error by which a run ended."""
+    """The error that ended a run."""
 
     kind: str
     message: str
 
 
 class CutTrace(TypedDict):
-    """The number of events that did not fit into a row, and the hash of the JSON of the whole trace."""
+    """The number of events that did not fit into a row, and the hash of the whole trace as JSON."""
 
     events: int
     sha256: str
@@ -50,9 +50,9 @@ Numbered: TypeAlias = list[Annotated[list[int | str | None], msgspec.Meta(min_le
 
 
 class WorldVerdict(TypedDict):
-    """The judgement in one world; the last five entries are about the events of `trace`.
+    """The judgement in one world; the last five entries describe the events of `trace`.
 
-    A trace too long for its row ends early, with a `cut`.
+    A trace that is too long for its row ends early and has a `cut`.
     """
 
     world: str
@@ -74,11 +74,11 @@ class Row(TypedDict):
 
     Args:
         task: the task's name.
-        prompt: which phrasing, counted from 0.
-        index: which sample, counted from 0.
+        prompt: the number of the phrasing, from 0.
+        index: the number of the sample, from 0.
         program_sha256: the hash of the program that was judged.
         passed: whether the program satisfies the requirements in all worlds.
-        failure: the first failure; None if it passed.
+        failure: the first failure, or None if the program passed.
         verdicts: the judgement in each world, in order.
     """
 
@@ -92,7 +92,7 @@ class Row(TypedDict):
 
 
 def add_or_raise(fault: UserError, faults: list[UserError] | None) -> None:
-    """Add a fault to a list; raise it if there is no list."""
+    """Append a fault to the list, or raise it if there is no list."""
     if faults is None:
         raise fault from None
     faults.append(fault)
@@ -104,16 +104,13 @@ def key_of(row: Mapping[str, Any]) -> tuple[str, int, int]:
 
 
 def failure_of(row: Row) -> Failure:
-    """Return the failure of a row whose program did not pass."""
+    """Return the failure of a failed row."""
     assert row["failure"] is not None, "this program passed"
     return row["failure"]
 
 
-# --- reading
-
-
 def decode_row(line: bytes, *, check_kinds: bool = False) -> Row:
-    """Decode and check a row of an evaluation, with `check_kinds` also the kinds of events."""
+    """Decode and validate a row of an evaluation; `check_kinds` also validates the kinds of events."""
     try:
         data = _decoded(line)
         row = msgspec.convert(data, Row)
@@ -129,18 +126,18 @@ def _decoded(line: bytes) -> object:
     try:
         return msgspec.json.decode(line)
     except msgspec.DecodeError:
-        # UTF-8 cannot hold lone surrogates, so keep their escapes as text.
+        # UTF-8 cannot encode lone surrogates, so keep their escapes as text.
         return msgspec.json.decode(ESCAPES.sub(lambda found: (b"\\" if found[1] else b"") + found[0], line))
 
 
 def _expect_consistent(row: Row, data: object) -> None:
     if row != data:
-        raise ValueError("it has unknown entries")
+        raise ValueError("the row has unknown entries")
     failure = row["failure"]
     if row["passed"] != (failure is None):
-        raise ValueError("a completion that passes has no failure, and any other has one")
+        raise ValueError("a failure must be present if and only if the completion does not pass")
     if failure is not None and not 0 <= failure["world"] < len(row["verdicts"]):
-        raise ValueError("no such world decided")
+        raise ValueError("the world of the failure does not exist")
     for verdict in row["verdicts"]:
         Status(verdict["status"])
 
@@ -150,21 +147,21 @@ def _expect_known_kinds(row: Row) -> None:
         for event in verdict["trace"]:
             if event[0] not in EVENT_KINDS and by_event(event[0]) is None:
                 raise ValueError(
-                    f'"{event[0]}" is not a kind of event; name the file of its skill with --skills'
+                    f'unknown event type "{event[0]}"; give the file that defines its skill with --skills'
                 )
 
 
 def event_count(verdict: WorldVerdict) -> int:
-    """Return how many events a trace had when it was judged."""
+    """Return the number of events that a trace had when it was judged, before any cut."""
     return len(verdict["trace"]) + (verdict["cut"]["events"] if "cut" in verdict else 0)
 
 
 @dataclass(frozen=True)
 class LocatedRow:
-    """A row with its place in the file."""
+    """A row with its position in the file."""
 
-    number: int  # from 1
-    at: int  # first byte in the file
+    number: int  # the line number, from 1
+    at: int  # the offset in the file, in bytes
     size: int
     row: Row
 
@@ -178,7 +175,7 @@ def read_lines_of(
     on_line: Callable[[bytes], None] | None = None,
     faults: list[UserError] | None = None,
 ) -> Iterator[LocatedRow]:
-    """Read an evaluation, or its rows on one task, and ignore a torn last line; add or raise faults."""
+    """Read the rows of an evaluation, or of one task; ignore an incomplete last line; add or raise faults."""
     name = b"" if task is None else to_line(task).removesuffix(b"\n")
     seal = seal or Seal()
     at, is_reported = 0, False
@@ -201,7 +198,7 @@ def read_lines_of(
 
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
-    """Yield the task, hash and problems of each checked program."""
+    """Yield the key and the problems of each checked program; a key is a task and a hash."""
     for number, row in read_rows(path, growing=True):
         match row:
             case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:
@@ -210,11 +207,8 @@ def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
                 raise UserError("this line is not a check result; delete the file", file=path, line=number)
 
 
-# --- the seal of a finished file
-
-
 class Seal:
-    """The number of rows and the hash of a file, which KEY.json records of a finished evaluation."""
+    """The row count and hash of a file of rows, which KEY.json records when an evaluation is finished."""
 
     def __init__(self) -> None:
         self._count, self._hash = 0, hashlib.sha256()
@@ -225,14 +219,14 @@ class Seal:
         self._hash.update(line)
 
     def data(self) -> dict[str, Any]:
-        """Return the entries of KEY.json."""
+        """Return the seal as entries of KEY.json."""
         return {"rows": self._count, "sha256": self._hash.hexdigest()}
 
     def is_broken(self, manifest: Mapping[str, Any]) -> bool:
-        """Whether the rows have changed since the evaluation was finished."""
+        """Whether the rows differ from those recorded when the evaluation was finished."""
         return is_sealed(manifest) and any(manifest.get(name) != value for name, value in self.data().items())
 
 
 def is_sealed(manifest: Mapping[str, Any]) -> bool:
-    """Whether a KEY.json is of a finished evaluation."""
+    """Whether the content of KEY.json belongs to a finished evaluation."""
     return "rows" in manifest or "sha256" in manifest

@@ -1,4 +1,4 @@
-"""The completions of a run that were requested, exist and were judged."""
+"""Counts which completions of a run were requested, exist and were judged."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from roboeval.suites.load import Suite
 
 @dataclass(frozen=True)
 class Coverage:
-    """How many completions a result covers, and how many it should."""
+    """The number of completions that a result covers, and the number it should cover."""
 
     judged: int
-    there: int  # in the run now
-    requested: int | None = None  # None if it was not recorded
+    there: int  # completions now in the run
+    requested: int | None = None  # requested completions, or None if that was not recorded
 
     @property
     def total(self) -> int:
-        """How many completions the result should cover."""
+        """Return the number of completions that the result should cover."""
         return max(self.there, self.requested or 0)
 
     @property
     def is_whole(self) -> bool:
-        """Whether it covers all of them."""
+        """Whether the result covers all of these completions."""
         return self.judged == self.total
 
     def __str__(self) -> str:
-        """Format it, such as `3,900 of 4,000 completions (50 missing, 50 not judged)`."""
+        """Format the coverage, such as `3,900 of 4,000 completions (50 missing, 50 not judged)`."""
         if self.judged > self.total:
-            return f"{how_many(self.judged)}, of which only {self.there:,} are still in the run"
+            return f"{how_many(self.judged)}, but only {self.there:,} of them are still in the run"
         lacks = {"missing": self.total - self.there, "not judged": self.there - self.judged}
         said = ", ".join(f"{count:,} {what}" for what, count in lacks.items() if count > 0)
         return f"{self.judged:,} of {how_many(self.total)}{f' ({said})' if said else ''}"
@@ -41,14 +41,14 @@ class Coverage:
 
 @dataclass(frozen=True)
 class JudgingScope:
-    """The completions to judge."""
+    """The completions that an evaluation should judge."""
 
-    completions: Mapping[str, int]  # by task, also of tasks that are not selected
+    completions: Mapping[str, int]  # the number for each task, selected or not
     tasks: frozenset[str] | None = None  # selected tasks; None for all
-    models: frozenset[str | None] = frozenset()  # of selected tasks; None: not recorded
-    requested: Mapping[str, int] | None = None  # by task, from run.json
-    cut_off: int = 0  # replies for selected tasks that ended at the limit of tokens
-    limit: int | None = None  # this limit, in tokens, if it was set
+    models: frozenset[str | None] = frozenset()  # models of the selected tasks; None if not recorded
+    requested: Mapping[str, int] | None = None  # requested completions of each task, from run.json
+    cut_off: int = 0  # replies for selected tasks that ended at the token limit
+    limit: int | None = None  # the token limit, if it was set
 
     @classmethod
     def of(
@@ -58,7 +58,7 @@ class JudgingScope:
         about: Mapping[str, Any] = {},
         suite: Suite | None = None,
     ) -> JudgingScope:
-        """Count completions of selected tasks, None for all, given run.json and the suite."""
+        """Count the completions of the selected tasks, or of all if `tasks` is None."""
         counts: Counter[str] = Counter()
         models: set[str | None] = set()
         cut_off = 0
@@ -72,7 +72,7 @@ class JudgingScope:
 
     @property
     def total(self) -> int:
-        """The number of completions to judge."""
+        """Return the number of completions to judge."""
         return sum(n for task, n in self.completions.items() if self.selects(task))
 
     def selects(self, task: str) -> bool:
@@ -80,7 +80,7 @@ class JudgingScope:
         return self.tasks is None or task in self.tasks
 
     def coverage(self, judged: int, task: str | None = None) -> Coverage:
-        """Return the coverage for a number of judged completions, of all selected tasks or of one."""
+        """Return the coverage of a number of judged completions, for one task or for all selected tasks."""
         if task is not None:
             requested = None if self.requested is None else self.requested.get(task, 0)
             return Coverage(judged, self.completions.get(task, 0), requested)
@@ -90,7 +90,7 @@ class JudgingScope:
 
 
 def requested_of(about: Mapping[str, Any], suite: Suite | None) -> dict[str, int] | None:
-    """Return how many completions of each task were requested; None if it was not recorded."""
+    """Return the number of requested completions of each task, or None if it was not recorded."""
     each = requested_of_prompts(about, suite)
     if each is None or suite is None:
         return None
@@ -98,7 +98,7 @@ def requested_of(about: Mapping[str, Any], suite: Suite | None) -> dict[str, int
 
 
 def requested_of_prompts(about: Mapping[str, Any], suite: Suite | None) -> dict[str, int] | None:
-    """Return how many completions of each prompt of a task were requested; None if it was not recorded."""
+    """Return the number of requested completions per prompt for each task, or None if not recorded."""
     found = batches(about)
     if not found or suite is None:
         return None
@@ -112,34 +112,32 @@ def requested_of_prompts(about: Mapping[str, Any], suite: Suite | None) -> dict[
 
 
 def limit_of(about: Mapping[str, Any]) -> int | None:
-    """Return the limit of tokens in a run.json; None if it has none."""
+    """Return the token limit in run.json, or None if there is no limit."""
     settings = about.get("settings")
     limit = settings.get("max_tokens") if isinstance(settings, dict) else None
     return limit if type(limit) is int else None
 
-
-# --- cut-off replies
 
 MAX_CUT_OFF_SHARE = 0.02  # share of replies that may be cut off without a warning
 
 
 @dataclass(frozen=True)
 class CutOff:
-    """The replies of a run that ended at the limit of tokens."""
+    """The replies of a run that ended at the token limit."""
 
-    replies: int  # also with a complete program
-    without_program: int  # of these
+    replies: int  # replies that were cut off, even after a complete program
+    without_program: int  # cut-off replies without a program
     of: int
     limit: int | None
 
     @property
     def share(self) -> float:
-        """Their share of all replies."""
+        """Return the share of replies that were cut off."""
         return self.replies / self.of if self.of else 0.0
 
     @property
     def warning(self) -> str | None:
-        """A warning with a remedy; None if few replies were cut off."""
+        """Return a warning with a remedy, or None if only few replies were cut off."""
         if self.share <= MAX_CUT_OFF_SHARE:
             return None
         at = "the model's own limit" if self.limit is None else f"{self.limit:,} tokens"
@@ -147,5 +145,5 @@ class CutOff:
         whole = self.replies - self.without_program
         return (
             f"{self.replies:,} of {self.of:,} replies ({self.share:.1%}) were cut off at {at}, "
-            f"{whole:,} of them after a whole program; {how} --max-tokens"
+            f"{whole:,} of them after a complete program; {how} --max-tokens"
         )

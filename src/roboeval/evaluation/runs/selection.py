@@ -1,4 +1,4 @@
-"""Selections of a part of a run: a task, a prompt or one completion."""
+"""Parses selections of a part of a run: a task, a prompt or one completion."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Selection:
-    """A part of a run: a task, a prompt or one completion; all of it if everything is None."""
+    """A part of a run: a task, a prompt or one completion; the whole run if all fields are None."""
 
     task: str | None = None
     prompt: int | None = None
@@ -27,12 +27,12 @@ class Selection:
 
     @property
     def key(self) -> CompletionKey:
-        """The key of the selected completion, if it is one."""
-        assert self.task is not None and self.prompt is not None and self.index is not None  # noqa: PT018 - one thing
+        """Return the key of the selected completion; call this only if a single completion is selected."""
+        assert self.task is not None and self.prompt is not None and self.index is not None  # noqa: PT018 - a single condition
         return self.task, self.prompt, self.index
 
     def expect_judged(self, judged: Results) -> None:
-        """Raise UserError if nothing of this part was judged."""
+        """Raise UserError if no completion in this part was judged."""
         wanted = self.task, self.prompt, self.index
         if not any(all(w in {None, h} for w, h in zip(wanted, key, strict=True)) for key in judged.places):
             what = f"completion {self}" if self.index is not None else f"completion of {self}"
@@ -40,21 +40,25 @@ class Selection:
 
 
 def parse_selection(text: str | None, suite: Suite) -> Selection:
-    """Read TASK, TASK/PROMPT or TASK/PROMPT/INDEX, or nothing for the whole run."""
+    """Parse TASK, TASK/PROMPT or TASK/PROMPT/INDEX; None selects the whole run."""
     if not text:
         return Selection()
     name, *numbers = text.removesuffix("/").split("/")
     if len(numbers) > 2 or not all(n.isascii() and n.isdecimal() and len(n) < 10 for n in numbers):  # noqa: PLR2004 - parts
-        raise UserError(f'"{visible(text)}" selects nothing; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX')
+        raise UserError(
+            f'"{visible(text)}" is not a valid selection; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX'
+        )
     if name not in suite.tasks:
         name = next((task for task in suite.tasks if task.lower() == name.lower()), name)
     task = suite.task(name)
     selection = Selection(name, *map(int, numbers))
     if selection.prompt is not None and selection.prompt >= len(task.prompts):
-        raise UserError(f"{name} has prompts 0 to {len(task.prompts) - 1}, so {selection} selects nothing")
+        raise UserError(
+            f"{selection} does not exist, because {name} has prompts 0 to {len(task.prompts) - 1}"
+        )
     return selection
 
 
 def names_completion(text: str) -> bool:
-    """Whether a selection has all three parts."""
-    return text.removesuffix("/").count("/") == 2  # noqa: PLR2004 - between three parts
+    """Whether a selection has all three parts and so names one completion."""
+    return text.removesuffix("/").count("/") == 2  # noqa: PLR2004 - two slashes separate three parts

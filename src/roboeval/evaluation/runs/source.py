@@ -1,4 +1,4 @@
-"""Sources of completions: a run, a file, published programs or recorded models."""
+"""Reads completions from any source: a run, a file, published programs or recorded models."""
 
 from __future__ import annotations
 
@@ -17,41 +17,41 @@ from roboeval.suites.load import Suite
 
 @dataclass(frozen=True)
 class Source:
-    """Completions, and the run that holds them if there is one."""
+    """Completions, and the run that contains them if they come from a run."""
 
-    completions: Sequence[Completion]  # all of tasks of the suite
+    completions: Sequence[Completion]  # all completions for tasks of the suite
     run: RunFolder | None = None
 
     def of(self, tasks: frozenset[str] | None) -> list[Completion]:
-        """Return the completions of some tasks, or all."""
+        """Return the completions of the given tasks, or of all tasks if None."""
         return [one for one in self.completions if tasks is None or one.task in tasks]
 
 
 def open_source(text: str, suite: Suite) -> Source:
-    """Read completions from a run folder, a .jsonl, a folder or zip of .py, or `recorded:NAME`."""
+    """Read completions from a run folder, a .jsonl file, a folder or zip of .py files, or `recorded:NAME`."""
     if not text:
-        raise UserError("the argument is empty; name a run, a .jsonl, or a folder or zip of .py")
+        raise UserError("the argument is empty; name a run, a .jsonl file, or a folder or zip of .py files")
     path = Path(text)
     if text.partition(":")[0] == "recorded" and not path.exists():
         return Source([*recorded_completions(text, suite)])
     if not path.exists():
         raise UserError(
-            "there is no such file or folder; name a run, a .jsonl, or a folder or zip of .py", file=path
+            "does not exist; name a run, a .jsonl file, or a folder or zip of .py files", file=path
         )
     if (path / COMPLETIONS).is_file():
         return Source([*RunFolder(path).read(suite)], RunFolder(path))
     if path.is_dir() or path.suffix == ".zip":
         return Source([*published_completions(path, suite)])
     if path.suffix == ".py":
-        raise UserError(f"is one program; write it as a row of a .jsonl: {EXAMPLE}", file=path)
+        raise UserError(f"is a single program; write it as a row of a .jsonl file: {EXAMPLE}", file=path)
     return Source([*read_completions(path, suite)])
 
 
-MAX_ANSWER_BYTES = 10 * MAX_ROW  # bytes; an answer may hold more than we keep
+MAX_ANSWER_BYTES = 10 * MAX_ROW  # an answer may contain more than we keep
 
 
 def is_answers(path: Path) -> bool:
-    """Whether a file begins like requests to a batch endpoint, or its answers."""
+    """Whether a file starts like the requests to a batch endpoint or like its answers."""
     if not path.is_file():
         return False
     _, line = next(read_lines(path, limit=MAX_ANSWER_BYTES), (0, b""))
@@ -59,7 +59,7 @@ def is_answers(path: Path) -> bool:
 
 
 def recorded_model_for(name: str, suite: Suite) -> RecordedModel:
-    """Open a recorded model with the solutions of a suite; raise UserError if there is none."""
+    """Open a recorded model with the solutions of a suite; raise UserError if the model does not exist."""
     model = open_recorded(name, None if suite.folder is None else suite.folder / "solutions")
     short = model.name.removeprefix("recorded:")
     if short not in RECORDED_NAMES:
@@ -71,7 +71,7 @@ def recorded_model_for(name: str, suite: Suite) -> RecordedModel:
 def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
     """Yield all replies of a recorded model to a suite's prompts.
 
-    Raises UserError if there is no such model, or it knows none of the prompts.
+    Raises UserError if the model does not exist or has no reply to any prompt.
     """
     model = recorded_model_for(name, suite)
     found = False
@@ -88,4 +88,4 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
                     program=reply.program,
                 )
     if not found:
-        raise UserError(f'{name} knows no instruction of the suite "{suite.name}"')
+        raise UserError(f'{name} has no program for any instruction of the suite "{suite.name}"')

@@ -1,4 +1,4 @@
-"""The table of a judged run: its columns, its construction from rows, and its files."""
+"""Builds the table of a judged run from rows, and writes it to files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from roboeval.evaluation.runs.rows import Row, event_count, key_of
 
 Tokens = TypeVar("Tokens", float, pl.Expr)
 MILLION = 1_000_000
-CHUNK_ROWS = 10_000  # Python objects at a time
+CHUNK_ROWS = 10_000  # rows held as Python objects at a time
 
 COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "task": pl.String,
@@ -43,7 +43,7 @@ COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "cost": pl.Float64,
     "accepted": pl.Boolean,
 }
-"""The columns about the completion; see docs/results.md."""
+"""The columns that describe a completion; see docs/results.md."""
 
 WORLD_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "world_number": pl.Int64,
@@ -57,18 +57,18 @@ WORLD_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "category": pl.String,
     "events": pl.Int64,
 }
-"""The columns about one world."""
+"""The columns that describe one world."""
 
 
 class Price(NamedTuple):
-    """The price of a million tokens of input and of output."""
+    """The prices of a million input and output tokens."""
 
     input: float
     output: float
 
     @classmethod
     def read(cls, text: str) -> Price:
-        """Read `INPUT/OUTPUT`; raises ValueError unless both are numbers from 0 up to a million."""
+        """Parse `INPUT/OUTPUT`; raise ValueError unless both are numbers from 0 to a million."""
         try:
             price = cls(*map(float, text.split("/")))
         except TypeError as error:
@@ -78,22 +78,22 @@ class Price(NamedTuple):
         return price
 
     def of(self, input_tokens: Tokens, output_tokens: Tokens) -> Tokens:
-        """Compute the cost of tokens, as a number or as a column."""
+        """Compute the cost of tokens, given as numbers or as columns."""
         return (input_tokens * self.input + output_tokens * self.output) / MILLION
 
 
 def with_cost(table: pl.DataFrame, price: Price) -> pl.DataFrame:
-    """Set the column `cost` of a table."""
+    """Return the table with the column `cost` computed from its tokens."""
     return table.with_columns(cost=price.of(pl.col("input_tokens"), pl.col("output_tokens")))
 
 
 def keys_where(table: pl.DataFrame, column: str) -> list[CompletionKey]:
-    """Return the completions for which a column is true."""
+    """Return the keys of the completions for which a column is true."""
     return [*table.filter(pl.col(column), pl.col("world_number") == 0).select(KEY).iter_rows()]
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
-    """Set the column `accepted` of a table to whether the check found no problem in a program."""
+    """Return the table with the column `accepted`: whether the check found no problem in the program."""
     names = ["task", "program_sha256"]
     answers = [(*key, not found) for key, found in problems.items()]
     accepted = pl.DataFrame(
@@ -104,12 +104,12 @@ def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequenc
 
 
 class TableBuilder:
-    """Collects rows of an evaluation as the table that `load_results` describes."""
+    """Builds the table that `load_results` describes from the rows of an evaluation."""
 
     def __init__(
         self,
-        completions: Mapping[CompletionKey, Completion] = {},  # of the run now
-        categories: Mapping[tuple[str, str], str] = {},  # of requirements, by task and text
+        completions: Mapping[CompletionKey, Completion] = {},  # the completions now in the run
+        categories: Mapping[tuple[str, str], str] = {},  # of requirements, by task and requirement text
         accepted: Mapping[tuple[str, str], bool] = {},  # by task and hash of the program
     ) -> None:
         self._completions, self._categories, self._accepted = completions, categories, accepted
@@ -122,7 +122,7 @@ class TableBuilder:
         self._counts: list[int] = []
 
     def add(self, row: Row) -> None:
-        """Add a completion with its verdicts."""
+        """Add a completion with its verdict in each world."""
         if len(self._worlds) >= CHUNK_ROWS:
             self._store()
         written = self._completions.get(key_of(row))
@@ -164,7 +164,7 @@ class TableBuilder:
             )
 
     def table(self) -> pl.DataFrame:
-        """Return the table."""
+        """Return the table of all rows added so far."""
         self._store()
         return self._frame.rechunk()
 
@@ -191,36 +191,33 @@ def _usage(written: Completion | None) -> tuple[float | None, ...]:
 
 
 def storable(text: str) -> str:
-    """Escape the lone surrogates of a text, which UTF-8 cannot hold."""
+    """Escape the lone surrogates of a text, which UTF-8 cannot encode."""
     return text.encode(errors="backslashreplace").decode()
 
 
-# --- files
-
-
 TABLE_FORMATS = ("csv", "parquet")
-TABLE_BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")  # of files in these formats
+TABLE_BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")  # the first bytes of tables in these formats
 
 
 def kind_of(path: Path | None) -> str:
-    """Return the format by a file's ending; csv by default."""
+    """Return the table format for a file name's ending; csv by default."""
     ending = "" if path is None else path.suffix.removeprefix(".").lower()
     return ending if ending in TABLE_FORMATS else TABLE_FORMATS[0]
 
 
 def write_table(frame: pl.DataFrame, path: Path, kind: str) -> None:
-    """Write a table to a file as csv or parquet; equal tables give equal bytes."""
+    """Write a table to a file as csv or parquet; equal tables produce equal bytes."""
     if kind not in TABLE_FORMATS:
-        raise UserError(f'there is no format "{kind}"; choose one of {", ".join(TABLE_FORMATS)}')
+        raise UserError(f'unknown format "{kind}"; choose one of {", ".join(TABLE_FORMATS)}')
     if not path.parent.is_dir():
         raise UserError("there is no such folder", file=path.parent)
     content = io.BytesIO()
     if kind == "csv":
-        # Spreadsheets take such cells for formulas; OWASP advises to prepend an apostrophe.
+        # Spreadsheets treat such cells as formulas; OWASP recommends prepending an apostrophe.
         frame.with_columns(pl.col(pl.String).str.replace(r"^([=+\-@\t\r\n])", "'${1}")).write_csv(content)
     else:
         frame.write_parquet(content)
-    if path.exists() and not path.is_file():  # /dev/stdout, for example, must not be replaced
+    if path.exists() and not path.is_file():  # do not replace special files such as /dev/stdout
         path.write_bytes(content.getvalue())
     else:
         write_whole(path.resolve() if path.is_symlink() else path, content.getvalue())

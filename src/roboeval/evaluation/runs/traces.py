@@ -1,4 +1,4 @@
-"""The circumstances of events, such as the room, which rows store separately from a trace."""
+"""Stores the circumstances of events, such as the room, separately from a trace."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ CIRCUMSTANCES = ("places", "holding", "to", "destinations")
 
 
 def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
-    """Return the changes of the circumstances that formulas compare; events count from 1.
+    """Return the changes in circumstances that formulas refer to; events are numbered from 1.
 
-    `places` is always present, the others only if they are not empty:
+    `places` is always present, the other entries only if they are not empty:
 
-    - `places`: `[number, room]`, the room from that event on; the last number may be one more than there
-      are events.
-    - `holding`: `[number, thing]`, what the robot holds from that event on; empty for nothing, as at first.
-    - `to`: `[number, person]`, who is asked by events of this kind from that one on; null for nobody.
-    - `destinations`: `[number, room]`, the goal of a drive, if it is not the place of the next event; null
-      if the drive failed.
+    - `places`: `[number, room]`, the room from that event on; the last number may be one more than the
+      number of events.
+    - `holding`: `[number, thing]`, what the robot holds from that event on; initially empty for nothing.
+    - `to`: `[number, person]`, whom events of this kind ask from that event on; null for nobody.
+    - `destinations`: `[number, room]`, the goal of a drive if it differs from the place of the next event;
+      null if the drive failed.
     """
     places = [event.place for event in trace]
-    places += [event.destination or event.place for event in trace[-1:]]  # the robot's last room
+    places += [event.destination or event.place for event in trace[-1:]]  # the last room the robot was in
     drives = [number for number, event in enumerate(trace, 1) if event.kind == GOTO]
     led = [(number, trace[number - 1].destination) for number in drives]
     found = {
@@ -53,7 +53,7 @@ def _changes_by_kind(trace: Trace) -> list[list[Any]]:
 
 
 def first_events(verdict: Mapping[str, Any], count: int) -> dict[str, Any]:
-    """Cut the data of a verdict to a number of events, but keep the place after the last one."""
+    """Cut the data of a verdict to its first `count` events, but keep the place after the last of them."""
     known = {name: verdict[name] for name in CIRCUMSTANCES if name in verdict}
     kept = {
         name: [entry for entry in entries if entry[0] <= count + (name == "places")]
@@ -63,15 +63,15 @@ def first_events(verdict: Mapping[str, Any], count: int) -> dict[str, Any]:
 
 
 def without_trace(verdict: Mapping[str, Any]) -> dict[str, Any]:
-    """Remove the events from the data of a verdict."""
+    """Return the data of a verdict without its events and their circumstances."""
     return {name: value for name, value in verdict.items() if name not in CIRCUMSTANCES} | {"trace": []}
 
 
 def trace_of(verdict: Mapping[str, Any]) -> Trace:
-    """Restore the trace of a verdict in a row, with all that formulas compare."""
+    """Restore the trace of a verdict from a row, with everything that formulas refer to."""
     places, holding, to, destinations = (dict(verdict.get(name, ())) for name in CIRCUMSTANCES)
     here, held, events = "", "", []
-    asked: dict[str, str | None] = {}  # by the kind of event
+    asked: dict[str, str | None] = {}  # the person asked last, by kind of event
     for number, event in enumerate(trace_from(verdict["trace"]), 1):
         here, held = places.get(number, here), holding.get(number, held)
         if number in to:

@@ -1,4 +1,4 @@
-"""Suites of tasks that families generate for the seeds of a split, such as `families-test-7`."""
+"""Builds suites of generated tasks for the seeds of a split, such as `families-test-7`."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ FAMILY_SUITE_NAME = re.compile(r"families-([a-z]+)-(\d{1,9})(?:-(\d{1,3}))?", re
 
 
 def first_seed(split: str, seed: int, count: int, what: str) -> int:
-    """The first of `count` seeds of a split; a different `seed`, from 0, selects entirely different ones.
+    """Return the first of `count` consecutive seeds of a split; each `seed` selects entirely different ones.
 
-    Raises UserError if the split does not exist or a number is out of range; `what` names the counted things.
+    Raises UserError if the split does not exist or a number is out of range; `what` names the counted items.
     """
     if split not in FIRST_SEEDS:
-        raise UserError(f'there is no split "{split}"; use {listed(list(FIRST_SEEDS))}')
+        raise UserError(f'unknown split "{split}"; use {listed(list(FIRST_SEEDS))}')
     if count < 1:
         raise UserError(f"the number of {what}s is {count}, but it must be at least 1")
     if not 0 <= seed * count <= SEEDS_PER_SPLIT - count:
@@ -43,11 +43,11 @@ def first_seed(split: str, seed: int, count: int, what: str) -> int:
 
 @dataclass(frozen=True)
 class FamilyTasks:
-    """The tasks of families that a suite consists of; families take turns.
+    """Selects the generated tasks of a suite; the families take turns.
 
     Args:
         split: `train`, `validation` or `test`, which share no task.
-        seed: another seed gives entirely different tasks.
+        seed: each seed, from 0, gives entirely different tasks.
         count: the number of tasks, 1 to 100; one for each family by default.
 
     Raises:
@@ -65,12 +65,12 @@ class FamilyTasks:
 
     @property
     def name(self) -> str:
-        """The name of the suite, such as `families-test-7`."""
+        """Return the name of the suite, such as `families-test-7`."""
         usual = self.count == len(family_names())
         return f"families-{self.split}-{self.seed}" + ("" if usual else f"-{self.count}")
 
     def suite(self, skills: SkillTable = SKILLS) -> Suite:
-        """Build the suite of these tasks; the result is reproducible."""
+        """Build a suite from these tasks; the result is reproducible."""
         return _build_suite(self, skills)
 
     def seeds(self) -> Iterator[tuple[str, str, int]]:
@@ -85,7 +85,7 @@ class FamilyTasks:
 
 
 def family_tasks_named(name: str) -> FamilyTasks | None:
-    """Parse the name of a suite of families; None for other names."""
+    """Parse a suite name such as `families-test-7`, or return None for other names."""
     match = FAMILY_SUITE_NAME.fullmatch(name)
     if match is None:
         return None
@@ -113,13 +113,13 @@ def _build_suite(which: FamilyTasks, skills: SkillTable) -> Suite:
 
 
 def _named(name: str, made: TrainedTask) -> Task:
-    """Rename a task for its suite, and point it to the file of its family."""
+    """Return a task with its name in the suite and the path of its family's file."""
     task = made.suite.tasks[made.name]
     return replace(task, name=name, path=task.path.with_name(f"{name.partition('-')[0]}.yaml"))
 
 
 def _recorded(made: TrainedTask) -> Iterator[InstructionSolutions]:
-    """The programs of the recorded models: right ones, and for hasty ones some wrong ones first."""
+    """Yield the programs of recorded models: right ones; hasty models first give some wrong ones."""
     right = Solution(about="right", program=made.solution)
     wrong = [Solution(about=one.about, program=one.program, fails="unknown") for one in made.wrong]
     mixed = (right, *wrong)

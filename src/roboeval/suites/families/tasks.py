@@ -1,4 +1,4 @@
-"""Families of tasks: templates that generate a task for each seed, with its own names, words and worlds."""
+"""Generates the task of a family for a seed, with its own names, words and worlds."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ from roboeval.suites.taskfile import read_task
 FAMILY_FOLDER = Path(__file__).parent
 TRAINING_SUITE, TRAINING_WORLDS = "training", 8
 NUMBER_WORDS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
-SEVERAL_WORDS = re.compile(r"(\d+) (\w+)")  # several distinct words of a pool
+SEVERAL_WORDS = re.compile(r"(\d+) (\w+)")  # several distinct words from a pool, such as `3 rooms`
 RESERVED_MARKS = frozenset("${}|")
 NUMBER_RANGE = re.compile(r"(\d+) to (\d+)")
-SYNONYMS = re.compile(r"\{([^{}]*\|[^{}]*)\}")  # one of several synonyms
+SYNONYMS = re.compile(r"\{([^{}]*\|[^{}]*)\}")  # a choice of synonyms, such as {look|see}
 
 # A robot that retracts its report has not reported.
 RETRACTION = (
@@ -53,20 +53,20 @@ Choice: TypeAlias = Name | Annotated[list[Name], Field(min_length=1)]
 
 
 class WrongProgram(StrictForm):
-    """A program that does not do all of what was asked."""
+    """A program that does not do everything that was asked."""
 
     about: Name
     program: YamlText
 
 
 class FamilyFile(StrictForm):
-    """The template of a family; `$name` is replaced by a value chosen for each seed.
+    """The template file of a family; `$name` is replaced by a value chosen for each seed.
 
     Args:
-        about: a description of its tasks in a sentence.
-        choose: the choices by name: a word of a pool in words.yaml (`things`), several (`3 rooms`), a number
-            (`2 to 4`), or an entry of a list. No word is chosen twice.
-        task: a task file without a name. In prompts, `{look|see}` is one of these words.
+        about: a one-sentence description of the tasks.
+        choose: the choices by name: a word from a pool in words.yaml (`things`), several words (`3 rooms`),
+            a number (`2 to 4`), or an entry of a list. No word is chosen twice.
+        task: the content of a task file, without a name. In prompts, `{look|see}` is replaced by either word.
         solution: a program that is right in all worlds.
         wrong: wrong programs, each with a reward below 1.
     """
@@ -80,36 +80,36 @@ class FamilyFile(StrictForm):
 
 @dataclass(frozen=True)
 class TrainedTask:
-    """A task of a family."""
+    """A task generated from a family, with a right program and wrong ones."""
 
-    suite: Suite  # a suite with this task only
+    suite: Suite  # a suite that contains only this task
     name: str  # the family and the seed, such as `BringThing-17`
-    solution: str  # a right program
-    wrong: tuple[WrongProgram, ...]  # wrong programs
+    solution: str  # a right program's source
+    wrong: tuple[WrongProgram, ...]  # programs that miss part of the instruction
 
     @property
     def prompts(self) -> tuple[str, ...]:
-        """The phrasings of its instruction."""
+        """Return the phrasings of the instruction."""
         return self.suite.tasks[self.name].prompts
 
     def expect_prompt(self, index: int) -> None:
-        """Raise a UserError if there is no prompt with this number."""
+        """Raise UserError if there is no prompt with this number."""
         if not 0 <= index < len(self.prompts):
             raise UserError(f"{self.name} has no prompt {index}; use 0 to {len(self.prompts) - 1}")
 
 
 @cache
 def family_names() -> tuple[str, ...]:
-    """The sorted names of all families that ship with RoboEval."""
+    """Return the sorted names of all families that ship with RoboEval."""
     return tuple(sorted(path.stem for path in (FAMILY_FOLDER / "templates").glob("*.yaml")))
 
 
 def family_file(family: str) -> Path:
-    """Find the file of a family: one of `family_names()`, or a `.yaml` file; raises UserError otherwise."""
+    """Return the path of one of `family_names()` or of a `.yaml` file; otherwise raise UserError."""
     if family.endswith(".yaml") and Path(family).is_file():
         return Path(family)
     if family not in family_names():
-        raise UserError(f'there is no family "{family}"; use {listed(family_names())}, or a .yaml file')
+        raise UserError(f'unknown family "{family}"; use {listed(family_names())}, or a .yaml file')
     return FAMILY_FOLDER / "templates" / f"{family}.yaml"
 
 
@@ -117,9 +117,9 @@ def trained_task(family: str, seed: int, *, worlds: int = TRAINING_WORLDS) -> Tr
     """Generate the task of a family for a seed; the result is reproducible.
 
     Args:
-        family: one of `family_names()`, or a `.yaml` file, which is read only once.
+        family: one of `family_names()`, or the path of a `.yaml` file, which is read only once.
         seed: an integer from 0, which determines names, words and worlds.
-        worlds: the least number of worlds to sample, 1 to 10,000.
+        worlds: the minimum number of worlds to sample, 1 to 10,000.
 
     Raises:
         UserError: the family does not exist, its file is not valid, or a number is out of range.
@@ -134,7 +134,7 @@ def trained_task(family: str, seed: int, *, worlds: int = TRAINING_WORLDS) -> Tr
 def trained_prompts(family: str, seed: int) -> tuple[str, ...]:
     """Generate only the prompts of `trained_task`, which is much faster because no world is sampled.
 
-    For a `.yaml` file, call `trained_task` once before, which validates it.
+    For a `.yaml` file, call `trained_task` once beforehand to validate the file.
     """
     template = _template(family_file(family))
     random = template.random(seed)
@@ -143,7 +143,7 @@ def trained_prompts(family: str, seed: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _Template:
-    """The template of a family, parsed and as text."""
+    """The template of a family, both as text and parsed."""
 
     path: Path
     text: str
@@ -151,11 +151,11 @@ class _Template:
     form: FamilyFile
 
     def random(self, seed: int) -> Random:
-        """The random generator of a seed."""
+        """Return the random generator for a seed."""
         return Random(f"{self.path.stem} {seed}")  # noqa: S311 - not for cryptography
 
     def choose(self, random: Random) -> dict[str, str]:
-        """Choose the value of each name."""
+        """Choose a value for each name."""
         return dict(_choose(self.form, self.file, random))
 
 
@@ -169,7 +169,7 @@ def _generate(family: str, seed: int, worlds: int) -> TrainedTask:
     _expect_python(form, file)
     name = f"{path.stem}-{seed}"
     content = {"name": name, **form.task}
-    if isinstance(content.get("prompts"), list):  # otherwise, `read_task` reports the error
+    if isinstance(content.get("prompts"), list):  # `read_task` reports invalid prompts
         content["prompts"] = [*_phrasings(template, chosen, random)]
     task_file = file.part("task", content)
     head = suite_file()
@@ -190,9 +190,9 @@ def _generate(family: str, seed: int, worlds: int) -> TrainedTask:
 
 
 def _forbid_retraction(task: Task) -> Task:
-    """Change all requirements so that none holds once a program has retracted its report.
+    """Change all requirements so that none of them holds once a program has retracted its report.
 
-    A separate requirement would hold from the start and reward wrong programs.
+    A separate requirement would already hold at the start and so reward wrong programs.
     """
     no_retraction = parse(f'not tr.Exists(say(r"{RETRACTION}"))', skills=SKILLS)
 
@@ -201,9 +201,6 @@ def _forbid_retraction(task: Task) -> Task:
 
     scenarios = (replace(one, require=tuple(map(strict, one.require))) for one in task.scenarios)
     return replace(task, scenarios=tuple(scenarios))
-
-
-# --- choices
 
 
 def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[str, str]]:
@@ -239,12 +236,12 @@ def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
 def _pool(pool: str, file: YamlFile, name: str) -> list[str]:
     words = _words()
     if pool not in words:
-        raise file.wrong(f'there is no pool "{pool}"; use {listed(list(words))}', "choose", name)
+        raise file.wrong(f'unknown pool "{pool}"; use {listed(list(words))}', "choose", name)
     return words[pool]
 
 
 def _scalar(name: str, word: str) -> Iterator[tuple[str, str]]:
-    """A word, its capitalised form, with an article, and in the plural."""
+    """Yield the values of a word: as is, capitalised, with an article, and in the plural."""
     article = "an" if word[0] in "aeiou" else "a"
     plural = word + ("es" if word.endswith(("s", "x", "ch", "sh")) else "s")
     yield from ((name, word), (name.capitalize(), word[:1].upper() + word[1:]))
@@ -252,7 +249,7 @@ def _scalar(name: str, word: str) -> Iterator[tuple[str, str]]:
 
 
 def _list(name: str, words: list[str]) -> Iterator[tuple[str, str]]:
-    """Words as a YAML list, in a sentence, as a Python list, and one by one."""
+    """Yield the values of several words: as a YAML list, as a phrase, as a Python list, and one by one."""
     yield from ((name, ", ".join(words)), (f"{name}_and", listed(words)))
     yield f"{name}_quoted", "[" + ", ".join(f'"{word}"' for word in words) + "]"
     for number, word in enumerate(words, 1):
@@ -290,9 +287,6 @@ def _phrasings(template: _Template, chosen: Mapping[str, str], random: Random) -
         yield text
 
 
-# --- files
-
-
 @cache
 def _template(path: Path) -> _Template:
     text = read_text(path)
@@ -309,5 +303,5 @@ def _words() -> Mapping[str, list[str]]:
 
 @cache
 def suite_file() -> SuiteFile:
-    """The version and the simulation settings of all families."""
+    """Return the version and the simulation settings that all families share."""
     return YamlFile.read(FAMILY_FOLDER / "training.yaml").validate(SuiteFile)

@@ -276,7 +276,7 @@ def test_rows_that_judge_a_completion_again_are_refused(tmp_path: Path, paper: S
     judged(run, paper)
     path = run.rows("paper")
     path.write_bytes(2 * path.read_bytes())
-    with pytest.raises(UserError, match="again") as error:
+    with pytest.raises(UserError, match="a second time") as error:
         judged(run, paper)
     assert (error.value.file, error.value.line) == (path, 2)
 
@@ -306,7 +306,7 @@ def test_further_tasks_are_judged_beside_those_that_were(tmp_path: Path, paper: 
 def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> None:
     run = a_run(tmp_path / "run", [GREETS])
     before = run.completions.read_bytes()
-    with pytest.raises(UserError, match="other completions"):
+    with pytest.raises(UserError, match="different completions"):
         careful_run(run.path, paper)
     assert run.completions.read_bytes() == before
 
@@ -315,7 +315,7 @@ def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> 
 def test_more_or_fewer_completions_are_others(tmp_path: Path, paper: Suite, more: str | None) -> None:
     run = a_run(tmp_path / "run", [GREETS, "#"])
     other = a_run(tmp_path / "other", [GREETS, "#", more] if more else [GREETS])
-    with pytest.raises(UserError, match="other completions"):
+    with pytest.raises(UserError, match="different completions"):
         run.keep(open_source(str(other.path), paper).completions)
     run.keep(open_source(str(run.path), paper).completions)
 
@@ -347,7 +347,7 @@ def test_a_source_can_be_a_run_a_file_a_folder_or_a_recorded_model(tmp_path: Pat
     (folder / "SayGoodDay_0_3.py").write_text(f"name = 'x'\nprompt = 'p'\ncompletion = {GREETS!r}\n")
     assert [c.key for c in open_source(str(folder), paper).completions] == [("SayGoodDay", 0, 3)]
     assert len(open_source("recorded:hasty", paper).completions) >= 160
-    with pytest.raises(UserError, match="no such file or folder") as error:
+    with pytest.raises(UserError, match="does not exist") as error:
         open_source(str(tmp_path / "nothing"), paper)
     assert str(error.value.file) == str(tmp_path / "nothing")
 

@@ -61,7 +61,7 @@ def test_only_files_of_the_name_are_read_in_the_order_of_their_numbers(tmp_path:
         ("completion = 'x'\nprompt = {1: 2}\n", 2, "`prompt` is not a plain string"),
         ("a = 1\ncompletion = 'x\n", 2, "(unterminated string literal (detected"),
         ("a = 1\ncompletion = f'{x}'\n", 2, "`completion` is not a plain string"),
-        ("completion = " + "-" * 100_000 + "1\n", None, "not readable Python"),
+        ("completion = " + "-" * 100_000 + "1\n", None, "cannot be parsed as Python"),
         (b"a = 1\ncompletion = '\xff'\n", 2, "UTF-8"),
         (b"#" * 5_000_001, None, "is larger than 5,000,000 bytes"),
         ("completion = '" + "\x01" * 1_000_000 + "'\n", None, "this row is longer than 5,000,000 bytes"),
