@@ -57,7 +57,7 @@ class Access:
     def from_options(
         cls, operator: str | None, face: str | None, *, open_to_all: bool, is_private: bool
     ) -> Access:
-        """Take a user's tokens, and create those that are None; raises UserError if they are unsafe."""
+        """Take a user's tokens, and create those that are None; raise UserError if they are unsafe."""
         if open_to_all and (operator or face or not is_private):
             raise UserError("--no-token works only without --host, --behind-proxy and tokens of your own")
         if any(token is not None and len(token) < MIN_TOKEN_LENGTH for token in (operator, face)):
@@ -137,7 +137,7 @@ class PageAddress:
         return self.is_loopback and not self.proxies
 
     def listen(self) -> socket.socket:
-        """Open a socket; raises UserError if no port is free."""
+        """Open a socket; raise UserError if no port is free."""
         ports = PAGE_PORTS if self.port is None else (self.port,)
         for port in ports:
             try:

@@ -88,7 +88,7 @@ class Console:
         return self.view
 
     def begin(self, order: MissionOrder) -> MissionSession:
-        """Begin a mission, by default with the first model; raises MissionError while another one runs."""
+        """Begin a mission, by default with the first model; raise MissionError while another one runs."""
         model = order.model.strip() or ("" if order.has_program else self.models[0])
         order = replace(order, instruction=order.instruction.strip(), model=model)
         for text in (order.instruction, order.program):

@@ -42,7 +42,7 @@ class OuterAddress:
 
     @classmethod
     def parse(cls, text: str) -> OuterAddress:
-        """Parse an address such as https://host:8443/robot; raises UserError if it is invalid."""
+        """Parse an address such as https://host:8443/robot; raise UserError if it is invalid."""
         address = cls.found_in(text)
         if address is None:
             quoted = f'"{elide_middle(text, _MAX_QUOTED)}" is not the address of a proxy'
@@ -98,7 +98,7 @@ class OuterAddress:
 
 
 def outer_addresses(texts: Iterable[str]) -> tuple[OuterAddress, ...]:
-    """Parse addresses; raises UserError if one is invalid, or two have the same host."""
+    """Parse addresses; raise UserError if one is invalid, or two have the same host."""
     found = tuple(dict.fromkeys(map(OuterAddress.parse, texts)))
     hosts = [address.host for address in found]
     for address in found:
@@ -108,7 +108,7 @@ def outer_addresses(texts: Iterable[str]) -> tuple[OuterAddress, ...]:
 
 
 def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
-    """Return the addresses from the command line, or else from config.yaml; raises UserError if invalid."""
+    """Return the addresses from the command line, or else from config.yaml; raise UserError if invalid."""
     file = config_file()
     if given or file is None or not file.is_file():
         return outer_addresses(given or ())
