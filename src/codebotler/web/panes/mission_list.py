@@ -42,7 +42,7 @@ class MissionFilter:
         return f"?{urlencode(chosen)}" if chosen else ""
 
     def shows(self, summary: MissionSummary) -> bool:
-        """Whether the filter shows a mission."""
+        """Whether a mission passes the filter."""
         has_state = self.state in {"", summary.state} and self.robot in {"", summary.robot}
         texts = (summary.instruction, summary.program, summary.reason)
         return has_state and any(self.text.casefold() in text.casefold() for text in texts)
@@ -79,7 +79,7 @@ class _MissionList:
         self._list = ui.element("ol").classes("rows")
 
     async def update(self) -> None:
-        """Read and show the missions again if the current one has changed its state."""
+        """Reload the list if the state of the current mission has changed."""
         view = self._console.view
         seen = (view.id, view.state, view.reason)
         if seen == self._seen:
@@ -143,7 +143,7 @@ def _count_text(found: int, known: int) -> str:
 
 
 class _MissionRow:
-    """An entry of the list."""
+    """An entry in the list of missions."""
 
     def __init__(self, mission: str) -> None:
         with ui.element("li") as self.element, html.a(href=outside(f"{_MISSIONS_PATH}/{mission}")):
@@ -154,7 +154,7 @@ class _MissionRow:
             self._state = PlainText("small")
 
     def show(self, summary: MissionSummary) -> None:
-        """Show a mission."""
+        """Update the entry for a mission."""
         self._time.say(f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
         self._title.say(shortened(title(summary), _MAX_TITLE))
         reason = (
