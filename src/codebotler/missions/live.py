@@ -139,7 +139,7 @@ class LiveRobot:
     # --- rules
 
     def _judge(self, event: Event, *, is_drive: bool) -> str:
-        """Raise an error if a rule forbids an event, before the robot executes it; return the robot's room."""
+        """Raise an error if a rule forbids an event that is about to happen; return the robot's room."""
         guard = self._guard
         if guard is None:
             return event.place

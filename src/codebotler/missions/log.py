@@ -112,7 +112,7 @@ class MissionSummary:
             datetime.fromtimestamp(summary.created, UTC)
             "".join((*summary.problems, *(getattr(summary, name) for name in _TEXT_FIELDS)))
         except (ValueError, TypeError, OverflowError, RecursionError):
-            raise UserError("this is not a valid mission summary; remove the mission's folder", file=path) from None
+            raise UserError("this is not a valid mission summary; remove its folder", file=path) from None
         return summary
 
     def write(self, folder: Path) -> None:

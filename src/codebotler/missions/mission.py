@@ -137,7 +137,7 @@ class Mission:
             self._step(MissionState.CHECKED, "be checked", problems=tuple(problems))
 
     def approve(self, *, despite_problems: bool = False) -> None:
-        """Approve the program; raise MissionError if it is unchecked or has problems that were not accepted."""
+        """Approve the program; raise MissionError if it is unchecked or has problems not yet accepted."""
         with self._writing:
             if self.state is MissionState.CHECKED and self.summary.problems and not despite_problems:
                 raise MissionError(

@@ -118,7 +118,7 @@ class MissionSession:
         return self._events[start:]
 
     def edit(self, program: str) -> None:
-        """Replace and check the program; raise MissionError after its approval or while a model is writing."""
+        """Replace and check the program; raise MissionError after its approval or while a model writes."""
         with self._editing, self._lock:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")

@@ -27,7 +27,7 @@ class StopButton:
         self._lock = threading.Lock()  # held briefly
 
     def press(self, by: str) -> None:
-        """Stop the robot, then call all listeners, newest first, even if some fail; log `by` as the source."""
+        """Stop the robot, then call all listeners, newest first, even if some fail; log the source `by`."""
         now = time.monotonic()
         with ExitStack() as afterwards:
             with self._lock:

@@ -35,7 +35,7 @@ class Role(StrEnum):
 
 
 class TooManyTriesError(Exception):
-    """Raised if an address has sent too many invalid tokens; even a valid token is then refused for a while."""
+    """Raised after too many invalid tokens from an address; for a while, even a valid token is refused."""
 
 
 def new_token() -> str:

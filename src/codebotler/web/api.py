@@ -59,7 +59,7 @@ class Approval(_Form):
 class AskAgainForm(_Form):
     """A request for another program."""
 
-    repair: bool = Field(False, description="Whether to send the model its program and the problems found.")
+    repair: bool = Field(default=False, description="Whether to send the program and its problems.")
     max_tokens: Annotated[int, Field(ge=0)] = Field(
         0, description="A new token limit, such as `higher_limit` of `no_program`; 0 keeps the limit."
     )
@@ -98,7 +98,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
-        """Begin a mission; its program is written and checked in the background. Refused while a mission runs."""
+        """Begin a mission, and prepare its program in the background. Refused while a mission runs."""
         with as_http_errors():
             session = console.begin(MissionOrder(new.instruction, new.model, new.program))
         await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
@@ -170,7 +170,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/stop", status_code=202)
     async def stop(
-        *, only_moving: Annotated[bool, Query(description="Stop only if the robot is running a program.")] = False
+        *, only_moving: Annotated[bool, Query(description="Stop only if a program is running.")] = False
     ) -> dict[str, Any]:
         """Stop the current mission; return whether there is a mission to stop."""
         return {"stopping": console.stop(BY_PAGE, only_moving=only_moving)}

@@ -134,7 +134,7 @@ class Console:
         self.notifier.change()
 
     def stop(self, by: str, *, only_moving: bool = False) -> bool:
-        """Stop the current mission without waiting; return False if there is none, or none that is moving."""
+        """Stop the mission, or only a running mission, without waiting; return whether one was found."""
         session, view = self.session, self.view
         if session is None or view.is_over or (only_moving and not view.is_running):
             return False

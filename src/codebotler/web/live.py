@@ -14,7 +14,7 @@ _UPDATE_PAUSE = 0.1
 
 
 async def follow(notifier: Notifier, update: Callable[[], Awaitable[None]]) -> None:
-    """Wait for the browser to connect, then call `update` once and after each change while it is connected."""
+    """Once the browser connects, call `update` immediately and after each change, until it disconnects."""
     client, here = ui.context.client, ui.context.slot.parent
     await client.connected()
 

@@ -108,7 +108,7 @@ def outer_addresses(texts: Iterable[str]) -> tuple[OuterAddress, ...]:
 
 
 def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
-    """Return the addresses on the command line, or else in config.yaml; raise UserError if they are invalid."""
+    """Return the addresses on the command line, or else in config.yaml; raise UserError if invalid."""
     file = config_file()
     if given or file is None or not file.is_file():
         return outer_addresses(given or ())

@@ -95,7 +95,8 @@ def _links(place: PageAddress, port: int, access: Access, console: Console | Non
     if not place.is_loopback:
         lines.append("Other machines can open this link, too. The connection is not encrypted.\n")
     if console and console.face is not None:
-        where = "on this machine (--host lets other machines connect)" if place.is_private else "on the robot's tablet"
+        here = "on this machine (others need --host)"
+        where = here if place.is_private else "on the robot's tablet"
         lines.append(f"Open the robot's face, which cannot run programs, {where}:\n")
         lines += links("face", access.face)
     return "\n".join(lines)

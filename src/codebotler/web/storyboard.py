@@ -63,7 +63,7 @@ _NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which ar
 
 
 def draw_strips(check: CheckResult, reached: RouteProgress = NO_PROGRESS) -> None:
-    """Draw what a robot would do according to a check; tick off visited rooms, and collapse refuted strips."""
+    """Draw what a robot would do according to a check; tick off visited rooms, collapse refuted strips."""
     shown = strips(check)
     PlainText("h3", "What the robot would do" if shown else "")
     numbers = [scenes_reached(strip, reached) for strip in shown]
@@ -87,7 +87,7 @@ def folded(numbers: Sequence[int | None]) -> list[bool]:
 
 
 def scenes_reached(strip: Strip, reached: RouteProgress) -> int | None:
-    """Return how many drives of a strip the robot has completed, or None if its run differs from the strip."""
+    """Return how many drives of a strip the robot has completed, or None if its run differs from it."""
     is_whole = all(scene.room != _LEFT_OUT for scene in strip.scenes)
     seen = [look_text(*look) for look in reached.looks]
     has_seen = _texts(strip, CHECK)[: len(seen)] == seen

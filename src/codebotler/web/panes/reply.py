@@ -27,7 +27,7 @@ class ReplyPane:
             text = view.arriving.text
         elif none is not None and (view.may_be_approved or view.waits_for_program):
             why = none.sentence + (" The previous program is kept." if view.program else "")
-            text = "" if none.sentence.endswith(none.text.strip()) else none.text  # the sentence already quotes it
+            text = "" if none.sentence.endswith(none.text.strip()) else none.text  # do not quote it twice
             reasoning = "" if none.reasoning in none.text else none.reasoning
         self._why.say(why)
         self._text.say(text, is_arriving=view.is_written)
