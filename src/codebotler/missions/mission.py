@@ -255,11 +255,8 @@ class Mission:
                 if self.state is MissionState.STOPPING and why:
                     state, reason = MissionState.FAILED, why
                 elif self.state is MissionState.STOPPING and not is_lost:
-                    state, reason, line = (
-                        MissionState.STOPPED,
-                        self.summary.reason,
-                        live.broken_rule.get("line"),
-                    )
+                    state, reason = MissionState.STOPPED, self.summary.reason
+                    line = live.broken_rule.get("line")
                 self._step(state, "end", reason=reason, line=line)
         except Exception as error:  # noqa: BLE001 - `run` raises it
             self._fault = error

@@ -284,7 +284,6 @@ class MissionSession:
         self._take(mission, made.program)
 
     def _restore(self, before: SessionView) -> None:
-        """Show the previous program again."""
         kept = {name: getattr(before, name) for name in (*_UNCHECKED, "program", "author")}
         self._show(**kept | {"busy": ""}, is_written=False, reply="")
 

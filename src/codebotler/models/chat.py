@@ -134,7 +134,8 @@ class ChatModel:
         details = response.provider_details or {}
         refusal = details.get("refusal") or ""
         calls = [part for part in response.parts if isinstance(part, messages.ToolCallPart)]
-        texts = [response.text or "", str(refusal), *map(_describe_call, calls)]
+        texts = [response.text or "", str(refusal)]
+        texts += [f"[tool call] {call.tool_name}({call.args_as_json_str()})" for call in calls]
         thoughts = [p.content for p in response.parts if isinstance(p, messages.ThinkingPart) and p.content]
         finish_reason = chunks and chunks.finish_reason
         return make_reply(
@@ -215,10 +216,6 @@ def _is_filtered(error: Exception) -> bool:
     if isinstance(error, exceptions.ModelHTTPError):
         return is_filtered(error.status_code, error.body)
     return isinstance(error, exceptions.ContentFilterError)
-
-
-def _describe_call(call: messages.ToolCallPart) -> str:
-    return f"[tool call] {call.tool_name}({call.args_as_json_str()})"
 
 
 def _usage(response: messages.ModelResponse) -> Usage:

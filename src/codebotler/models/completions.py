@@ -88,11 +88,8 @@ class CompletionsModel:
             raise error_in_reply(self.name, chunks.error)
         if not chunks.is_whole:
             raise incomplete_error(self.name, has_begun=bool(text))
-        usage = (
-            Usage()
-            if chunks.usage is None
-            else Usage(chunks.usage.prompt_tokens, chunks.usage.completion_tokens)
-        )
+        sent = chunks.usage
+        usage = Usage() if sent is None else Usage(sent.prompt_tokens, sent.completion_tokens)
         text, latency = remove_keys(text), time.monotonic() - start
         return make_reply(text, usage, latency, chunks.finish_reason, opening=prompt)
 

@@ -212,7 +212,6 @@ def _named_host(scope: Scope) -> str:
 
 
 def _host(request: HTTPConnection) -> str:
-    """Return the requested host name."""
     found = _HOST_HEADER.fullmatch(_named_host(request.scope))
     if found is None or not 0 < int(found[3] or 80) <= _MAX_PORT:
         raise RefusedError(HTTPStatus.BAD_REQUEST, "send exactly one Host header, with a name and a port")

@@ -82,18 +82,14 @@ class OuterAddress:
         if path == self.prefix:
             path, raw = f"{path}/", raw + b"/"
         headers = [(name, value) for name, value in scope["headers"] if name != _FORWARDED_PREFIX]
-        secure = (
-            _SECURE_SCHEMES.get(scope["scheme"], scope["scheme"])
-            if self.scheme == "https"
-            else scope["scheme"]
-        )
+        secure = _SECURE_SCHEMES if self.scheme == "https" else {}
         return {
             **scope,
             "path": path,
             "raw_path": raw,
             "root_path": self.prefix,
             "headers": headers,
-            "scheme": secure,
+            "scheme": secure.get(scope["scheme"], scope["scheme"]),
         }
 
 

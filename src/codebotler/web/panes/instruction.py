@@ -49,9 +49,7 @@ class InstructionPane:
                 .on("keydown.ctrl.enter", self._ask)
             )
             self._model = ui.select(
-                {name: visible(name) for name in console.models},
-                value=console.models[0],
-                label="Model",
+                {name: visible(name) for name in console.models}, value=console.models[0], label="Model"
             )
             self._model.props("outlined dense").on_value_change(self._about_model)
             self._about = PlainText("p", _ABOUT_RECORDED, "quiet")

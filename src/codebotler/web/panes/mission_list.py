@@ -91,12 +91,8 @@ class _MissionList:
             return
         self._seen = seen
         self._error.say("")
-        _set_options(
-            self._state, "All states", {summary.state for summary in self._known}, self._chosen.state
-        )
-        _set_options(
-            self._robot, "All robots", {summary.robot for summary in self._known}, self._chosen.robot
-        )
+        _set_options(self._state, "All states", {one.state for one in self._known}, self._chosen.state)
+        _set_options(self._robot, "All robots", {one.robot for one in self._known}, self._chosen.robot)
         self._show()
 
     def _choose(self) -> None:

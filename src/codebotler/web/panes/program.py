@@ -257,7 +257,6 @@ def _escape_marks(program: str) -> list[dict[str, Any]]:
 
 
 def _current_line(view: SessionView) -> list[dict[str, Any]]:
-    """Return a mark for the line that is running or has failed."""
     line = view.progress.line if view.is_running else view.line
     kind = "running-line" if view.is_running else "failed-line"
     is_there = line is not None and line <= view.program.count("\n") + 1
@@ -265,7 +264,6 @@ def _current_line(view: SessionView) -> list[dict[str, Any]]:
 
 
 def _problem_marks(found: CheckResult | None, program: str) -> list[dict[str, Any]]:
-    """Return marks for the lines with problems and for their messages."""
     if found is None:
         return []
     lines = program.split("\n")
