@@ -95,7 +95,7 @@ def scene_update(rooms: Iterable[Room], time: int) -> Message:
 
 
 def log_line(level: int, message: str, name: str, line: int | None, time: int) -> Message:
-    """Build a log line; `name` is a skill or a kind of event, `line` a program line, `time` ns since 1970."""
+    """Build a log line for a skill or kind of event (`name`), a program line, and a time in ns since 1970."""
     where = {"file": "", "line": 0} if line is None else {"file": "program.py", "line": line}
     return {"timestamp": _time(time), "level": level, "message": message, "name": name, **where}
 

@@ -27,7 +27,7 @@ from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.settings import ENDLESS, SimulationSettings
 
 EventWriter: TypeAlias = Callable[..., None]
-"""Logs an event from any thread, given its kind, and its data as keyword arguments (a `picture` as bytes)."""
+"""A function that logs an event from any thread; it takes the kind and, as keyword arguments, the data."""
 
 
 class StoppedError(Exception):
@@ -65,7 +65,7 @@ class LiveRobot:
         self._room = place or None  # the current room, as rules name it; None if unknown
         self._has_asked = False
         self._at: Point | None = None  # the last reported position
-        self._guard_lock = threading.RLock()  # poses arrive on a thread of the robot
+        self._guard_lock = threading.RLock()  # poses arrive on one of the robot's threads
         self._events: list[Event] = []
         self._number = 0
         self._began: float | None = None
@@ -167,7 +167,7 @@ class LiveRobot:
             guard.happened(seen)
 
     def _resolve_drive(self, guard: RuleGuard, event: Event, *, failed: bool) -> Event:
-        """Return a drive with the name of its destination; ask the robot for it if a rule depends on it."""
+        """Return a drive with the name of its destination; if a rule depends on the name, ask the robot."""
         goals = self._rooms_meant(event.text)
         possible = [replace(event, text=goal) for goal in goals or [event.text]]
         is_known = not failed and (len(goals) == 1 or self._room_map is None)

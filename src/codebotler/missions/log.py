@@ -76,12 +76,12 @@ NEXT_STATES = {
         "stopping": "stopped failed",
     }.items()
 }
-"""The possible next states; all others are final. If its process dies, a mission becomes interrupted."""
+"""The states that can follow each state. States not listed are final; recovery sets `interrupted`."""
 
 
 @dataclass
 class MissionSummary:
-    """The summary of a mission, which is stored beside its log."""
+    """The summary of a mission, stored beside its log."""
 
     id: str
     state: MissionState

@@ -41,7 +41,7 @@ _JSON_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 
 
 class TopicMessage(NamedTuple):
-    """A message and its topic; `schema` is the name of a Foxglove schema, or our own schema."""
+    """A message and its topic; `schema` is the name of a Foxglove schema, or one of our own schemas."""
 
     topic: str
     message: Message

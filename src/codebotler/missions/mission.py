@@ -1,4 +1,4 @@
-"""The state machine of a mission, which is drafted, checked, approved, run, and stopped at any time."""
+"""The state machine of a mission: drafted, checked, approved and run, with a stop at any time."""
 
 from __future__ import annotations
 

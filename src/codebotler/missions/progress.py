@@ -18,7 +18,7 @@ from codebotler.simulator.sampled_robot import RoomMap
 POSITION_FEEDBACK = re.compile(r"at \((-?\d{1,7}(?:\.\d{1,20})?), (-?\d{1,7}(?:\.\d{1,20})?)\)")
 _MAX_MOMENTS, _MAX_STEPS = 200, 60
 _MIN_MOVE_METRES = 0.05  # shorter moves are not added to the trail
-ANSWER = "answer"  # the kind of a moment that holds an answer to the robot
+ANSWER = "answer"  # the kind of moment in which a person answers the robot
 _STOP_STATES = frozenset({MissionState.STOPPING, MissionState.STOPPED})  # logged after the robot has stopped
 
 
@@ -41,7 +41,7 @@ class Find:
 
 @dataclass(frozen=True)
 class Progress:
-    """The progress of a mission after some of its events."""
+    """A snapshot of the progress of a mission."""
 
     has_begun: bool = False  # whether the program has started on the robot
     doing: str = ""  # the current skill or pause in words; empty between them

@@ -246,7 +246,7 @@ class MissionSession:
         for sentence in (*self._view.missing_skills, *self._view.unknown_rooms):
             mission.note(f"before the robot moves: {sentence}")
         rules = self._view.rules_in_force
-        keep_out = getattr(self._robot, "keep_out", None)  # optional: robots with a path planner
+        keep_out = getattr(self._robot, "keep_out", None)  # an optional method of robots with a path planner
         with suppress(MissionError, CancelledError):  # it was stopped before it could run
             if keep_out is not None:
                 keep_out(rules)

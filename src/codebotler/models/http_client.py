@@ -144,7 +144,7 @@ def _is_loopback(host: str) -> bool:
 
 
 def opening_error(name: str, error: Exception) -> UserError:
-    """Build the error for a client that cannot be created, such as because of a wrong proxy."""
+    """Build the error for a client that cannot be created, for example because of a wrong proxy."""
     for variable in CERTIFICATE_VARIABLES:
         if (path := os.environ.get(variable)) and not Path(path).exists():
             return UserError(f"{name} cannot be used: {variable} names {path}, which does not exist")

@@ -16,7 +16,7 @@ from codebotler.core.errors import UserError
 SECRET_NAME = re.compile(r"(?:key|token|secret|password|passwd|credential)s?(?:_|$)", re.IGNORECASE)
 """Matches the names of variables that hold keys, but not TOKENIZERS_PARALLELISM."""
 MIN_SECRET = 8  # shorter values are kept in replies, where they may be parts of names
-MIN_SECRET_IN_ERRORS = 3  # the same limit for errors and logs
+MIN_SECRET_IN_ERRORS = 3  # the limit for error messages and logs
 KEY_SHAPES = r"\b(?:sk|pk|gsk|xai|hf)[-_][\w*.-]{8,}|\bAIza[\w*-]{20,}|(?<=Bearer )\S{8,}"
 KEY_REMOVED = "[key removed]"
 CLIENT_LOGGERS = (
@@ -83,7 +83,7 @@ class _Redaction(logging.Filter):
         try:
             message = record.getMessage()
         except (TypeError, ValueError):
-            return True  # logging reports such a record with its format only
+            return True  # logging prints only the format of an invalid record
         record.msg, record.args = redact(message), None
         if record.exc_info:
             record.exc_text = redact(logging.Formatter().formatException(record.exc_info))

@@ -193,7 +193,7 @@ class LocalModel:
         _expect_wanted(batch)
         tokens = self._tokens([job.text for job in batch], return_tensors="pt", padding=True).to(self.device)
         start = tokens["input_ids"].shape[1]
-        counts: dict[int, int] = {}  # tokens per reply that has ended
+        counts: dict[int, int] = {}  # the number of tokens of each completed reply
 
         def stop_ended(sequences: torch.Tensor, _scores: object, **_: object) -> torch.Tensor:
             for row, job in enumerate(batch):

@@ -31,7 +31,7 @@ from codebotler.prompts import Prompt
 MODELS_LOG = logging.getLogger("codebotler.models")
 MAX_WAIT = 30.0  # seconds between two tries, unless the server asks for more
 MAX_RETRY_AFTER = 600.0  # seconds; a request that a server delays for longer fails
-CHARACTERS_PER_TOKEN = 3  # overestimates the tokens where the model does not count them
+CHARACTERS_PER_TOKEN = 3  # a high estimate, used if the model does not count tokens
 
 
 @dataclass
@@ -45,7 +45,7 @@ class RateLimited:
         model: the model to ask.
         concurrency: how many requests may run at the same time, at least 1.
         requests_per_minute: how many tries may start per minute, evenly spaced; None for no limit.
-        retries: how often to repeat each failed request, at least 0.
+        retries: how many times to repeat a failed request, at least 0.
         token_budget: the number of tokens after which no request starts; running requests complete. If the
             model does not count tokens, three characters are assumed per token. None for no limit.
         first_wait: about how many seconds to wait before the second try; the wait doubles each time.

@@ -78,7 +78,7 @@ class SamplingSettings:
 
 
 def _check_url(url: str) -> None:
-    # Never quote the URL: in a mistyped one, any part may be a password.
+    # Never quote the URL: in a mistyped URL, any part may be a password.
     if any(mark in url for mark in "@?#"):
         raise UserError(
             "the base URL contains a user name, a password, a query or a fragment; remove it, "

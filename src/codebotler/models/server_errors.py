@@ -19,7 +19,7 @@ STATUS_HINTS = {
 CONNECT_ERROR = "ConnectError"  # the name in both httpx and httpx2; providers use either
 MAX_ERROR_CHARACTERS = 300
 FORBIDDEN = 403
-PROMPT_STATUSES = (400, 413, 422)  # statuses that may concern this prompt alone
+PROMPT_STATUSES = (400, 413, 422)  # statuses that may be caused by this prompt
 FILTER_WORDS = re.compile(
     r"content[\s_-]*(?:filter|management|policy|exists risk)|safety system|data_inspection|moderation"
     r"|flagged|usage polic|prohibited_content|敏感内容",
@@ -89,7 +89,7 @@ def status_error(
 
 
 def error_in_reply(name: str, body: object) -> ModelError:
-    """Build the error from a body that a server sent instead of a reply, with a status of success."""
+    """Build the error for an error body that a server sent with a success status."""
     fields = body if isinstance(body, Mapping) else {}
     code = next((fields[key] for key in ("code", "status") if fields.get(key)), None)
     if str(code).isdigit() and int(str(code)) > SUCCESS:

@@ -69,7 +69,7 @@ class Access:
         return cls(None if open_to_all else operator or new_token(), face or new_token(), unguessable)
 
     def of_token(self, token: str, address: str) -> Role | None:
-        """Return the role for a token, or None if it is invalid, which counts towards the address's limit."""
+        """Return the role for a token, or None if it is invalid; this counts towards the address's limit."""
         role = self._of(token, lambda known: known)
         if role in self.unguessable:
             return role

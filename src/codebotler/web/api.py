@@ -163,7 +163,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/stop", status_code=202)
     async def stop_mission(mission: str) -> dict[str, Any]:
-        """Stop the current mission; `state` tells when it has stopped."""
+        """Stop the current mission; `state` shows when it has stopped."""
         _current_session(console, mission)
         console.stop(BY_PAGE)
         return view_data(console.view)

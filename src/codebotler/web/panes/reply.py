@@ -8,7 +8,7 @@ from codebotler.missions.view import SessionView
 from codebotler.web.frame import PlainText
 
 _MAX_CHARACTERS = 6_000
-"""The maximum length of a shown reply: its end while it arrives, its beginning afterwards."""
+"""The maximum length of the shown part of a reply: the end while it arrives, then the beginning."""
 
 
 class ReplyPane:
