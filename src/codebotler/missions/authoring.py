@@ -26,7 +26,7 @@ class ModelAuthor:
         self._is_cancelled = False
 
     def write(self, prompt: Prompt, on_text: TextListener) -> tuple[str, Generation]:
-        """Request a program, and return the model's name and the result; raise CancelledError if cancelled."""
+        """Request a program; return the model's name and the result; raise CancelledError after `cancel`."""
         if self.max_tokens is None or self._model is None:
             self._model = self._open_model(self._name)
         if self.max_tokens is not None:
