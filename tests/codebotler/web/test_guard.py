@@ -195,7 +195,9 @@ def test_a_token_is_made_for_each_start() -> None:
     [
         (["--no-token", "--host", "0.0.0.0"], "--no-token cannot be combined"),
         *(
-            pytest.param(["--no-token", "--host", host], "--no-token cannot be combined", marks=pytest.mark.slow)
+            pytest.param(
+                ["--no-token", "--host", host], "--no-token cannot be combined", marks=pytest.mark.slow
+            )
             for host in ("::", "0", "127.example", "")
         ),
         (["--no-token", "--token", "x" * 20], "--no-token cannot be combined"),
