@@ -273,7 +273,7 @@ def test_a_check_of_what_cannot_be_checked_is_refused(wrong: dict[str, Any], nam
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"max_tokens": 0}, "tokens is 0; .* 1$"),
+        ({"max_tokens": 0}, "token limit is 0; .* 1$"),
         ({"temperature": -1}, "temperature is -1; .* 0 "),
         ({"top_p": 2}, "top-p is 2; .* 1$"),
         ({"timeout": 0}, "timeout is 0 "),

@@ -59,7 +59,7 @@ def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path,
         expect(page.locator(".problems")).to_contain_text('the rule "study" forbids going to "study"')
         page.get_by_role("button", name="Switch off the rule study for this program").click()
         page.get_by_role("button", name="Switch it off").click()
-        expect(page.get_by_text("say why this program may break")).to_be_visible()
+        expect(page.get_by_text("give a reason why this program may break")).to_be_visible()
         page.get_by_label("Reason").fill("Ann has asked for a visit")
         page.get_by_role("button", name="Switch it off").click()
         expect(page.locator(".house-rules li.off")).to_contain_text("switched off for this program")

@@ -1,4 +1,4 @@
-"""Missions: an instruction's life from its program to the end of the robot's work, and its log on the disk.
+"""Missions turn an instruction into an approved program, run it on a robot, and log every step on disk.
 
-Start with `mission.py`, the states and the stop; `live.py` is the robot as a running program meets it.
+Start with `mission.py`, which defines the states and the stop; `live.py` connects a program to the robot.
 """

@@ -1,4 +1,4 @@
-"""`ModelAuthor`: requests the programs of one mission from a language model."""
+"""`ModelAuthor`: requests programs for one mission from a language model."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from codebotler.robots.base import Robot
 
 
 class ModelAuthor:
-    """Requests programs from a model, one at a time, until it is cancelled from any thread."""
+    """Requests programs from a model, one at a time; any thread can cancel it."""
 
     def __init__(self, open_model: Callable[[str], Model], name: str) -> None:
         self._open_model, self._name = open_model, name
-        self._model: Model | None = None  # the latest one
-        self.max_tokens: int | None = None  # a person's limit for replies
+        self._model: Model | None = None  # the model of the latest request
+        self.max_tokens: int | None = None  # the token limit chosen by a person; None for the default
         self._request: tuple[asyncio.AbstractEventLoop, asyncio.Task[Generation]] | None = None
         self._is_cancelled = False
 
     def write(self, prompt: Prompt, on_text: TextListener) -> tuple[str, Generation]:
-        """Request a program; return the model's name and the result, or raise asyncio.CancelledError."""
+        """Request a program; return the model's name and the result; raise CancelledError after `cancel`."""
         if self.max_tokens is None or self._model is None:
             self._model = self._open_model(self._name)
         if self.max_tokens is not None:
@@ -35,10 +35,10 @@ class ModelAuthor:
         return self._model.name, asyncio.run(self._write(self._model, prompt, on_text))
 
     def cancel(self) -> None:
-        """Cancel the current request, and all later ones."""
+        """Cancel the current request and any later ones."""
         self._is_cancelled, request = True, self._request
         if request is not None:
-            with suppress(RuntimeError):  # the loop has ended
+            with suppress(RuntimeError):  # the event loop has already ended
                 request[0].call_soon_threadsafe(request[1].cancel)
 
     async def _write(self, model: Model, prompt: Prompt, on_text: TextListener) -> Generation:
@@ -53,7 +53,7 @@ class ModelAuthor:
 
 
 def prompt_of(view: SessionView, robot: Robot, *, repair: bool) -> Prompt:
-    """Return the prompt for a mission's instruction; a repair includes what was wrong."""
+    """Return the prompt for a mission's instruction; a repair prompt also says what was wrong."""
     prompt = prompt_for(
         view.instruction,
         rooms=() if view.room_map is None else view.room_map.rooms,

@@ -1,4 +1,4 @@
-"""Messages in Foxglove's schemas: poses, frames, rooms, log lines and pictures."""
+"""Build messages in Foxglove's schemas: poses, frames, rooms, log lines and pictures."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Schema: TypeAlias = Mapping[str, Any]
 Message: TypeAlias = dict[str, Any]
 
 MAP_FRAME, ROBOT_FRAME = "map", "robot"
-"""The coordinate frames; `map` is the one that the 3D panel displays by default."""
+"""The coordinate frames; Foxglove's 3D panel displays `map` by default."""
 
 SECOND_NS = 1_000_000_000  # nanoseconds
 LEVEL_DEBUG, LEVEL_INFO, LEVEL_WARNING, LEVEL_ERROR = 1, 2, 3, 4
-_LINE_LOOP = 1  # the type of a closed line
+_LINE_LOOP = 1  # the line type for a closed outline
 _LINE_WIDTH, _LETTER_HEIGHT = 0.05, 0.4  # metres
 _OUTLINE_COLOR = {"r": 0.35, "g": 0.55, "b": 0.8, "a": 1.0}
 _IMAGE_FORMATS = {"jpg": "jpeg", "png": "png"}
@@ -69,16 +69,16 @@ SCHEMAS: Mapping[str, Schema] = {
         timestamp=_TIME, frame_id=TEXT, data={**TEXT, "contentEncoding": "base64"}, format=TEXT
     ),
 }
-"""The schemas by name, with only the fields that we write."""
+"""Foxglove's schemas by name, reduced to the fields that we write."""
 
 
 def pose_in_frame(at: Point, heading: float, time: int) -> Message:
-    """The robot's pose: position in metres, heading in radians from the x axis, time in ns since 1970."""
+    """Build a pose message: position in metres, heading in radians from the x axis, time in ns since 1970."""
     return {"timestamp": _time(time), "frame_id": MAP_FRAME, "pose": _pose(at, heading)}
 
 
 def frame_transform(at: Point, heading: float, time: int) -> Message:
-    """The robot's frame relative to the map; takes the arguments of `pose_in_frame`."""
+    """Build the transform from the map to the robot's frame; the arguments are those of `pose_in_frame`."""
     pose = _pose(at, heading)
     return {
         "timestamp": _time(time),
@@ -90,18 +90,18 @@ def frame_transform(at: Point, heading: float, time: int) -> Message:
 
 
 def scene_update(rooms: Iterable[Room], time: int) -> Message:
-    """The outlines and names of rooms that were laid out."""
+    """Build the outlines and names of rooms; every room needs a footprint and a stopping point."""
     return {"entities": [_entity(room, time) for room in rooms]}
 
 
 def log_line(level: int, message: str, name: str, line: int | None, time: int) -> Message:
-    """A log line: `name` is a skill or a kind of event, `line` the program's, `time` in ns since 1970."""
+    """Build a log line for a skill or kind of event (`name`), a program line, and a time in ns since 1970."""
     where = {"file": "", "line": 0} if line is None else {"file": "program.py", "line": line}
     return {"timestamp": _time(time), "level": level, "message": message, "name": name, **where}
 
 
 def compressed_image(kind: str, data: bytes, time: int) -> Message:
-    """A picture; `kind` is `jpg` or `png`, `time` is in ns since 1970."""
+    """Build an image message; `kind` is `jpg` or `png`, and `time` is in ns since 1970."""
     encoded = base64.b64encode(data).decode()
     return {"timestamp": _time(time), "frame_id": "", "data": encoded, "format": _IMAGE_FORMATS[kind]}
 
@@ -142,7 +142,7 @@ def _entity(room: Room, time: int) -> Message:
         "timestamp": _time(time),
         "frame_id": MAP_FRAME,
         "id": room.name,
-        "lifetime": {"sec": 0, "nsec": 0},  # until it is replaced
+        "lifetime": {"sec": 0, "nsec": 0},  # shown until it is replaced
         "frame_locked": True,
         "lines": [outline],
         "texts": [label],

@@ -1,4 +1,4 @@
-"""`LiveRobot`: executes a program's skills on a robot, logs each one, and starts none after a stop."""
+"""`LiveRobot`: executes and logs a program's skills on a robot, and starts no skill after a stop."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.settings import ENDLESS, SimulationSettings
 
 EventWriter: TypeAlias = Callable[..., None]
-"""Logs an event, from any thread: its kind, and its data as keyword arguments; a `picture` is bytes."""
+"""A function that logs an event from any thread; it takes the kind and, as keyword arguments, the data."""
 
 
 class StoppedError(Exception):
-    """The robot and its program were stopped."""
+    """Raised to end a program whose mission was stopped."""
 
 
 class LiveRobot:
-    """Executes the skills of a program that `Worker.run_live` runs, on a connected real or simulated robot.
+    """Executes the skills that a program calls on a connected robot, real or simulated.
 
-    The program's clock starts at `clock_starts`, by default the local time, because programs tell people the
-    time. A broken rule presses `button`.
+    `Worker.run_live` runs the program. The program's clock starts at `clock_starts`, by default the local
+    time, because programs may tell people the time. Breaking a rule presses `button`.
     """
 
     is_live = True
@@ -65,7 +65,7 @@ class LiveRobot:
         self._room = place or None  # the current room, as rules name it; None if unknown
         self._has_asked = False
         self._at: Point | None = None  # the last reported position
-        self._guard_lock = threading.RLock()  # poses arrive on a thread of the robot
+        self._guard_lock = threading.RLock()  # poses arrive on one of the robot's threads
         self._events: list[Event] = []
         self._number = 0
         self._began: float | None = None
@@ -75,20 +75,20 @@ class LiveRobot:
 
     @property
     def now(self) -> float:
-        """Seconds by the robot's clock since the program's first skill."""
+        """Seconds on the robot's clock since the program's first skill."""
         return 0.0 if self._began is None else self.robot.clock.now - self._began
 
     @property
     def trace(self) -> Trace:
-        """The robot's trace so far."""
+        """The trace of the robot so far."""
         return tuple(self._events)
 
     def stop(self) -> None:
-        """Cancel the robot's work and start no other skill; callable from any thread, repeatedly."""
+        """Cancel the robot's work and prevent further skills; callable repeatedly and from any thread."""
         self._button.cancel_robot()
 
     def sleep_until(self, now: float) -> None:
-        """Wait by the robot's clock; raises StoppedError."""
+        """Wait until a time on the robot's clock; raise StoppedError if the mission is stopped."""
         self._check_end()
         seconds = max(0.0, now - self.now)
         at = {} if self.line is None else {"line": self.line}
@@ -97,17 +97,17 @@ class LiveRobot:
         self._check_end()
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill; raises RobotError, StoppedError, RobotLostError, or OSError for the log."""
+        """Execute one skill; raise RobotError, StoppedError, RobotLostError, or OSError if logging fails."""
         self._check_end()
         try:
             return self._execute(self.skills[skill], arguments)
         finally:
-            if skill not in SKILLS:  # a skill of the user's own may move the robot
+            if skill not in SKILLS:  # a custom skill may have moved the robot
                 self._room, self._has_asked = None, False
 
     def _execute(self, row: Skill, arguments: Sequence[Argument]) -> Result:
         is_drive = row.is_drive
-        if is_drive:  # so that rules judge the very text that the robot gets
+        if is_drive:  # rules must judge exactly the text that the robot receives
             arguments = [one.strip() if isinstance(one, str) else one for one in arguments]
         event = attempted_event(row, arguments, place=self._place, time=self.now, holding=self._held)
         room = "" if event is None else self._judge(event, is_drive=is_drive)
@@ -139,7 +139,7 @@ class LiveRobot:
     # --- rules
 
     def _judge(self, event: Event, *, is_drive: bool) -> str:
-        """Refuse an event that a rule forbids, before it reaches the robot; return the robot's room."""
+        """Raise an error if a rule forbids an event that is about to happen; return the robot's room."""
         guard = self._guard
         if guard is None:
             return event.place
@@ -156,7 +156,7 @@ class LiveRobot:
         return room
 
     def _report(self, event: Event, room: str, *, is_drive: bool, failed: bool = False) -> None:
-        """Report an event to the guard; with its result, it may break a rule."""
+        """Report an executed event to the guard, because its result may break a rule."""
         guard = self._guard
         if guard is None:
             return
@@ -167,7 +167,7 @@ class LiveRobot:
             guard.happened(seen)
 
     def _resolve_drive(self, guard: RuleGuard, event: Event, *, failed: bool) -> Event:
-        """Return a drive with its destination's name; ask the robot where it is if a rule depends on it."""
+        """Return a drive with the name of its destination; if a rule depends on the name, ask the robot."""
         goals = self._rooms_meant(event.text)
         possible = [replace(event, text=goal) for goal in goals or [event.text]]
         is_known = not failed and (len(goals) == 1 or self._room_map is None)
@@ -175,7 +175,7 @@ class LiveRobot:
         rules = [rule for rule in guard.rules if rule.tells_apart(possible)]
         if not rules:
             return possible[0]
-        if not failed:  # after a failed drive, its room does not reveal its destination
+        if not failed:  # after a failed drive, the robot's room does not reveal the destination
             self._room = self._ask_room()
         if self._room is not None:
             return replace(event, text=self._room)
@@ -184,25 +184,22 @@ class LiveRobot:
         return possible[0]
 
     def _on_pose(self, at: Point | None) -> None:
-        """Report a move to the guard as a straight line; None means that poses are missing."""
+        """Report a move to the guard as a straight line; a position of None means that poses are missing."""
         if self._guard is None or self._stopped.is_set():
             return
         if at is None:
             self._fault = RobotLostError(
-                "it stopped reporting its position during a drive, which a rule needs"
+                "it stopped reporting its position during a drive, but a rule needs the position"
             )
             self.stop()
             return
         before, self._at = self._at or at, at
-        with (
-            suppress(StoppedError, RuleViolationError),
-            self._enforcing(),
-        ):  # no error may reach the robot's thread
+        with suppress(StoppedError, RuleViolationError), self._enforcing():  # keep errors off robot threads
             self._guard.moved(before, at, self._held)
 
     @contextmanager
     def _enforcing(self) -> Iterator[None]:
-        """Lock the guard, and act on a broken rule."""
+        """Hold the guard's lock, and handle a broken rule."""
         try:
             with self._guard_lock:
                 yield
@@ -211,18 +208,18 @@ class LiveRobot:
             raise
 
     def _enforce(self, broken: RuleViolationError) -> None:
-        """Stop the mission, or log the prevented call if the program may go on."""
+        """Stop the mission, or log the prevented call if the program may continue."""
         at = {} if self.line is None else {"line": self.line}
         entry = at | _rule_entry(broken)
         if broken.ends_run:
-            self.broken_rule = entry  # logged by the mission, because this may be a thread of the robot
+            self.broken_rule = entry  # the mission logs it, because this may be a robot's thread
             self._button.press(f"rule {broken.rule.name}")
         else:
             self._write_event("rule", **entry)
         self._check_end()
 
     def report_unkept(self) -> str:
-        """Log the first rule that is broken at the end, and return its sentence; empty if there is none."""
+        """Log the first rule that is broken at the end, and return its sentence, or "" if all are kept."""
         broken = None if self._guard is None else self._guard.at_end()
         if broken is None:
             return ""
@@ -230,12 +227,12 @@ class LiveRobot:
         return str(broken)
 
     def _rooms_meant(self, request: str) -> list[str]:
-        """The rooms that a request may mean, as rules name them."""
+        """Return the rooms that a request may refer to, as rules name them."""
         rooms = [] if self._room_map is None else self._room_map.possible_rooms(request)
         return [*dict.fromkeys(name_of(room, request) for room in rooms)]
 
     def _ask_room(self) -> str | None:
-        """Ask the robot for its current room, once; None if it does not know."""
+        """Ask the robot for its current room, but only once; return None if it does not know."""
         if self._has_asked or ROOM_SKILL not in self.skills or ROOM_SKILL in self.robot.missing:
             return None
         self._has_asked = True
@@ -286,7 +283,7 @@ class LiveRobot:
                     if not self._is_watched and (match := POSITION_FEEDBACK.fullmatch(feedback)):
                         self._on_pose((float(match[1]), float(match[2])))
                     self._write_event("feedback", **which, text=feedback)
-            except OSError as error:  # would be lost on a thread of the robot
+            except OSError as error:  # raising it on a robot's thread would lose it
                 self._fault = error
                 self.stop()
 
@@ -295,10 +292,10 @@ class LiveRobot:
         return check_answer(skill, self.robot.perform(skill.name, given, on_feedback))
 
     def _check_end(self) -> None:
-        """Raise an error if the program has to end."""
+        """Raise an error if the program must end; the first call starts the program's clock."""
         if self._began is None:
             self._began = self.robot.clock.now
-            watch = getattr(self.robot, "watch", None)  # optional
+            watch = getattr(self.robot, "watch", None)  # an optional method
             if watch is not None and self._guard is not None and self._guard.judges_poses:
                 self._is_watched = watch(self._on_pose)
         if self._fault is not None:
@@ -308,17 +305,17 @@ class LiveRobot:
 
 
 def check_answer(skill: Skill, result: base.RobotResult) -> base.RobotResult:
-    """Return a robot's answer; raises RobotLostError if its type does not fit the skill."""
+    """Return a robot's answer unchanged; raise RobotLostError if its type does not match the skill."""
     if not skill.returns.fits(result):
         expected = skill.returns.annotation
         raise RobotLostError(
-            f"the robot answered {skill.name} with {result!r:.100}, where {expected} is expected"
+            f"the robot answered {skill.name} with {result!r:.100}, but {expected} was expected"
         )
     return result
 
 
 def _rule_entry(broken: RuleViolationError) -> dict[str, object]:
-    """The log entry of a broken rule, or of one that prevented a call."""
+    """Return the log entry for a rule that was broken or that prevented a call."""
     rule, event = broken.rule, broken.event
     what = {} if event is None else {"what": trace_data((event,))[0], "prevented": not broken.is_late}
     why = {"why": broken.why} if broken.why else {}
@@ -332,7 +329,7 @@ def _plain_argument(argument: Argument) -> base.RobotArgument:
 
 
 def _chosen_option(result: base.RobotResult, event: Event) -> int:
-    """Return the position of the chosen option, ignoring case; raises RobotError if none matches."""
+    """Return the position of the chosen option, ignoring case; raise RobotError if no option matches."""
     heard = str(result)
     for same in (str, lambda text: text.strip().casefold()):
         for number, option in enumerate(event.options):

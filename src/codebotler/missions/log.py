@@ -1,4 +1,4 @@
-"""The files of a mission: a log with one line per event, and a summary."""
+"""Read and write the files of a mission: a log with one line per event, and a summary."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from codebotler.core.files import Appender, read_rows, to_line, write_whole
 EVENTS_FILE, SUMMARY_FILE = "events.jsonl", "mission.json"
 
 LogLine: TypeAlias = dict[str, Any]
-"""An event: `time` (seconds since 1970), `clock` (robot seconds), `event` (its kind), and its data."""
+"""An event: `time` (seconds since 1970), `clock` (seconds on the robot's clock), `event` (kind), and data."""
 
 _TEXT_FIELDS = ("id", "robot", "instruction", "model", "program", "reason", "if_tool_dies")
 _REQUIRED_KEYS: Mapping[str, frozenset[str]] = {
@@ -34,11 +34,11 @@ _REQUIRED_KEYS: Mapping[str, frozenset[str]] = {
     "log": frozenset({"text"}),
     "map": frozenset({"rooms", "robot"}),
 }
-"""The keys of each kind of event."""
+"""The keys that each kind of event must have."""
 
 
 class MissionState(StrEnum):
-    """The states of a mission."""
+    """The state of a mission."""
 
     DRAFTING = "drafting"
     CHECKED = "checked"
@@ -57,12 +57,12 @@ class MissionState(StrEnum):
 
     @property
     def is_moving(self) -> bool:
-        """Whether the robot works or is stopping."""
+        """Whether the robot is working or stopping."""
         return self in {MissionState.RUNNING, MissionState.STOPPING}
 
     @property
     def is_final(self) -> bool:
-        """Whether no other state follows."""
+        """Whether no other state can follow."""
         return self not in NEXT_STATES
 
 
@@ -76,34 +76,34 @@ NEXT_STATES = {
         "stopping": "stopped failed",
     }.items()
 }
-"""The possible next states; the other states are final. A mission whose process died becomes interrupted."""
+"""The states that can follow each state. States not listed are final; recovery sets `interrupted`."""
 
 
 @dataclass
 class MissionSummary:
-    """The main facts of a mission."""
+    """The summary of a mission, stored beside its log."""
 
     id: str
     state: MissionState
     robot: str  # the kind of robot
     created: float  # seconds since 1970
-    instruction: str = ""  # empty if the program did not come from one
-    model: str = ""  # the program's author; empty for a person
+    instruction: str = ""  # empty if there is only a program
+    model: str = ""  # the model that wrote the program; empty if a person did
     program: str = ""
-    problems: tuple[str, ...] = ()  # sentences from the check
-    reason: str = ""  # why it is in its state
-    line: int | None = None  # the program's line at which it ended
+    problems: tuple[str, ...] = ()  # sentences about problems that the check found
+    reason: str = ""  # why the mission is in this state
+    line: int | None = None  # the program's line at which the mission ended
     ended: float | None = None  # seconds since 1970
     if_tool_dies: str = ""  # what the robot does if CodeBotler ends unexpectedly
 
     @property
     def has_ended(self) -> bool:
-        """Whether its state is final."""
+        """Whether the mission has reached a final state."""
         return self.state.is_final
 
     @classmethod
     def read(cls, folder: Path) -> MissionSummary:
-        """Read the summary of a mission; raises UserError if it is damaged."""
+        """Read the summary of a mission; raise UserError if it is damaged."""
         path = folder / SUMMARY_FILE
         try:
             data = json.loads(path.read_bytes())
@@ -112,32 +112,32 @@ class MissionSummary:
             datetime.fromtimestamp(summary.created, UTC)
             "".join((*summary.problems, *(getattr(summary, name) for name in _TEXT_FIELDS)))
         except (ValueError, TypeError, OverflowError, RecursionError):
-            raise UserError("this is not the summary of a mission; remove its folder", file=path) from None
+            raise UserError("this is not a valid mission summary; remove its folder", file=path) from None
         return summary
 
     def write(self, folder: Path) -> None:
-        """Replace the file in one step."""
+        """Replace the summary file atomically."""
         write_whole(folder / SUMMARY_FILE, json.dumps(asdict(self), indent=1).encode())
 
 
 def open_log(folder: Path) -> Appender:
-    """Open and lock the log of a mission; raises BlockingIOError if another process has it open."""
+    """Open and lock the log of a mission; raise BlockingIOError if another process has it open."""
     return Appender(folder / EVENTS_FILE, exclusive=True)
 
 
 def add_event(log: Appender, event: str, clock: float, **data: object) -> LogLine:
-    """Write an event with the current time, and return it."""
+    """Append an event with the current time to a log, and return the event."""
     line = {"time": round(time.time(), 6), "clock": round(clock, 6), "event": event, **data}
     log.append(to_line(line))
     return line
 
 
 def read_events(folder: Path) -> list[LogLine]:
-    """Read the events of a mission, except a torn last line; raises UserError if a line is no event."""
+    """Read the events of a mission, without an incomplete last line; raise UserError if a line is invalid."""
     path, events = folder / EVENTS_FILE, []
     for number, line in read_rows(path, growing=True):
         if not _is_event(line):
-            raise UserError("this is not an event of a mission; remove the line", file=path, line=number)
+            raise UserError("this line is not a mission event; remove the line", file=path, line=number)
         events.append(line)
     return events
 
@@ -155,7 +155,7 @@ SKILL_END_EVENTS = frozenset({"result", "error", "cancelled", "late"})
 
 
 def find_unfinished_skill(events: Iterable[LogLine]) -> LogLine | None:
-    """Return the event of the last skill that has not ended, if any."""
+    """Return the event that started an unfinished skill, or None if all skills have ended."""
     going: LogLine | None = None
     for line in events:
         if line["event"] == "skill":

@@ -1,4 +1,4 @@
-"""Convert the map of a mission's world to and from the event `map`."""
+"""Convert the map of a mission's world to and from a `map` event."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from codebotler.core.world import Point, Room, World, laid_out
 
 
 def map_data(world: World) -> dict[str, Any]:
-    """Return the rooms of a world, each with its corners and its stopping point, in metres."""
+    """Return the data of a `map` event: the rooms with their corners and stopping points, in metres."""
     rooms = [
         {"name": room.name, "footprint": room.footprint, "stand_at": room.stand_at}
         for room in laid_out(world).rooms
@@ -18,7 +18,7 @@ def map_data(world: World) -> dict[str, Any]:
 
 
 def map_from(data: Mapping[str, Any]) -> World:
-    """Return the world of an event `map`, with only its rooms and the robot's starting room."""
+    """Return the world described by a `map` event: only its rooms and the robot's starting room."""
     rooms = [
         Room(room["name"], footprint=tuple(map(_point, room["footprint"])), stand_at=_point(room["stand_at"]))
         for room in data["rooms"]

@@ -27,21 +27,21 @@ from codebotler.simulator.sampled_robot import RoomMap
 
 TimeSource: TypeAlias = Literal["wall", "robot"]
 
-MAX_TIME_NS = 2**63 - 1024  # nanoseconds since 1970 that every reader can hold
+MAX_TIME_NS = 2**63 - 1024  # the latest time, in nanoseconds since 1970, that every reader can store
 _TEXT_KEYS = ("text", "message", "file")
-"""The keys under which a skill's events hold text."""
+"""The keys of a skill's event that may hold its text."""
 _LOG_LEVELS = {
     "feedback": foxglove.LEVEL_DEBUG,
     "error": foxglove.LEVEL_ERROR,
     **dict.fromkeys(("rule", "stop", "cancelled", "late"), foxglove.LEVEL_WARNING),
 }
-"""Log levels by kind of event; others have INFO."""
+"""The log levels by kind of event; all other kinds have level INFO."""
 _STATE_SCHEMA: Schema = {"type": "object", "properties": {"state": TEXT, "reason": TEXT, "clock": FLOAT}}
 _JSON_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 
 
 class TopicMessage(NamedTuple):
-    """A message and its topic; `schema` is the name of a Foxglove schema, or our own schema."""
+    """A message and its topic; `schema` is the name of a Foxglove schema, or one of our own schemas."""
 
     topic: str
     message: Message
@@ -56,10 +56,10 @@ def write_mcap(
     folder: Path | None = None,
     clock: TimeSource = "wall",
 ) -> None:
-    """Write a mission: one topic per skill, and topics for states, the log, the robot's pose and the rooms.
+    """Write a mission with a topic for each skill, and topics for states, the log, poses and the rooms.
 
-    The program is an attachment. Times come from the wall clock, or from the robot's clock counted from the
-    beginning of the mission. Pictures are read from `folder`; None leaves them out.
+    The program is added as an attachment. Times come from the wall clock, or from the robot's clock, which
+    then starts when the mission was created. Pictures are read from `folder`; None leaves them out.
     """
     began = round(min(summary.created * SECOND_NS, MAX_TIME_NS))
     writer = Writer(file)
@@ -91,7 +91,7 @@ def write_mcap(
     program = summary.program.encode(errors="surrogatepass")
     writer.add_attachment(began, last, "program.py", "text/x-python", program)
     writer.add_metadata("mission", _metadata(summary))
-    writer.finish()  # type: ignore[no-untyped-call]  # theirs
+    writer.finish()  # type: ignore[no-untyped-call]  # untyped in the library
 
 
 def _about_event(line: LogLine, skills: _SkillMessages, at: int) -> Iterator[TopicMessage]:
@@ -117,7 +117,7 @@ def _about_picture(line: LogLine, folder: Path | None, at: int) -> Iterator[Topi
 
 
 class _SkillMessages:
-    """Creates skill messages, with schemas inferred from all arguments and results."""
+    """Creates messages for skills, with schemas inferred from all their arguments and results."""
 
     def __init__(self, events: Sequence[LogLine]) -> None:
         arguments: dict[str, dict[str, list[object]]] = {}
@@ -134,7 +134,7 @@ class _SkillMessages:
         self._results = {skill: schema_of(values) for skill, values in results.items()}
 
     def message(self, line: LogLine) -> TopicMessage:
-        """Return the message for a skill's event."""
+        """Return the message for an event of a skill."""
         skill = line["skill"]
         arguments, result = self._arguments.get(skill, {}), self._results.get(skill)
         message = {"number": line["number"], "event": line["event"], "clock": line["clock"]}
@@ -187,7 +187,7 @@ class _RobotPath:
 
 
 def schema_of(values: Sequence[object]) -> dict[str, Any]:
-    """Infer a schema from values; mixed types become text, because Foxglove has no union types."""
+    """Infer a JSON schema from values; mixed types become text, because Foxglove has no union types."""
     lists = [value for value in values if isinstance(value, list)]
     if len(lists) == len(values):
         return {"type": "array", "items": {"type": _json_type([one for each in lists for one in each])}}
@@ -228,10 +228,10 @@ def export_mcap(
     clock: TimeSource,
     folder: Path | None = None,
 ) -> None:
-    """Write an MCAP file in one step; raises UserError rather than overwrite a file of another kind."""
+    """Write an MCAP file atomically; raise UserError instead of overwriting a file of another kind."""
     path = path.resolve()
     expect_replaceable(path, b"\x89MCAP")
-    path.parent.stat()  # do not create folders for a mistyped name
+    path.parent.stat()  # fail instead of creating folders for a mistyped path
     whole = io.BytesIO()
     write_mcap(whole, summary, events, folder=folder, clock=clock)
     if path.exists() and not path.is_file():

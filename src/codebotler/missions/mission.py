@@ -1,4 +1,4 @@
-"""The state machine of a mission: drafted, checked, approved, run on a robot, stopped at any time."""
+"""The state machine of a mission: drafted, checked, approved and run, with a stop at any time."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError, Worker
 
 STOP_GRACE_SECONDS = 10.0
-"""Real seconds within which a robot must confirm a stop."""
+"""The time that a robot has to confirm a stop, in real seconds."""
 
 BY_SHUTDOWN = "CodeBotler, shutting down"
-"""Named in the log when CodeBotler ends during a mission."""
+"""The source of the stop in the log if CodeBotler exits during a mission."""
 
 UNCONFIRMED_STOP = (
     "the robot has not confirmed the stop; check it now, and press its emergency stop if it still moves"
@@ -41,27 +41,27 @@ UNCONFIRMED_STOP = (
 
 
 class MissionError(Exception):
-    """A mission does not allow this now."""
+    """Raised if a mission's state does not allow the requested action."""
 
     @property
     def sentence(self) -> str:
-        """The message."""
+        """The error message."""
         return str(self)
 
 
 EventListener: TypeAlias = Callable[[LogLine], None]
-"""Called with each written event, one at a time, from any thread."""
+"""A function that receives each logged event; calls may come from any thread, but never overlap."""
 
 
 class Mission:
-    """One mission; as a context manager, it ends at the end of the block.
+    """A mission, used as a context manager; leaving the block ends the mission.
 
     Args:
-        home: the folder that contains `missions`.
-        robot: the kind of robot.
-        instruction: in plain words; empty if there is none.
-        on_event: called with each event.
-        stop_button: stops the mission and its robot; by default, a new one.
+        home: the folder that contains the `missions` folder.
+        robot: the kind of robot, such as `simulated`.
+        instruction: the instruction in plain words; empty if there is none.
+        on_event: a function to call with each event.
+        stop_button: the button that stops the mission and its robot; by default, a new button.
 
     Raises:
         OSError: the folder is not writable.
@@ -80,8 +80,8 @@ class Mission:
         self._pictures = PictureStore(self.folder)
         self.on_event = on_event
         self.stop_button = stop_button or StopButton()
-        self._writing = threading.RLock()  # held while an event is written; a robot is cancelled without it
-        self._has_program = False  # even an empty one
+        self._writing = threading.RLock()  # held while writing an event, but not while cancelling the robot
+        self._has_program = False  # also true for an empty program
         self._live: LiveRobot | None = None
         self._logged_rule: dict[str, object] = {}
         self._is_over = threading.Event()
@@ -108,21 +108,21 @@ class Mission:
 
     @property
     def id(self) -> str:
-        """The name of its folder."""
+        """The ID of the mission, which is also the name of its folder."""
         return self.summary.id
 
     @property
     def state(self) -> MissionState:
-        """The current state."""
+        """The current state of the mission."""
         return self.summary.state
 
     @property
     def has_ended(self) -> bool:
-        """Whether its state is final."""
+        """Whether the mission has reached a final state."""
         return self.summary.has_ended
 
     def draft(self, program: str, model: str = "") -> None:
-        """Set or replace the program, and the model that wrote it; raises MissionError after the approval."""
+        """Set or replace the program and its author; raise MissionError after the approval."""
         with self._writing:
             self._step(
                 MissionState.DRAFTING, "take another program", program=program, model=model, problems=()
@@ -130,14 +130,14 @@ class Mission:
             self._has_program = True
 
     def check(self, problems: Sequence[str]) -> None:
-        """Record the problems that a check found; raises MissionError if there is no program to check."""
+        """Record the problems that a check found; raise MissionError if there is no program to check."""
         with self._writing:
             if not self._has_program:
                 raise MissionError(f"mission {self.id} has no program to check")
             self._step(MissionState.CHECKED, "be checked", problems=tuple(problems))
 
     def approve(self, *, despite_problems: bool = False) -> None:
-        """Approve the program; raises MissionError if it is unchecked, or has unaccepted problems."""
+        """Approve the program; raise MissionError if it is unchecked or has problems not yet accepted."""
         with self._writing:
             if self.state is MissionState.CHECKED and self.summary.problems and not despite_problems:
                 raise MissionError(
@@ -146,25 +146,25 @@ class Mission:
             self._step(MissionState.APPROVED, "be approved")
 
     def fail(self, reason: str) -> None:
-        """Fail before running; raises MissionError if the mission runs or has ended."""
+        """Mark the mission as failed; raise MissionError if it is running or has ended."""
         with self._writing:
             if self.state.is_moving:
                 raise MissionError(f"mission {self.id} is {self.state}; stop it instead")
             self._step(MissionState.FAILED, "fail", reason=reason)
 
     def note(self, text: str) -> None:
-        """Log a sentence."""
+        """Add a sentence to the log."""
         self._write("log", text=text)
 
     def show_map(self, world: World) -> None:
-        """Log the map of the rooms."""
+        """Add the map of the rooms to the log."""
         self._write("map", **map_data(world))
 
     def stop(self, by: str = "somebody") -> None:
-        """Stop the robot and the program, from any thread; `run` returns once they have ended.
+        """Stop the robot and the program; callable from any thread. `run` returns once both have stopped.
 
         Args:
-            by: the source of the stop, such as `Ctrl-C`, for the log.
+            by: the source of the stop for the log, such as `Ctrl-C`.
 
         Raises:
             MissionError: the mission has ended.
@@ -182,19 +182,19 @@ class Mission:
         rules: Sequence[Rule] = (),
         room_map: RoomMap | None = None,
     ) -> MissionState:
-        """Run the program on a robot until both have ended; return done, failed or stopped.
+        """Run the program on a robot, and return the final state: done, failed or stopped.
 
         The mission fails if the robot does not confirm a stop within `STOP_GRACE_SECONDS`.
 
         Args:
-            reserved: the robot.
-            place: its current room, if known.
-            rules: the house rules; a broken one stops the mission.
+            reserved: the reservation of the robot.
+            place: the robot's current room; empty if unknown.
+            rules: the house rules; breaking one stops the mission.
             room_map: the rooms that the robot knows.
 
         Raises:
             MissionError: the program is not approved.
-            NotReadyError: the reservation is in use, or was used.
+            NotReadyError: the reservation is in use or has been used before.
             OSError: an event could not be logged or printed, so the robot was stopped.
         """
         guard = RuleGuard(rules, () if room_map is None else room_map.plan) if rules else None
@@ -221,7 +221,7 @@ class Mission:
         return self.state
 
     def _execute(self, live: LiveRobot) -> None:
-        """Run the program on its own thread, because a skill may never return."""
+        """Run the program; this needs its own thread, because a skill may never return."""
         try:
             with closing(Worker()) as worker:
                 self.stop_button.on_press(worker.stop)
@@ -244,7 +244,7 @@ class Mission:
             )
 
     def _end(self, live: LiveRobot, state: MissionState, reason: str, line: object, *, is_lost: bool) -> None:
-        """Enter a final state once: after a stop, it is `stopped` unless the robot is lost."""
+        """Enter a final state, only once; a stop that did not reach the robot counts as a failure."""
         why = "" if is_lost else self.stop_button.why_unstopped()
         try:
             with self._writing:
@@ -255,11 +255,8 @@ class Mission:
                 if self.state is MissionState.STOPPING and why:
                     state, reason = MissionState.FAILED, why
                 elif self.state is MissionState.STOPPING and not is_lost:
-                    state, reason, line = (
-                        MissionState.STOPPED,
-                        self.summary.reason,
-                        live.broken_rule.get("line"),
-                    )
+                    state, reason = MissionState.STOPPED, self.summary.reason
+                    line = live.broken_rule.get("line")
                 self._step(state, "end", reason=reason, line=line)
         except Exception as error:  # noqa: BLE001 - `run` raises it
             self._fault = error
@@ -268,7 +265,7 @@ class Mission:
             self.stop_button.ended.set()
 
     def _log_stop(self) -> None:
-        """Log the source of the stop and the broken rule, once each."""
+        """Log the source of a stop and any broken rule, each only once."""
         with self._writing:
             by = self.stop_button.by
             if by is not None and self.state is MissionState.RUNNING:
@@ -291,7 +288,7 @@ class Mission:
             self.fail(visible(str(error)) or type(error).__name__)
 
     def _step(self, to: MissionState, what: str, **changes: object) -> None:
-        """Change the state and log it; the caller holds the lock."""
+        """Change and log the state; the caller must hold the lock."""
         if to not in NEXT_STATES.get(self.state, ()):
             raise MissionError(f"mission {self.id} cannot {what}: its state is {self.state}")
         self.summary.state = to
@@ -311,7 +308,7 @@ class Mission:
             self._log = None
 
     def _write(self, event: str, /, **data: object) -> None:
-        """Log an event and call the listener; events after the end are dropped."""
+        """Log an event and notify the listener; drop events after the end of the mission."""
         clock = 0.0 if self._live is None else self._live.now
         with self._writing:
             if self._log is None:

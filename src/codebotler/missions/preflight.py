@@ -1,4 +1,4 @@
-"""Questions to a robot before it moves: its rooms, its current room, and its missing skills."""
+"""Ask a robot for its rooms, its current room and its missing skills before it moves."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 MAX_CHECKED_ROOMS = 1_000
-"""A check compares each drive with all rooms."""
+"""The limit for a check, which compares each drive with all rooms."""
 
 
 def ask_rooms(
     robot: Robot, remark: Callable[[str], None], world: World | None = None
 ) -> tuple[RoomMap | None, str]:
-    """Ask a connected robot for its rooms and its current room; `remark` gets likely mistakes.
+    """Ask a connected robot for its rooms and its current room; pass likely mistakes to `remark`.
 
     Returns:
-        the rooms, with footprints from `world`, or None if the robot does not list them; and its current
-        room, empty if it does not say.
+        the rooms, with footprints from `world`, or None if the robot does not list its rooms; and the
+        current room, or an empty string if the robot does not report it.
 
     Raises:
         NotReadyError: the robot gives no valid answer.
@@ -63,7 +63,7 @@ def ask_rooms(
 
 
 def _plan(robot: Robot, world: World) -> tuple[Room, ...]:
-    """The rooms of a map; only robots that use our grid get its default footprints."""
+    """Return the rooms of a map; only robots that drive on our grid get its default footprints."""
     rooms = laid_out(world).rooms if robot.rooms_are_regexes else world.rooms
     is_straight = robot.name == "simulated"
     return tuple(Room(r.name, (), (), r.footprint, r.stand_at if is_straight else None) for r in rooms)
@@ -78,13 +78,13 @@ def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) 
         lacks = next(others, "each room" if room_map is None else "")
         what = f'the footprint of "{lacks}"; add it to the map'
         if not robot.has_pose:
-            what = f"the robot's position, which {robot.name} does not report; leave the rule out"
+            what = f"the robot's position, which {robot.name} does not report; remove the rule"
         if lacks or not robot.has_pose:
             raise NotReadyError(f'the rule "{rule.name}" needs {what}')
 
 
 def limit_rooms(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:
-    """Return the rooms for a check, or None, with a remark, if there are too many."""
+    """Return the rooms for a check; if there are too many, return None and make a remark."""
     if room_map is None or len(room_map.rooms) <= MAX_CHECKED_ROOMS:
         return room_map
     remark(
@@ -105,7 +105,7 @@ def unknown_rooms(program: str, room_map: RoomMap, skills: SkillTable = SKILLS) 
 
 
 def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
-    """Return the recorded instructions, each with a program, whose rooms exist here."""
+    """Return the recorded instructions whose rooms exist here, each with its program."""
     replies = open_recorded("recorded").replies
     known = {instruction: solutions[0].program for instruction, solutions in replies.items()}
 
@@ -117,7 +117,7 @@ def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
 
 
 def with_closest_here(error: UnknownInstructionError, room_map: RoomMap | None) -> UnknownInstructionError:
-    """Return the same error with the closest instructions whose rooms exist here."""
+    """Return the same error, but suggest only instructions whose rooms exist here."""
     closest = find_closest(error.instruction, known_instructions(room_map))
     return UnknownInstructionError(error.model, error.instruction, closest)
 

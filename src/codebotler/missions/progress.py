@@ -1,4 +1,4 @@
-"""The progress of a mission, derived from its events: activity, position, conversation."""
+"""Derive the progress of a mission from its events: activity, position and conversation."""
 
 from __future__ import annotations
 
@@ -18,50 +18,50 @@ from codebotler.simulator.sampled_robot import RoomMap
 POSITION_FEEDBACK = re.compile(r"at \((-?\d{1,7}(?:\.\d{1,20})?), (-?\d{1,7}(?:\.\d{1,20})?)\)")
 _MAX_MOMENTS, _MAX_STEPS = 200, 60
 _MIN_MOVE_METRES = 0.05  # shorter moves are not added to the trail
-ANSWER = "answer"  # the kind of a moment in which the robot hears an answer
+ANSWER = "answer"  # the kind of moment in which a person answers the robot
 _STOP_STATES = frozenset({MissionState.STOPPING, MissionState.STOPPED})  # logged after the robot has stopped
 
 
 @dataclass(frozen=True)
 class Moment:
-    """An entry of the activity list."""
+    """An entry in the activity list."""
 
-    clock: float  # seconds by the robot's clock since the program began
-    kind: str  # of the event; for speech a skill's, such as `say`, or `ANSWER`
+    clock: float  # seconds on the robot's clock since the program began
+    kind: str  # the kind of event; for speech, the kind of skill, such as `say`, or `ANSWER`
     text: str
 
 
 @dataclass(frozen=True)
 class Find:
-    """A thing or a person that the robot has found."""
+    """An object or a person that the robot has found."""
 
-    room: str  # in the program's words; empty for the starting room
+    room: str  # as named in the program; empty for the starting room
     name: str
 
 
 @dataclass(frozen=True)
 class Progress:
-    """The progress of a mission."""
+    """A snapshot of the progress of a mission."""
 
-    has_begun: bool = False  # on the robot
+    has_begun: bool = False  # whether the program has started on the robot
     doing: str = ""  # the current skill or pause in words; empty between them
     skill: str = ""  # the current skill
-    subject: str = ""  # its first argument
-    activity: str = ""  # such as `driving to supply room`; kept after a cancellation
+    subject: str = ""  # the first argument of the current skill
+    activity: str = ""  # the current activity, such as `driving to kitchen`; kept after a cancellation
     line: int | None = None  # the program's current line, if known
-    clock: float = 0.0  # seconds by the robot's clock since the program began
-    room: str = ""  # the destination or current room, in the program's words
-    left: str = ""  # the room before `room`, where a failed drive leaves the robot
+    clock: float = 0.0  # seconds on the robot's clock since the program began
+    room: str = ""  # the destination or current room, as named in the program
+    left: str = ""  # the previous room; the robot is there again if its drive fails
     at: Point | None = None  # the position in metres, if reported
-    is_driving: bool = False  # to `room`
-    is_between: bool = False  # between rooms, after a cancelled drive
-    visited: tuple[str, ...] = ()  # completed drives, in the program's words
-    looks: tuple[tuple[str, bool], ...] = ()  # objects, and whether they were found
-    answers: tuple[str | None, ...] = ()  # None for a question that failed
-    trail: tuple[Point, ...] = ()  # the latest positions
-    finds: tuple[Find, ...] = ()  # objects seen and people asked, once each
+    is_driving: bool = False  # whether the robot is driving to `room`
+    is_between: bool = False  # whether a cancelled drive left the robot between rooms
+    visited: tuple[str, ...] = ()  # the destinations of completed drives, as named in the program
+    looks: tuple[tuple[str, bool], ...] = ()  # objects that were looked for, and whether they were found
+    answers: tuple[str | None, ...] = ()  # the answers to questions; None for a question that failed
+    trail: tuple[Point, ...] = ()  # the latest positions, in metres
+    finds: tuple[Find, ...] = ()  # objects seen and people asked, each listed once
     held: str = ""  # the object in the robot's hand
-    moments: tuple[Moment, ...] = ()  # the latest ones
+    moments: tuple[Moment, ...] = ()  # the latest entries of the activity list
 
     def after(self, line: LogLine) -> Progress:
         """Return the progress after an event."""
@@ -117,7 +117,7 @@ class Progress:
         return replace(now, trail=(*self.trail, at)[-_MAX_MOMENTS:])
 
     def with_result(self, result: object) -> Progress:
-        """Return the progress after the current skill's success."""
+        """Return the progress after the current skill has succeeded."""
         recording = _recording(self.skill)
         now = self
         match recording and recording.kind:
@@ -137,7 +137,7 @@ class Progress:
         return now
 
     def with_failure(self, event: str) -> Progress:
-        """Return the progress after the current skill's failure or cancellation."""
+        """Return the progress after the current skill has failed or was cancelled."""
         recording = _recording(self.skill)
         if recording is not None and recording.is_drive and event != "late":
             return replace(self, room=self.left, is_between=self.is_between or event == "cancelled")
@@ -151,9 +151,9 @@ class Progress:
 
 
 def position_on_map(progress: Progress, world: World, room_map: RoomMap | None) -> Point | None:
-    """Return the robot's position on a map, in metres; None if unknown.
+    """Return the robot's position on a map, in metres, or None if it is unknown.
 
-    Before the first reported position, it is the stopping point of the robot's room.
+    Until the robot reports a position, this is the stopping point of its room.
     """
     if progress.at is not None:
         return progress.at

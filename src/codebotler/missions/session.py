@@ -1,4 +1,4 @@
-"""`MissionSession`: leads one mission through writing, checking, approval and execution.
+"""`MissionSession`: takes one mission through writing, checking, approval and execution.
 
 The command line and the page control and observe it.
 """
@@ -46,10 +46,10 @@ _EXPECTED_ERRORS = (UserError, ModelError, NotReadyError, EngineError, MissionEr
 
 
 class MissionSession:
-    """Leads one mission on its own thread, with a robot that is connected for the duration of the session.
+    """Runs one mission on its own thread, with a robot that stays connected during the whole session.
 
-    `check` takes a program, the robot's rooms and the rules in force; `changed` is called at each change of
-    the view and must return at once; `before` is a session to wait for; `world` is the map, if any.
+    `check` takes a program, the robot's rooms and the rules in force; `changed` is called whenever the view
+    changes, and must return at once; `before` is a session to wait for; `world` is the map, if any.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class MissionSession:
         self._check, self._changed, self._before, self._world = check, changed, before, world
         self._author = ModelAuthor(open_model, order.model)
         self._stop_button = StopButton()
-        self._lock = threading.Condition()  # held briefly, never during a call of the mission
+        self._lock = threading.Condition()  # held briefly, never while calling the mission
         self._editing = threading.Lock()  # held while the program is replaced or approved
         self._view = SessionView(
             number,
@@ -91,7 +91,7 @@ class MissionSession:
         )
         self._stop_button.on_press(self._end_waiting)
         self._thread = threading.Thread(target=self._run, name=f"session-{number}", daemon=True)
-        self.on_event: Callable[[LogLine], None] = lambda _: None  # an error in it stops the robot
+        self.on_event: Callable[[LogLine], None] = lambda _: None  # an error raised here stops the robot
         self.error: Exception | None = None  # set if an error ended the session
 
     def start(self) -> None:
@@ -103,7 +103,7 @@ class MissionSession:
         self._thread.join(seconds)
 
     def wait_until(self, is_met: Callable[[SessionView], bool]) -> SessionView:
-        """Wait for a view that meets a condition, or for the last one; signals are handled meanwhile."""
+        """Wait until the view meets a condition or the session ends, and return the view."""
         with self._lock:
             self._lock.wait_for(lambda: self._view.is_over or is_met(self._view))
             return self._view
@@ -114,11 +114,11 @@ class MissionSession:
         return self._view
 
     def events(self, start: int = 0) -> list[LogLine]:
-        """The events of the mission from a position on."""
+        """Return the events of the mission, beginning at a position."""
         return self._events[start:]
 
     def edit(self, program: str) -> None:
-        """Replace and check the program; raises MissionError after the approval, or while a model writes."""
+        """Replace and check the program; raise MissionError after its approval or while a model writes."""
         with self._editing, self._lock:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
@@ -128,26 +128,26 @@ class MissionSession:
     def switch_off(self, name: str, reason: str) -> None:
         """Switch off a rule for this program only, log the reason, and check the program again."""
         if not any(letter.isalnum() for letter in reason):
-            raise MissionError("say why this program may break the rule")
+            raise MissionError("give a reason why this program may break the rule")
         with self._editing:
             view, mission = self._view, self._mission
             if mission is None or not view.may_be_approved:
                 raise MissionError("rules can be switched off only while a program waits for approval")
             if name not in {rule.name for rule in view.rules_in_force}:
-                raise MissionError(f'there is no rule "{name}" in force')
+                raise MissionError(f'the rule "{name}" is not in force')
             mission.note(f'a person switched off the rule "{name}" for this program: {reason.strip()}')
             with self._lock:
                 self._next_task = partial(self._take, program=view.program)
                 self._change(disabled_rules=(*view.disabled_rules, name), **_UNCHECKED)
 
     def ask_again(self, *, repair: bool, max_tokens: int | None = None) -> None:
-        """Have the model write another program; for a repair, it gets its program with the problems.
+        """Ask the model for another program; for a repair, send it the program and its problems.
 
-        `max_tokens` is a new limit for this reply and later ones; None keeps the limit.
+        `max_tokens` is a new limit for this reply and later ones; None keeps the current limit.
         """
         with self._editing, self._lock:
             if not self._view.may_be_asked_again:
-                raise MissionError("the model cannot be asked again now")
+                raise MissionError("the model cannot be queried again at this point")
             self._author.max_tokens = max_tokens or self._author.max_tokens
             self._next_task = partial(self._ask, repair=repair)
             self._change(busy=f"asking {self._view.model}", is_written=True, reply="", disabled_rules=())
@@ -168,7 +168,7 @@ class MissionSession:
         self._mission.fail(reason)
 
     def stop(self, by: str) -> None:
-        """Stop the robot, then all other work; returns once the robot has the request."""
+        """Stop the robot, then all other work; return once the request has reached the robot."""
         if not self._view.is_over:
             self._stop_button.press(by)
 
@@ -199,7 +199,7 @@ class MissionSession:
             if not isinstance(error, _EXPECTED_ERRORS):
                 _logger.exception("a mission failed unexpectedly")
             if isinstance(error, NotReadyError) and self._is_stopped:
-                return  # a stopped robot answers no questions
+                return  # expected, because a stopped robot answers no questions
             self.error = error
             self._show(error=_sentence(error))
         finally:
@@ -246,7 +246,7 @@ class MissionSession:
         for sentence in (*self._view.missing_skills, *self._view.unknown_rooms):
             mission.note(f"before the robot moves: {sentence}")
         rules = self._view.rules_in_force
-        keep_out = getattr(self._robot, "keep_out", None)  # optional: robots with a path planner
+        keep_out = getattr(self._robot, "keep_out", None)  # an optional method of robots with a path planner
         with suppress(MissionError, CancelledError):  # it was stopped before it could run
             if keep_out is not None:
                 keep_out(rules)
@@ -257,7 +257,7 @@ class MissionSession:
         return self._stop_button.by is not None
 
     def _ask(self, mission: Mission, *, repair: bool) -> None:
-        """Have the model write a program, and check it; if there is none, keep the previous one."""
+        """Ask the model for a program and check it; keep the previous program if the reply has none."""
         before = self._view
         writing = {"busy": f"asking {before.model}", "is_written": True}
         self._show(**_UNCHECKED | writing, program="", reply="", error="")
@@ -284,7 +284,6 @@ class MissionSession:
         self._take(mission, made.program)
 
     def _restore(self, before: SessionView) -> None:
-        """Show the previous program again."""
         kept = {name: getattr(before, name) for name in (*_UNCHECKED, "program", "author")}
         self._show(**kept | {"busy": ""}, is_written=False, reply="")
 
@@ -293,7 +292,7 @@ class MissionSession:
             self._change(reply=self._view.reply + piece)
 
     def _take(self, mission: Mission, program: str) -> None:
-        """Check a program for the mission, unless a newer one is waiting."""
+        """Check a program for the mission, unless a newer program is waiting."""
         with self._lock:
             if self._next_task is not None:
                 return
@@ -323,7 +322,7 @@ class MissionSession:
         self._show(remarks=(*self._view.remarks, sentence))
 
     def _add_event(self, line: LogLine) -> None:
-        """Add an event of the mission, which holds its own lock meanwhile."""
+        """Add an event to the view; the mission holds its own lock during this call."""
         with self._lock:
             self._events.append(line)
             self._change(progress=self._view.progress.after(line))
@@ -334,7 +333,7 @@ class MissionSession:
             self._change(**changes)
 
     def _change(self, **changes: object) -> None:
-        """Change the view, including the mission's state; the caller holds the lock."""
+        """Update the view, including the mission's state; the caller must hold the lock."""
         if self._mission is not None:
             now = self._mission.summary
             changes |= {"state": now.state, "reason": now.reason, "line": now.line}
@@ -352,7 +351,7 @@ _UNCHECKED: dict[str, object] = {
     "programless": None,
     "busy": CHECKING,
 }
-"""The view's fields for an unchecked program."""
+"""The fields of the view for a program that has not been checked."""
 
 
 def _sentence(error: Exception) -> str:

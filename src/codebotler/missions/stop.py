@@ -11,11 +11,11 @@ from contextlib import ExitStack
 from codebotler.robots.base import Robot
 
 STOP_REQUEST_SECONDS = 6.0
-"""Seconds that a stop request may take to reach the robot."""
+"""The time that a stop request may take to reach the robot, in seconds."""
 
 
 class StopButton:
-    """Stops a robot first, then calls its listeners; from any thread, any number of times."""
+    """Stops a robot, then notifies listeners; can be pressed repeatedly and from any thread."""
 
     def __init__(self, robot: Robot | None = None) -> None:
         self.robot = robot
@@ -27,7 +27,7 @@ class StopButton:
         self._lock = threading.Lock()  # held briefly
 
     def press(self, by: str) -> None:
-        """Stop the robot, then call all listeners, newest first, even if one fails; `by` is for the log."""
+        """Stop the robot, then call all listeners, newest first, even if some fail; log the source `by`."""
         now = time.monotonic()
         with ExitStack() as afterwards:
             with self._lock:
@@ -38,7 +38,7 @@ class StopButton:
             self.cancel_robot()
 
     def cancel_robot(self) -> None:
-        """Cancel the robot's work and let no skill start, without recording a source."""
+        """Cancel the robot's work and prevent further skills, without recording a source."""
         self.ended.set()
         robot = self.robot
         if robot is None:
@@ -51,13 +51,13 @@ class StopButton:
             self._has_reached.set()
 
     def attach(self, robot: Robot) -> None:
-        """Take a connected robot, and cancel it at once if the button was already pressed."""
+        """Set the connected robot, and cancel it at once if the button was already pressed."""
         self.robot = robot
         if self.by is not None:
             self.cancel_robot()
 
     def on_press(self, listener: Callable[[], None]) -> None:
-        """Call a function at each press, and now if the button was already pressed."""
+        """Call a function at each press, and also now if the button was already pressed."""
         with self._lock:
             self._listeners.append(listener)
             is_pressed = self.by is not None
@@ -66,11 +66,11 @@ class StopButton:
 
     @property
     def seconds(self) -> float:
-        """Seconds from the first press until the robot had the request, or until now."""
+        """Seconds from the first press until the request reached the robot, or until now."""
         return max(0.0, min(self._reached_at, time.monotonic()) - self._pressed_at)
 
     def why_unstopped(self) -> str:
-        """Return why the robot did not accept a stop request; empty if it did, or reports nothing."""
+        """Return why the robot did not accept a stop request, or "" if it did or gives no reason."""
         if self.ended.is_set():
             self._has_reached.wait(STOP_REQUEST_SECONDS)
         return str(getattr(self.robot, "failed_stop", ""))  # optional

@@ -1,4 +1,4 @@
-"""Past missions on disk: list and find them, and close interrupted ones."""
+"""List and find past missions on disk, and close interrupted missions."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
 
 
 def read_missions(home: Path) -> list[MissionSummary]:
-    """Read the summaries of all missions, oldest first; raises UserError if one is damaged."""
+    """Read the summaries of all missions, oldest first; raise UserError if one is damaged."""
     return sorted(
         map(MissionSummary.read, _mission_folders(home)), key=lambda summary: (summary.created, summary.id)
     )
 
 
 def find_mission(home: Path, name: str) -> Path:
-    """Return the folder of a mission, given its name or `last`; raises UserError if there is none."""
+    """Return the folder of a mission, given its ID or `last`; raise UserError if there is no such mission."""
     if name == "last" and (known := read_missions(home)):
         return home / "missions" / known[-1].id
     folder = home / "missions" / name
@@ -43,14 +43,14 @@ def find_mission(home: Path, name: str) -> Path:
 
 
 def recover_missions(home: Path) -> list[MissionSummary]:
-    """Close the missions whose process died, and report them; damaged ones are skipped."""
+    """Close and report missions whose process died; skip damaged missions."""
     found: list[MissionSummary] = []
     for folder in _mission_folders(home):
         try:
             found += _close_interrupted(folder)
         except UserError:
             continue
-        except OSError as error:  # such as a full disk; it must not keep CodeBotler from starting
+        except OSError as error:  # such as a full disk, which must not keep CodeBotler from starting
             why = system_sentence(error)
             note(f"mission {folder.name} may have been interrupted, but cannot be closed: {why}")
     for summary in found:

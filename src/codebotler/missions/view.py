@@ -16,7 +16,7 @@ from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.sampled_robot import RoomMap
 
 _SYNTAX_ERRORS = frozenset({"SyntaxError", "IndentationError", "TabError"})
-"""Problems that keep a program from starting."""
+"""The kinds of problems that prevent a program from starting."""
 
 CHECKING = "checking"  # a value of `SessionView.busy`
 
@@ -25,10 +25,10 @@ Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking",
 
 @dataclass(frozen=True)
 class MissionOrder:
-    """A request for a mission: an instruction for a model, or a program; one is required (UserError)."""
+    """A request for a mission, with an instruction or a program; raises UserError if both are missing."""
 
     instruction: str = ""
-    model: str = ""  # empty if none may be asked
+    model: str = ""  # empty if no model may be asked
     program: str = ""
     author: str = ""  # the model that wrote the program, if any
 
@@ -38,7 +38,7 @@ class MissionOrder:
 
     @property
     def has_program(self) -> bool:
-        """Whether the order contains the program, so that no model writes it."""
+        """Whether the order contains the program, so that no model needs to write one."""
         return bool(self.program.strip())
 
 
@@ -47,21 +47,21 @@ class SessionView:
     """An immutable snapshot of a session, the same for all observers."""
 
     number: int = 0  # counts sessions from 1; 0 before the first
-    id: str = ""  # the mission's; empty until it exists
-    state: MissionState | None = None  # the mission's
-    reason: str = ""  # why it is in that state
-    line: int | None = None  # the program's line at which it failed
+    id: str = ""  # the ID of the mission; empty until it exists
+    state: MissionState | None = None  # the state of the mission
+    reason: str = ""  # why the mission is in that state
+    line: int | None = None  # the program's line at which the mission failed
     busy: str = ""  # the work before the robot moves, such as `checking`
     error: str = ""  # the last error, as a sentence
     suggestions: tuple[str, ...] | None = None  # similar instructions that a recorded model knows
     instruction: str = ""
-    model: str = ""  # empty if none may be asked
+    model: str = ""  # empty if no model may be asked
     program: str = ""
-    reply: str = ""  # received so far, while a model writes
+    reply: str = ""  # the part received so far, while a model is writing
     programless: ProgramlessReply | None = None  # the model's last reply, if it contains no program
     author: str = ""  # the model that wrote the program; empty for a person
     is_written: bool = False  # whether a model is writing now
-    check: CheckResult | None = None  # of exactly this program
+    check: CheckResult | None = None  # the result for exactly this program
     missing_skills: tuple[str, ...] = ()  # sentences about skills that the robot lacks
     unknown_rooms: tuple[str, ...] = ()  # sentences about rooms that the robot does not know
     room_map: RoomMap | None = None  # the robot's rooms, if it lists them
@@ -73,7 +73,7 @@ class SessionView:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """Sentences about problems of the program."""
+        """Sentences about problems in the program."""
         found = () if self.check is None else self.check.problems
         return (*(problem.sentence for problem in found), *self.missing_skills)
 
@@ -94,12 +94,12 @@ class SessionView:
 
     @property
     def digest(self) -> str:
-        """Identifies exactly this program, for approvals."""
+        """The hash that identifies exactly this program in an approval."""
         return program_digest(self.program)
 
     @property
     def phase(self) -> Phase:
-        """The current phase, or the final state."""
+        """The current phase of the session, or the final state of its mission."""
         if self.is_over or self.is_running:
             return "" if self.state is None else self.state
         if self.is_written:
@@ -112,7 +112,7 @@ class SessionView:
 
     @property
     def is_running(self) -> bool:
-        """Whether the robot works or is stopping."""
+        """Whether the robot is working or stopping."""
         return self.state is not None and self.state.is_moving and not self.is_over
 
     @property
@@ -137,7 +137,7 @@ class SessionView:
         """Whether the program can be replaced now."""
         if self.is_over or self.is_written:
             return self.is_over
-        waits = self.state is None and bool(self.program)  # for the robot; typed text is kept
+        waits = self.state is None and bool(self.program)  # for the robot; edits are kept until then
         return waits or (self.state is not None and self.state.is_open)
 
 

@@ -1,4 +1,4 @@
-"""The events of a mission, in English."""
+"""Describe the events of a mission in English."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from codebotler.core.trace import attempted_event, to_options, trace_from
 from codebotler.core.words import brief
 from codebotler.missions.log import LogLine, MissionSummary
 
-BY_PAGE = "the page"  # the source of a stop, in the log
+BY_PAGE = "the page"  # the source of a stop from the page, as it appears in the log
 _TITLE_CALLS = 2
 _MAX_ACTIVITY_CHARACTERS = 100
 
 
 def event_text(line: LogLine) -> str:
-    """Return an event in words, such as `drives to "kitchen"`; empty if there are none."""
+    """Describe an event, such as `drives to "kitchen"`; return an empty string for events to be hidden."""
     words = _EVENT_WORDERS.get(line["event"])
     return words(line) if words else ""
 
 
 def activity(line: LogLine) -> str:
-    """Return a skill or pause in words, such as `going to "supply room"`."""
+    """Describe a current skill or pause, such as `going to "supply room"`."""
     if line["event"] == "sleep":
         return f"waiting for {line['seconds']:g} s"
     return skill_text(line, "ing", _MAX_ACTIVITY_CHARACTERS) or f"executing {visible(line['skill'])}"
 
 
 def skill_text(line: LogLine, form: VerbForm, most: int = 500) -> str:
-    """Return the call of a skill in words; empty for a skill without a verb."""
+    """Describe the call of a skill; return an empty string if the skill has no verb."""
     skill = by_name(line["skill"])
     if skill is None or skill.verb is None:
         return ""
@@ -47,25 +47,25 @@ def skill_text(line: LogLine, form: VerbForm, most: int = 500) -> str:
 
 
 def stop_text(by: str, doing: str = "") -> str:
-    """Return a stop in words, with the activity that it interrupted, if any."""
+    """Describe a stop, including the activity that it interrupted, if any."""
     during = f" while {doing}" if doing else ""
     return f"stopped {'from' if by == BY_PAGE else 'by'} {visible(by)}{during}"
 
 
 def state_text(state: str, reason: str) -> str:
-    """Return a state and its reason, such as `stopped by rule vault` or `failed: the door is shut`."""
+    """Describe a state and its reason, such as `stopped by rule vault` or `failed: the door is shut`."""
     if not reason or reason.startswith(state):
         return shortened(reason) or state
     return f"{state}: {shortened(reason)}"
 
 
 def reason_text(reason: str, line: int | None) -> str:
-    """Return the reason with the program's line, if known."""
+    """Return the reason, preceded by the program's line, if known."""
     return reason if line is None else f"line {line}: {reason}"
 
 
 def title(summary: MissionSummary) -> str:
-    """Return the instruction of a mission, or the first skills that its program calls."""
+    """Return the title of a mission: its instruction, or else the first skills that its program calls."""
     if summary.instruction:
         return summary.instruction
     calls = [
@@ -122,4 +122,4 @@ _EVENT_WORDERS: Mapping[str, Callable[[LogLine], str]] = {
     "log": lambda line: shortened(line["text"]),
     "map": lambda _: "",
 }
-"""Functions that word each kind of event."""
+"""The functions that describe each kind of event."""

@@ -1,1 +1,1 @@
-"""Ways of talking to language models."""
+"""Language models: on servers, in this process, or recorded."""

@@ -13,15 +13,15 @@ from codebotler.prompts import Prompt
 from codebotler.prompts.extract import read_reply
 
 TextListener: TypeAlias = Callable[[str], None]
-"""Called with each piece of a reply as it arrives."""
+"""A function that receives each piece of a reply as it arrives."""
 
 
 @dataclass(frozen=True)
 class Usage:
-    """The tokens of a request; None where the model does not count them."""
+    """The token counts of a request; counts that the model does not report are None."""
 
     input_tokens: int | None = None
-    output_tokens: int | None = None  # including the reasoning
+    output_tokens: int | None = None  # including reasoning tokens
     reasoning_tokens: int | None = None
 
     @property
@@ -36,15 +36,15 @@ class Reply:
 
     text: str = field(repr=False)  # the complete reply with tool calls, or the message of a refusal
     program: str = field(repr=False)  # the program in the reply; it may not parse
-    usage: Usage  # the number of tokens
+    usage: Usage  # the token counts
     latency_s: float | None  # the seconds from the request to the end of the reply; None if not measured
-    finish_reason: str | None  # the server's reason for the end, such as `stop` or `length`; None without one
+    finish_reason: str | None  # why the server ended the reply, such as `stop` or `length`; None if unknown
     reasoning: str = field(default="", repr=False)  # the model's reasoning, where the server shows it
-    no_program: NoProgram | None = None  # why there is no program; None if there is one, or if uncertain
+    no_program: NoProgram | None = None  # why there is no program; None if there is, or may be, a program
 
     @property
     def is_cut_off(self) -> bool:
-        """Whether the reply reached the token limit; its program may be complete all the same."""
+        """Whether the reply reached the token limit; its program may still be complete."""
         return is_cut_off(self.finish_reason)
 
     def data(self) -> dict[str, Any]:
@@ -73,8 +73,8 @@ def make_reply(
 ) -> Reply:
     """Extract the program and build a `Reply`.
 
-    `opening` is the prompt that a base model continues; None for a chat model. `known_kind` is the kind of
-    reply without a program, if the server reported it outside the text. Only an answer can hold a program.
+    `opening` is the prompt that a base model continues, or None for a chat model. `known_kind` says why there
+    is no program, if the server reported it outside the text. Without an answer, no program is extracted.
     """
     answer = text if has_answer else ""
     found = read_reply(
@@ -87,18 +87,18 @@ def make_reply(
 
 
 def ignore_text(_piece: str) -> None:
-    """Ignore the text."""
+    """Do nothing; this is the default listener."""
 
 
 class Model(Protocol):
-    """Writes programs on request.
+    """A language model that writes programs on request.
 
-    Several requests may run at a time, all in one event loop; each can be cancelled.
+    Several requests may run at the same time, all in one event loop; each of them can be cancelled.
     """
 
     @property
     def name(self) -> str:
-        """The name for command lines and runs, such as `openai-chat:gpt-5.1`."""
+        """The name on the command line and in runs, such as `openai-chat:gpt-5.1`."""
 
     @property
     def settings(self) -> SamplingSettings:
@@ -108,10 +108,10 @@ class Model(Protocol):
         """Request one reply.
 
         Args:
-            prompt: the request.
-            number: the number of the sample of this prompt, from 0.
-            on_text: called with each piece of the text, and of reasoning between `<think>` and `</think>`;
-                starts again from the beginning when a request is repeated after an error.
+            prompt: the prompt to answer.
+            number: the number of the reply among the replies to this prompt, from 0.
+            on_text: called with each piece of text, with reasoning between `<think>` and `</think>`; if a
+                request is repeated after an error, the pieces start again from the beginning.
 
         Raises:
             ModelError: no complete reply arrived.
@@ -122,13 +122,13 @@ class Model(Protocol):
 
 
 class ModelError(Exception):
-    """A model did not reply; a reply without a program is no error.
+    """Raised if a model did not reply; a reply without a program is not an error.
 
     Args:
         sentence: the cause and, if known, the fix; contains no keys.
         may_pass: whether the same request may succeed later.
-        retry_after: the seconds that the server asks to wait; None if it does not.
-        is_refusal: whether the server refused this prompt, rather than failed.
+        retry_after: how many seconds to wait, if the server asks for a delay, else None.
+        is_refusal: whether the server rejected this prompt, rather than failing.
     """
 
     def __init__(
@@ -143,7 +143,7 @@ class ModelError(Exception):
 
 
 class BudgetSpentError(Exception):
-    """The token budget is used up, so no further request is made."""
+    """Raised if the token budget is used up, so no further request is made."""
 
     def __init__(self, budget: int, used: int) -> None:
         self.budget, self.used = budget, used

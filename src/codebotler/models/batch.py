@@ -1,4 +1,4 @@
-"""Requests and answers in files for batch endpoints of OpenAI's protocol."""
+"""Build requests and parse answers in files for batch endpoints that use OpenAI's protocol."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class BatchRequest:
 
 
 class BatchModel:
-    """A model whose requests and answers are in files; it sends nothing and needs no key.
+    """A model whose requests and answers are stored in files; it sends nothing and needs no key.
 
-    It reuses the code of the same model for single requests, and takes the place of its server.
+    It reuses the model's code for single requests, and takes the place of the server.
     """
 
     def __init__(self, name: str, settings: SamplingSettings) -> None:
@@ -50,7 +50,7 @@ class BatchModel:
         elif kind == OWN_SERVER or (kind == "openai" and settings.base_url is not None):
             self._model = ChatModel(name, usable, client)
         else:
-            raise UserError(f"{name} takes no batch file; use {OWN_SERVER}:NAME or completions:NAME")
+            raise UserError(f"{name} does not support batch files; use {OWN_SERVER}:NAME or completions:NAME")
         self.name = self._model.name
         self.settings = replace(self._model.settings, base_url=settings.base_url, timeout=settings.timeout)
         self._runner = asyncio.Runner()
@@ -65,16 +65,16 @@ class BatchModel:
             assert self._sent is not None, "the model sends its request to this object"
             sent = json.loads(self._sent.content)
             self._bodies[prompt] = {name: value for name, value in sent.items() if name not in STREAM_FIELDS}
-        seed = self.settings.seed_of(number)  # requests for the same prompt differ only in this
+        seed = self.settings.seed_of(number)  # requests for the same prompt differ only in their seed
         body = {**self._bodies[prompt], **({} if seed is None else {"seed": seed})}
         is_chat = isinstance(self._model, ChatModel)
         return BatchRequest("/v1/chat/completions" if is_chat else "/v1/completions", body)
 
     def reply(self, prompt: Prompt, *, number: int, status: int, body: object) -> Reply:
-        """Parse the HTTP status and the JSON of an answer; ModelError if the answer is an error."""
+        """Parse the HTTP status and JSON of an answer; raise ModelError if the answer is an error."""
         if status < FIRST_ERROR and not _has_choice(body):
             raise error_in_reply(self.name, body)
-        short = replace(prompt, messages=prompt.messages[-1:])  # a long request would take time
+        short = replace(prompt, messages=prompt.messages[-1:])  # encoding a long prompt would only cost time
         return replace(self._reply(short, number, _response(status, body)), latency_s=None)
 
     def close(self) -> None:
@@ -97,7 +97,7 @@ def _has_choice(body: object) -> bool:
 
 
 def _response(status: int, body: Any) -> httpx2.Response:  # noqa: ANN401 - any JSON
-    """Build the response that the server would have sent for a stream."""
+    """Build the response that a server would have sent as a stream."""
     if status >= FIRST_ERROR:
         return httpx2.Response(status, json=body)
     head = {name: value for name, value in body.items() if name not in {"choices", "usage"}}
@@ -109,7 +109,7 @@ def _response(status: int, body: Any) -> httpx2.Response:  # noqa: ANN401 - any 
 
 
 def _split_choice(choice: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Split a choice into those of a stream, reasoning first."""
+    """Split a choice into the choices of a stream, with the reasoning first."""
     message = choice.get("message")
     if not isinstance(message, Mapping):
         return [dict(choice)]

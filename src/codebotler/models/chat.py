@@ -47,7 +47,7 @@ from codebotler.models.server_errors import (
 from codebotler.prompts import PictureMessage, Prompt, PromptMessage
 
 BASE_URL_VARIABLE = "OPENAI_BASE_URL"
-OWN_SERVER = "openai-chat"  # the protocol of vLLM, llama.cpp and the like
+OWN_SERVER = "openai-chat"  # the protocol of vLLM, llama.cpp and similar servers
 NEW_LIMIT_HOSTS = ("api.openai.com", ".openai.azure.com")
 """Hosts that support OpenAI's newer name for the token limit."""
 EFFORTS = ("none", *get_args(ThinkingEffort))
@@ -61,8 +61,8 @@ TRANSPORT_PACKAGES = ("httpx", "httpx2", "httpcore", "httpcore2", "anyio", "ssl"
 class ChatModel:
     """A chat model, named `provider:model` as in pydantic-ai.
 
-    With a base URL `openai:` means `openai-chat:`, since few other servers have the Responses API. An
-    `http_client` must be of the library that the provider uses.
+    With a base URL, `openai:` means `openai-chat:`, since few other servers support the Responses API. An
+    `http_client` must come from the HTTP library that the provider uses.
     """
 
     def __init__(self, name: str, settings: SamplingSettings, http_client: object = None) -> None:
@@ -99,7 +99,7 @@ class ChatModel:
 
     async def close(self) -> None:
         """Close the connections."""
-        async with self._model:  # its exit closes them
+        async with self._model:  # leaving the block closes them
             pass
 
     async def _request(
@@ -121,8 +121,8 @@ class ChatModel:
                     case messages.PartDeltaEvent(delta=messages.ThinkingPartDelta() as delta):
                         hear(delta.content_delta or "", is_thought=True)
             response = stream.get()
-        # A stream that stops early without an error lacks only its finish reason, and for chat completions
-        # pydantic-ai invents one.
+        # A stream that ends early without an error can be told only by its missing finish reason, but for
+        # chat completions pydantic-ai makes up a reason.
         is_complete = response.finish_reason is not None if chunks is None else chunks.is_whole
         if chunks is not None and chunks.error is not None:
             raise error_in_reply(self.name, chunks.error)
@@ -134,7 +134,8 @@ class ChatModel:
         details = response.provider_details or {}
         refusal = details.get("refusal") or ""
         calls = [part for part in response.parts if isinstance(part, messages.ToolCallPart)]
-        texts = [response.text or "", str(refusal), *map(_describe_call, calls)]
+        texts = [response.text or "", str(refusal)]
+        texts += [f"[tool call] {call.tool_name}({call.args_as_json_str()})" for call in calls]
         thoughts = [p.content for p in response.parts if isinstance(p, messages.ThinkingPart) and p.content]
         finish_reason = chunks and chunks.finish_reason
         return make_reply(
@@ -173,7 +174,7 @@ class _PieceListener(Protocol):
 
 
 def _mark_thoughts(on_text: TextListener) -> _PieceListener:
-    """Pass on pieces of a reply, with tags around reasoning that a server sends apart from the text."""
+    """Return a listener that passes on pieces of a reply, with tags around separately sent reasoning."""
     was_thought = False
 
     def hear(piece: str, *, is_thought: bool) -> None:
@@ -189,7 +190,7 @@ def _mark_thoughts(on_text: TextListener) -> _PieceListener:
 
 
 def to_messages(conversation: tuple[PromptMessage, ...]) -> list[messages.ModelMessage]:
-    """Convert a conversation to the types of pydantic-ai."""
+    """Convert a conversation to pydantic-ai message types."""
     found: list[messages.ModelMessage] = []
     for message in conversation:
         if message.role == "assistant":
@@ -217,10 +218,6 @@ def _is_filtered(error: Exception) -> bool:
     return isinstance(error, exceptions.ContentFilterError)
 
 
-def _describe_call(call: messages.ToolCallPart) -> str:
-    return f"[tool call] {call.tool_name}({call.args_as_json_str()})"
-
-
 def _usage(response: messages.ModelResponse) -> Usage:
     usage = response.usage
     if usage.unmeasured_requests or not (usage.input_tokens or usage.output_tokens):
@@ -241,18 +238,18 @@ def _usage_in_chunk(usage: CompletionUsage | None) -> Usage:
 
 
 def supported_settings(model: Model, name: str, settings: SamplingSettings) -> SamplingSettings:
-    """Remove settings that a model does not support, and add the limit that its provider requires."""
+    """Remove settings that a model does not support, and add a token limit if its provider requires one."""
     if "seed" in model.unsupported_settings:
         settings = replace(settings, seed=None)
     if settings.extra_body is not None and "extra_body" in model.unsupported_settings:
-        raise UserError(f"{name} takes no extra body; leave it out")
+        raise UserError(f"{name} does not support an extra body; remove it")
     if isinstance(model, OpenAIChatModel | OpenAIResponsesModel):
         return _supported_by_openai(model.profile, settings)
     if settings.reasoning_effort is not None and not model.profile.get("supports_thinking"):
-        raise UserError(f"{name} takes no reasoning effort; leave it out")
+        raise UserError(f"{name} does not support a reasoning effort; remove it")
     if settings.reasoning_effort not in {None, *EFFORTS}:
         raise UserError(
-            f'{name} has no reasoning effort "{settings.reasoning_effort}"; use one of {", ".join(EFFORTS)}'
+            f'unknown reasoning effort "{settings.reasoning_effort}"; {name} supports {", ".join(EFFORTS)}'
         )
     return _supported_by_anthropic(model.profile, settings) if model.system == "anthropic" else settings
 
@@ -261,7 +258,7 @@ def _supported_by_anthropic(profile: Mapping[str, Any], settings: SamplingSettin
     thinks = settings.reasoning_effort not in {None, "none"}
     if thinks or profile.get("anthropic_disallows_sampling_settings"):
         settings = replace(settings, temperature=None, top_p=None)
-    elif settings.temperature is not None:  # newer models reject both together
+    elif settings.temperature is not None:  # newer models reject requests with both settings
         settings = replace(settings, top_p=None)
     # Reasoning has its own budget, which must be smaller than the limit.
     limit = 2 * CHAT_MAX_TOKENS if thinks else CHAT_MAX_TOKENS
@@ -279,7 +276,7 @@ def _supported_by_openai(profile: Mapping[str, Any], settings: SamplingSettings)
 
 
 def _is_reasoning(profile: Mapping[str, Any], effort: str | None) -> bool:
-    """Whether an OpenAI model reasons at this effort; it then rejects sampling settings."""
+    """Whether an OpenAI model reasons at this effort, and so rejects sampling settings."""
     if not profile.get("openai_supports_reasoning"):
         return False
     efforts = profile.get("openai_reasoning_efforts")
@@ -292,7 +289,7 @@ def _is_reasoning(profile: Mapping[str, Any], effort: str | None) -> bool:
 
 
 def _request_settings(model: Model, settings: SamplingSettings) -> ModelSettings:
-    """Convert settings for pydantic-ai, without those that are None."""
+    """Convert settings for pydantic-ai, leaving out settings that are None."""
     is_openai = isinstance(model, OpenAIChatModel | OpenAIResponsesModel)
     effort = settings.reasoning_effort
     given: dict[str, Any] = {
@@ -352,7 +349,7 @@ def _open_model(name: str, settings: SamplingSettings, http_client: object) -> M
 
 
 def _key_variables(provider: str) -> list[str]:
-    """Find the environment variables for a provider's key, which only its source code names."""
+    """Find the environment variables for a provider's key, which are named only in its source code."""
     try:
         found = infer_provider_class(provider)
     except ValueError:
@@ -365,7 +362,7 @@ def _unknown_provider(provider: str) -> str:
     known = sorted({known.partition(":")[0] for known in known_model_names() if ":" in known})
     close = difflib.get_close_matches(provider, known, n=1)
     fix = f'did you mean "{close[0]}"?' if close else "use one such as openai-chat, anthropic or google"
-    return f'there is no provider "{provider}"; {fix}'
+    return f'unknown provider "{provider}"; {fix}'
 
 
 def _open_provider(name: str, base_url: str | None, http_client: object) -> Provider[object]:
@@ -374,14 +371,14 @@ def _open_provider(name: str, base_url: str | None, http_client: object) -> Prov
     make: Callable[..., Provider[object]] = infer_provider_class(name)
     if name.startswith("gateway/") or "base_url" not in inspect.signature(make).parameters:
         raise UserError(
-            f'the provider "{name}" takes no base URL; for your own server use {OWN_SERVER}:MODEL'
+            f'the provider "{name}" does not support a base URL; for your own server, use {OWN_SERVER}:MODEL'
         )
     client = {} if http_client is None else {"http_client": http_client}
     return make(base_url=base_url, **client)
 
 
 def _limit_provider(provider: Provider[object], name: str, settings: SamplingSettings) -> Provider[object]:
-    """Limit the size of replies to a provider's client, and to clients that replace it."""
+    """Limit the size of replies to a provider's HTTP client, and to clients that replace it."""
     if isinstance(client := provider.client, openai.AsyncOpenAI):
         make_lenient(client)
     first, make = provider._own_http_client, provider._http_client_factory  # noqa: SLF001 - no public way

@@ -29,7 +29,7 @@ class ChosenModel:
     max_tokens: int | None = None  # None means the default limit for a reply
 
     def add_server(self, settings: SamplingSettings) -> SamplingSettings:
-        """Return the settings with this model's address, and with its limit unless they have one."""
+        """Return the settings with this model's server, and with its limit unless they have a limit."""
         limit = settings.max_tokens or self.max_tokens
         return replace(settings, base_url=self.base_url, max_tokens=limit)
 
@@ -47,12 +47,12 @@ class ConfigFile(BaseModel):
     @model_validator(mode="after")
     def _has_a_model_for_its_settings(self) -> Self:
         if self.model_fields_set & {"base_url", "max_tokens"} and "model" not in self.model_fields_set:
-            raise ValueError("base_url and max_tokens belong to a model; name it as model:")
+            raise ValueError("base_url and max_tokens apply to a model; name the model as model:")
         return self
 
 
 def choose_model(name: str | None = None, base_url: str | None = None) -> ChosenModel:
-    """Choose the given model, or else the one of CODEBOTLER_MODEL, of config.yaml, or the recorded one.
+    """Choose the given model, or else the model in CODEBOTLER_MODEL or config.yaml, or a recorded model.
 
     The address and the limit in config.yaml apply only to the model named there.
 
@@ -74,7 +74,7 @@ def choose_model(name: str | None = None, base_url: str | None = None) -> Chosen
 def make_opener(
     models: Sequence[str], base_url: str | None, settings: SamplingSettings
 ) -> Callable[[str], Model]:
-    """Return a function that opens models by name; raise UserError at once for an invalid name."""
+    """Return a function that opens models by name; raise UserError at once if a name is invalid."""
     for each in models:
         kind_of(each)
     if base_url is not None:

@@ -36,11 +36,11 @@ from codebotler.prompts import Prompt
 
 OPENAI_KEY = "OPENAI_API_KEY"
 PLACEHOLDER_KEY = "none"  # the client requires a key even if the server does not
-QUOTA_ERROR = "insufficient_quota"  # waiting does not help against this 429
+QUOTA_ERROR = "insufficient_quota"  # a status of 429 for which waiting does not help
 
 
 class CompletionsModel:
-    """A base model on a server; it continues a text."""
+    """A base model on a server, which continues the text of a prompt."""
 
     def __init__(
         self, model: str, settings: SamplingSettings, http_client: httpx2.AsyncClient | None = None
@@ -48,12 +48,12 @@ class CompletionsModel:
         self.name = f"completions:{model}"
         key = read_key(OPENAI_KEY)
         if settings.base_url is None and not key:
-            raise UserError(f"{self.name} needs --base-url, or {OPENAI_KEY} to use OpenAI's own")
+            raise UserError(f"{self.name} needs --base-url, or {OPENAI_KEY} for OpenAI's server")
         self.model, self.settings = model, settings.for_base_model(self.name)
         try:
             with without_proxy(settings.base_url):
                 client = http_client or openai.DefaultAsyncHttpxClient()
-        except Exception as error:  # noqa: BLE001 - wrong proxies and certificates raise many types
+        except Exception as error:  # noqa: BLE001 - wrong proxies and certificates cause many kinds of errors
             raise opening_error(self.name, error) from None
         self.client = make_lenient(
             openai.AsyncOpenAI(
@@ -88,11 +88,8 @@ class CompletionsModel:
             raise error_in_reply(self.name, chunks.error)
         if not chunks.is_whole:
             raise incomplete_error(self.name, has_begun=bool(text))
-        usage = (
-            Usage()
-            if chunks.usage is None
-            else Usage(chunks.usage.prompt_tokens, chunks.usage.completion_tokens)
-        )
+        sent = chunks.usage
+        usage = Usage() if sent is None else Usage(sent.prompt_tokens, sent.completion_tokens)
         text, latency = remove_keys(text), time.monotonic() - start
         return make_reply(text, usage, latency, chunks.finish_reason, opening=prompt)
 

@@ -1,4 +1,4 @@
-"""HTTP clients with a limit on replies, without redirects, and without proxies for local servers."""
+"""Configure HTTP clients with a limit on replies, no redirects, and no proxies for local servers."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ ENDPOINTS = ("/chat/completions", "/completions", "/responses", "/messages")
 
 
 def byte_limit(max_tokens: int | None) -> int:
-    """Return a generous limit for the bytes of a reply with up to `max_tokens` tokens."""
+    """Return a generous size limit, in bytes, for a reply with up to `max_tokens` tokens."""
     return max(MIN_REPLY_BYTES, BYTES_PER_TOKEN * (max_tokens or ASSUMED_TOKENS))
 
 
 def limit_replies(client: HTTPClient, name: str, limit: int) -> HTTPClient:
-    """Limit the bytes of each reply to a model's HTTP client, and return the client.
+    """Limit the size of each reply to a model's HTTP client, and return the client.
 
-    The client raises ModelError for a longer reply; a compressed one, which could expand without limit; a
-    redirect, which could send the key to another server; and for an error sent as JSON instead of a stream.
+    The client raises ModelError for a longer reply, a compressed reply (which could expand without limit), a
+    redirect (which could send the key to another server), and an error sent as JSON instead of a stream.
     """
 
     async def check(response: Any) -> None:  # noqa: ANN401 - see HTTPClient
@@ -46,7 +46,7 @@ def limit_replies(client: HTTPClient, name: str, limit: int) -> HTTPClient:
         response.stream = _limit_stream(response.stream, name, limit)
         if response.has_redirect_location:
             address = _base_url(str(response.url.join(response.headers["location"])))
-            sentence = f"{name}: the server redirects to {address}; set the base URL to that"
+            sentence = f"{name}: the server redirects to {address}; set the base URL to this address"
             raise ModelError(sentence, may_pass=False)
         is_json = response.headers.get("content-type", "").startswith("application/json")
         if is_json and response.status_code < FIRST_ERROR and b'"stream":true' in response.request.content:
@@ -121,7 +121,7 @@ def without_proxy(url: str | None) -> Iterator[None]:
 
 
 def mention_proxy(error: ModelError, url: str | None) -> ModelError:
-    """Add the proxy of a request, if there is one, to its error, and return the error."""
+    """Add the proxy of a request, if any, to the request's error, and return the error."""
     parts = urlsplit(url or "https://provider.invalid")
     host = parts.hostname or ""
     proxies = getproxies()
@@ -144,7 +144,7 @@ def _is_loopback(host: str) -> bool:
 
 
 def opening_error(name: str, error: Exception) -> UserError:
-    """Build the error for a client that cannot be created, such as with a wrong proxy or certificate."""
+    """Build the error for a client that cannot be created, for example because of a wrong proxy."""
     for variable in CERTIFICATE_VARIABLES:
         if (path := os.environ.get(variable)) and not Path(path).exists():
             return UserError(f"{name} cannot be used: {variable} names {path}, which does not exist")

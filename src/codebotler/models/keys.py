@@ -14,9 +14,9 @@ from urllib.parse import quote
 from codebotler.core.errors import UserError
 
 SECRET_NAME = re.compile(r"(?:key|token|secret|password|passwd|credential)s?(?:_|$)", re.IGNORECASE)
-"""In the names of variables that hold keys, but not in TOKENIZERS_PARALLELISM."""
-MIN_SECRET = 8  # shorter values stay in replies, where they may be parts of names
-MIN_SECRET_IN_ERRORS = 3  # also in logs
+"""Matches the names of variables that hold keys, but not TOKENIZERS_PARALLELISM."""
+MIN_SECRET = 8  # shorter values are kept in replies, where they may be parts of names
+MIN_SECRET_IN_ERRORS = 3  # the limit for error messages and logs
 KEY_SHAPES = r"\b(?:sk|pk|gsk|xai|hf)[-_][\w*.-]{8,}|\bAIza[\w*-]{20,}|(?<=Bearer )\S{8,}"
 KEY_REMOVED = "[key removed]"
 CLIENT_LOGGERS = (
@@ -26,13 +26,13 @@ CLIENT_LOGGERS = (
 
 
 def read_key(variable: str) -> str | None:
-    """Return the key in an environment variable, or None; UserError if an HTTP header cannot hold it."""
+    """Return the key in a variable, or None; raise UserError if it is not valid in an HTTP header."""
     key = os.environ.get(variable, "")
     if not key.strip():
         return None
     if not (key.isascii() and key.isprintable() and key == key.strip()):
         raise UserError(
-            f"the key in {variable} has a line break, a space at an end, or a character outside ASCII; "
+            f"the key in {variable} has a line break, an outer space, or a character outside ASCII; "
             "set it again"
         )
     return key
@@ -56,13 +56,13 @@ def redact(text: str) -> str:
 
 
 def remove_keys(text: str) -> str:
-    """Remove long values of key variables from a reply; text that only looks like a key may be a name."""
+    """Remove long values of key variables from a reply, but keep text that only looks like a key."""
     secrets = _secrets(MIN_SECRET)
     return re.sub("|".join(secrets), KEY_REMOVED, text) if secrets else text
 
 
 def _secrets(shortest: int) -> list[str]:
-    """Return patterns of the values of key variables, longest first, since one may contain another."""
+    """Return regexes for the values of key variables, longest first, since one may contain another."""
     values = {value.strip() for name, value in os.environ.items() if SECRET_NAME.search(name)}
     spellings = {
         spelling
@@ -83,7 +83,7 @@ class _Redaction(logging.Filter):
         try:
             message = record.getMessage()
         except (TypeError, ValueError):
-            return True  # logging reports such a record with its format only
+            return True  # logging prints only the format of an invalid record
         record.msg, record.args = redact(message), None
         if record.exc_info:
             record.exc_text = redact(logging.Formatter().formatException(record.exc_info))
@@ -95,7 +95,7 @@ _REDACTION = _Redaction()
 
 
 def guard_logs() -> None:
-    """Remove keys from the logs of client libraries, and silence their warnings; call it after their import.
+    """Remove keys from client libraries' logs, and silence their warnings; call this after importing them.
 
     CodeBotler's own notes name the settings that a model does not support.
     """

@@ -24,21 +24,21 @@ from codebotler.prompts.rendering import task_end
 
 SEED_BLOCK = 10  # replies to a prompt that share a seed; runs usually have a multiple of ten per prompt
 MAX_BATCH = 32  # replies without a seed that are generated together
-GATHER_SECONDS = 0.01  # time for simultaneous requests to arrive
+GATHER_SECONDS = 0.01  # seconds to wait for simultaneous requests to arrive
 
 Ending: TypeAlias = tuple[str, Usage, str] | ModelError  # text, tokens and finish reason
 
 
 @dataclass(eq=False)
 class _Job:
-    """A reply to generate, for a request or to complete a block."""
+    """A reply to generate, either for a request or to complete a block."""
 
     prompt: Prompt
-    text: str  # the input of the model
+    text: str  # the text of the prompt for the model
     number: int
     ending: asyncio.Future[Ending]
     on_text: TextListener | None = None  # None until the reply is requested
-    passed: int = 0  # characters passed to `on_text`
+    passed: int = 0  # the number of characters passed to `on_text`
 
     @property
     def is_wanted(self) -> bool:
@@ -61,17 +61,17 @@ def _expect_wanted(batch: Sequence[_Job]) -> None:
 
 
 class LocalModel:
-    """A causal language model in this process, on a GPU if available; from a folder or the hub.
+    """A causal language model from a folder or the hub that runs in this process, on a GPU if available.
 
     It is a chat model if its tokenizer has a chat template, otherwise a base model. With a seed, replies are
-    generated in blocks that depend only on the numbers of the replies, so an interrupted run gives the same
+    generated in blocks that depend only on the numbers of the replies, so a resumed run gives the same
     replies. Without a seed, waiting requests form a batch. The timeout is ignored.
     """
 
     def __init__(self, path: str, settings: SamplingSettings) -> None:
         self.name, self.settings = f"hf:{path}", settings
         if settings.base_url is not None:
-            raise UserError(f"{self.name} runs on this machine and takes no --base-url; leave it out")
+            raise UserError(f"{self.name} runs on this machine and does not support --base-url; remove it")
         source = find_source(path)
         self.device, dtype = _device()
         transformers.utils.logging.disable_progress_bar()
@@ -85,7 +85,7 @@ class LocalModel:
             self.tokenizer.pad_token = self.tokenizer.eos_token or self.tokenizer.convert_ids_to_tokens(0)
         self.is_chat = bool(self.tokenizer.chat_template)
         if settings.reasoning_effort is not None or settings.extra_body is not None:
-            raise UserError(f"{self.name} takes no --reasoning-effort or --extra-body; leave them out")
+            raise UserError(f"{self.name} does not support --reasoning-effort or --extra-body; remove them")
         if self.is_chat:
             self.settings = replace(settings, max_tokens=settings.max_tokens or CHAT_MAX_TOKENS)
         else:
@@ -96,7 +96,7 @@ class LocalModel:
         self.longest = getattr(model.config, "max_position_embeddings", None) or sys.maxsize
         self.is_seeded = settings.seed is not None and settings.temperature != 0
         self._waiting: list[_Job] = []
-        self._unclaimed: dict[tuple[str, int], _Job] = {}  # further replies of blocks
+        self._unclaimed: dict[tuple[str, int], _Job] = {}  # replies of a block that were not requested yet
         self._worker: asyncio.Task[None] | None = None
         guard_logs()
 
@@ -193,7 +193,7 @@ class LocalModel:
         _expect_wanted(batch)
         tokens = self._tokens([job.text for job in batch], return_tensors="pt", padding=True).to(self.device)
         start = tokens["input_ids"].shape[1]
-        counts: dict[int, int] = {}  # tokens per reply that has ended
+        counts: dict[int, int] = {}  # the number of tokens of each completed reply
 
         def stop_ended(sequences: torch.Tensor, _scores: object, **_: object) -> torch.Tensor:
             for row, job in enumerate(batch):
@@ -236,7 +236,7 @@ class LocalModel:
         """Pass on complete lines; return whether a base model has completed the function."""
         text = self._decode(self._before_end(tokens))
         end = self._end(job, text)
-        # Keep back the last line and the line break before it, which may turn out to be after the end.
+        # Hold back the last line and the line break before it, because they may lie after the end.
         job.pass_on(text[: max(0, text.rfind("\n", 0, end))])
         return end < len(text)
 
@@ -253,7 +253,7 @@ class LocalModel:
 
 
 def find_source(path: str) -> str:
-    """Return a model's folder or its name on the hub, for transformers."""
+    """Return a model's folder, or its name on the hub, as transformers expects it."""
     folder = Path(path).expanduser()
     if path.startswith((".", "/", "~")) and not folder.is_dir():
         raise UserError("there is no such model folder; correct the path", file=path)

@@ -1,4 +1,4 @@
-"""Why a reply holds no program, if the server says so or the text makes it certain."""
+"""Classify replies without a program, if the server reports the cause or the text makes it certain."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _BY_REASON: Mapping[str, NoProgram] = {
     **dict.fromkeys(("content_filter", "content_filtered", "safety", "recitation", "blocklist"), "filtered"),
     **dict.fromkeys(("prohibited_content", "spii", "language", "guardrail_intervened"), "filtered"),
 }
-"""Kinds of replies by the finish reasons of servers, in lower case."""
+"""The kinds of replies by the server's finish reason, in lower case."""
 
 
 def is_cut_off(finish_reason: str | None) -> bool:
@@ -48,17 +48,17 @@ def classify_reply(
     has_code: bool,
     known_kind: NoProgram | None = None,
 ) -> NoProgram | None:
-    """Return why a reply holds no program; None if it holds one, or text that may be meant as one.
+    """Return why a reply contains no program, or None if it contains a program or text that may be one.
 
-    A reply that was cut off after a complete program holds one. If the reply was cut off inside the
-    program, the program is incomplete, even if it parses.
+    A reply that was cut off after a complete program contains it. A program that was itself cut off is
+    incomplete, even if it parses.
 
     Args:
         reply: the text; None if it was not recorded.
         program: the extracted program.
-        finish_reason: the server's reason for the end; None without one.
+        finish_reason: the server's finish reason; None if it gave none.
         has_code: whether the reply contains any code.
-        known_kind: the kind, if the server reported it outside the text, such as in a field for refusals.
+        known_kind: the kind of reply, if the server reported it outside the text, such as in a refusal field.
     """
     by_reason = _BY_REASON.get((finish_reason or "").lower())
     kind = by_reason if by_reason == "cut-off" else known_kind or by_reason
@@ -72,7 +72,7 @@ def classify_reply(
 
 
 def _ends_in_code(reply: str, program: str) -> bool:
-    """Whether a reply ends inside its program, or inside a later fence with a better version."""
+    """Whether a reply ends inside its program, or inside a later code fence with a better version."""
     last = program.rstrip().rpartition("\n")[2].strip()
     _, _, rest = compose(reply).rpartition(last)
     fences = sum(line.lstrip().startswith(("```", "~~~")) for line in rest.splitlines())

@@ -19,7 +19,7 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
     Args:
         name: `recorded`, `recorded:hasty`, `provider:name` as in pydantic-ai, `completions:name` for a
             text-completion endpoint, or `hf:PATH` for a folder or a name on the Hugging Face hub.
-        settings: the settings of its requests.
+        settings: the settings of requests to the model.
 
     Raises:
         UserError: the model does not exist, or a key or a package is missing.
@@ -46,7 +46,7 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
 
 
 def expect_server(*names: str) -> None:
-    """Raise UserError if none of the models runs on a server, so a base URL makes no sense."""
+    """Raise UserError if no model runs on a server, because a base URL would then have no effect."""
     if not any(map(runs_on_server, names)):
         raise UserError(
             f"a base URL is given, but {' and '.join(names)} {'does' if len(names) == 1 else 'do'} not use "
@@ -60,7 +60,7 @@ def runs_on_server(name: str) -> bool:
 
 
 def kind_of(name: str) -> str:
-    """Validate a model's name without importing a large library; return its part before the colon."""
+    """Validate a model's name without importing large libraries; return the part before the colon."""
     kind, _, rest = name.partition(":")
     if kind == "recorded":
         open_recorded(name)

@@ -1,4 +1,4 @@
-"""Streams of OpenAI's protocol, also from servers that deviate from it."""
+"""Decode streams of OpenAI's protocol, even from servers that deviate from it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class LenientDecoder(SSEDecoder):
     is_done = False
 
     def decode(self, line: str) -> ServerSentEvent | None:
-        """Return the event that a line completes; None if there is none, or if it has no data."""
+        """Return the event that a line completes, or None if there is no event or it has no data."""
         if line.startswith(ERROR_FIELD):  # a nonstandard field of llama.cpp
             line = f'data: {{"error": {line.removeprefix(ERROR_FIELD)}}}'
         event = super().decode(line)
@@ -37,7 +37,7 @@ def make_lenient(client: OpenAIClient) -> OpenAIClient:
 
 
 class Chunks:
-    """The chunks of a stream; collects the usage and the finish reason.
+    """Iterates over the chunks of a stream, and collects the usage and the finish reason.
 
     Servers report usage in the last chunk or cumulatively in each, so the last report counts. Some send a
     last chunk without `delta`, or only `[DONE]` instead of a finish reason.
@@ -48,7 +48,7 @@ class Chunks:
         self.source = getattr(stream, "source", stream)  # pydantic-ai closes it
         self.usage: Any = None
         self.finish_reason: str | None = None
-        self.error: object = None  # a body that came in place of a chunk
+        self.error: object = None  # an error body that came instead of a chunk
         self._has_choice = False
 
     async def __aiter__(self) -> AsyncIterator[Any]:

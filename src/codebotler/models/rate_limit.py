@@ -31,24 +31,24 @@ from codebotler.prompts import Prompt
 MODELS_LOG = logging.getLogger("codebotler.models")
 MAX_WAIT = 30.0  # seconds between two tries, unless the server asks for more
 MAX_RETRY_AFTER = 600.0  # seconds; a request that a server delays for longer fails
-CHARACTERS_PER_TOKEN = 3  # overestimates the tokens where the model does not count them
+CHARACTERS_PER_TOKEN = 3  # a high estimate, used if the model does not count tokens
 
 
 @dataclass
 class RateLimited:
-    """A model with limits.
+    """Wraps a model to limit and repeat its requests.
 
     It retries temporary errors: statuses such as 429 and 500, timeouts, failed connections and invalid
     answers. It never repeats a complete reply, even one without a program.
 
     Args:
         model: the model to ask.
-        concurrency: the requests that may run at the same time, at least 1.
-        requests_per_minute: the tries that may start per minute, evenly spread; None for no limit.
-        retries: the further tries of each request, at least 0.
-        token_budget: the tokens after which no request starts; running ones complete. Where the model does
-            not count tokens, one is assumed for every three characters. None for no limit.
-        first_wait: the approximate seconds before the second try; the wait doubles each time.
+        concurrency: how many requests may run at the same time, at least 1.
+        requests_per_minute: how many tries may start per minute, evenly spaced; None for no limit.
+        retries: how many times to repeat a failed request, at least 0.
+        token_budget: the number of tokens after which no request starts; running requests complete. If the
+            model does not count tokens, three characters are assumed per token. None for no limit.
+        first_wait: about how many seconds to wait before the second try; the wait doubles each time.
 
     Raises:
         UserError: a limit is out of range.
@@ -60,10 +60,10 @@ class RateLimited:
     retries: int = 6
     token_budget: int | None = None
     first_wait: float = 0.5
-    requests: int = field(default=0, init=False)  # including further tries
+    requests: int = field(default=0, init=False)  # including retries
     retry_count: int = field(default=0, init=False)
     usage: Usage = field(default_factory=Usage, init=False)  # of all replies
-    tokens_used: int = field(default=0, init=False)  # with estimates where the model does not count
+    tokens_used: int = field(default=0, init=False)  # estimated if the model does not count them
     _has_replied: bool = field(default=False, init=False, repr=False)
     _free: asyncio.Semaphore = field(init=False, repr=False)
     _gate: asyncio.Lock = field(default_factory=asyncio.Lock, init=False, repr=False)
@@ -124,7 +124,7 @@ class RateLimited:
     async def _try(self, prompt: Prompt, number: int, on_text: TextListener) -> Reply:
         self._check_budget()
         await self._wait_for_turn()
-        self._check_budget()  # other requests may have used it up meanwhile
+        self._check_budget()  # other requests may have used it up in the meantime
         self.requests += 1
         length = 0
 
@@ -169,7 +169,7 @@ class RateLimited:
         self.retry_count += 1
         if not self._has_replied and self.retry_count == 1 and state.outcome is not None:
             MODELS_LOG.warning("trying again, up to %d times: %s", self.retries, state.outcome.exception())
-        # A server that asks for a delay means all requests, not only the rejected one.
+        # A delay that a server asks for applies to all requests, not only to the rejected request.
         now = asyncio.get_running_loop().time()
         self._deferred_until = max(self._deferred_until, now + _retry_after(state))
 

@@ -23,7 +23,7 @@ from codebotler.prompts import Prompt
 RECORDED_FOLDER = Path(__file__).with_name("recorded")
 RECORDED_NAMES = ("careful", "hasty")
 MAX_SUGGESTIONS = 3
-MAX_SHOWN_CHARACTERS = 100  # of an instruction in a message
+MAX_SHOWN_CHARACTERS = 100  # the maximum length of an instruction quoted in a message
 LONG_WORD = re.compile(r"[^\W\d_]{4,}")  # shorter words occur in every instruction
 RECORDED_NOTICE = (
     "recorded programs, no language model; choose one with --model (`codebotler models` lists them)"
@@ -62,12 +62,12 @@ class RecordedFile(BaseModel):
 
 
 class UnknownInstructionError(ModelError):
-    """A recorded model has no program for an instruction; the error suggests similar ones."""
+    """Raised if a recorded model has no program for an instruction; suggests similar instructions."""
 
     def __init__(self, model: str, instruction: str, closest: Sequence[str]) -> None:
         similar = " or ".join(f'"{_short(known)}"' for known in closest)
         super().__init__(
-            f'{model} has no program for "{_short(instruction)}"; known are: {similar}',
+            f'{model} has no program for "{_short(instruction)}"; similar instructions: {similar}',
             may_pass=False,
         )
         self.model, self.instruction, self.closest = model, instruction, tuple(closest)
@@ -86,7 +86,7 @@ class RecordedModel:
     settings: SamplingSettings = field(default_factory=partial(SamplingSettings, None, None))
 
     def solution(self, instruction: str, index: int) -> Solution:
-        """Return the reply for completion `index`, counted from 0; the replies repeat."""
+        """Return the reply for completion `index`, counted from 0; the replies repeat in a cycle."""
         replies = self.replies[instruction]
         return replies[index % len(replies)]
 
@@ -107,7 +107,7 @@ class RecordedModel:
 
 
 def find_closest(instruction: str, known: Iterable[str]) -> list[str]:
-    """Return the known instructions that share the most long words, in order, with an unknown one."""
+    """Return the known instructions that share the most long words, in the same order, with `instruction`."""
     matcher = SequenceMatcher(a=(), b=LONG_WORD.findall(instruction.lower()), autojunk=False)
 
     def similarity(other: str) -> tuple[int, float]:
@@ -126,12 +126,12 @@ def _short(text: str) -> str:
 
 
 def is_recorded(name: str) -> bool:
-    """Whether a name is that of a recorded model."""
+    """Whether a name belongs to a recorded model."""
     return name.partition(":")[0] == "recorded"
 
 
 def open_recorded(name: str, folder: Path | None = None) -> RecordedModel:
-    """Open `recorded`, `recorded:careful`, `recorded:hasty` or `recorded:FOLDER`, with a further folder."""
+    """Open a recorded model by its name; `folder` may hold further solutions."""
     short = name.removeprefix("recorded").removeprefix(":") or RECORDED_NAMES[0]
     if short not in RECORDED_NAMES and Path(short).is_dir():
         own = _read(Path(short))
@@ -139,7 +139,7 @@ def open_recorded(name: str, folder: Path | None = None) -> RecordedModel:
         return RecordedModel(f"recorded:{short}", replies, tuple(replies))
     if short not in RECORDED_NAMES:
         known = " or ".join(f"recorded:{known}" for known in RECORDED_NAMES)
-        raise UserError(f'there is no recorded model "{name}"; use {known}')
+        raise UserError(f'unknown recorded model "{name}"; use {known}')
     paper, rules = (_read_suite(suite) for suite in ("paper", "rules"))
     further = () if folder is None else _read(folder)
     replies = {one.instruction: one.replies_of(short) for one in (*paper, *rules, *further)}
@@ -148,7 +148,7 @@ def open_recorded(name: str, folder: Path | None = None) -> RecordedModel:
 
 @cache
 def _read_suite(suite: str) -> tuple[InstructionSolutions, ...]:
-    """Read the instructions of a benchmark suite; the paper's suite includes those of this folder."""
+    """Read the instructions of a benchmark suite; the paper's suite includes this folder's instructions."""
     return _read(*_suite_folders(suite), *([RECORDED_FOLDER] if suite == "paper" else []))
 
 

@@ -10,21 +10,21 @@ from urllib.parse import urlsplit
 
 from codebotler.core.errors import UserError
 
-MAX_TEMPERATURE = 100  # a higher temperature is a typo
+MAX_TEMPERATURE = 100  # a higher temperature must be a typo
 PAPER_MAX_TOKENS = 512
 """The paper's limit for a reply, in tokens; also the default for base models, which may never stop."""
 CHAT_MAX_TOKENS = 16_384
-"""The limit for a chat reply, in tokens, where the provider requires one and the user gives none."""
+"""The token limit for chat replies if the provider requires a limit and the user gives none."""
 
 RESERVED_FIELDS = frozenset(
     ("model", "messages", "prompt", "stream", "stream_options", "temperature", "top_p", "seed", "max_tokens")
 ) | {"max_completion_tokens", "reasoning_effort"}
-"""Fields that an extra body must not contain, because other settings determine and record them."""
+"""Fields that an extra body must not contain, because other settings control them."""
 
 
 @dataclass(frozen=True)
 class SamplingSettings:
-    """The settings of requests; settings that are None are not sent.
+    """The settings of requests to a model; settings that are None are not sent.
 
     Args:
         temperature: from 0 (always the likeliest token) up to about 2; None for the model's default.
@@ -34,8 +34,8 @@ class SamplingSettings:
         seed: the random seed, if the model supports one; reply number n gets `seed + n`.
         timeout: the limit for a complete request, in seconds.
         base_url: the server's address, such as `http://localhost:8000/v1`; None for the provider's own.
-        reasoning_effort: the provider's word for how much a model reasons, such as `low`.
-        extra_body: further fields for the JSON of each request.
+        reasoning_effort: the provider's name for how much a model reasons, such as `low`.
+        extra_body: additional fields for the JSON body of each request.
 
     Raises:
         UserError: a value is out of range.
@@ -58,30 +58,30 @@ class SamplingSettings:
         if self.top_p is not None and not 0 < self.top_p <= 1:
             raise UserError(f"top-p is {self.top_p:g}; it must be above 0 and at most 1")
         if self.max_tokens is not None and self.max_tokens < 1:
-            raise UserError(f"the limit of tokens is {self.max_tokens}; it must be at least 1")
+            raise UserError(f"the token limit is {self.max_tokens}; it must be at least 1")
         if not 0 < self.timeout < math.inf:
             raise UserError(f"the timeout is {self.timeout:g} seconds; it must be above 0")
         if self.base_url is not None:
             _check_url(self.base_url)
         for name in RESERVED_FIELDS.intersection(self.extra_body or ()):
-            raise UserError(f'the extra body has "{name}", which CodeBotler sets itself; leave it out')
+            raise UserError(f'the extra body contains "{name}", which CodeBotler sets itself; remove it')
 
     def seed_of(self, number: int) -> int | None:
         """Return the seed for reply `number`, counted from 0."""
         return None if self.seed is None else self.seed + number
 
     def for_base_model(self, name: str) -> SamplingSettings:
-        """Return these settings with a base model's limit; raise UserError for a reasoning effort."""
+        """Return the settings for a base model; raise UserError if there is a reasoning effort."""
         if self.reasoning_effort is not None:
-            raise UserError(f"{name} is a base model and takes no reasoning effort; leave it out")
+            raise UserError(f"{name} is a base model and does not support a reasoning effort; remove it")
         return replace(self, max_tokens=self.max_tokens or PAPER_MAX_TOKENS)
 
 
 def _check_url(url: str) -> None:
-    # Never quote the URL: in a mistyped one, any part may be a password.
+    # Never quote the URL: in a mistyped URL, any part may be a password.
     if any(mark in url for mark in "@?#"):
         raise UserError(
-            "the base URL has a user name, a password, a query or a fragment; remove it, "
+            "the base URL contains a user name, a password, a query or a fragment; remove it, "
             "and put keys into the environment"
         )
     try:

@@ -16,10 +16,10 @@ STATUS_HINTS = {
     403: "; is the right key in the environment?",
     404: "; are the model's name and the base URL right?",
 }
-CONNECT_ERROR = "ConnectError"  # in httpx and httpx2; providers use either
+CONNECT_ERROR = "ConnectError"  # the name in both httpx and httpx2; providers use either
 MAX_ERROR_CHARACTERS = 300
 FORBIDDEN = 403
-PROMPT_STATUSES = (400, 413, 422)  # may concern this prompt alone
+PROMPT_STATUSES = (400, 413, 422)  # statuses that may be caused by this prompt
 FILTER_WORDS = re.compile(
     r"content[\s_-]*(?:filter|management|policy|exists risk)|safety system|data_inspection|moderation"
     r"|flagged|usage polic|prohibited_content|敏感内容",
@@ -29,15 +29,15 @@ ACCOUNT_WORDS = re.compile(
     r"\b(?:credit|billing|balance|quota|payment|budget|expired|api[ _-]?key|permission|unauthori[sz]ed)",
     re.IGNORECASE,
 )
-"""In messages of errors about an account, not about a prompt."""
+"""Matches messages of errors that concern an account, not a prompt."""
 RETRYABLE_WORDS = re.compile(
     r"rate_?limit|overload|unavailable|server_?error|internal|timeout", re.IGNORECASE
 )
-"""In the types and codes of temporary errors."""
+"""Matches the types and codes of temporary errors."""
 
 
 def model_error(name: str, fault: str | Exception, *, may_pass: bool) -> ModelError:
-    """Build an error from a sentence or an exception, with the original cause."""
+    """Build an error from a sentence or an exception, including the original cause."""
     first: BaseException | None = fault if isinstance(fault, Exception) else None
     while first and first.__cause__:
         first = first.__cause__
@@ -46,7 +46,7 @@ def model_error(name: str, fault: str | Exception, *, may_pass: bool) -> ModelEr
 
 
 def connection_error(name: str, error: Exception, url: str | None) -> ModelError | None:
-    """Build the error for a refused connection; None if the error has another cause."""
+    """Build the error for a refused connection, or return None if the error has another cause."""
     failed = next((cause for cause in _causes(error) if type(cause).__name__ == CONNECT_ERROR), None)
     if failed is None:
         return None
@@ -56,7 +56,7 @@ def connection_error(name: str, error: Exception, url: str | None) -> ModelError
 
 
 def find_model_error(error: Exception) -> ModelError | None:
-    """Return the ModelError that a library wrapped in its own exception, if there is one."""
+    """Return the ModelError that a library wrapped in its own exception, or None if there is none."""
     return next((cause for cause in _causes(error) if isinstance(cause, ModelError)), None)
 
 
@@ -80,7 +80,7 @@ def timeout_error(name: str, seconds: float) -> ModelError:
 def status_error(
     name: str, status: int, body: object, *, retry_after: float | None = None, is_permanent: bool = False
 ) -> ModelError:
-    """Build the error for a status of 400 or more; a permanent one is not retried, whatever its status."""
+    """Build the error for a status of 400 or more; a permanent error is not retried, whatever its status."""
     message = f" ({text})" if (text := error_text(body)) else ""
     sentence = f"{name}: the server answered with status {status}{message}{STATUS_HINTS.get(status, '')}"
     may_pass = not is_permanent and (status >= SERVER_ERROR or status in RETRYABLE_STATUSES)
@@ -89,7 +89,7 @@ def status_error(
 
 
 def error_in_reply(name: str, body: object) -> ModelError:
-    """Build the error that a server sent in place of a reply, with a status of success."""
+    """Build the error for an error body that a server sent with a success status."""
     fields = body if isinstance(body, Mapping) else {}
     code = next((fields[key] for key in ("code", "status") if fields.get(key)), None)
     if str(code).isdigit() and int(str(code)) > SUCCESS:
@@ -104,7 +104,7 @@ def is_filtered(status: int | None, body: object) -> bool:
 
 
 def error_text(body: object) -> str:
-    """Return the message of a server or a library in one short line without keys."""
+    """Return the error message of a server or a library as one short line without keys."""
     text = next(_messages(body), None) or ("" if body is None else str(body))
     return brief(redact(text), MAX_ERROR_CHARACTERS).rstrip(".")
 

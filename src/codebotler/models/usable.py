@@ -23,7 +23,7 @@ KEY_VARIABLES: Mapping[str, str] = {
     "ANTHROPIC_API_KEY": "anthropic:claude-sonnet-4-5",
     "GOOGLE_API_KEY": "google:gemini-3-pro",
 }
-"""Environment variables for keys, each with an example of a model."""
+"""The environment variables for API keys, each with an example model."""
 
 SERVER_TIMEOUT = 0.5  # seconds
 MAX_LIST_BYTES = 1_000_000
@@ -32,15 +32,15 @@ MODEL_HINT = "set OPENAI_API_KEY or another provider's key, or start a model ser
 
 @dataclass(frozen=True)
 class UsableModel:
-    """A model that can be used."""
+    """A model that can be used now."""
 
     name: str  # the value for `--model`
-    why: str  # the reason that it can be used, such as `OPENAI_API_KEY is set`
+    why: str  # why the model can be used, such as `OPENAI_API_KEY is set`
     base_url: str | None = None  # the value for `--base-url`; None if not needed
 
     @property
     def is_recorded(self) -> bool:
-        """Whether it is a recorded model, not a language model."""
+        """Whether this is a recorded model, not a language model."""
         return is_recorded(self.name)
 
     @property
@@ -72,7 +72,7 @@ def find_usable_models(servers: Mapping[str, int] = MODEL_SERVERS) -> list[Usabl
 
 
 def suggest_model(servers: Mapping[str, int] = MODEL_SERVERS) -> str:
-    """Return the options for the first model found, or else how to get one."""
+    """Return the options that select the first usable model, or else how to set up a model."""
     first = find_usable_models(servers)[0]
     return MODEL_HINT if first.is_recorded else f"add {first.options}"
 
@@ -80,12 +80,12 @@ def suggest_model(servers: Mapping[str, int] = MODEL_SERVERS) -> str:
 def _is_set(key: str) -> bool:
     try:
         return read_key(key) is not None
-    except UserError:  # an HTTP header cannot hold the key
+    except UserError:  # the key is not valid in an HTTP header
         return False
 
 
 def _list_models(server: str, port: int) -> list[UsableModel]:
-    """Ask a server for its models; return none if it does not answer, or is not a model server."""
+    """Ask a server for its models; return an empty list if it is not a running model server."""
     connection = HTTPConnection("127.0.0.1", port, timeout=SERVER_TIMEOUT)
     try:
         connection.request("GET", "/v1/models", headers={"Accept": "application/json"})

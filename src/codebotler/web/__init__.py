@@ -1,4 +1,4 @@
-"""The page and its API: an operator's console in a browser.
+"""The operator's console in a browser: a web page and its API.
 
-Start with `page.py` and `panes/`; `server.py` puts them on a port, behind `guard.py`.
+Start with `page.py` and `panes/`; `server.py` serves them, and `guard.py` protects them.
 """

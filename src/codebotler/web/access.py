@@ -1,4 +1,4 @@
-"""Access to the page: tokens, roles, cookies, hosts and addresses."""
+"""Control access to the page by tokens, roles, cookies, hosts and addresses."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from codebotler.core.errors import UserError
 from codebotler.web.proxy import OuterAddress, addresses_by_host
 
 MAX_WRONG_TOKENS, WRONG_TOKEN_SECONDS = 10, 60.0
-"""The limit for wrong tokens from one address, per period."""
+"""The number of invalid tokens accepted from one address per period, and the period in seconds."""
 
 MAX_ADDRESSES = 10_000
 MIN_TOKEN_LENGTH = 16
@@ -28,14 +28,14 @@ _LISTEN_BACKLOG = 128  # connections
 
 
 class Role(StrEnum):
-    """The role of a visitor: operators may do everything, the robot's face may only talk and stop."""
+    """The role of a visitor: operators may do everything; a face may only answer questions and stop."""
 
     OPERATOR = "operator"
     FACE = "face"
 
 
 class TooManyTriesError(Exception):
-    """Too many wrong tokens came from an address; for a while, even the right one is refused."""
+    """Raised after too many invalid tokens from an address; for a while, even a valid token is refused."""
 
 
 def new_token() -> str:
@@ -45,11 +45,11 @@ def new_token() -> str:
 
 @dataclass(frozen=True)
 class Access:
-    """The tokens and their roles."""
+    """Maps tokens and cookies to roles, and limits the number of invalid tokens per address."""
 
-    operator: str | None = field(default_factory=new_token)  # None if operators need none
+    operator: str | None = field(default_factory=new_token)  # None if operators need no token
     face: str = field(default_factory=new_token)
-    unguessable: frozenset[Role] = frozenset()  # roles with random tokens, which no limit applies to
+    unguessable: frozenset[Role] = frozenset()  # roles with random tokens, for which there is no limit
     now: Callable[[], float] = time.monotonic
     _wrong: dict[str, deque[float]] = field(default_factory=dict)
 
@@ -57,19 +57,19 @@ class Access:
     def from_options(
         cls, operator: str | None, face: str | None, *, open_to_all: bool, is_private: bool
     ) -> Access:
-        """Take a user's tokens, and create those that are None; raises UserError if they are unsafe."""
+        """Use the given tokens, and create those that are None; raise UserError if a token is unsafe."""
         if open_to_all and (operator or face or not is_private):
-            raise UserError("--no-token works only without --host, --behind-proxy and tokens of your own")
+            raise UserError("--no-token cannot be combined with --host, --behind-proxy or your own tokens")
         if any(token is not None and len(token) < MIN_TOKEN_LENGTH for token in (operator, face)):
             raise UserError(f"this token is too short; use at least {MIN_TOKEN_LENGTH} characters")
         if operator is not None and operator == face:
-            raise UserError("the face's token must differ from the operator's; choose another one")
+            raise UserError("the face's token must differ from the operator's; choose another token")
         made = {Role.OPERATOR: operator is None, Role.FACE: face is None}
         unguessable = frozenset(role for role, is_new in made.items() if is_new)
         return cls(None if open_to_all else operator or new_token(), face or new_token(), unguessable)
 
     def of_token(self, token: str, address: str) -> Role | None:
-        """Return a token's role, or None for a wrong one, which counts towards the address's limit."""
+        """Return the role for a token, or None if it is invalid; this counts towards the address's limit."""
         role = self._of(token, lambda known: known)
         if role in self.unguessable:
             return role
@@ -85,11 +85,11 @@ class Access:
         return role
 
     def of_cookie(self, value: str) -> Role | None:
-        """Return a cookie's role, or None for a wrong one."""
+        """Return the role for a cookie, or None if the cookie is invalid."""
         return self._of(value, _cookie_value)
 
     def cookie(self, role: Role) -> str:
-        """Return a role's cookie, from which nobody can derive the token."""
+        """Return the cookie for a role; the token cannot be derived from it."""
         return _cookie_value(self.face if role is Role.FACE else self.operator or "")
 
     def _of(self, shown: str, form: Callable[[str], str]) -> Role | None:
@@ -109,8 +109,8 @@ class GuardRules:
 
     access: Access
     hosts: frozenset[str] = LOCAL_HOST_NAMES  # accepted host names, without ports
-    any_address: bool = False  # whether to accept all numeric addresses, too
-    cookie: str = "codebotler"  # the cookie's name, different for each port
+    any_address: bool = False  # whether to accept any IP address as a host, too
+    cookie: str = "codebotler"  # the name of the cookie, different for each port
     proxies: Mapping[str, OuterAddress] = field(default_factory=dict)  # by Host header
 
 
@@ -119,13 +119,13 @@ class PageAddress:
     """The address at which to serve the page."""
 
     host: str = "127.0.0.1"
-    port: int | None = None  # 0 for any free port, None for the first free one of `PAGE_PORTS`
+    port: int | None = None  # 0 for any free port, None for the first free port of `PAGE_PORTS`
     names: tuple[str, ...] = ()  # additional host names
-    proxies: tuple[OuterAddress, ...] = ()  # its addresses at reverse proxies
+    proxies: tuple[OuterAddress, ...] = ()  # the page's addresses at reverse proxies
 
     @property
     def is_loopback(self) -> bool:
-        """Whether it listens on a loopback interface."""
+        """Whether the server listens only on a loopback interface."""
         try:
             return ipaddress.ip_address(self.host).is_loopback
         except ValueError:
@@ -133,11 +133,11 @@ class PageAddress:
 
     @property
     def is_private(self) -> bool:
-        """Whether no other machine can reach it, even through a proxy."""
+        """Whether no other machine can reach the page, even through a proxy."""
         return self.is_loopback and not self.proxies
 
     def listen(self) -> socket.socket:
-        """Open a socket; raises UserError if no port is free."""
+        """Open a listening socket; raise UserError if no port is free."""
         ports = PAGE_PORTS if self.port is None else (self.port,)
         for port in ports:
             try:

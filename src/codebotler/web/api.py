@@ -26,7 +26,7 @@ from codebotler.missions.wording import BY_PAGE
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, MAX_WAIT_SECONDS, Console
 
 _CURRENT = "current"
-"""Names the current mission in a path."""
+"""The name of the current mission in a path."""
 
 _LimitedText = Annotated[str, Field(max_length=MAX_PROGRAM_CHARACTERS)]
 
@@ -39,12 +39,12 @@ class NewMission(_Form):
     """A new mission: an instruction, a program, or both; without a program, the model writes one."""
 
     instruction: _LimitedText = ""
-    model: Annotated[str, Field(max_length=200)] = Field("", description="By default, the first one.")
+    model: Annotated[str, Field(max_length=200)] = Field("", description="By default, the first model.")
     program: _LimitedText = ""
 
 
 class NewProgram(_Form):
-    """A program to check, or to replace the current one."""
+    """A program to check, or to replace the current program."""
 
     program: _LimitedText
 
@@ -59,13 +59,9 @@ class Approval(_Form):
 class AskAgainForm(_Form):
     """A request for another program."""
 
-    repair: bool = Field(
-        default=False,
-        description="Whether to send the model the program and its problems.",
-    )
+    repair: bool = Field(default=False, description="Whether to send the program and its problems.")
     max_tokens: Annotated[int, Field(ge=0)] = Field(
-        default=0,
-        description="Another limit for replies, such as `higher_limit` of `no_program`; 0 for none.",
+        0, description="A new token limit, such as `higher_limit` of `no_program`; 0 keeps the limit."
     )
 
 
@@ -73,7 +69,7 @@ class AsciiJSONResponse(JSONResponse):
     """ASCII-only JSON, because programs may contain lone surrogates."""
 
     def render(self, content: object) -> bytes:
-        """The response's body."""
+        """Encode the body of the response."""
         return json.dumps(content, separators=(",", ":")).encode("ascii")
 
 
@@ -96,13 +92,13 @@ def router(console: Console) -> APIRouter:
 def _add_missions(api: APIRouter, console: Console) -> None:
     @api.get("/missions")
     def list_missions() -> list[dict[str, Any]]:
-        """All missions, oldest first."""
+        """List all missions, oldest first."""
         with as_http_errors():
             return [asdict(summary) for summary in read_missions(console.home)]
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
-        """Begin a mission, which is written and checked in the background. Refused while a mission runs."""
+        """Begin a mission, and prepare its program in the background. Refused while a mission runs."""
         with as_http_errors():
             session = console.begin(MissionOrder(new.instruction, new.model, new.program))
         await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
@@ -112,7 +108,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.get("/missions/{mission}")
     def show(mission: str) -> dict[str, Any]:
-        """The current mission with its check, or the summary of a past one."""
+        """Return the current mission with its check, or the summary of a past mission."""
         view = console.view
         if mission in {_CURRENT, view.id}:
             return view_data(view)
@@ -128,14 +124,11 @@ def _add_missions(api: APIRouter, console: Console) -> None:
     @api.get("/missions/{mission}/events.mcap")
     def mcap(
         mission: str,
-        clock: Annotated[
-            Literal["wall", "robot"],
-            Query(description="`robot` for simulated time, else `wall`."),
-        ] = "wall",
+        clock: Annotated[Literal["wall", "robot"], Query(description="`robot` for simulated time.")] = "wall",
     ) -> Response:
         """Download the events as MCAP, for Foxglove."""
         with as_http_errors(), installed():
-            from codebotler.missions.mcap import write_mcap  # noqa: PLC0415 - of an extra of its own
+            from codebotler.missions.mcap import write_mcap  # noqa: PLC0415 - part of an optional extra
 
         summary, events = _read_mission(console, mission)
         file = io.BytesIO()
@@ -154,7 +147,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/again", status_code=202)
     def ask_again(mission: str, again: AskAgainForm) -> dict[str, Any]:
-        """Have the model write and check another program."""
+        """Ask the model for another program, and check it."""
         session = _current_session(console, mission)
         with as_http_errors():
             session.ask_again(repair=again.repair, max_tokens=again.max_tokens or None)
@@ -170,21 +163,21 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/stop", status_code=202)
     async def stop_mission(mission: str) -> dict[str, Any]:
-        """Stop the current mission; `state` tells when it has stopped."""
+        """Stop the current mission; `state` shows when it has stopped."""
         _current_session(console, mission)
         console.stop(BY_PAGE)
         return view_data(console.view)
 
     @api.post("/stop", status_code=202)
     async def stop(
-        *, only_moving: Annotated[bool, Query(description="Stop only a robot that runs a program.")] = False
+        *, only_moving: Annotated[bool, Query(description="Stop only if a program is running.")] = False
     ) -> dict[str, Any]:
-        """Stop the current mission, or only a running one; return whether there is one."""
+        """Stop the current mission; return whether there is a mission to stop."""
         return {"stopping": console.stop(BY_PAGE, only_moving=only_moving)}
 
     @api.get("/missions/{mission}/events", response_class=StreamingResponse)
     async def events(mission: str, last_event_id: Annotated[int, Header(ge=0)] = 0) -> StreamingResponse:
-        """Stream the events (server-sent), from the beginning or after `Last-Event-ID`."""
+        """Stream the events as server-sent events, from the beginning or after `Last-Event-ID`."""
         return StreamingResponse(
             _stream(console, _current_session(console, mission), last_event_id),
             media_type="text/event-stream",
@@ -209,7 +202,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
             bool, Query(description="Wait for the beginning of a mission, at most 15 s.")
         ] = False,
     ) -> dict[str, Any]:
-        """The robot, its skills and the current mission."""
+        """Return the robot, its skills and the current mission."""
         if once_begun:
             await console.view_once(over=False)
         view = await console.view_once(over=True) if once_over else console.view
@@ -229,7 +222,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
 
 
 async def _stream(console: Console, session: MissionSession, known: int) -> AsyncIterator[str]:
-    """Yield server-sent events; a slow reader misses nothing and delays nobody."""
+    """Yield server-sent events; a slow client misses no events and delays no other client."""
 
     def has_more() -> bool:
         return bool(session.events(known)) or session.view.is_over

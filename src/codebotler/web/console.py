@@ -28,16 +28,16 @@ from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
 
 MAX_PROGRAM_CHARACTERS = 200_000
-"""The limit for programs and instructions."""
+"""The maximum length of a program or an instruction."""
 
 MAX_WAIT_SECONDS = 15.0
-"""The longest time for which a request waits for a change."""
+"""The longest time that a request waits for a change."""
 
 
 class Console:
-    """Holds a robot, which only missions connect, and the current mission, for viewers on any thread.
+    """Holds the robot and the current mission for viewers on any thread; only missions connect the robot.
 
-    `models` are the names of available models, the default first.
+    `models` are the names of the available models, beginning with the default.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Console:
         self.interrupted: tuple[MissionSummary, ...] = ()
         self._open_model = open_model
         self._lock = threading.Lock()  # held briefly
-        self.session: MissionSession | None = None  # the current one, or the last one
+        self.session: MissionSession | None = None  # the current session, or else the last session
         self._checking = threading.Lock()
         self._held = ExitStack()
         self._pool: WorkerPool | None = None
@@ -83,12 +83,12 @@ class Console:
         return SessionView() if session is None else session.view
 
     async def view_once(self, *, over: bool) -> SessionView:
-        """Return the view once the mission is over, or has begun, or after `MAX_WAIT_SECONDS`."""
+        """Return the view once its `is_over` equals `over`, or after `MAX_WAIT_SECONDS`."""
         await self.notifier.until(lambda: self.view.is_over == over, MAX_WAIT_SECONDS)
         return self.view
 
     def begin(self, order: MissionOrder) -> MissionSession:
-        """Begin a mission, by default with the first model; raises MissionError while another one runs."""
+        """Begin a mission, by default with the first model; raise MissionError while another mission runs."""
         model = order.model.strip() or ("" if order.has_program else self.models[0])
         order = replace(order, instruction=order.instruction.strip(), model=model)
         for text in (order.instruction, order.program):
@@ -116,7 +116,7 @@ class Console:
         return session
 
     def edit(self, program: str) -> MissionSession:
-        """Replace the current program; after the end of a mission, begin another one."""
+        """Replace the current program; after the end of a mission, begin a new mission."""
         _check_length(program)
         session = self.session
         if session is None or session.view.is_over:
@@ -134,7 +134,7 @@ class Console:
         self.notifier.change()
 
     def stop(self, by: str, *, only_moving: bool = False) -> bool:
-        """Stop the mission, or only a running one, without waiting; return whether there is one."""
+        """Stop the mission, or only a running mission, without waiting; return whether one was found."""
         session, view = self.session, self.view
         if session is None or view.is_over or (only_moving and not view.is_running):
             return False
@@ -144,7 +144,7 @@ class Console:
     def check(
         self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()
     ) -> CheckResult:
-        """Check one program at a time; without a map, in the rooms that it names."""
+        """Check a program, one at a time; without a map, use the rooms that the program names."""
         with self._checking:
             if self._pool is None:
                 self._pool = self._held.enter_context(WorkerPool(1))
@@ -153,7 +153,7 @@ class Console:
 
 
 class Notifier:
-    """Wakes viewers at each change; they read the latest view, so no queue can grow."""
+    """Wakes viewers after each change; they read the latest view, so no queue can build up."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -167,7 +167,7 @@ class Notifier:
             wake()
 
     async def changes(self) -> AsyncGenerator[None]:
-        """Yield now and after changes; several during one iteration of the event loop count as one."""
+        """Yield once now and again after changes; changes in quick succession may be merged."""
         loop, changed = asyncio.get_running_loop(), asyncio.Event()
 
         def wake() -> None:
@@ -186,7 +186,7 @@ class Notifier:
                 self._wakes.remove(wake)
 
     async def until(self, is_met: Callable[[], bool], seconds: float | None = None) -> bool:
-        """Wait for a condition, at most some seconds; return whether it is met."""
+        """Wait until a condition is met, for at most `seconds`; return whether it is met."""
         with suppress(TimeoutError):
             async with asyncio.timeout(seconds), aclosing(self.changes()) as changes:
                 async for _ in changes:
@@ -196,7 +196,7 @@ class Notifier:
 
 
 def is_version_of(program: str, changed: str) -> bool:
-    """Whether an edited program keeps half of its lines, so that its instruction still applies."""
+    """Whether an edited program keeps at least half of its lines, so that its instruction still applies."""
     lines = [line for line in map(str.strip, program.splitlines()) if line]
     kept = set(map(str.strip, changed.splitlines()))
     return bool(lines) and 2 * sum(line in kept for line in lines) >= len(lines)

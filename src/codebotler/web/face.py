@@ -25,13 +25,13 @@ _FACE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"
 )
-"""Stricter than for NiceGUI's pages: no script can turn text into markup."""
+"""Stricter than the policy of NiceGUI's pages: no script can turn text into markup."""
 
 BY_FACE = "a person at the face"
 _BACK_LINK = '<a id="back" href="./">Operate the robot</a>'
-_BACK_PLACEHOLDER = "<!-- back -->"  # replaced for operators
+_BACK_PLACEHOLDER = "<!-- back -->"  # replaced by the link for operators
 MAX_FACE_TEXT, MAX_FACE_OPTION, MAX_FACE_OPTIONS = 2_000, 300, 50
-"""Limits for texts and options, in characters and number."""
+"""The maximum lengths of a text and an option in characters, and the maximum number of options."""
 
 
 class FaceAnswer(BaseModel):
@@ -57,7 +57,7 @@ def router(console: Console, face: Face) -> APIRouter:
 
     @routes.get("/api/face")
     async def show(*, once_over: bool = False, once_begun: bool = False) -> dict[str, Any]:
-        """What the robot does, says and asks; with `once_over`, after the end of the mission."""
+        """Return what the robot does, says and asks; `once_over` waits for the end of the mission."""
         if once_begun:
             await console.view_once(over=False)
         if once_over:
@@ -75,7 +75,7 @@ def router(console: Console, face: Face) -> APIRouter:
 
     @routes.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
-        """Stop a running mission; return whether there is one."""
+        """Stop a running mission; return whether there is a mission to stop."""
         return {"stopping": console.stop(BY_FACE, only_moving=True)}
 
     @routes.websocket("/api/face/live")
@@ -106,7 +106,7 @@ async def _send_changes(socket: WebSocket, console: Console, face: Face) -> None
 
 
 def face_data(console: Console, face: Face) -> dict[str, Any]:
-    """Return what a face shows, as plain data."""
+    """Return the contents of a face as plain data."""
     view, shown = console.view, face.shown
     question = shown.question
     is_moving = view.is_running and view.progress.is_driving

@@ -1,4 +1,4 @@
-"""The map of the rooms as SVG, with the robot, its trail and its finds."""
+"""Draw a map of the rooms as SVG, with the robot, its trail and its finds."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _MAX_LABEL_CHARACTERS, _MAX_FINDS = 60, 3
 
 @dataclass(frozen=True)
 class MapState:
-    """The contents of a map.
+    """The contents of a map besides the rooms.
 
     Args:
         at: the robot's position in metres, if known.
-        room: its room or destination; empty if unknown or between rooms.
-        is_driving: whether `room` is its destination.
-        trail: its previous positions.
-        finds: things and people that it found, by room.
-        held: the object that it holds.
+        room: the robot's room or destination; empty if it is unknown or between rooms.
+        is_driving: whether `room` is the destination.
+        trail: the robot's previous positions in metres.
+        finds: the objects and people that the robot has found, by room.
+        held: the object that the robot holds; empty if there is none.
     """
 
     at: Point | None = None
@@ -41,7 +41,7 @@ class MapState:
 
     @property
     def sentence(self) -> str:
-        """The contents in words."""
+        """A description of the contents."""
         where = "is between rooms" if self.at else ""
         if self.room:
             where = f"{'is driving to' if self.is_driving else 'is in'} {self.room}"
@@ -52,7 +52,7 @@ class MapState:
 
 
 def floorplan(world: World, state: MapState) -> str:
-    """Draw a world from above, with room names on top."""
+    """Return an SVG map of a world, seen from above."""
     rooms = laid_out(world).rooms[:MAX_DRAWN_ROOMS]
     points = [corner for one in rooms for corner in one.footprint or ()]
     points += [*state.trail, *([state.at] if state.at else [])]
@@ -86,7 +86,7 @@ def floorplan(world: World, state: MapState) -> str:
 
 
 def room_at(rooms: Iterable[Room], at: Point) -> str:
-    """Return the name of the room that contains a point; empty if there is none."""
+    """Return the name of the room that contains a point, or an empty string if no room does."""
     return next((one.name for one in rooms if one.footprint and is_within(at, one.footprint)), "")
 
 
@@ -103,7 +103,7 @@ def _robot(x: float, y: float) -> str:
 def _labels(
     room: Room, corners: Sequence[Point], on_map: Callable[[Point], Point], finds: Sequence[str]
 ) -> Iterator[str]:
-    """Yield a room's name at the wall farther from the robot, and its finds near it if there is space."""
+    """Yield a room's name at the wall farther from the robot, and its finds beside the name if they fit."""
     top, bottom = min(y for _, y in corners), max(y for _, y in corners)
     left, right = min(x for x, _ in corners), max(x for x, _ in corners)
     middle, stop = (left + right) / 2, on_map(room.stand_at)[1] if room.stand_at else bottom
@@ -137,7 +137,7 @@ def _text(x: float, y: float, size: float, text: str, kind: str) -> str:
 def _wrap(name: str) -> list[str]:
     """Split a long name into two lines of similar length."""
     words = name.split()
-    if len(words) < 2 or len(name) < 9:  # noqa: PLR2004 - two words, and longer than fits
+    if len(words) < 2 or len(name) < 9:  # noqa: PLR2004 - needs two words; shorter names fit
         return [name]
     at = min(range(1, len(words)), key=lambda n: max(len(" ".join(words[:n])), len(" ".join(words[n:]))))
     return [" ".join(words[:at]), " ".join(words[at:])]

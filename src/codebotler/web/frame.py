@@ -1,4 +1,4 @@
-"""The frame of all pages: the bar with STOP, plain texts and buttons, and the entry point for more pages."""
+"""The frame of all pages: the bar with STOP, plain text and buttons, and an entry point for more pages."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ _ENTRY_POINTS = "codebotler.pages"
 """The entry point group for pages of other packages."""
 
 PAGE_BUILD_SECONDS = 60.0
-"""The time limit for building a page, which may have to read a run first."""
+"""The time limit for building a page, which may first have to read a run."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Adds the bar to a page; STOP works without the rest of the page.
+    """Adds the bar to a page; its STOP button works even if the rest of the page does not.
 
     Args:
         links: the names and addresses of pages, in order.
-        brand: the name in the bar.
+        brand: the name shown in the bar.
         has_robot: whether to show STOP.
     """
 
@@ -43,7 +43,7 @@ class Frame:
     has_robot: bool = True
 
     def __call__(self, title: str, here: str, parts: Sequence[tuple[str, str]] = ()) -> None:
-        """Begin a page; the bar marks the address `here`, and on small screens links to `parts`."""
+        """Begin a page; the bar highlights the address `here`, and on small screens links to `parts`."""
         ui.page_title(f"{title} · {self.brand}")
         ui.add_head_html(_STYLESHEET_HTML.format(prefix=outside("")))
         if self.has_robot:
@@ -62,7 +62,7 @@ class Frame:
 
 
 def outside(address: str) -> str:
-    """Return the address that the browser must use for a path: behind a proxy, it may have a prefix."""
+    """Return the address that the browser must use for a path, which may have a prefix behind a proxy."""
     request = ui.context.client.request
     return prefix_of(request.scope) + address
 
@@ -76,7 +76,7 @@ def script(name: str) -> None:
 
 
 class PlainText(TextElement):
-    """An HTML element with a text; `kind` is its CSS classes."""
+    """An HTML element with plain text; `kind` contains its CSS classes."""
 
     def __init__(self, tag: str, text: str = "", kind: str = "") -> None:
         super().__init__(tag=tag, text=visible_lines(text))
@@ -84,7 +84,7 @@ class PlainText(TextElement):
         self.props("dir=auto")
 
     def say(self, text: str) -> None:
-        """Show another text; an empty one hides the element."""
+        """Replace the text; an empty text hides the element."""
         shown = visible_lines(text)
         if shown != self.text:
             self.text = shown
@@ -97,7 +97,7 @@ def scroll_up() -> None:
 
 
 def scroll_to(element: str) -> None:
-    """Scroll to the element with an ID."""
+    """Scroll to the element with the given ID."""
     ui.run_javascript(f"document.getElementById({element!r}).scrollIntoView()")
 
 
@@ -114,8 +114,8 @@ class Button(PlainText):
         self.props("type=button")
         self.on("click", pressed)
 
-    def allow(self, may: bool) -> None:  # noqa: FBT001 - one word after the verb
-        """Enable or disable it."""
+    def allow(self, may: bool) -> None:  # noqa: FBT001 - the only argument
+        """Enable or disable the button."""
         if may:
             self.props(remove="disabled")
         else:
@@ -127,11 +127,11 @@ class Button(PlainText):
 
 @dataclass(frozen=True)
 class Site:
-    """The site to which other packages add pages; the guard protects these, too, and excludes faces.
+    """The site to which other packages add pages; the guard protects these pages and keeps faces out.
 
     Args:
-        app: the application: API paths belong below `/api/`, files below `/static/`.
-        frame: call it first on each page.
+        app: the application; API routes belong below `/api/`, and files below `/static/`.
+        frame: the frame, which must be called first on each page.
         runs: the folder of runs.
     """
 
@@ -142,13 +142,13 @@ class Site:
 
 @dataclass(frozen=True)
 class Pages:
-    """Pages that another package adds.
+    """The pages that another package adds to a site.
 
     Args:
-        name: the name in the bar.
+        name: the name shown in the bar.
         brand: the name of the site if it has no other pages.
         address: the address of the first page.
-        add: adds the pages to a site.
+        add: a function that adds the pages to a site.
     """
 
     name: str
@@ -158,7 +158,7 @@ class Pages:
 
 
 def installed_pages() -> tuple[Pages, ...]:
-    """Load the pages of installed packages; those that fail are reported and left out."""
+    """Load the pages of installed packages; report and leave out pages that fail to load."""
     found: list[Pages] = []
     for point in sorted(entry_points(group=_ENTRY_POINTS), key=lambda point: point.name):
         try:

@@ -21,11 +21,11 @@ from codebotler.web.access import GuardRules, Role, TooManyTriesError
 from codebotler.web.proxy import OuterAddress, path_of, prefix_of
 
 MAX_BODY_BYTES = 2_000_000
-"""The limit for the body of a request."""
+"""The maximum size of a request body."""
 
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _FACE_PATHS = ("/face", "/api/face", "/static", "/favicon.ico")
-"""The paths for faces; NiceGUI's websocket would accept messages for any page by its number."""
+"""The paths that faces may use; NiceGUI's websocket is excluded, as it accepts messages for any page."""
 
 _PAGE_POLICY = (
     "default-src 'none'; script-src 'self' 'nonce-{nonce}' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
@@ -45,7 +45,7 @@ _SECURITY_HEADERS = {
     "permissions-policy": "camera=(), geolocation=(), payment=(), usb=(), microphone=(self)",
 }
 _HOST_HEADER = re.compile(r"(?:([a-z0-9._-]+)|\[([0-9a-f:.]+)\])(?::(\d{1,5}))?")
-"""Any port, because a tunnel or a proxy has its own."""
+"""Any port is allowed, because tunnels and proxies use ports of their own."""
 
 _MAX_PORT = 65_535
 _CONTROL_CHARACTERS = re.compile(r"[\x00-\x1f\x7f-\x9f]")
@@ -66,7 +66,7 @@ padding:0 1.5rem}}h1{{font-size:1.4rem}}</style><h1>{brand}</h1><p>{sentence}</p
 
 
 class RefusedError(Exception):
-    """A request is refused, with a status and a reason."""
+    """Raised to refuse a request with a status and a reason."""
 
     def __init__(self, status: HTTPStatus, sentence: str) -> None:
         super().__init__(status, sentence)
@@ -112,7 +112,7 @@ class Guard:
             await self._app(scope, receive, send)
 
     def _check_path(self, path: str) -> None:
-        if _CONTROL_CHARACTERS.search(path) and not self._has_page(path):  # names of runs may have them
+        if _CONTROL_CHARACTERS.search(path) and not self._has_page(path):  # names of runs may contain them
             raise RefusedError(HTTPStatus.BAD_REQUEST, _NO_CONTROL_CHARACTERS)
 
     def _check_host(self, request: HTTPConnection) -> None:
@@ -125,7 +125,7 @@ class Guard:
             )
 
     def _check_origin(self, request: HTTPConnection, proxy: OuterAddress | None) -> None:
-        """Refuse requests from foreign pages."""
+        """Refuse requests from pages of other sites."""
         headers, is_socket = request.headers, request.scope["type"] == "websocket"
         origin = headers.get("origin")
         host = headers.get("host", "") if proxy is None else proxy.host
@@ -140,7 +140,7 @@ class Guard:
             raise RefusedError(HTTPStatus.FORBIDDEN, _OTHER_SITE)
 
     def _why_not(self, origin: str, request: HTTPConnection, proxy: OuterAddress | None) -> str:
-        """Explain a foreign origin, which may be that of a proxy."""
+        """Explain why an origin was refused, since it may belong to a proxy that must be named."""
         outer = OuterAddress.found_in(origin)
         is_our_page = request.headers.get("sec-fetch-site") == "same-origin"
         if outer is None or not (is_our_page or outer.name == _host(request)):
@@ -150,7 +150,7 @@ class Guard:
         if outer.host in self._rules.proxies:
             return _HOST_CHANGED
         sentence = f"behind a proxy, start with --behind-proxy {outer.origin}, plus its path, if any"
-        if not self._has_noted:  # in the terminal, because the browser only shows a lost connection
+        if not self._has_noted:  # also in the terminal, because the browser shows only a lost connection
             self._has_noted = True
             note(f"a request was refused: {sentence}")
         return sentence
@@ -175,7 +175,7 @@ class Guard:
             ) from None
 
     def _let_in(self, token: str, request: HTTPConnection) -> Response:
-        """Exchange the token of a link for a cookie, to keep it out of the history."""
+        """Exchange the token in a link for a cookie, to keep the token out of the browser's history."""
         role = self._of_token(token, request)
         if role is None and self._rules.access.operator is not None:
             raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG)
@@ -206,13 +206,12 @@ class Guard:
 
 
 def _named_host(scope: Scope) -> str:
-    """The value of the only Host header; empty if there are none or several."""
+    """Return the Host header, or an empty string if there is none or more than one."""
     named = [value for name, value in scope["headers"] if name == b"host"]
     return named[0].decode("latin-1").lower() if len(named) == 1 else ""
 
 
 def _host(request: HTTPConnection) -> str:
-    """The requested host name."""
     found = _HOST_HEADER.fullmatch(_named_host(request.scope))
     if found is None or not 0 < int(found[3] or 80) <= _MAX_PORT:
         raise RefusedError(HTTPStatus.BAD_REQUEST, "send exactly one Host header, with a name and a port")
@@ -252,7 +251,7 @@ def _check_length(request: HTTPConnection) -> None:
 
 
 class _LimitedBody:
-    """Cuts off a request body that is too large, and adds security headers to the response."""
+    """Rejects request bodies that are too large, and adds security headers to responses."""
 
     def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self._scope, self._receive, self._send = scope, receive, send
@@ -307,7 +306,7 @@ def refusal(
     headers: Mapping[str, str],
     brand: str = "CodeBotler",
 ) -> Response:
-    """Return one sentence, as a page for browsers, else as JSON."""
+    """Build a response with one sentence, as a page for browsers and as JSON for other clients."""
     if "text/html" in request.headers.get("accept", ""):
         return HTMLResponse(_REFUSAL_PAGE.format(sentence=sentence, brand=brand), status, headers)
     return JSONResponse({"detail": sentence}, status, headers)

@@ -1,4 +1,4 @@
-"""Live updates of pages."""
+"""Update open pages when something changes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _UPDATE_PAUSE = 0.1
 
 
 async def follow(notifier: Notifier, update: Callable[[], Awaitable[None]]) -> None:
-    """Wait for the browser, then call `update` now and at each change while the page is open."""
+    """Once the browser connects, call `update` immediately and after each change, until it disconnects."""
     client, here = ui.context.client, ui.context.slot.parent
     await client.connected()
 

@@ -47,7 +47,7 @@ def add(console: Console, frame: Frame) -> None:
 
 
 def _next_step(view: SessionView) -> str:
-    """The operator's next step, which determines the order of panes on small screens."""
+    """Return the operator's next step, which determines the order of panes on small screens."""
     if view.is_running:
         return "watch"
     if not view.is_over:

@@ -1,4 +1,4 @@
-"""Addresses of the page at reverse proxies, and the requests that these pass on."""
+"""Support reverse proxies: parse the page's addresses there, and restore forwarded requests."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class OuterAddress:
     Args:
         scheme: https or http.
         host: the name and port, as in the Host header, without the scheme's default port.
-        prefix: the path of the page, such as /robot, or empty.
+        prefix: the path of the page, such as /robot; empty if there is none.
     """
 
     scheme: str
@@ -42,11 +42,11 @@ class OuterAddress:
 
     @classmethod
     def parse(cls, text: str) -> OuterAddress:
-        """Parse an address such as https://host:8443/robot; raises UserError if it is invalid."""
+        """Parse an address such as https://host:8443/robot; raise UserError if it is invalid."""
         address = cls.found_in(text)
         if address is None:
             quoted = f'"{elide_middle(text, _MAX_QUOTED)}" is not the address of a proxy'
-            raise UserError(f"{quoted}; write https://HOST, plus :PORT and /PATH, if any")
+            raise UserError(f"{quoted}; write https://HOST, with :PORT and /PATH if needed")
         return address
 
     @classmethod
@@ -61,7 +61,7 @@ class OuterAddress:
 
     @property
     def name(self) -> str:
-        """The name or numeric address of the host."""
+        """The name or IP address of the host, without the port."""
         return host_name(self.host)
 
     @property
@@ -71,34 +71,30 @@ class OuterAddress:
 
     @property
     def page(self) -> str:
-        """The address of the first page."""
+        """The address of the start page."""
         return f"{self.origin}{self.prefix}/"
 
     def seen_from_outside(self, scope: Scope) -> dict[str, Any]:
-        """Return a request with the browser's scheme and path, even if the proxy removed the prefix."""
+        """Return a request with the scheme and path of the browser, even if the proxy removed the prefix."""
         path, raw = scope["path"], scope.get("raw_path") or b""
         if self.prefix and path != self.prefix and not path.startswith(f"{self.prefix}/"):
             path, raw = self.prefix + path, self.prefix.encode() + raw
         if path == self.prefix:
             path, raw = f"{path}/", raw + b"/"
         headers = [(name, value) for name, value in scope["headers"] if name != _FORWARDED_PREFIX]
-        secure = (
-            _SECURE_SCHEMES.get(scope["scheme"], scope["scheme"])
-            if self.scheme == "https"
-            else scope["scheme"]
-        )
+        secure = _SECURE_SCHEMES if self.scheme == "https" else {}
         return {
             **scope,
             "path": path,
             "raw_path": raw,
             "root_path": self.prefix,
             "headers": headers,
-            "scheme": secure,
+            "scheme": secure.get(scope["scheme"], scope["scheme"]),
         }
 
 
 def outer_addresses(texts: Iterable[str]) -> tuple[OuterAddress, ...]:
-    """Parse addresses; raises UserError if one is invalid, or two have the same host."""
+    """Parse addresses; raise UserError if an address is invalid or two addresses have the same host."""
     found = tuple(dict.fromkeys(map(OuterAddress.parse, texts)))
     hosts = [address.host for address in found]
     for address in found:
@@ -108,7 +104,7 @@ def outer_addresses(texts: Iterable[str]) -> tuple[OuterAddress, ...]:
 
 
 def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
-    """Return the addresses from the command line, or else from config.yaml; raises UserError if invalid."""
+    """Return the addresses on the command line, or else in config.yaml; raise UserError if invalid."""
     file = config_file()
     if given or file is None or not file.is_file():
         return outer_addresses(given or ())
@@ -120,7 +116,7 @@ def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
 
 
 def addresses_by_host(addresses: Iterable[OuterAddress]) -> Mapping[str, OuterAddress]:
-    """Index addresses by Host header; some clients add the scheme's default port."""
+    """Index addresses by Host header, with and without the default port, which some clients add."""
     found: dict[str, OuterAddress] = {}
     for address in addresses:
         found[address.host] = address
@@ -136,7 +132,7 @@ def host_name(host: str) -> str:
 
 
 def prefix_of(scope: Mapping[str, Any]) -> str:
-    """Return the path of the page at the proxy; empty without one."""
+    """Return the path of the page at the proxy, or an empty string without a proxy."""
     prefix: str = scope.get("app_root_path", scope.get("root_path", ""))  # a mounted app changes root_path
     return prefix
 

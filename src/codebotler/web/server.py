@@ -1,4 +1,4 @@
-"""Serves the page and its API behind the guard, and prints the link that opens it."""
+"""Serve the page and its API behind the guard, and print the link that opens the page."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _PAGE_SOCKETS = "/_nicegui_ws/"
 """An operator's page keeps a websocket open below this path."""
 
 _STREAM_END_SECONDS = 3
-"""The time for streams to end when the server stops."""
+"""The time that streams have to end when the server stops, in seconds."""
 
 
 def serve(
@@ -55,9 +55,9 @@ def serve(
     *,
     alone_for: float | None = None,
 ) -> None:
-    """Serve the page, or without a console only other pages, until Ctrl-C, which also stops a running robot.
+    """Serve the page until Ctrl-C, which also stops a running robot; without a console, serve only `further`.
 
-    A running robot is also stopped `alone_for` seconds after the last operator left; None means never.
+    A running robot is also stopped `alone_for` seconds after the last operator has left, unless it is None.
     """
     with place.listen() as bound, console or nullcontext():
         port = bound.getsockname()[1]
@@ -69,7 +69,7 @@ def serve(
         guard = Guard(app, place.rules(access, port), partial(_has_page, pages))
         settings = uvicorn.Config(
             guard,
-            log_config=None,  # its log goes to our own
+            log_config=None,  # its messages go to our own log
             log_level=logging.WARNING,
             access_log=False,
             proxy_headers=False,
@@ -95,7 +95,8 @@ def _links(place: PageAddress, port: int, access: Access, console: Console | Non
     if not place.is_loopback:
         lines.append("Other machines can open this link, too. The connection is not encrypted.\n")
     if console and console.face is not None:
-        where = "here (--host lets other machines in)" if place.is_private else "on the robot's tablet"
+        here = "on this machine (others need --host)"
+        where = here if place.is_private else "on the robot's tablet"
         lines.append(f"Open the robot's face, which cannot run programs, {where}:\n")
         lines += links("face", access.face)
     return "\n".join(lines)
@@ -109,7 +110,7 @@ def _check_prefixes(app: FastAPI, place: PageAddress) -> None:
         first = proxy.prefix.split("/")[1] if proxy.prefix else ""
         if first and first in own:
             raise UserError(
-                f"--behind-proxy {proxy.page}: /{first} is a path of the page; choose another one"
+                f"--behind-proxy {proxy.page}: /{first} is already used by the page; choose another path"
             )
 
 
@@ -139,7 +140,7 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
         pages.add(Site(app, frame, runs))
     app.add_exception_handler(RequestValidationError, api.invalid_request)
     app.mount("/static", StaticFiles(directory=STATIC_FOLDER))
-    core.sio.eio.cors_allowed_origins = []  # NiceGUI allows all origins; the guard only ours
+    core.sio.eio.cors_allowed_origins = []  # NiceGUI allows all origins, but the guard only ours
     nicegui.app.config.socket_io_js_transports = ["websocket"]
     nicegui.app.add_exception_handler(HTTPStatus.NOT_FOUND.value, partial(_not_found, app, frame.brand))
     ui.run_with(
@@ -150,7 +151,7 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
         language="en-US",
         tailwind=False,
         reconnect_timeout=20.0,
-        gzip_middleware_factory=None,  # the guard adds nonces to uncompressed pages
+        gzip_middleware_factory=None,  # the guard can add nonces only to uncompressed pages
         show_welcome_message=False,
     )
     return app
@@ -176,9 +177,9 @@ def _is_taken(routes: Sequence[BaseRoute], method: str, path: str) -> bool:
 
 
 class Presence:
-    """ASGI middleware that calls `alone` after some seconds without an open operator's page.
+    """ASGI middleware that calls `alone` once no operator has had a page open for some seconds.
 
-    The call must return at once. The delay covers reloads.
+    `alone` must return at once. The delay allows operators to reload their page.
     """
 
     def __init__(self, app: ASGIApp, seconds: float, alone: Callable[[], object]) -> None:
@@ -187,7 +188,7 @@ class Presence:
         self._leaving: asyncio.TimerHandle | None = None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, and count open pages."""
+        """Pass on a request, and count the open pages."""
         is_operator = scope.get("state", {}).get("role") is Role.OPERATOR
         if not is_operator or scope["type"] != "websocket" or not path_of(scope).startswith(_PAGE_SOCKETS):
             await self._app(scope, receive, send)
@@ -204,7 +205,7 @@ class Presence:
 
 
 class _Server(uvicorn.Server):
-    """Stops the robot first at a signal."""
+    """A server that stops the robot before it handles a signal."""
 
     def __init__(self, config: uvicorn.Config, console: Console | None) -> None:
         super().__init__(config)

@@ -1,4 +1,4 @@
-"""Storyboards on the page: one strip for each kind of sampled world."""
+"""Draw storyboards on the page, with one strip for each kind of sampled world."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ _LEFT_OUT = "…"  # replaces rooms in a shortened strip
 class Action:
     """An action of the robot in a room."""
 
-    kind: str  # the event's, or `answer`
+    kind: str  # the kind of event, or `answer`
     text: str
-    step: int = field(default=0, compare=False)  # position in the trace, from 1; 0 for an answer
+    step: int = field(default=0, compare=False)  # the position in the trace, from 1; 0 for an answer
 
 
 @dataclass(frozen=True)
 class Scene:
     """A stay in a room."""
 
-    room: str  # the requested one if the drive fails
+    room: str  # the requested room if the drive fails
     deeds: tuple[Action, ...] = ()
     is_found: bool = True  # whether the room exists
-    step: int = field(default=0, compare=False)  # of the drive, in the trace, from 1; 0 at the start
+    step: int = field(default=0, compare=False)  # the drive's position in the trace, from 1; 0 at the start
 
 
 @dataclass(frozen=True)
 class Strip:
     """The scenes of one sampled world."""
 
-    world: str  # its description, as the first half of a sentence
+    world: str  # a description of the world, as the first half of a sentence
     scenes: tuple[Scene, ...]
     ending: str
     ends_well: bool
@@ -53,9 +53,9 @@ class Strip:
 class RouteProgress:
     """The progress of a robot along a strip."""
 
-    visited: tuple[str, ...] = ()  # rooms
-    looks: tuple[tuple[str, bool], ...] = ()  # objects, and whether they were found
-    answers: tuple[str | None, ...] = ()  # None for a question that failed
+    visited: tuple[str, ...] = ()  # the rooms of completed drives
+    looks: tuple[tuple[str, bool], ...] = ()  # objects that were looked for, and whether they were found
+    answers: tuple[str | None, ...] = ()  # the answers to questions; None for a question that failed
 
 
 NO_PROGRESS = RouteProgress()
@@ -63,7 +63,7 @@ _NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which ar
 
 
 def draw_strips(check: CheckResult, reached: RouteProgress = NO_PROGRESS) -> None:
-    """Draw what a robot would do according to a check; tick off visited rooms, and fold refuted strips."""
+    """Draw what a robot would do according to a check; tick off visited rooms, collapse refuted strips."""
     shown = strips(check)
     PlainText("h3", "What the robot would do" if shown else "")
     numbers = [scenes_reached(strip, reached) for strip in shown]
@@ -81,13 +81,13 @@ def draw_strips(check: CheckResult, reached: RouteProgress = NO_PROGRESS) -> Non
 
 
 def folded(numbers: Sequence[int | None]) -> list[bool]:
-    """Whether to fold each strip; if none matches, all are shown."""
+    """Return for each strip whether to collapse it; if no strip matches the run, show all strips."""
     is_among_them = any(number is not None for number in numbers)
     return [is_among_them and number is None for number in numbers]
 
 
 def scenes_reached(strip: Strip, reached: RouteProgress) -> int | None:
-    """The number of a strip's drives that the robot has made; None if its run differs from the strip."""
+    """Return how many drives of a strip the robot has completed, or None if its run differs from it."""
     is_whole = all(scene.room != _LEFT_OUT for scene in strip.scenes)
     seen = [look_text(*look) for look in reached.looks]
     has_seen = _texts(strip, CHECK)[: len(seen)] == seen
@@ -103,7 +103,7 @@ def scenes_reached(strip: Strip, reached: RouteProgress) -> int | None:
 
 
 def _has_heard(strip: Strip, answers: Sequence[str | None]) -> bool:
-    # Speech recognition may change an option's case and add blanks.
+    # Speech recognition may change the case of an option and add spaces.
     heard = [NO_ANSWER if answer is None else shortened(answer, _MAX_STEP_TEXT) for answer in answers]
     expected = _texts(strip, "answer")[: len(answers)]
     return [text.strip().casefold() for text in expected] == [text.strip().casefold() for text in heard]
@@ -116,7 +116,7 @@ def _texts(strip: Strip, kind: str) -> list[str]:
 def draw_scene(
     scene: Scene, wrong: Container[int] = frozenset(), *, is_reached: bool = False, anchor: str = ""
 ) -> None:
-    """Draw a stay in a room, and mark wrong steps; the id of a step is `anchor` and its number."""
+    """Draw a stay in a room, and mark wrong steps; the HTML ID of a step is `anchor` plus its number."""
     kinds = ["scene"] if scene.deeds or not scene.is_found else ["scene", "passing"]
     kinds += ["wrong"] * (scene.step in wrong) + ["reached"] * is_reached
     with ui.element("li").classes(" ".join(kinds)):
@@ -140,7 +140,7 @@ def _number(element: PlainText, step: int, anchor: str) -> None:
 
 
 def strips(check: CheckResult) -> list[Strip]:
-    """Return one strip for each outcome, those with problems first."""
+    """Return one strip for each distinct outcome, beginning with the outcomes that have problems."""
     different: dict[tuple[tuple[Scene, ...], str], tuple[bool, Strip]] = {}
     for sample in check.samples:
         strip = _strip(sample, check)
@@ -152,7 +152,7 @@ def strips(check: CheckResult) -> list[Strip]:
 def _strip(sample: Sample, check: CheckResult) -> Strip:
     error = sample.outcome.error
     if sample.in_vain:
-        ending = "The robot waits or searches in vain; this does not count as a problem."
+        ending = "The robot waits or searches without success; this does not count as a problem."
     elif error is not None:
         ending = f"Fails: {shortened(error.message, _MAX_STEP_TEXT)} ({shortened(error.kind)})"
     else:
@@ -165,7 +165,7 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
 def scenes(
     steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int | None] = frozenset()
 ) -> tuple[Scene, ...]:
-    """Return the scenes of a trace; a long one is shortened in the middle, except for needed steps."""
+    """Return the scenes of a trace; a long trace is shortened in the middle, but keeps all needed steps."""
     found: list[Scene] = [Scene(shortened(start, _MAX_STEP_TEXT))]
     for is_shown, some in select_steps(steps, needed):
         if not is_shown:
@@ -192,7 +192,7 @@ def _actions(step: Mapping[str, Any]) -> Sequence[Action]:
 
 
 def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the trace
-    """Return a look and its result in words."""
+    """Describe a look for an object and its result."""
     return _phrase(Event(CHECK, what, found=is_found))
 
 

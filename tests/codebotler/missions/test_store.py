@@ -134,7 +134,7 @@ WHOLE = {"id": "x", "state": "done", "robot": "sim", "created": 1.0}
 def test_summary_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
     folder = left(tmp_path, MissionState.DONE)
     (folder / SUMMARY_FILE).write_text(text)
-    with pytest.raises(UserError, match="not the summary") as error:
+    with pytest.raises(UserError, match="not a valid mission summary") as error:
         read_missions(tmp_path)
     assert error.value.file == folder / SUMMARY_FILE
     assert recover_missions(tmp_path) == [], "a robot can work nevertheless"
@@ -152,7 +152,7 @@ def test_event_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
     folder = left(tmp_path, MissionState.DONE, RUNNING)
     with (folder / EVENTS_FILE).open("a") as file:
         file.write(f"{text}\n")
-    with pytest.raises(UserError, match=r"JSON|not an event") as error:
+    with pytest.raises(UserError, match=r"JSON|not a mission event") as error:
         read_events(folder)
     assert (error.value.file, error.value.line) == (folder / EVENTS_FILE, 2)
 

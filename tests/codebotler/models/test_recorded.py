@@ -162,7 +162,7 @@ def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
         ({"temperature": float("nan")}, ["temperature", " nan", "0 to 100"]),
         ({"top_p": 0.0}, ["top-p", " 0", " 1"]),
         ({"top_p": 1.5}, ["top-p", " 1.5", " 1"]),
-        ({"max_tokens": 0}, ["tokens", " 0", " 1"]),
+        ({"max_tokens": 0}, ["token limit", " 0", " 1"]),
         ({"timeout": 0.0}, ["timeout", " 0 seconds"]),
         ({"base_url": "localhost:8000"}, ["base URL", "http:// or https://"]),
         ({"base_url": "http://a:99999/v1"}, ["base URL", "host and port"]),

@@ -217,7 +217,7 @@ def test_what_is_asked_wrongly_is_said(
     answer = server.call(method, path, body)
     assert answer.status == status, answer.text
     if status == 201:
-        assert "no recorded model" in until(server, lambda now: now["is_over"])["trouble"]
+        assert "unknown recorded model" in until(server, lambda now: now["is_over"])["trouble"]
 
 
 @pytest.mark.parametrize(

@@ -278,7 +278,7 @@ def test_there_is_no_face_unless_one_is_asked_for(tmp_path: Path) -> None:
     [
         (["--face-token", "short"], f"{MIN_TOKEN_LENGTH} characters"),
         (["--token", "x" * 20, "--face-token", "x" * 20], "must differ from the operator's"),
-        (["--no-token", "--face-token", "x" * 20], "--no-token works only"),
+        (["--no-token", "--face-token", "x" * 20], "--no-token cannot be combined"),
         (["--face-timeout", "0"], "'--face-timeout'"),
         (["--stop-when-alone", "0"], "'--stop-when-alone'"),
     ],

@@ -193,15 +193,17 @@ def test_a_token_is_made_for_each_start() -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--no-token", "--host", "0.0.0.0"], "--no-token works only"),
+        (["--no-token", "--host", "0.0.0.0"], "--no-token cannot be combined"),
         *(
-            pytest.param(["--no-token", "--host", host], "--no-token works only", marks=pytest.mark.slow)
+            pytest.param(
+                ["--no-token", "--host", host], "--no-token cannot be combined", marks=pytest.mark.slow
+            )
             for host in ("::", "0", "127.example", "")
         ),
-        (["--no-token", "--token", "x" * 20], "--no-token works only"),
-        (["--no-token", "--behind-proxy", "https://robot.example"], "--no-token works only"),
-        (["--behind-proxy", "https://robot.example/missions"], ": /missions is a path of the page"),
-        (["--behind-proxy", "https://robot.example/_nicegui/x"], ": /_nicegui is a path of the page"),
+        (["--no-token", "--token", "x" * 20], "--no-token cannot be combined"),
+        (["--no-token", "--behind-proxy", "https://robot.example"], "--no-token cannot be combined"),
+        (["--behind-proxy", "https://robot.example/missions"], ": /missions is already used by the page"),
+        (["--behind-proxy", "https://robot.example/_nicegui/x"], ": /_nicegui is already used by the page"),
         (["--behind-proxy", "robot.example"], "https://HOST"),
         (["--token", "short"], "too short"),
         (["--host", "999.1.1.1"], "cannot listen"),

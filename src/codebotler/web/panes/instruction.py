@@ -33,7 +33,7 @@ _ABOUT_RECORDED = (
 
 
 class InstructionPane:
-    """Takes an instruction and the choice of a model."""
+    """Lets an operator write an instruction and choose a model."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -49,9 +49,7 @@ class InstructionPane:
                 .on("keydown.ctrl.enter", self._ask)
             )
             self._model = ui.select(
-                {name: visible(name) for name in console.models},
-                value=console.models[0],
-                label="Model",
+                {name: visible(name) for name in console.models}, value=console.models[0], label="Model"
             )
             self._model.props("outlined dense").on_value_change(self._about_model)
             self._about = PlainText("p", _ABOUT_RECORDED, "quiet")
@@ -66,7 +64,7 @@ class InstructionPane:
     async def load(self) -> None:
         """Add the examples and the recent instructions."""
         shown = await asyncio.to_thread(examples, self._console)
-        if not self._examples.is_deleted:  # the page may be closed by now
+        if not self._examples.is_deleted:  # the page may have been closed in the meantime
             self._fill(self._examples, "Examples", [(text, "") for text in shown])
         await self._load_recent()
 
@@ -83,7 +81,7 @@ class InstructionPane:
             self._fill(self._recent, "Recent", texts)
 
     def show(self, view: SessionView) -> None:
-        """Show a view."""
+        """Update the pane for a view."""
         if view.number != self._number:
             self._number = view.number
             if (self._text.value or "").strip() in {"", self._asked}:  # keep text that is being typed

@@ -42,7 +42,7 @@ class MissionFilter:
         return f"?{urlencode(chosen)}" if chosen else ""
 
     def shows(self, summary: MissionSummary) -> bool:
-        """Whether the filter shows a mission."""
+        """Whether a mission passes the filter."""
         has_state = self.state in {"", summary.state} and self.robot in {"", summary.robot}
         texts = (summary.instruction, summary.program, summary.reason)
         return has_state and any(self.text.casefold() in text.casefold() for text in texts)
@@ -79,7 +79,7 @@ class _MissionList:
         self._list = ui.element("ol").classes("rows")
 
     async def update(self) -> None:
-        """Read and show the missions again if the current one has changed its state."""
+        """Reload the list if the state of the current mission has changed."""
         view = self._console.view
         seen = (view.id, view.state, view.reason)
         if seen == self._seen:
@@ -91,12 +91,8 @@ class _MissionList:
             return
         self._seen = seen
         self._error.say("")
-        _set_options(
-            self._state, "All states", {summary.state for summary in self._known}, self._chosen.state
-        )
-        _set_options(
-            self._robot, "All robots", {summary.robot for summary in self._known}, self._chosen.robot
-        )
+        _set_options(self._state, "All states", {one.state for one in self._known}, self._chosen.state)
+        _set_options(self._robot, "All robots", {one.robot for one in self._known}, self._chosen.robot)
         self._show()
 
     def _choose(self) -> None:
@@ -143,7 +139,7 @@ def _count_text(found: int, known: int) -> str:
 
 
 class _MissionRow:
-    """An entry of the list."""
+    """An entry in the list of missions."""
 
     def __init__(self, mission: str) -> None:
         with ui.element("li") as self.element, html.a(href=outside(f"{_MISSIONS_PATH}/{mission}")):
@@ -154,7 +150,7 @@ class _MissionRow:
             self._state = PlainText("small")
 
     def show(self, summary: MissionSummary) -> None:
-        """Show a mission."""
+        """Update the entry for a mission."""
         self._time.say(f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
         self._title.say(shortened(title(summary), _MAX_TITLE))
         reason = (

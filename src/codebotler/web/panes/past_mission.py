@@ -22,10 +22,10 @@ from codebotler.web.live import follow
 
 MAX_LISTED_EVENTS, _MAX_CODE_CHARACTERS = 1_000, 200
 _STATE_TITLES: Mapping[str, str] = {MissionState.DRAFTING: "Program written", MissionState.RUNNING: "Started"}
-"""Names of states in the timeline; others are used as they are."""
+"""The titles of states in the timeline; other states keep their own names."""
 
 _STATES_IMPLIED_BY_STOP = frozenset({MissionState.STOPPING, MissionState.STOPPED})
-"""States that are not shown after a stop."""
+"""The states that the timeline hides after a stop."""
 
 
 def add(console: Console, frame: Frame) -> None:
@@ -47,13 +47,13 @@ def add(console: Console, frame: Frame) -> None:
 
 
 async def _update(console: Console, page: _MissionPage) -> None:
-    """Refresh the page, if it shows the current mission of this process."""
+    """Refresh the page if it shows the current mission of this process."""
     if page.mission == console.view.id and not page.has_ended:
         page.show(*await asyncio.to_thread(_read, console, page.mission))
 
 
 def timeline(events: Sequence[LogLine]) -> Iterator[tuple[LogLine, str]]:
-    """Yield the visible events in words; a stop includes the activity that it interrupted."""
+    """Yield the visible events with their descriptions; a stop includes the activity that it interrupted."""
     doing, is_stopped = "", False
     for number, line in enumerate(events):
         event = line["event"]
@@ -72,7 +72,7 @@ def timeline(events: Sequence[LogLine]) -> Iterator[tuple[LogLine, str]]:
 
 
 def timeline_text(line: LogLine, *, is_first: bool) -> str:
-    """Return the text of an event in the timeline; empty if it is hidden."""
+    """Return the text of an event in the timeline, or an empty string if the event is hidden."""
     event = line["event"]
     if event == "state":
         state, reason = line["state"], shortened(line.get("reason", ""))
@@ -145,7 +145,7 @@ def _draw_header(summary: MissionSummary) -> None:
 
 
 def _last_line(summary: MissionSummary) -> str:
-    """The line of the program at which the mission ended, unindented; empty if unknown."""
+    """Return the unindented program line at which the mission ended, or an empty string if unknown."""
     lines, number = ["", *summary.program.split("\n")], summary.line or 0
     return lines[number].strip() if 0 < number < len(lines) else ""
 

@@ -31,11 +31,11 @@ _MAX_PROBLEMS = 20
 
 
 class ProgramPane:
-    """Shows the current program; takes edits and the approval."""
+    """Shows the current program, and lets an operator edit and approve it."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._received = 0  # the number of the last text from this browser
+        self._received = 0  # the number of the last text received from this browser
         self._sent: dict[str, object] = {}
         self._drawn: tuple[object, ...] = ()
         script("editor.js")
@@ -65,7 +65,7 @@ class ProgramPane:
         ui.run_javascript(f"programEditor.start({self._editor.id})")
 
     def show(self, view: SessionView) -> None:
-        """Show a view."""
+        """Update the pane for a view."""
         self._view = view
         shown = _for_editor(view.arriving.code if view.is_written else view.program)
         self._send(view, shown)
@@ -83,7 +83,7 @@ class ProgramPane:
             self._draw(view, reached)
 
     def _send(self, view: SessionView, shown: str, *, force: bool = False) -> None:
-        """Send a program and its marks to the browser, which keeps newer text of its own."""
+        """Send a program and its marks to the browser, which keeps its own text if that is newer."""
         content: dict[str, object] = {
             "program": shown,
             "marks": [
@@ -115,7 +115,7 @@ class ProgramPane:
         self.show(self._console.view)
 
     def _restore(self, why: str) -> None:
-        """Show the console's program again, and a warning."""
+        """Show the console's program again, with a warning."""
         view = self._console.view
         self._send(view, _for_editor(view.program), force=True)
         warn(why, 10.0)
@@ -174,7 +174,7 @@ class ProgramPane:
                 scroll_up()
 
     async def _is_seen(self, view: SessionView) -> bool:
-        """Whether this browser shows exactly that program: two people may type at the same time."""
+        """Whether this browser shows exactly the view's program; two people may type at the same time."""
         seen = await ui.run_javascript("programEditor.settle()", timeout=5.0)
         if seen["text"] == _for_editor(view.program):
             return True
@@ -213,7 +213,7 @@ class ProgramPane:
 
 
 def route_progress(view: SessionView) -> RouteProgress:
-    """Return the robot's progress, with the check's names of rooms."""
+    """Return the robot's progress, with rooms named as in the check."""
     named = view.room_map or (view.check and view.check.room_map)
     if not named:
         return RouteProgress()
@@ -247,7 +247,7 @@ def _skill_marks(program: str) -> list[dict[str, Any]]:
 
 
 def _escape_marks(program: str) -> list[dict[str, Any]]:
-    """Marks that escape characters that are invisible or change the direction of text."""
+    """Return marks that escape characters that are invisible or change the direction of text."""
     hidden = ((at, one) for at, one in enumerate(program) if not (one.isprintable() or one in "\t\n"))
     marks: list[dict[str, Any]] = []
     for at, one in islice(hidden, _MAX_ESCAPES):
@@ -257,7 +257,6 @@ def _escape_marks(program: str) -> list[dict[str, Any]]:
 
 
 def _current_line(view: SessionView) -> list[dict[str, Any]]:
-    """A mark for the line that is running or has failed."""
     line = view.progress.line if view.is_running else view.line
     kind = "running-line" if view.is_running else "failed-line"
     is_there = line is not None and line <= view.program.count("\n") + 1
@@ -265,7 +264,6 @@ def _current_line(view: SessionView) -> list[dict[str, Any]]:
 
 
 def _problem_marks(found: CheckResult | None, program: str) -> list[dict[str, Any]]:
-    """Marks for lines with problems, and their messages."""
     if found is None:
         return []
     lines = program.split("\n")

@@ -1,4 +1,4 @@
-"""The question on the robot's face, which operators can answer, too."""
+"""The pane with the question on the robot's face, which operators can answer, too."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MAX_OPTIONS, _MAX_OPTION_CHARACTERS = 50, 200
 
 
 class QuestionPane:
-    """Shows the question, and the number of open faces."""
+    """Shows the robot's question, and the number of screens that show the face."""
 
     def __init__(self, face: Face) -> None:
         self._face = face
@@ -23,7 +23,7 @@ class QuestionPane:
         self._box = ui.element("div").classes("asking").props('role=group aria-label="What the robot asks"')
 
     def show(self, *, is_over: bool) -> None:
-        """Show the current question; during a mission, recommend to open the face."""
+        """Show the current question; during a mission, recommend opening the face if no screen shows it."""
         screens = self._face.screens
         shown = f"The robot's face is open on {counted(screens, 'screen')}."
         nobody = "" if is_over else "Open the robot's face so people can see what it says and asks."

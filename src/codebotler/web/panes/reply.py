@@ -1,4 +1,4 @@
-"""The text of a model's reply, while it arrives and if it contains no program."""
+"""The pane with a model's reply, shown while it arrives and if it contains no program."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from codebotler.missions.view import SessionView
 from codebotler.web.frame import PlainText
 
 _MAX_CHARACTERS = 6_000
-"""The limit for a reply: its end is shown while it arrives, its beginning afterwards."""
+"""The maximum length of the shown part of a reply: the end while it arrives, then the beginning."""
 
 
 class ReplyPane:
-    """Shows a model's text, and why there is no program."""
+    """Shows a model's reply, and why it contains no program."""
 
     def __init__(self) -> None:
         self._why = PlainText("p", "", "programless").props("role=alert")
@@ -20,14 +20,14 @@ class ReplyPane:
         self._reasoning = _Folded("The model's reasoning", is_open=False)
 
     def show(self, view: SessionView) -> None:
-        """Show a view."""
+        """Update the pane for a view."""
         why = text = reasoning = ""
         none = view.programless
         if view.is_written:
             text = view.arriving.text
         elif none is not None and (view.may_be_approved or view.waits_for_program):
             why = none.sentence + (" The previous program is kept." if view.program else "")
-            text = "" if none.sentence.endswith(none.text.strip()) else none.text  # else quoted twice
+            text = "" if none.sentence.endswith(none.text.strip()) else none.text  # do not quote it twice
             reasoning = "" if none.reasoning in none.text else none.reasoning
         self._why.say(why)
         self._text.say(text, is_arriving=view.is_written)
@@ -35,7 +35,7 @@ class ReplyPane:
 
 
 class _Folded:
-    """A text that can be folded."""
+    """A collapsible text with a title."""
 
     def __init__(self, title: str, *, is_open: bool) -> None:
         self._box = html.details().classes("reply").props("open" if is_open else "")
@@ -44,7 +44,7 @@ class _Folded:
             self._text = PlainText("div", "", "text").props("tabindex=0")
 
     def say(self, text: str, *, is_arriving: bool = False) -> None:
-        """Show a text; an empty one hides the element."""
+        """Show a text; an empty text hides the element."""
         self._box.set_visibility(bool(text.strip()))
         if len(text) > _MAX_CHARACTERS:
             text = f"… {text[-_MAX_CHARACTERS:]}" if is_arriving else f"{text[:_MAX_CHARACTERS]} …"

@@ -54,7 +54,7 @@ class RobotPane:
         self._interrupted.set_visibility(False)
 
     def show(self, view: SessionView) -> None:
-        """Show a view."""
+        """Update the pane for a view."""
         self._show_interrupted(self._console.interrupted)
         progress = view.progress
         self._state.say(_headline(view))
@@ -85,7 +85,7 @@ class RobotPane:
             self._map.set_content(floorplan(world, state))
 
     def _draw_moments(self, moments: tuple[Moment, ...]) -> None:
-        """Append new moments, and scroll to them; redraw all for another mission."""
+        """Append new moments and scroll to them; for another mission, redraw the whole list."""
         if moments == self._drawn:
             return
         known = len(self._drawn)

@@ -1,4 +1,4 @@
-"""The house rules, which can be switched off for one program."""
+"""The pane with the house rules, which can be switched off for one program."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MAX_RULES, _MAX_RULE_CHARACTERS, _MAX_SWITCH_OFF_REASON = 100, 300, 500
 
 
 class RulesPane:
-    """Lists the rules, if any."""
+    """Lists the house rules, if there are any."""
 
     def __init__(self, console: Console) -> None:
         self._console = console

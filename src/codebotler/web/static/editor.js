@@ -1,4 +1,4 @@
-// The editor: sends typed text to the server and shows the server's program, without either overwriting the other.
+// The editor: sends typed text to the server, and shows the server's program without overwriting newer text.
 globalThis.programEditor = (() => {
   const PAUSE = 300; // ms without a key press before typed text is sent
   const MOST = 200_000; // characters that the server accepts
@@ -11,7 +11,7 @@ def task_program():
   let editor; // NiceGUI's component, once it is loaded
   let latest; // the latest state from the server
   let sent = 0; // the number of texts sent
-  let waiting; // the timer for the next one
+  let waiting; // the timer for sending the next text
   let base = ""; // the server's program on which local edits are based
 
   const text = () => editor.editor.state.doc.toString();
@@ -34,7 +34,7 @@ def task_program():
   const apply = () => {
     editor.setDisabled(!latest.editable);
     const isOlder = waiting !== undefined || latest.received < sent;
-    if (isOlder && !latest.force) return; // the server's answer to the newest text is still to come
+    if (isOlder && !latest.force) return; // the server has not yet answered the newest text
     clearTimeout(waiting);
     waiting = undefined;
     base = latest.program;
@@ -42,7 +42,7 @@ def task_program():
     editor.setDecorations(latest.marks);
   };
 
-  /** Replace only the part that differs, to keep cursors; local undo does not cover it. */
+  /** Replace only the part that differs, so that cursors stay in place; local undo skips this change. */
   const put = (program) => {
     const [view, old] = [editor.editor, text()];
     if (old === program) return;

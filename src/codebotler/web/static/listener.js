@@ -1,4 +1,4 @@
-// Recognizes one of the options by the browser's speech recognition; people confirm it elsewhere.
+// Recognizes a spoken option with the browser's speech recognition; face.js asks people to confirm it.
 const Recognition = window.SpeechRecognition ?? window.webkitSpeechRecognition;
 const ERRORS = {
   "not-allowed": "The browser blocks the microphone. Please tap an answer.",
@@ -16,7 +16,7 @@ const plain = (text) =>
     .replace(/[^\p{L}\p{N}]+/gu, " ")
     .trim();
 
-/** The position of the only matching option; -1 if none or several match. */
+/** Return the position of the only matching option, or -1 if none or several match. */
 export function match(heard, options) {
   const words = options.map(plain);
   for (const one of heard.map(plain)) {

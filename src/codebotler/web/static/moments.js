@@ -1,4 +1,4 @@
-// The activity list: scrolls to new entries, unless somebody has scrolled up to read.
+// The activity list: scrolls to new entries, unless a person has scrolled up to read.
 globalThis.moments = (() => {
   const NEAR = 60; // pixels from the end that still count as the end
   let shown = 0; // the previous height of the list

@@ -1,13 +1,13 @@
-// Speaks texts by the browser's speech synthesis; remembers whether it is muted.
+// Speaks texts with the browser's speech synthesis, and remembers whether it is muted.
 const KEY = "codebotler-muted";
-const LONGEST = 600; // characters of one text
+const LONGEST = 600; // the maximum number of characters of a text
 
 export class Speaker {
   exists = "speechSynthesis" in window && "SpeechSynthesisUtterance" in window;
   isMuted = localStorage.getItem(KEY) === "yes";
   isSpeaking = false;
 
-  /** @param changed called with whether it speaks */
+  /** @param changed called with true when speech begins, and with false when it ends */
   constructor(changed) {
     this.changed = changed;
     this.waiting = 0;
