@@ -326,7 +326,7 @@ def test_a_run_that_is_deleted_while_it_is_looked_at(few_runs: Path, opened: Ope
         expect(page.get_by_role("alert")).to_have_text(re.compile("^This run was deleted"))
         expect(page.locator(".heat td").first).to_be_visible()
         page.reload()
-        expect(page.get_by_role("alert")).to_contain_text('there is no run "hasty" in this folder')
+        expect(page.get_by_role("alert")).to_contain_text('this folder has no run "hasty"')
         page.get_by_role("link", name="All runs").click()
         expect(page.get_by_text("There are no runs yet.")).to_be_visible()
         page.context.close()

@@ -62,7 +62,7 @@ def test_pages(
     expect(page.locator(".problem-line")).to_be_visible()
     look("problems")
     office.rest()
-    for name, path in (("missions", "missions"), ("mission", f"missions/{mission}"), ("api", "api")):
+    for name, path in (("missions", "missions"), ("mission", f"missions/{mission}")):
         page.goto(f"http://localhost:{office.port}/{path}")
         expect(page.locator("h1")).to_be_visible()
         look(name)

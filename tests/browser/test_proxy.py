@@ -99,7 +99,7 @@ def test_the_page_lives_and_stops_the_robot(site: Site, opened: OpenPage) -> Non
 
 def test_no_address_leaves_the_path_of_the_page(site: Site, opened: OpenPage) -> None:
     page = opened(site.server, link=site.link())
-    for path in ("", "missions", "runs", "runs/careful", "api", "face"):
+    for path in ("", "missions", "runs", "runs/careful", "face"):
         page.goto(f"{site.proxy.address}/{path}")
         page.wait_for_load_state("networkidle")
         found = addresses(page)
