@@ -87,7 +87,7 @@ def test_nobody_is_listened_to_before_somebody_switches_it_on(server: PageServer
     face = hearing(server, opened)
     voice = face.get_by_role("switch", name="Answer by voice")
     expect(voice).not_to_be_checked()
-    expect(voice).to_have_accessible_description(re.compile("many browsers send speech to their vendor"))
+    expect(voice).to_have_accessible_description(re.compile("many browsers send your voice to their vendor"))
     expect(face.locator("#voice-about")).to_be_visible()
     server.run(ASKS)
     expect(option(face, "Yes")).to_be_enabled()

@@ -14,7 +14,7 @@ def test_pages_that_refuse(server: PageServer, opened: OpenPage, screen: Screen)
     _, size, dark = screen
     address = f"http://localhost:{server.port}/"
     page = opened(server, size=size, dark=dark, link=address, expecting="Failed to load resource")
-    expect(page.locator("p")).to_contain_text("open the link")
+    expect(page.locator("p")).to_contain_text("open the printed link")
     expect_no_grave_fault(page)
     page.goto(f"{server.link}x")
     expect(page.locator("p")).to_have_text("this token is wrong")
