@@ -91,7 +91,7 @@ class Ledger:
                 return Outcome(Status.FINISHED, self.robot.trace)
             case {"end": "timeout"}:
                 return self.outcome(
-                    Status.TIMEOUT, "TimeoutError", f"{self.limits.ticks:,} loop iterations", line
+                    Status.TIMEOUT, "TimeoutError", f"{self.limits.ticks:,} turns of loops", line
                 )
             case {"end": "robot-error", "number": int(number)} if 0 <= number < len(self.errors):
                 error = self.errors[number]
