@@ -40,6 +40,7 @@ NOT_RUN = {
     "roboeval-plus.md": ["takes minutes"],
     "robots.md": ["needs pyrobosim, with which `make test-pyrobosim` tests the robot"],
     "ros1.md": ["needs root, and a Debian or Ubuntu"],
+    "serve.md": ["needs a running server"],
     "training.md": [
         *("needs a model behind it", "needs a model behind it", "needs a model behind it"),
         "needs a package of its own",
