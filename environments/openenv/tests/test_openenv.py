@@ -26,7 +26,7 @@ from openenv.validation.parsers.openenv_yaml import OpenEnvYamlParser
 from openenv.validation.runtime.collector import collect_runtime_evidence
 from openenv.validation.runtime.contracts import load_runtime_plan
 
-from roboeval.suites.families.suite import SPLITS
+from roboeval.suites.families.suite import FIRST_SEEDS
 from roboeval.suites.families.tasks import family_file, family_names, trained_task
 from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
@@ -96,7 +96,7 @@ def solution(session: Session) -> str:
 # --- prompts
 
 
-@pytest.mark.parametrize("split", SPLITS)
+@pytest.mark.parametrize("split", FIRST_SEEDS)
 def test_a_reset_gives_the_prompt_of_load_prompts(session: Session, split: str) -> None:
     result = session.reset(seed=5, split=split)
     (row,) = load_prompts(split, count=1, seed=5)

@@ -45,7 +45,7 @@ def test_a_failure_of_the_engine_is_an_error(monkeypatch: pytest.MonkeyPatch) ->
     def broken(*_: object) -> object:
         raise EngineError("no process can be started")
 
-    monkeypatch.setattr(rollouts, "_judged", broken)
+    monkeypatch.setattr(rollouts, "_judge_batch", broken)
     rows = load_prompts("train", count=1, seed=77, only=[FAMILY])
     with pytest.raises(EngineError, match="no process"):
         reward(["    say('a')\n"], **columns(rows))

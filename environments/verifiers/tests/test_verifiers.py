@@ -31,7 +31,7 @@ from verifiers.v1.graph import MessageNode
 from verifiers.v1.runtimes import make_runtime
 from verifiers.v1.utils.loaders import environment_class, resolve_env_config, taskset_class
 
-from codebotler.simulator.pool import SHARED, shared_pool
+from codebotler.simulator.pool import SHARED_POOL, shared_pool
 from codebotler.simulator.worker import EngineError
 from roboeval.suites.families.tasks import trained_task
 from roboeval.training.prompts import load_prompts
@@ -153,7 +153,7 @@ def broken_engine() -> Iterator[None]:
     try:
         yield
     finally:
-        SHARED.end()  # the next call starts another
+        SHARED_POOL.end()  # the next call starts another
 
 
 def test_a_failure_of_the_engine_is_no_reward(task: TrainingTask) -> None:

@@ -20,7 +20,7 @@ REASON = "torch and transformers are not installed; `make test-transformers` has
 torch = pytest.importorskip("torch", reason=REASON)
 transformers = pytest.importorskip("transformers", reason=REASON)
 tokenizers = pytest.importorskip("tokenizers", reason=REASON)
-BLOCK = pytest.importorskip("codebotler.models.local").BLOCK
+SEED_BLOCK = pytest.importorskip("codebotler.models.local").SEED_BLOCK
 
 T = TypeVar("T")
 PROMPT = prompt_for("Go to the lab.")
@@ -168,7 +168,7 @@ SEEDED = SamplingSettings(temperature=1.0, top_p=1.0, max_tokens=12, seed=5)
 
 
 def test_with_a_seed_each_number_has_its_own_reply_wherever_a_run_was_resumed(babbler: str) -> None:
-    numbers = range(BLOCK + 3)
+    numbers = range(SEED_BLOCK + 3)
     texts = [reply.text for reply in replies(babbler, SEEDED, *numbers)]
     assert len({*texts}) == len(numbers)
     for resumed in (numbers[4:], numbers[-1:], (3, 1)):
@@ -185,11 +185,11 @@ def test_replies_of_a_block_are_written_once(babbler: str) -> None:
             return generate(**options)
 
         model.model.generate = watched
-        for number in range(BLOCK + 1):
+        for number in range(SEED_BLOCK + 1):
             await model.reply(PROMPT, number=number)
         return sizes
 
-    assert run(ask()) == [BLOCK, BLOCK]
+    assert run(ask()) == [SEED_BLOCK, SEED_BLOCK]
 
 
 def test_without_a_seed_no_two_replies_are_alike_and_without_temperature_all_are(babbler: str) -> None:

@@ -283,6 +283,6 @@ def test_nodes_that_are_killed_lose_nothing_until_there_is_none(
             nodes.kill()
     assert there == here
     nodes.kill()
-    monkeypatch.setattr(rayengine, "PATIENCE_S", 1)
+    monkeypatch.setattr(rayengine, "RAY_POLL_SECONDS", 1)
     with pytest.raises(EngineError, match="no free core"):
         list(cluster.map_distinct(NUMBERS, numbered(range(2)), int))

@@ -12,12 +12,12 @@ from codebotler.core.errors import UserError
 from codebotler.core.words import listed
 from codebotler.simulator.worker import EngineError
 from codebotler_openenv.models import CodebotlerAction, CodebotlerObservation, CodebotlerState, Message
-from roboeval.suites.families.suite import SPLITS
+from roboeval.suites.families.suite import FIRST_SEEDS
 from roboeval.suites.families.tasks import family_names
 from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Components, Rollout, judge
 
-SEEDS = SPLITS["validation"] - SPLITS["train"]
+SEEDS = FIRST_SEEDS["validation"] - FIRST_SEEDS["train"]
 """The number of seeds of a split; larger ones belong to another split."""
 
 

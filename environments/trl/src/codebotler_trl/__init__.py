@@ -11,7 +11,7 @@ from typing import Any
 
 from datasets import Dataset  # type: ignore[import-untyped]  # datasets has no types
 
-from roboeval.training.prompts import Completion, Form, program_in
+from roboeval.training.prompts import PolicyReply, PromptForm, program_in
 from roboeval.training.prompts import load_prompts as rows_of
 from roboeval.training.rollouts import Components, Rollout, judge
 
@@ -19,7 +19,12 @@ __all__ = ["load_prompts", "parses", "passed", "requirements", "reward", "withou
 
 
 def load_prompts(
-    split: str = "train", *, count: int = 1_000, seed: int = 0, only: Sequence[str] = (), form: Form = "chat"
+    split: str = "train",
+    *,
+    count: int = 1_000,
+    seed: int = 0,
+    only: Sequence[str] = (),
+    form: PromptForm = "chat",
 ) -> Dataset:
     """Create a data set of prompts; see `roboeval.training.prompts.load_prompts`.
 
@@ -29,7 +34,7 @@ def load_prompts(
     return Dataset.from_list(rows_of(split, count=count, seed=seed, only=only, form=form))
 
 
-def reward(completions: Sequence[Completion], **columns: Any) -> list[float]:  # noqa: ANN401 - columns of any type
+def reward(completions: Sequence[PolicyReply], **columns: Any) -> list[float]:  # noqa: ANN401 - columns of any type
     """The reward of each completion: 1 if and only if its program passes, 0 if it does nothing.
 
     Args:
@@ -42,27 +47,27 @@ def reward(completions: Sequence[Completion], **columns: Any) -> list[float]:  #
     return [one.reward for one in _judge(completions, columns)]
 
 
-def passed(completions: Sequence[Completion], **columns: Any) -> list[float]:  # noqa: ANN401 - columns of any type
+def passed(completions: Sequence[PolicyReply], **columns: Any) -> list[float]:  # noqa: ANN401 - columns of any type
     """Whether each program passes: 1 or 0."""
     return [one.passed for one in _judge(completions, columns)]
 
 
-def requirements(completions: Sequence[Completion], **columns: Any) -> list[float]:  # noqa: ANN401 - columns of any type
+def requirements(completions: Sequence[PolicyReply], **columns: Any) -> list[float]:  # noqa: ANN401 - columns of any type
     """The share of requirements that hold; some hold for a program that does nothing."""
     return [one.requirements for one in _judge(completions, columns)]
 
 
-def without_errors(completions: Sequence[Completion], **columns: Any) -> list[float]:  # noqa: ANN401 - columns of any type
+def without_errors(completions: Sequence[PolicyReply], **columns: Any) -> list[float]:  # noqa: ANN401 - columns of any type
     """The share of worlds in which each program ends without an error."""
     return [one.without_errors for one in _judge(completions, columns)]
 
 
-def parses(completions: Sequence[Completion], **columns: Any) -> list[float]:  # noqa: ANN401 - columns of any type
+def parses(completions: Sequence[PolicyReply], **columns: Any) -> list[float]:  # noqa: ANN401 - columns of any type
     """Whether each program is valid Python: 1 or 0."""
     return [one.parses for one in _judge(completions, columns)]
 
 
-def _judge(completions: Sequence[Completion], columns: dict[str, Any]) -> list[Components]:
+def _judge(completions: Sequence[PolicyReply], columns: dict[str, Any]) -> list[Components]:
     openings = columns.get("opening") or [""] * len(completions)
     asked = zip(columns["family"], columns["seed"], columns["prompt_index"], strict=True)
     return judge(

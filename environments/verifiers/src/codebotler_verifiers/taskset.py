@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeAlias
 import verifiers.v1 as vf
 from pydantic import Field, field_validator
 
-from roboeval.suites.families.tasks import WORLDS, trained_task
+from roboeval.suites.families.tasks import TRAINING_WORLDS, trained_task
 from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Components, Rollout, judge
 
@@ -32,7 +32,7 @@ class TrainingConfig(vf.TasksetConfig):
     """Another seed gives entirely different tasks."""
     families: list[str] = Field(default_factory=list)
     """The families; all of them by default."""
-    worlds: int = Field(WORLDS, ge=1, le=10_000)
+    worlds: int = Field(TRAINING_WORLDS, ge=1, le=10_000)
     """The least number of worlds in which a program is judged."""
 
     @field_validator("families")
