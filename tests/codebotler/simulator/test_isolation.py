@@ -169,7 +169,7 @@ from roboeval.cli.app import main
 sys.argv[0] = "roboeval"
 main()
 """
-MISSING = r"(roboeval: )?[^\n]*less isolated[^\n]*kernel refuses[^\n]*\(seccomp\)\n"
+MISSING = r"(roboeval: )?[^\n]*less isolated[^\n]*kernel does not allow[^\n]*\(seccomp\)\n"
 
 
 def evaluated(*options: str, before: str = "import sys") -> subprocess.CompletedProcess[str]:

@@ -125,7 +125,7 @@ def test_there_is_no_limit_of_skill_calls_or_of_time(worker: Worker) -> None:
 def test_program_may_compute_for_long_if_it_acts_in_between(
     worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("codebotler.simulator.process.isolated_process.MAX_WAIT_SECONDS", 3.0)
+    monkeypatch.setattr("codebotler.simulator.process.isolated_process.PROCESS_WAIT_SECONDS", 3.0)
     program = (
         "def task_program():\n"
         "    for i in range(20):\n"
