@@ -225,7 +225,7 @@ def test_no_more_sessions_than_allowed() -> None:
     [
         ({"family": "NoSuchFamily"}, 'there is no family "NoSuchFamily"'),
         ({"family": str(family_file("BringThing"))}, "there is no family"),  # no file is read for a client
-        ({"split": "plus"}, 'there is no split "plus"'),
+        ({"split": "plus"}, 'unknown split "plus"'),
         ({"seed": -1}, "the seed is -1"),
         ({"seed": SEEDS}, "from 0 to 999,999,999"),
         ({"seed": "x"}, "the seed is 'x'"),
@@ -250,7 +250,7 @@ def test_steps_that_cannot_be_judged_say_why(session: Session) -> None:
         with pytest.raises(RuntimeError, match="either a completion or a program"):
             session.step(wrong)
     session.step(CodebotlerAction(program=""))
-    with pytest.raises(RuntimeError, match="done after its one step"):
+    with pytest.raises(RuntimeError, match="over after its one step"):
         session.step(CodebotlerAction(program=""))
     session.reset(seed=1)
     assert session.step(CodebotlerAction(program=solution(session))).reward == 1
