@@ -40,13 +40,13 @@ def test_code_looks_into_a_picture(tmp_path: Path) -> None:
 def test_limits_are_those_of_the_code() -> None:
     for told in (
         f"at most {MAX_IMAGE_BYTES // 10**6} MB and {MAX_PIXELS // 10**6} million pixels",
-        f"at least {MIN_SIDE} pixels a side",
-        f"at most {LONGEST_SIDE:,} pixels a side",
+        f"at least {MIN_SIDE} pixels per side",
+        f"at most {LONGEST_SIDE:,} pixels per side",
         f"at most {MAX_LABEL_CHARACTERS} characters",
-        f"from a score of {MIN_SCORE} on",
+        f"its score is at least {MIN_SCORE};",
         f"temperature={DETECTOR_SETTINGS.temperature:g}, timeout={DETECTOR_SETTINGS.timeout:g}",
-        f"more than {missionpictures.MAX_STORED_PICTURE_BYTES // 10**6} MB is left out",
-        f"beyond {missionpictures.MAX_MISSION_PICTURE_BYTES // 10**6} MB in one mission",
+        f"Pictures of more than {missionpictures.MAX_STORED_PICTURE_BYTES // 10**6} MB",
+        f"a total of {missionpictures.MAX_MISSION_PICTURE_BYTES // 10**6} MB per mission",
     ):
         assert told in TEXT, told
     listed = re.search(r"with the encoding (.*?)\. They", TEXT)
@@ -56,4 +56,4 @@ def test_limits_are_those_of_the_code() -> None:
 
 def test_what_was_not_seen_is_said() -> None:
     assert "The detector was tested only with random weights" in TEXT
-    assert "How well any real model sees was not tested" in TEXT
+    assert "We did not test how well real models recognise objects" in TEXT
