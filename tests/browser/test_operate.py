@@ -553,4 +553,4 @@ def test_what_became_of_a_mission_is_said_after_the_tool_died(tmp_path: Path, op
 
 def test_without_the_token_there_is_a_sentence(server: PageServer) -> None:
     answer = server.ask("GET", "/", accept="text/html")
-    assert "link" in answer.text
+    assert "open the printed link" in answer.text
