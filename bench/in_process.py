@@ -192,7 +192,7 @@ class Unwalled(Bare):
         if status is Status.FINISHED:
             return Outcome(status, self.robot.trace)
         if status is Status.TIMEOUT:
-            error = RunError("TimeoutError", self.limit or f"{self.limits.ticks:,} loop iterations")
+            error = RunError("TimeoutError", self.limit or f"{self.limits.ticks:,} turns of loops")
         elif status is Status.ROBOT_ERROR:
             failure = self.errors[final["number"]]
             error = RunError(failure.kind, str(failure))

@@ -182,10 +182,10 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
     check()
     assert list(map(all_of, run(seen, workers=3, settings=RULES))) == list(map(all_of, seen.values()))
     count = Counter(outcome.status for outcome in seen.values())
-    assert count[Status.FINISHED] >= (len(seen) / 3 if NIGHTLY else 1)  # twenty programs prove no more
+    assert count[Status.FINISHED] >= len(seen) / (3 if NIGHTLY else 5)  # twenty programs scatter widely
     for status in (Status.PYTHON_ERROR, Status.ROBOT_ERROR, Status.TIMEOUT):
         assert count[status] >= len(seen) // 60, count
-    assert sum(map(len, (outcome.trace for outcome in seen.values()))) >= (2 if NIGHTLY else 0.5) * len(seen)
+    assert sum(map(len, (outcome.trace for outcome in seen.values()))) >= 2 * len(seen)
 
 
 def test_recursion_through_anything_ends_alike_in_every_run(pool: WorkerPool, other_pool: WorkerPool) -> None:
@@ -287,7 +287,7 @@ def test_random_programs_that_share_a_child_end_as_each_does_alone(
     alone: Runs = {}
     jobs = [(source, [lambda: SimulatedRobot(WORLDS[0], RULES)]) for source in sources]
     decided = sum(len(pool.here().run_tame(jobs[at : at + MOST])) for at in range(0, len(jobs), MOST))
-    assert decided >= (0.6 * len(sources) if NIGHTLY else 1)
+    assert decided >= (0.6 if NIGHTLY else 0.4) * len(sources)
     for _ in range(2):
         for batch in batches(random, sources, WORLDS):
             for pair in ((source, world) for source, worlds in batch for world in worlds):
@@ -295,7 +295,7 @@ def test_random_programs_that_share_a_child_end_as_each_does_alone(
                     alone[pair] = outcome_of(pool_of_processes, *pair)
             assert_alike(pool.here(), batch, alone, RULES)
     count = Counter(outcome.status for outcome in alone.values())
-    assert count[Status.FINISHED] >= (len(alone) / 4 if NIGHTLY else 1)
+    assert count[Status.FINISHED] >= len(alone) / (4 if NIGHTLY else 8)
     for status in (Status.PYTHON_ERROR, Status.ROBOT_ERROR, Status.TIMEOUT):
         assert count[status] >= len(alone) // 60, count
 
