@@ -132,8 +132,8 @@ def stop_sentence(*, is_kept: bool, is_started: bool, redo: bool) -> str:
     """Return a sentence about what was saved before Ctrl-C, and how to continue."""
     if not is_kept:
         return "stopped; nothing was saved (add --out RUN to save verdicts)"
-    if not is_started:
-        return "stopped before judging; run the same command again"
+    if redo and not is_started:  # the verdicts from before may still be there
+        return "stopped; run the same command again"
     return f"stopped; the same command {'without --redo ' * redo}continues where it stopped"
 
 
