@@ -14,12 +14,12 @@ from hacking import earned, hacks, honest, taken_back
 from roboeval.suites.families.tasks import RETRACTION, family_names, trained_prompts, trained_task
 from roboeval.suites.load import load_suite, shipped_suites
 from roboeval.suites.solutions import solutions
+from roboeval.suites.task import Task
 from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
 
 SEEDS = (0, 1, 1_000_000_000)
 IDLE = ("", "def task_program():\n    pass\n")
-MEASURED = [(suite, task) for suite in shipped_suites() for task in load_suite(suite).tasks.values()]
 ALIKE = 8  # words in a row that two instructions may not share
 
 
@@ -146,13 +146,18 @@ def shape(program: str) -> str:
 
 
 @cache
+def measured_tasks() -> list[Task]:
+    return [task for suite in shipped_suites() for task in load_suite(suite).tasks.values()]
+
+
+@cache
 def measured_shingles() -> set[tuple[str, ...]]:
-    return {words for _, task in MEASURED for prompt in task.prompts for words in shingles(prompt)}
+    return {words for task in measured_tasks() for prompt in task.prompts for words in shingles(prompt)}
 
 
 @cache
 def measured_shapes() -> set[str]:
-    return {shape(one.program) for _, task in MEASURED for one in solutions(task) if one.fails is None}
+    return {shape(one.program) for task in measured_tasks() for one in solutions(task) if one.fails is None}
 
 
 @pytest.mark.parametrize("family", family_names())
