@@ -21,7 +21,7 @@ _MAX_ACTIVITY_CHARACTERS = 100
 
 
 def event_text(line: LogLine) -> str:
-    """Describe an event, such as `drives to "kitchen"`; return an empty string for events to be hidden."""
+    """Describe an event, such as `drives to "kitchen"`. Return an empty string for hidden events."""
     words = _EVENT_WORDERS.get(line["event"])
     return words(line) if words else ""
 
@@ -34,7 +34,7 @@ def activity(line: LogLine) -> str:
 
 
 def skill_text(line: LogLine, form: VerbForm, most: int = 500) -> str:
-    """Describe the call of a skill; return an empty string if the skill has no verb."""
+    """Describe the call of a skill. Return an empty string if the skill has no verb."""
     skill = by_name(line["skill"])
     if skill is None or skill.verb is None:
         return ""

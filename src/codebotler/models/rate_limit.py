@@ -94,7 +94,7 @@ class RateLimited:
         return self.model.settings
 
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
-        """Request one reply, with retries; each try calls `on_text` from the beginning again.
+        """Request one reply, with retries. Each try passes the reply to `on_text` from the beginning.
 
         Raises:
             ModelError: the last try failed.

@@ -24,7 +24,7 @@ RESERVED_FIELDS = frozenset(
 
 @dataclass(frozen=True)
 class SamplingSettings:
-    """The settings of requests to a model; settings that are None are not sent.
+    """The settings of requests to a model. Settings that are None are not sent.
 
     Args:
         temperature: from 0 (always the likeliest token) up to about 2; None for the model's default.
@@ -71,7 +71,7 @@ class SamplingSettings:
         return None if self.seed is None else self.seed + number
 
     def for_base_model(self, name: str) -> SamplingSettings:
-        """Return the settings for a base model; raise UserError if there is a reasoning effort."""
+        """Return the settings for a base model, or raise UserError if they have a reasoning effort."""
         if self.reasoning_effort is not None:
             raise UserError(f"{name} is a base model and does not support a reasoning effort; remove it")
         return replace(self, max_tokens=self.max_tokens or PAPER_MAX_TOKENS)

@@ -1,4 +1,4 @@
-"""Find the models that can be used now: keys in the environment, local servers, recorded programs."""
+"""Find the models that can be used now: those with an API key, on local servers, or recorded."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def _is_set(key: str) -> bool:
 
 
 def _list_models(server: str, port: int) -> list[UsableModel]:
-    """Ask a server for its models; return an empty list if it is not a running model server."""
+    """Ask a server for its models. Return an empty list if it is not a running model server."""
     connection = HTTPConnection("127.0.0.1", port, timeout=SERVER_TIMEOUT)
     try:
         connection.request("GET", "/v1/models", headers={"Accept": "application/json"})

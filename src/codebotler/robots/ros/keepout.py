@@ -20,7 +20,7 @@ def keepout_messages(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Build the keepout mask (a nav_msgs/OccupancyGrid) and its nav2_msgs/CostmapFilterInfo.
 
-    Only rules of the form `always: not tr.Exists(inside(...))` have an effect; `frame` is that of the rooms.
+    Only rules of the form `always: not tr.Exists(inside(...))` have an effect. `frame` is that of the rooms.
     """
     patterns = [element for rule in rules if rule.when == "always" for element in _forbidden(rule.formula)]
     zones = [r.footprint for r in rooms if r.footprint and any(e.text.matches(r.name) for e in patterns)]
