@@ -13,7 +13,7 @@ Schema: TypeAlias = Mapping[str, Any]
 Message: TypeAlias = dict[str, Any]
 
 MAP_FRAME, ROBOT_FRAME = "map", "robot"
-"""The coordinate frames; Foxglove's 3D panel displays `map` by default."""
+"""The coordinate frames. Foxglove's 3D panel displays `map` by default."""
 
 SECOND_NS = 1_000_000_000  # nanoseconds
 LEVEL_DEBUG, LEVEL_INFO, LEVEL_WARNING, LEVEL_ERROR = 1, 2, 3, 4

@@ -35,13 +35,13 @@ _LOG_LEVELS = {
     "error": foxglove.LEVEL_ERROR,
     **dict.fromkeys(("rule", "stop", "cancelled", "late"), foxglove.LEVEL_WARNING),
 }
-"""The log levels by kind of event; all other kinds have level INFO."""
+"""The log levels by kind of event. All other kinds have level INFO."""
 _STATE_SCHEMA: Schema = {"type": "object", "properties": {"state": TEXT, "reason": TEXT, "clock": FLOAT}}
 _JSON_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 
 
 class TopicMessage(NamedTuple):
-    """A message and its topic. `schema` is the name of a Foxglove schema, or one of our own schemas."""
+    """A message and its topic. `schema` is either the name of a Foxglove schema or a schema of our own."""
 
     topic: str
     message: Message

@@ -59,9 +59,9 @@ class Mission:
     Args:
         home: the folder that contains the `missions` folder.
         robot: the kind of robot, such as `simulated`.
-        instruction: the instruction in plain words; empty if there is none.
+        instruction: the instruction in plain words, or "" if there is none.
         on_event: a function to call with each event.
-        stop_button: the button that stops the mission and its robot; by default, a new button.
+        stop_button: the button that stops the mission and its robot, by default a new one.
 
     Raises:
         OSError: the folder is not writable.
@@ -188,7 +188,7 @@ class Mission:
 
         Args:
             reserved: the reservation of the robot.
-            place: the robot's current room; empty if unknown.
+            place: the robot's current room, or "" if unknown.
             rules: the house rules. Breaking one of them stops the mission.
             room_map: the rooms that the robot knows.
 

@@ -49,7 +49,7 @@ class MissionSession:
     """Runs one mission on its own thread, with a robot that stays connected during the whole session.
 
     `check` takes a program, the robot's rooms and the rules in force. `changed` is called whenever the view
-    changes, and must return at once. `before` is a session to wait for, and `world` is the map, if any.
+    changes, and must return at once. `before` is a session that must end first. `world` is the map, if any.
     """
 
     def __init__(

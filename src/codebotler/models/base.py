@@ -44,7 +44,7 @@ class Reply:
 
     @property
     def is_cut_off(self) -> bool:
-        """Whether the reply reached the token limit; its program may still be complete."""
+        """Whether the reply reached the token limit. Its program may still be complete."""
         return is_cut_off(self.finish_reason)
 
     def data(self) -> dict[str, Any]:
@@ -93,7 +93,7 @@ def ignore_text(_piece: str) -> None:
 class Model(Protocol):
     """A language model that writes programs on request.
 
-    Several requests may run at the same time, all in one event loop; each of them can be cancelled.
+    Several requests may run at the same time, all in one event loop. Each of them can be cancelled.
     """
 
     @property

@@ -16,7 +16,7 @@ from codebotler.models.keys import read_key
 from codebotler.models.recorded import RECORDED_NAMES, is_recorded
 
 MODEL_SERVERS: Mapping[str, int] = {"Ollama": 11434, "LM Studio": 1234, "vLLM": 8000, "llama.cpp": 8080}
-"""Model servers and their default ports; all support OpenAI's protocol."""
+"""Model servers and their default ports. All of them support OpenAI's protocol."""
 
 KEY_VARIABLES: Mapping[str, str] = {
     "OPENAI_API_KEY": "openai-chat:gpt-5.1",

@@ -23,7 +23,7 @@ class Sighting:
     Args:
         found: whether the image shows it.
         box: the box around the clearest match, or None if nothing was found.
-        score: the confidence, from 0 to 1; scores from different models are not comparable.
+        score: the confidence, from 0 to 1. Scores from different models are not comparable.
 
     Raises:
         ValueError: the score or box is out of range.

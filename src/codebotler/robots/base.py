@@ -20,7 +20,7 @@ RobotArgument: TypeAlias = Scalar | tuple[Scalar, ...]
 """An argument of a skill: a single value, several values, or the options of a question."""
 
 RobotResult: TypeAlias = Scalar | list[str] | list[Scalar] | None
-"""The result of a skill; for a question, the text of the chosen option."""
+"""The result of a skill, or for a question, the text of the chosen option."""
 
 STOP_BY_HAND = "STOP THE ROBOT BY HAND"
 ROS_PYTHON = Path("/usr/bin/python3")
@@ -35,7 +35,7 @@ class CameraPicture:
 
 
 Feedback: TypeAlias = Callable[[str | CameraPicture], None]
-"""A callback for progress reports such as `at (3.1, 2.0)` and for pictures; any thread may call it."""
+"""A callback for progress reports such as `at (3.1, 2.0)` and for pictures. Any thread may call it."""
 
 
 def ignore_feedback(_: str | CameraPicture) -> None:
@@ -95,7 +95,7 @@ class Robot(Protocol):
             feedback: a callback for progress reports and pictures.
 
         Raises:
-            RobotError: the skill failed; programs can catch this error.
+            RobotError: the skill failed. Programs can catch this error.
             CancelledError: `cancel` was called, or another client stopped the robot.
             RobotLostError: the robot no longer responds.
         """

@@ -42,7 +42,7 @@ def is_own(name: str) -> bool:
 class OwnRobot:
     """Performs skills by calling the methods of a user's object.
 
-    Its `rooms()` must list the rooms. Its `stop()` must stop the robot at once; any thread may call it while
+    Its `rooms()` must list the rooms. Its `stop()` must stop the robot at once. Any thread may call it while
     another method runs. To report a failure, a method raises RobotError or an exception with the name of an
     error that the skill declares. Any other exception ends the mission.
 

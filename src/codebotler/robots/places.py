@@ -77,7 +77,7 @@ class PlacesFile(_PlacesForm):
 
 
 class PlacesMapping(_PlacesForm):
-    """Describes how to find places in a file; a path is a list of keys and indices joined by dots."""
+    """Describes how to find places in a file. A path is a list of keys and indices joined by dots."""
 
     file: Name
     frame: Name = "map"

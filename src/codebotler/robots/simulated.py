@@ -41,16 +41,16 @@ class Simulated:
 
     Args:
         world: the world that the robot works in.
-        speed: the robot's clock seconds per real second; None to skip all waits.
+        speed: the robot's clock seconds per real second, or None to skip all waits.
         skills: the skills that programs may call.
-        metres_per_second: the driving speed, above 0; infinity makes drives instantaneous.
+        metres_per_second: the driving speed, above 0. Infinity makes drives instantaneous.
 
     Raises:
         UserError: the speed is out of range.
     """
 
     name, address, has_pose = "simulated", "", True
-    if_tool_dies, rooms_are_regexes = "the simulated robot ended with the tool", True
+    if_tool_dies, rooms_are_regexes = "the simulated robot ended as well", True
     missing: Mapping[str, str] = MappingProxyType({})
 
     def __init__(

@@ -31,7 +31,7 @@ class Pyrobosim(Simulated):
     """A simulated robot whose position and objects are kept in pyrobosim."""
 
     name = "pyrobosim"
-    if_tool_dies, rooms_are_regexes = "the robot in pyrobosim ended with the tool", True
+    if_tool_dies, rooms_are_regexes = "the robot in pyrobosim ended as well", True
     _drivable: DrivableWorld
 
     def connect(self) -> None:

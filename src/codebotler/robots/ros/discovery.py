@@ -70,7 +70,7 @@ def discover_offers(robot: str, address: str, python: Path) -> list[str]:
 
     Args:
         robot: the version of ROS, ros1 or ros2.
-        address: the URI of a ROS 1 master or a ROS 2 domain number; empty for the default.
+        address: the URI of a ROS 1 master or a ROS 2 domain number, or "" for the default.
         python: the Python interpreter of the robot's ROS installation.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Convert the rooms that house rules forbid to messages for Nav2's keepout filter."""
+"""Convert the rooms that house rules forbid into messages for Nav2's keepout filter."""
 
 from __future__ import annotations
 

@@ -34,9 +34,9 @@ class VirtualRobot:
 
     Args:
         world: the world that the robot works in.
-        speed: the robot's clock seconds per real second; None to skip all waits.
+        speed: the robot's clock seconds per real second, or None to skip all waits.
         ros: the version of ROS, 1 or 2.
-        port: the port of the ROS 1 master; None for the port in ROS_MASTER_URI.
+        port: the port of the ROS 1 master, or None for the port in ROS_MASTER_URI.
         python: a Python interpreter with rclpy, or with rospy (and rosmaster to start a master).
         show: a callback that receives a line of text when a goal starts and when it ends.
         skills: the skills to offer.

@@ -27,7 +27,7 @@ ROS2_ENDS = {4: "succeeded", 5: "cancelled", 6: "aborted"}
 
 
 class Goal:
-    """A goal and its progress; all times are those of the monotonic clock."""
+    """A goal and its progress. All times are those of the monotonic clock."""
 
     def __init__(self, number: int, server: Any) -> None:
         self.number, self.server = number, server
@@ -71,7 +71,7 @@ class Server:
 
 
 class SkillWorker:
-    """Performs skills, one at a time; subclasses implement at least `connect`, `send` and `listen`.
+    """Performs skills, one at a time. Subclasses implement at least `connect`, `send` and `listen`.
 
     The first message has the `address`, the `node` name, the `calls` by skill, folders of `packages`, topics
     for `pose`, `velocity` and `keepout`, whether to `cancel_all` goals, the path `sign` of a file that names

@@ -54,7 +54,7 @@ class RosbridgeWorker(SkillWorker):
     settles = SETTLE_SECONDS
 
     def connect(self, start: Fields) -> bool:
-        """Open the connection; return False, because dead workers leave no node behind."""
+        """Open the connection, and return False, because dead workers leave no node behind."""
         calls = start["calls"]
         actions = [call for call in calls.values() if call["kind"] == "action"]
         try:
