@@ -142,7 +142,7 @@ def _entity(room: Room, time: int) -> Message:
         "timestamp": _time(time),
         "frame_id": MAP_FRAME,
         "id": room.name,
-        "lifetime": {"sec": 0, "nsec": 0},  # shown until it is replaced
+        "lifetime": {"sec": 0, "nsec": 0},  # show the room until it is replaced
         "frame_locked": True,
         "lines": [outline],
         "texts": [label],

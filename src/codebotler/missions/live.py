@@ -212,7 +212,7 @@ class LiveRobot:
         at = {} if self.line is None else {"line": self.line}
         entry = at | _rule_entry(broken)
         if broken.ends_run:
-            self.broken_rule = entry  # the mission logs it, because this may be a robot's thread
+            self.broken_rule = entry  # the mission logs the rule, because this may be a robot's thread
             self._button.press(f"rule {broken.rule.name}")
         else:
             self._write_event("rule", **entry)

@@ -100,7 +100,7 @@ class Mission:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            self._log_stop()  # the thread that pressed STOP may not have logged it yet
+            self._log_stop()  # the thread that pressed STOP may not have logged the stop yet
             if not self.has_ended:
                 self._leave(error)
         finally:

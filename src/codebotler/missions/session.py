@@ -247,7 +247,7 @@ class MissionSession:
             mission.note(f"before the robot moves: {sentence}")
         rules = self._view.rules_in_force
         keep_out = getattr(self._robot, "keep_out", None)  # an optional method of robots with a path planner
-        with suppress(MissionError, CancelledError):  # it was stopped before it could run
+        with suppress(MissionError, CancelledError):  # the mission was stopped before it could run
             if keep_out is not None:
                 keep_out(rules)
             mission.run(reserved, place, rules=rules, room_map=room_map)

@@ -77,7 +77,7 @@ def _close_interrupted(folder: Path) -> list[MissionSummary]:
     try:
         log = open_log(folder)
     except BlockingIOError:
-        return []  # another process runs it
+        return []  # another process runs the mission
     with closing(log):
         summary, events = MissionSummary.read(folder), read_events(folder)
         if summary.has_ended:

@@ -382,7 +382,7 @@ def _limit_provider(provider: Provider[object], name: str, settings: SamplingSet
     if isinstance(client := provider.client, openai.AsyncOpenAI):
         make_lenient(client)
     first, make = provider._own_http_client, provider._http_client_factory  # noqa: SLF001 - no public way
-    if first is None or make is None:  # it uses no HTTP client that we can reach
+    if first is None or make is None:  # the provider uses no HTTP client that we can reach
         return provider
     limit = byte_limit(settings.max_tokens)
 

@@ -124,7 +124,7 @@ class RateLimited:
     async def _try(self, prompt: Prompt, number: int, on_text: TextListener) -> Reply:
         self._check_budget()
         await self._wait_for_turn()
-        self._check_budget()  # other requests may have used it up in the meantime
+        self._check_budget()  # other requests may have used up the budget by now
         self.requests += 1
         length = 0
 

@@ -107,7 +107,7 @@ class RecordedModel:
 
 
 def find_closest(instruction: str, known: Iterable[str]) -> list[str]:
-    """Return the known instructions that share the most long words, in the same order, with `instruction`."""
+    """Return the known instructions that share the most long words with `instruction`, in the same order."""
     matcher = SequenceMatcher(a=(), b=LONG_WORD.findall(instruction.lower()), autojunk=False)
 
     def similarity(other: str) -> tuple[int, float]:

@@ -43,7 +43,7 @@ class OwnRobot:
     """Performs skills by calling the methods of a user's object.
 
     Its `rooms()` must list the rooms. Its `stop()` must stop the robot at once. Any thread may call it while
-    another method runs. To report a failure, a method raises RobotError or an exception with the name of an
+    another method runs. To report a failure, a method raises RobotError or an exception named after an
     error that the skill declares. Any other exception ends the mission.
 
     Args:

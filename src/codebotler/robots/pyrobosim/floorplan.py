@@ -35,7 +35,7 @@ TABLE_POSITIONS = 12  # the number of positions to try along each axis of a room
 class Passage:
     """A door between adjacent rooms, or a straight hallway between rooms that are apart."""
 
-    ends: tuple[int, int]  # the indices of the two floors it connects
+    ends: tuple[int, int]  # the indices of the two floors that it connects
     line: LineString  # the centre line, which starts inside one floor and ends inside the other
     width: float
 

@@ -186,7 +186,7 @@ class Roadmap(WorldGraphPlanner):
 class Motor(PathExecutor):
     """Moves the robot along a path at the pace of a clock, until the clock is stopped.
 
-    pyrobosim's own executor reacts to a cancel with a delay, and ignores one that comes too early.
+    pyrobosim's own executor reacts to a cancel with a delay, and ignores a cancel that comes too early.
     """
 
     def __init__(self, clock: Clock) -> None:

@@ -102,7 +102,7 @@ def draft_connection(robot: str, offers: Iterable[str]) -> str:
     rest = {by_form[form].partition(" ")[2] for form in forms}
     ready: set[str] = set()
     packages: set[str] = set()
-    lines: list[tuple[bool, str]] = []  # the lines of the draft, each with whether it defines a skill
+    lines: list[tuple[bool, str]] = []  # the lines of the draft, and whether each defines a skill
     for pattern, use, text, first in MAPPINGS:
         for form in (form for form in forms if re.fullmatch(pattern, form)):
             _, name, kind = by_form[form].split()

@@ -33,7 +33,7 @@ class Channel:
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._writer = threading.Thread(target=self._write, daemon=True)
         self._writer.start()
-        self.last_sign = float("inf")  # when the last line arrived; infinite while the worker handles it
+        self.last_sign = float("inf")  # when the last line arrived; infinite while the line is handled
 
     def send(self, kind: str, **more: Any) -> None:
         """Queue a message to CodeBotler. If CodeBotler has died, `lines` ends."""
