@@ -218,7 +218,7 @@ def test_what_is_missing_is_said(robots: Robots) -> None:
     robots.move_base()
     text = CONNECTION.replace("/move_base,", "/drive,").replace("/door/open", "/gate")
     robot = robots.robot(text=text.replace("/speech", "/voice"))
-    with pytest.raises(NotReadyError, match=r"offers nothing.*no action server at /drive"):
+    with pytest.raises(NotReadyError, match=r"offers no skills.*no action server at /drive"):
         robot.connect()
     robot = robots.robot(text=text.replace("velocity: {topic: /odom}\n", ""))
     robot.connect()

@@ -94,7 +94,7 @@ def test_no_rospy_is_said_with_the_mend(graph: Graph) -> None:
 
 
 def test_robot_without_any_server_is_not_ready(graph: Graph) -> None:
-    with pytest.raises(NotReadyError, match=r"offers nothing: .*/"):
+    with pytest.raises(NotReadyError, match=r"offers no skills: .*/"):
         graph.robot().connect()
 
 
@@ -264,7 +264,7 @@ def test_killed_worker_is_replaced_by_one_that_cancels_all(graph: Graph) -> None
         os.kill(robot._worker._process.pid, signal.SIGKILL)
         server.expect("cancel", "never")
     assert isinstance(ended["error"], RobotLostError)
-    assert re.search(r"\bros1 has died \(signal 9\).*cancelled", ended["error"].sentence)
+    assert re.search(r"\bros1 worker has died \(signal 9\).*cancelled", ended["error"].sentence)
     robot.connect()
     robot.perform("go_to", ["the hall"])
 
@@ -306,7 +306,7 @@ def test_hanging_worker_is_noticed_without_a_stop(graph: Graph) -> None:
         os.kill(robot._worker._process.pid, signal.SIGSTOP)
         server.expect("cancel", "never")
     assert isinstance(ended["error"], RobotLostError)
-    assert re.search(r"\bros1 does not answer.*cancelled", ended["error"].sentence)
+    assert re.search(r"\bros1 worker does not answer.*cancelled", ended["error"].sentence)
 
 
 TOOL = """

@@ -133,7 +133,7 @@ def test_second_virtual_robot_is_refused(graph: Graph, virtual: VirtualRobot) ->
 def test_killed_worker_is_said(virtual: VirtualRobot) -> None:
     assert virtual._worker is not None
     os.kill(virtual._worker._process.pid, signal.SIGKILL)
-    with pytest.raises(RobotLostError, match=r"virtual robot has died \(signal 9\)"):
+    with pytest.raises(RobotLostError, match=r"virtual robot's worker has died \(signal 9\)"):
         virtual.wait()
 
 

@@ -16,7 +16,7 @@ from codebotler.robots.base import Robot
 
 
 class ModelAuthor:
-    """Requests programs from a model, one at a time; any thread can cancel it."""
+    """Requests programs from a model, one at a time. Any thread can cancel the request."""
 
     def __init__(self, open_model: Callable[[str], Model], name: str) -> None:
         self._open_model, self._name = open_model, name
@@ -26,7 +26,7 @@ class ModelAuthor:
         self._is_cancelled = False
 
     def write(self, prompt: Prompt, on_text: TextListener) -> tuple[str, Generation]:
-        """Request a program; return the model's name and the result; raise CancelledError after `cancel`."""
+        """Return the model's name and a newly requested program. Raise CancelledError after `cancel`."""
         if self.max_tokens is None or self._model is None:
             self._model = self._open_model(self._name)
         if self.max_tokens is not None:
@@ -53,7 +53,7 @@ class ModelAuthor:
 
 
 def prompt_of(view: SessionView, robot: Robot, *, repair: bool) -> Prompt:
-    """Return the prompt for a mission's instruction; a repair prompt also says what was wrong."""
+    """Return the prompt for a mission's instruction. A repair prompt also says what was wrong."""
     prompt = prompt_for(
         view.instruction,
         rooms=() if view.room_map is None else view.room_map.rooms,

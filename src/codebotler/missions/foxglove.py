@@ -13,7 +13,7 @@ Schema: TypeAlias = Mapping[str, Any]
 Message: TypeAlias = dict[str, Any]
 
 MAP_FRAME, ROBOT_FRAME = "map", "robot"
-"""The coordinate frames; Foxglove's 3D panel displays `map` by default."""
+"""The coordinate frames. Foxglove's 3D panel displays `map` by default."""
 
 SECOND_NS = 1_000_000_000  # nanoseconds
 LEVEL_DEBUG, LEVEL_INFO, LEVEL_WARNING, LEVEL_ERROR = 1, 2, 3, 4
@@ -78,7 +78,7 @@ def pose_in_frame(at: Point, heading: float, time: int) -> Message:
 
 
 def frame_transform(at: Point, heading: float, time: int) -> Message:
-    """Build the transform from the map to the robot's frame; the arguments are those of `pose_in_frame`."""
+    """Build the transform from the map to the robot's frame, with the arguments of `pose_in_frame`."""
     pose = _pose(at, heading)
     return {
         "timestamp": _time(time),
@@ -90,7 +90,7 @@ def frame_transform(at: Point, heading: float, time: int) -> Message:
 
 
 def scene_update(rooms: Iterable[Room], time: int) -> Message:
-    """Build the outlines and names of rooms; every room needs a footprint and a stopping point."""
+    """Build the outlines and names of rooms. Every room needs a footprint and a stopping point."""
     return {"entities": [_entity(room, time) for room in rooms]}
 
 
@@ -101,7 +101,7 @@ def log_line(level: int, message: str, name: str, line: int | None, time: int) -
 
 
 def compressed_image(kind: str, data: bytes, time: int) -> Message:
-    """Build an image message; `kind` is `jpg` or `png`, and `time` is in ns since 1970."""
+    """Build an image message. `kind` is `jpg` or `png`, and `time` is in ns since 1970."""
     encoded = base64.b64encode(data).decode()
     return {"timestamp": _time(time), "frame_id": "", "data": encoded, "format": _IMAGE_FORMATS[kind]}
 
@@ -142,7 +142,7 @@ def _entity(room: Room, time: int) -> Message:
         "timestamp": _time(time),
         "frame_id": MAP_FRAME,
         "id": room.name,
-        "lifetime": {"sec": 0, "nsec": 0},  # shown until it is replaced
+        "lifetime": {"sec": 0, "nsec": 0},  # show the room until it is replaced
         "frame_locked": True,
         "lines": [outline],
         "texts": [label],

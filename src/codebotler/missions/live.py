@@ -27,7 +27,7 @@ from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.settings import ENDLESS, SimulationSettings
 
 EventWriter: TypeAlias = Callable[..., None]
-"""A function that logs an event from any thread; it takes the kind and, as keyword arguments, the data."""
+"""A function that logs an event from any thread. It takes the kind and, as keyword arguments, the data."""
 
 
 class StoppedError(Exception):
@@ -84,11 +84,11 @@ class LiveRobot:
         return tuple(self._events)
 
     def stop(self) -> None:
-        """Cancel the robot's work and prevent further skills; callable repeatedly and from any thread."""
+        """Cancel the robot's work and prevent further skills. Any thread may call this, even repeatedly."""
         self._button.cancel_robot()
 
     def sleep_until(self, now: float) -> None:
-        """Wait until a time on the robot's clock; raise StoppedError if the mission is stopped."""
+        """Wait until a time on the robot's clock, or raise StoppedError if the mission is stopped."""
         self._check_end()
         seconds = max(0.0, now - self.now)
         at = {} if self.line is None else {"line": self.line}
@@ -97,7 +97,7 @@ class LiveRobot:
         self._check_end()
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill; raise RobotError, StoppedError, RobotLostError, or OSError if logging fails."""
+        """Execute one skill. Raise RobotError, StoppedError, RobotLostError, or OSError if logging fails."""
         self._check_end()
         try:
             return self._execute(self.skills[skill], arguments)
@@ -139,7 +139,7 @@ class LiveRobot:
     # --- rules
 
     def _judge(self, event: Event, *, is_drive: bool) -> str:
-        """Raise an error if a rule forbids an event that is about to happen; return the robot's room."""
+        """Return the robot's room, or raise an error if a rule forbids an event that is about to happen."""
         guard = self._guard
         if guard is None:
             return event.place
@@ -167,7 +167,7 @@ class LiveRobot:
             guard.happened(seen)
 
     def _resolve_drive(self, guard: RuleGuard, event: Event, *, failed: bool) -> Event:
-        """Return a drive with the name of its destination; if a rule depends on the name, ask the robot."""
+        """Return a drive with the name of its destination. If a rule depends on the name, ask the robot."""
         goals = self._rooms_meant(event.text)
         possible = [replace(event, text=goal) for goal in goals or [event.text]]
         is_known = not failed and (len(goals) == 1 or self._room_map is None)
@@ -184,7 +184,7 @@ class LiveRobot:
         return possible[0]
 
     def _on_pose(self, at: Point | None) -> None:
-        """Report a move to the guard as a straight line; a position of None means that poses are missing."""
+        """Report a move to the guard as a straight line. A position of None means that poses are missing."""
         if self._guard is None or self._stopped.is_set():
             return
         if at is None:
@@ -212,7 +212,7 @@ class LiveRobot:
         at = {} if self.line is None else {"line": self.line}
         entry = at | _rule_entry(broken)
         if broken.ends_run:
-            self.broken_rule = entry  # the mission logs it, because this may be a robot's thread
+            self.broken_rule = entry  # the mission logs the rule, because this may be a robot's thread
             self._button.press(f"rule {broken.rule.name}")
         else:
             self._write_event("rule", **entry)
@@ -232,7 +232,7 @@ class LiveRobot:
         return [*dict.fromkeys(name_of(room, request) for room in rooms)]
 
     def _ask_room(self) -> str | None:
-        """Ask the robot for its current room, but only once; return None if it does not know."""
+        """Ask the robot for its current room, but only once. Return None if the robot does not know."""
         if self._has_asked or ROOM_SKILL not in self.skills or ROOM_SKILL in self.robot.missing:
             return None
         self._has_asked = True
@@ -283,7 +283,7 @@ class LiveRobot:
                     if not self._is_watched and (match := POSITION_FEEDBACK.fullmatch(feedback)):
                         self._on_pose((float(match[1]), float(match[2])))
                     self._write_event("feedback", **which, text=feedback)
-            except OSError as error:  # raising it on a robot's thread would lose it
+            except OSError as error:  # an error that is raised on a robot's thread would be lost
                 self._fault = error
                 self.stop()
 
@@ -292,7 +292,7 @@ class LiveRobot:
         return check_answer(skill, self.robot.perform(skill.name, given, on_feedback))
 
     def _check_end(self) -> None:
-        """Raise an error if the program must end; the first call starts the program's clock."""
+        """Raise an error if the program must end. The first call starts the program's clock."""
         if self._began is None:
             self._began = self.robot.clock.now
             watch = getattr(self.robot, "watch", None)  # an optional method
@@ -305,7 +305,7 @@ class LiveRobot:
 
 
 def check_answer(skill: Skill, result: base.RobotResult) -> base.RobotResult:
-    """Return a robot's answer unchanged; raise RobotLostError if its type does not match the skill."""
+    """Return a robot's answer unchanged, or raise RobotLostError if its type does not match the skill."""
     if not skill.returns.fits(result):
         expected = skill.returns.annotation
         raise RobotLostError(
@@ -329,7 +329,7 @@ def _plain_argument(argument: Argument) -> base.RobotArgument:
 
 
 def _chosen_option(result: base.RobotResult, event: Event) -> int:
-    """Return the position of the chosen option, ignoring case; raise RobotError if no option matches."""
+    """Return the position of the chosen option, ignoring case, or raise RobotError if no option matches."""
     heard = str(result)
     for same in (str, lambda text: text.strip().casefold()):
         for number, option in enumerate(event.options):

@@ -76,7 +76,7 @@ NEXT_STATES = {
         "stopping": "stopped failed",
     }.items()
 }
-"""The states that can follow each state. States not listed are final; recovery sets `interrupted`."""
+"""The states that can follow each state. States not listed are final. Recovery sets `interrupted`."""
 
 
 @dataclass
@@ -103,7 +103,7 @@ class MissionSummary:
 
     @classmethod
     def read(cls, folder: Path) -> MissionSummary:
-        """Read the summary of a mission; raise UserError if it is damaged."""
+        """Read the summary of a mission, or raise UserError if it is damaged."""
         path = folder / SUMMARY_FILE
         try:
             data = json.loads(path.read_bytes())
@@ -121,7 +121,7 @@ class MissionSummary:
 
 
 def open_log(folder: Path) -> Appender:
-    """Open and lock the log of a mission; raise BlockingIOError if another process has it open."""
+    """Open and lock the log of a mission, or raise BlockingIOError if another process has it open."""
     return Appender(folder / EVENTS_FILE, exclusive=True)
 
 
@@ -133,7 +133,7 @@ def add_event(log: Appender, event: str, clock: float, **data: object) -> LogLin
 
 
 def read_events(folder: Path) -> list[LogLine]:
-    """Read the events of a mission, without an incomplete last line; raise UserError if a line is invalid."""
+    """Read the events of a mission, without an incomplete last line. Raise UserError if a line is invalid."""
     path, events = folder / EVENTS_FILE, []
     for number, line in read_rows(path, growing=True):
         if not _is_event(line):

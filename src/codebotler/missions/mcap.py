@@ -35,13 +35,13 @@ _LOG_LEVELS = {
     "error": foxglove.LEVEL_ERROR,
     **dict.fromkeys(("rule", "stop", "cancelled", "late"), foxglove.LEVEL_WARNING),
 }
-"""The log levels by kind of event; all other kinds have level INFO."""
+"""The log levels by kind of event. All other kinds have level INFO."""
 _STATE_SCHEMA: Schema = {"type": "object", "properties": {"state": TEXT, "reason": TEXT, "clock": FLOAT}}
 _JSON_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 
 
 class TopicMessage(NamedTuple):
-    """A message and its topic; `schema` is the name of a Foxglove schema, or one of our own schemas."""
+    """A message and its topic. `schema` is either the name of a Foxglove schema or a schema of our own."""
 
     topic: str
     message: Message
@@ -59,7 +59,7 @@ def write_mcap(
     """Write a mission with a topic for each skill, and topics for states, the log, poses and the rooms.
 
     The program is added as an attachment. Times come from the wall clock, or from the robot's clock, which
-    then starts when the mission was created. Pictures are read from `folder`; None leaves them out.
+    then starts when the mission was created. Pictures are read from `folder`, unless it is None.
     """
     began = round(min(summary.created * SECOND_NS, MAX_TIME_NS))
     writer = Writer(file)
@@ -187,7 +187,7 @@ class _RobotPath:
 
 
 def schema_of(values: Sequence[object]) -> dict[str, Any]:
-    """Infer a JSON schema from values; mixed types become text, because Foxglove has no union types."""
+    """Infer a JSON schema from values. Mixed types become text, because Foxglove has no union types."""
     lists = [value for value in values if isinstance(value, list)]
     if len(lists) == len(values):
         return {"type": "array", "items": {"type": _json_type([one for each in lists for one in each])}}
@@ -228,7 +228,7 @@ def export_mcap(
     clock: TimeSource,
     folder: Path | None = None,
 ) -> None:
-    """Write an MCAP file atomically; raise UserError instead of overwriting a file of another kind."""
+    """Write an MCAP file atomically. Raise UserError instead of overwriting a file of another kind."""
     path = path.resolve()
     expect_replaceable(path, b"\x89MCAP")
     path.parent.stat()  # fail instead of creating folders for a mistyped path

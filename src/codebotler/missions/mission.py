@@ -50,18 +50,18 @@ class MissionError(Exception):
 
 
 EventListener: TypeAlias = Callable[[LogLine], None]
-"""A function that receives each logged event; calls may come from any thread, but never overlap."""
+"""A function that receives each logged event. Calls may come from any thread, but never overlap."""
 
 
 class Mission:
-    """A mission, used as a context manager; leaving the block ends the mission.
+    """A mission, used as a context manager. Leaving the block ends the mission.
 
     Args:
         home: the folder that contains the `missions` folder.
         robot: the kind of robot, such as `simulated`.
-        instruction: the instruction in plain words; empty if there is none.
+        instruction: the instruction in plain words, or "" if there is none.
         on_event: a function to call with each event.
-        stop_button: the button that stops the mission and its robot; by default, a new button.
+        stop_button: the button that stops the mission and its robot, by default a new one.
 
     Raises:
         OSError: the folder is not writable.
@@ -100,7 +100,7 @@ class Mission:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            self._log_stop()  # the thread that pressed STOP may not have logged it yet
+            self._log_stop()  # the thread that pressed STOP may not have logged the stop yet
             if not self.has_ended:
                 self._leave(error)
         finally:
@@ -122,7 +122,7 @@ class Mission:
         return self.summary.has_ended
 
     def draft(self, program: str, model: str = "") -> None:
-        """Set or replace the program and its author; raise MissionError after the approval."""
+        """Set or replace the program and its author, or raise MissionError after the approval."""
         with self._writing:
             self._step(
                 MissionState.DRAFTING, "take another program", program=program, model=model, problems=()
@@ -130,14 +130,14 @@ class Mission:
             self._has_program = True
 
     def check(self, problems: Sequence[str]) -> None:
-        """Record the problems that a check found; raise MissionError if there is no program to check."""
+        """Record the problems that a check found, or raise MissionError if there is no program to check."""
         with self._writing:
             if not self._has_program:
                 raise MissionError(f"mission {self.id} has no program to check")
             self._step(MissionState.CHECKED, "be checked", problems=tuple(problems))
 
     def approve(self, *, despite_problems: bool = False) -> None:
-        """Approve the program; raise MissionError if it is unchecked or has problems not yet accepted."""
+        """Approve the program, or raise MissionError if it is unchecked or has problems not yet accepted."""
         with self._writing:
             if self.state is MissionState.CHECKED and self.summary.problems and not despite_problems:
                 raise MissionError(
@@ -146,7 +146,7 @@ class Mission:
             self._step(MissionState.APPROVED, "be approved")
 
     def fail(self, reason: str) -> None:
-        """Mark the mission as failed; raise MissionError if it is running or has ended."""
+        """Mark the mission as failed, or raise MissionError if it is running or has ended."""
         with self._writing:
             if self.state.is_moving:
                 raise MissionError(f"mission {self.id} is {self.state}; stop it instead")
@@ -161,7 +161,7 @@ class Mission:
         self._write("map", **map_data(world))
 
     def stop(self, by: str = "somebody") -> None:
-        """Stop the robot and the program; callable from any thread. `run` returns once both have stopped.
+        """Stop the robot and the program, from any thread. `run` returns once both have stopped.
 
         Args:
             by: the source of the stop for the log, such as `Ctrl-C`.
@@ -188,8 +188,8 @@ class Mission:
 
         Args:
             reserved: the reservation of the robot.
-            place: the robot's current room; empty if unknown.
-            rules: the house rules; breaking one stops the mission.
+            place: the robot's current room, or "" if unknown.
+            rules: the house rules. Breaking one of them stops the mission.
             room_map: the rooms that the robot knows.
 
         Raises:
@@ -221,7 +221,7 @@ class Mission:
         return self.state
 
     def _execute(self, live: LiveRobot) -> None:
-        """Run the program; this needs its own thread, because a skill may never return."""
+        """Run the program. This needs its own thread, because a skill may never return."""
         try:
             with closing(Worker()) as worker:
                 self.stop_button.on_press(worker.stop)
@@ -244,7 +244,7 @@ class Mission:
             )
 
     def _end(self, live: LiveRobot, state: MissionState, reason: str, line: object, *, is_lost: bool) -> None:
-        """Enter a final state, only once; a stop that did not reach the robot counts as a failure."""
+        """Enter a final state, but only once. A stop that did not reach the robot counts as a failure."""
         why = "" if is_lost else self.stop_button.why_unstopped()
         try:
             with self._writing:
@@ -288,7 +288,7 @@ class Mission:
             self.fail(visible(str(error)) or type(error).__name__)
 
     def _step(self, to: MissionState, what: str, **changes: object) -> None:
-        """Change and log the state; the caller must hold the lock."""
+        """Change and log the state. The caller must hold the lock."""
         if to not in NEXT_STATES.get(self.state, ()):
             raise MissionError(f"mission {self.id} cannot {what}: its state is {self.state}")
         self.summary.state = to
@@ -308,7 +308,7 @@ class Mission:
             self._log = None
 
     def _write(self, event: str, /, **data: object) -> None:
-        """Log an event and notify the listener; drop events after the end of the mission."""
+        """Log an event and notify the listener, but drop events after the end of the mission."""
         clock = 0.0 if self._live is None else self._live.now
         with self._writing:
             if self._log is None:

@@ -25,7 +25,7 @@ class PictureStore:
         self._count = self._bytes = 0
 
     def keep(self, data: bytes) -> dict[str, str]:
-        """Store a picture; return its `file` for the event, or a `text` that says why it was not stored."""
+        """Store a picture. Return its `file` for the event, or a `text` that says why it was not stored."""
         kind = next((kind for kind, start in _SIGNATURES.items() if data.startswith(start)), None)
         if kind is None:
             return _explain_loss(f"its {len(data):,} bytes are neither JPEG nor PNG")

@@ -25,7 +25,7 @@ MAX_CHECKED_ROOMS = 1_000
 def ask_rooms(
     robot: Robot, remark: Callable[[str], None], world: World | None = None
 ) -> tuple[RoomMap | None, str]:
-    """Ask a connected robot for its rooms and its current room; pass likely mistakes to `remark`.
+    """Ask a connected robot for its rooms and its current room. Pass likely mistakes to `remark`.
 
     Returns:
         the rooms, with footprints from `world`, or None if the robot does not list its rooms; and the
@@ -63,7 +63,7 @@ def ask_rooms(
 
 
 def _plan(robot: Robot, world: World) -> tuple[Room, ...]:
-    """Return the rooms of a map; only robots that drive on our grid get its default footprints."""
+    """Return the rooms of a map. Only robots that drive on our grid get its default footprints."""
     rooms = laid_out(world).rooms if robot.rooms_are_regexes else world.rooms
     is_straight = robot.name == "simulated"
     return tuple(Room(r.name, (), (), r.footprint, r.stand_at if is_straight else None) for r in rooms)
@@ -84,7 +84,7 @@ def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) 
 
 
 def limit_rooms(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:
-    """Return the rooms for a check; if there are too many, return None and make a remark."""
+    """Return the rooms for a check. If there are too many, return None and make a remark."""
     if room_map is None or len(room_map.rooms) <= MAX_CHECKED_ROOMS:
         return room_map
     remark(

@@ -48,8 +48,8 @@ _EXPECTED_ERRORS = (UserError, ModelError, NotReadyError, EngineError, MissionEr
 class MissionSession:
     """Runs one mission on its own thread, with a robot that stays connected during the whole session.
 
-    `check` takes a program, the robot's rooms and the rules in force; `changed` is called whenever the view
-    changes, and must return at once; `before` is a session to wait for; `world` is the map, if any.
+    `check` takes a program, the robot's rooms and the rules in force. `changed` is called whenever the view
+    changes, and must return at once. `before` is a session that must end first. `world` is the map, if any.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class MissionSession:
         return self._events[start:]
 
     def edit(self, program: str) -> None:
-        """Replace and check the program; raise MissionError after its approval or while a model writes."""
+        """Replace and check the program. Raise MissionError after its approval or while a model writes."""
         with self._editing, self._lock:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
@@ -141,9 +141,9 @@ class MissionSession:
                 self._change(disabled_rules=(*view.disabled_rules, name), **_UNCHECKED)
 
     def ask_again(self, *, repair: bool, max_tokens: int | None = None) -> None:
-        """Ask the model for another program; for a repair, send it the program and its problems.
+        """Ask the model for another program. For a repair, send it the program and its problems.
 
-        `max_tokens` is a new limit for this reply and later ones; None keeps the current limit.
+        `max_tokens` is a new limit for this reply and later ones. None keeps the current limit.
         """
         with self._editing, self._lock:
             if not self._view.may_be_asked_again:
@@ -168,7 +168,7 @@ class MissionSession:
         self._mission.fail(reason)
 
     def stop(self, by: str) -> None:
-        """Stop the robot, then all other work; return once the request has reached the robot."""
+        """Stop the robot, then all other work. Return once the request has reached the robot."""
         if not self._view.is_over:
             self._stop_button.press(by)
 
@@ -220,7 +220,7 @@ class MissionSession:
                     self._run_approved(mission, reserved, place, room_map)
 
     def _prepare_rooms(self) -> tuple[RoomMap | None, str]:
-        """Ask the robot for its rooms and its current room; refuse rules that cannot be enforced."""
+        """Ask the robot for its rooms and its current room. Refuse rules that cannot be enforced."""
         room_map, place = ask_rooms(self._robot, self._add_remark, self._world)
         self._show(room_map=limit_rooms(room_map, self._add_remark))
         rules, rooms = self._view.rules, () if room_map is None else room_map.rooms
@@ -247,7 +247,7 @@ class MissionSession:
             mission.note(f"before the robot moves: {sentence}")
         rules = self._view.rules_in_force
         keep_out = getattr(self._robot, "keep_out", None)  # an optional method of robots with a path planner
-        with suppress(MissionError, CancelledError):  # it was stopped before it could run
+        with suppress(MissionError, CancelledError):  # the mission was stopped before it could run
             if keep_out is not None:
                 keep_out(rules)
             mission.run(reserved, place, rules=rules, room_map=room_map)
@@ -257,7 +257,7 @@ class MissionSession:
         return self._stop_button.by is not None
 
     def _ask(self, mission: Mission, *, repair: bool) -> None:
-        """Ask the model for a program and check it; keep the previous program if the reply has none."""
+        """Ask the model for a program and check it. Keep the previous program if the reply has none."""
         before = self._view
         writing = {"busy": f"asking {before.model}", "is_written": True}
         self._show(**_UNCHECKED | writing, program="", reply="", error="")
@@ -322,7 +322,7 @@ class MissionSession:
         self._show(remarks=(*self._view.remarks, sentence))
 
     def _add_event(self, line: LogLine) -> None:
-        """Add an event to the view; the mission holds its own lock during this call."""
+        """Add an event to the view. The mission holds its own lock during this call."""
         with self._lock:
             self._events.append(line)
             self._change(progress=self._view.progress.after(line))
@@ -333,7 +333,7 @@ class MissionSession:
             self._change(**changes)
 
     def _change(self, **changes: object) -> None:
-        """Update the view, including the mission's state; the caller must hold the lock."""
+        """Update the view, including the mission's state. The caller must hold the lock."""
         if self._mission is not None:
             now = self._mission.summary
             changes |= {"state": now.state, "reason": now.reason, "line": now.line}

@@ -15,7 +15,7 @@ STOP_REQUEST_SECONDS = 6.0
 
 
 class StopButton:
-    """Stops a robot, then notifies listeners; can be pressed repeatedly and from any thread."""
+    """Stops a robot, then notifies listeners. It can be pressed repeatedly and from any thread."""
 
     def __init__(self, robot: Robot | None = None) -> None:
         self.robot = robot
@@ -27,7 +27,7 @@ class StopButton:
         self._lock = threading.Lock()  # held briefly
 
     def press(self, by: str) -> None:
-        """Stop the robot, then call all listeners, newest first, even if some fail; log the source `by`."""
+        """Stop the robot, then call all listeners, newest first, even if some fail. Log the source `by`."""
         now = time.monotonic()
         with ExitStack() as afterwards:
             with self._lock:

@@ -26,14 +26,14 @@ _MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
 
 
 def read_missions(home: Path) -> list[MissionSummary]:
-    """Read the summaries of all missions, oldest first; raise UserError if one is damaged."""
+    """Read the summaries of all missions, oldest first. Raise UserError if one is damaged."""
     return sorted(
         map(MissionSummary.read, _mission_folders(home)), key=lambda summary: (summary.created, summary.id)
     )
 
 
 def find_mission(home: Path, name: str) -> Path:
-    """Return the folder of a mission, given its ID or `last`; raise UserError if there is no such mission."""
+    """Return the folder of a mission, given its ID or `last`. Raise UserError if there is no such mission."""
     if name == "last" and (known := read_missions(home)):
         return home / "missions" / known[-1].id
     folder = home / "missions" / name
@@ -43,7 +43,7 @@ def find_mission(home: Path, name: str) -> Path:
 
 
 def recover_missions(home: Path) -> list[MissionSummary]:
-    """Close and report missions whose process died; skip damaged missions."""
+    """Close and report missions whose process died, but skip damaged missions."""
     found: list[MissionSummary] = []
     for folder in _mission_folders(home):
         try:
@@ -77,7 +77,7 @@ def _close_interrupted(folder: Path) -> list[MissionSummary]:
     try:
         log = open_log(folder)
     except BlockingIOError:
-        return []  # another process runs it
+        return []  # another process runs the mission
     with closing(log):
         summary, events = MissionSummary.read(folder), read_events(folder)
         if summary.has_ended:

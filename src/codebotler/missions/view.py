@@ -25,7 +25,7 @@ Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking",
 
 @dataclass(frozen=True)
 class MissionOrder:
-    """A request for a mission, with an instruction or a program; raises UserError if both are missing."""
+    """A request for a mission, with an instruction or a program. It raises UserError if both are missing."""
 
     instruction: str = ""
     model: str = ""  # empty if no model may be asked

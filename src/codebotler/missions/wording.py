@@ -21,20 +21,20 @@ _MAX_ACTIVITY_CHARACTERS = 100
 
 
 def event_text(line: LogLine) -> str:
-    """Describe an event, such as `drives to "kitchen"`; return an empty string for events to be hidden."""
+    """Describe an event, as in `drives to "kitchen"`. Return an empty string for hidden events."""
     words = _EVENT_WORDERS.get(line["event"])
     return words(line) if words else ""
 
 
 def activity(line: LogLine) -> str:
-    """Describe a current skill or pause, such as `going to "supply room"`."""
+    """Describe the current skill or pause, as in `going to "supply room"`."""
     if line["event"] == "sleep":
         return f"waiting for {line['seconds']:g} s"
     return skill_text(line, "ing", _MAX_ACTIVITY_CHARACTERS) or f"executing {visible(line['skill'])}"
 
 
 def skill_text(line: LogLine, form: VerbForm, most: int = 500) -> str:
-    """Describe the call of a skill; return an empty string if the skill has no verb."""
+    """Describe the call of a skill. Return an empty string if the skill has no verb."""
     skill = by_name(line["skill"])
     if skill is None or skill.verb is None:
         return ""
@@ -53,7 +53,7 @@ def stop_text(by: str, doing: str = "") -> str:
 
 
 def state_text(state: str, reason: str) -> str:
-    """Describe a state and its reason, such as `stopped by rule vault` or `failed: the door is shut`."""
+    """Describe a state and its reason, as in `stopped by rule vault` or `failed: the door is shut`."""
     if not reason or reason.startswith(state):
         return shortened(reason) or state
     return f"{state}: {shortened(reason)}"

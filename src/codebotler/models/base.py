@@ -18,7 +18,7 @@ TextListener: TypeAlias = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Usage:
-    """The token counts of a request; counts that the model does not report are None."""
+    """The token counts of a request. Counts that the model does not report are None."""
 
     input_tokens: int | None = None
     output_tokens: int | None = None  # including reasoning tokens
@@ -44,7 +44,7 @@ class Reply:
 
     @property
     def is_cut_off(self) -> bool:
-        """Whether the reply reached the token limit; its program may still be complete."""
+        """Whether the reply reached the token limit. Its program may still be complete."""
         return is_cut_off(self.finish_reason)
 
     def data(self) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def make_reply(
     """Extract the program and build a `Reply`.
 
     `opening` is the prompt that a base model continues, or None for a chat model. `known_kind` says why there
-    is no program, if the server reported it outside the text. Without an answer, no program is extracted.
+    is no program, if the server reported this outside the text. Without an answer, no program is extracted.
     """
     answer = text if has_answer else ""
     found = read_reply(
@@ -87,13 +87,13 @@ def make_reply(
 
 
 def ignore_text(_piece: str) -> None:
-    """Do nothing; this is the default listener."""
+    """Ignore a piece of a reply. This is the default listener."""
 
 
 class Model(Protocol):
     """A language model that writes programs on request.
 
-    Several requests may run at the same time, all in one event loop; each of them can be cancelled.
+    Several requests may run at the same time, all in one event loop. Each of them can be cancelled.
     """
 
     @property
@@ -102,7 +102,7 @@ class Model(Protocol):
 
     @property
     def settings(self) -> SamplingSettings:
-        """The settings that are sent; settings that the provider does not support are None."""
+        """The settings that are sent. Settings that the provider does not support are None."""
 
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
         """Request one reply.
@@ -110,7 +110,7 @@ class Model(Protocol):
         Args:
             prompt: the prompt to answer.
             number: the number of the reply among the replies to this prompt, from 0.
-            on_text: called with each piece of text, with reasoning between `<think>` and `</think>`; if a
+            on_text: called with each piece of text, with reasoning between `<think>` and `</think>`. If a
                 request is repeated after an error, the pieces start again from the beginning.
 
         Raises:
@@ -118,14 +118,14 @@ class Model(Protocol):
         """
 
     async def close(self) -> None:
-        """Release connections and memory; call it only when no request is running."""
+        """Release connections and memory. Call this only when no request is running."""
 
 
 class ModelError(Exception):
-    """Raised if a model did not reply; a reply without a program is not an error.
+    """Raised if a model did not reply. A reply without a program is not an error.
 
     Args:
-        sentence: the cause and, if known, the fix; contains no keys.
+        sentence: the cause and, if known, the fix, without keys.
         may_pass: whether the same request may succeed later.
         retry_after: how many seconds to wait, if the server asks for a delay, else None.
         is_refusal: whether the server rejected this prompt, rather than failing.

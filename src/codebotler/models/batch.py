@@ -1,4 +1,4 @@
-"""Build requests and parse answers in files for batch endpoints that use OpenAI's protocol."""
+"""Build request files and parse answer files for batch endpoints that use OpenAI's protocol."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class BatchRequest:
 
 
 class BatchModel:
-    """A model whose requests and answers are stored in files; it sends nothing and needs no key.
+    """A model whose requests and answers are stored in files. It sends nothing and needs no key.
 
     It reuses the model's code for single requests, and takes the place of the server.
     """
@@ -71,7 +71,7 @@ class BatchModel:
         return BatchRequest("/v1/chat/completions" if is_chat else "/v1/completions", body)
 
     def reply(self, prompt: Prompt, *, number: int, status: int, body: object) -> Reply:
-        """Parse the HTTP status and JSON of an answer; raise ModelError if the answer is an error."""
+        """Parse the HTTP status and JSON of an answer, or raise ModelError if the answer is an error."""
         if status < FIRST_ERROR and not _has_choice(body):
             raise error_in_reply(self.name, body)
         short = replace(prompt, messages=prompt.messages[-1:])  # encoding a long prompt would only cost time

@@ -121,7 +121,7 @@ class ChatModel:
                     case messages.PartDeltaEvent(delta=messages.ThinkingPartDelta() as delta):
                         hear(delta.content_delta or "", is_thought=True)
             response = stream.get()
-        # A stream that ends early without an error can be told only by its missing finish reason, but for
+        # A stream that ends early without an error can be noticed only by its missing finish reason, but for
         # chat completions pydantic-ai makes up a reason.
         is_complete = response.finish_reason is not None if chunks is None else chunks.is_whole
         if chunks is not None and chunks.error is not None:
@@ -276,7 +276,7 @@ def _supported_by_openai(profile: Mapping[str, Any], settings: SamplingSettings)
 
 
 def _is_reasoning(profile: Mapping[str, Any], effort: str | None) -> bool:
-    """Whether an OpenAI model reasons at this effort, and so rejects sampling settings."""
+    """Whether an OpenAI model reasons at this effort, and therefore rejects sampling settings."""
     if not profile.get("openai_supports_reasoning"):
         return False
     efforts = profile.get("openai_reasoning_efforts")
@@ -382,7 +382,7 @@ def _limit_provider(provider: Provider[object], name: str, settings: SamplingSet
     if isinstance(client := provider.client, openai.AsyncOpenAI):
         make_lenient(client)
     first, make = provider._own_http_client, provider._http_client_factory  # noqa: SLF001 - no public way
-    if first is None or make is None:  # it uses no HTTP client that we can reach
+    if first is None or make is None:  # the provider uses no HTTP client that we can reach
         return provider
     limit = byte_limit(settings.max_tokens)
 

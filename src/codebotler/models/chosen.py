@@ -1,4 +1,4 @@
-"""Choose the default model: from the environment, config.yaml, or else a recorded one."""
+"""Choose the default model from the environment or config.yaml, or else a recorded model."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ChosenModel:
     max_tokens: int | None = None  # None means the default limit for a reply
 
     def add_server(self, settings: SamplingSettings) -> SamplingSettings:
-        """Return the settings with this model's server, and with its limit unless they have a limit."""
+        """Return the settings with this model's server and, if they have no token limit, with its limit."""
         limit = settings.max_tokens or self.max_tokens
         return replace(settings, base_url=self.base_url, max_tokens=limit)
 
@@ -74,7 +74,7 @@ def choose_model(name: str | None = None, base_url: str | None = None) -> Chosen
 def make_opener(
     models: Sequence[str], base_url: str | None, settings: SamplingSettings
 ) -> Callable[[str], Model]:
-    """Return a function that opens models by name; raise UserError at once if a name is invalid."""
+    """Return a function that opens models by name. Raise UserError at once if a name is invalid."""
     for each in models:
         kind_of(each)
     if base_url is not None:

@@ -1,4 +1,4 @@
-"""Configure HTTP clients with a limit on replies, no redirects, and no proxies for local servers."""
+"""Configure HTTP clients to limit replies, refuse redirects, and use no proxies for local servers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HTTPClient = TypeVar("HTTPClient", bound=Any)  # of httpx or httpx2, which share
 
 MIN_REPLY_BYTES = 8_000_000
 BYTES_PER_TOKEN = 4_000  # each event of a stream is much longer than its token
-ASSUMED_TOKENS = 100_000  # if there is no limit
+ASSUMED_TOKENS = 100_000  # assumed for replies without a limit
 CERTIFICATE_VARIABLES = ("SSL_CERT_FILE", "SSL_CERT_DIR")
 ENDPOINTS = ("/chat/completions", "/completions", "/responses", "/messages")
 

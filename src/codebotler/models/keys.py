@@ -26,7 +26,7 @@ CLIENT_LOGGERS = (
 
 
 def read_key(variable: str) -> str | None:
-    """Return the key in a variable, or None; raise UserError if it is not valid in an HTTP header."""
+    """Return the key in a variable, or None. Raise UserError if it is not valid in an HTTP header."""
     key = os.environ.get(variable, "")
     if not key.strip():
         return None
@@ -95,7 +95,7 @@ _REDACTION = _Redaction()
 
 
 def guard_logs() -> None:
-    """Remove keys from client libraries' logs, and silence their warnings; call this after importing them.
+    """Remove keys from client libraries' logs, and silence their warnings. Call this after importing them.
 
     CodeBotler's own notes name the settings that a model does not support.
     """

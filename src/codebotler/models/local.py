@@ -176,7 +176,7 @@ class LocalModel:
         return self.tokenizer(text, add_special_tokens=special, return_token_type_ids=False, **options)
 
     def _endings(self, batch: Sequence[_Job], seed: int | None) -> list[Ending]:
-        """Generate replies; halve the batch if memory runs out."""
+        """Generate replies, and halve the batch if memory runs out."""
         try:
             return self._generate(batch, seed)
         except _CancelledError:
@@ -233,7 +233,7 @@ class LocalModel:
         return {"do_sample": True, **{name: value for name, value in given.items() if value is not None}}
 
     def _is_over(self, job: _Job, tokens: list[int]) -> bool:
-        """Pass on complete lines; return whether a base model has completed the function."""
+        """Pass on complete lines, and return whether a base model has completed the function."""
         text = self._decode(self._before_end(tokens))
         end = self._end(job, text)
         # Hold back the last line and the line break before it, because they may lie after the end.

@@ -54,9 +54,9 @@ def classify_reply(
     incomplete, even if it parses.
 
     Args:
-        reply: the text; None if it was not recorded.
+        reply: the text, or None if it was not recorded.
         program: the extracted program.
-        finish_reason: the server's finish reason; None if it gave none.
+        finish_reason: the server's finish reason, or None if it gave none.
         has_code: whether the reply contains any code.
         known_kind: the kind of reply, if the server reported it outside the text, such as in a refusal field.
     """

@@ -60,7 +60,7 @@ def runs_on_server(name: str) -> bool:
 
 
 def kind_of(name: str) -> str:
-    """Validate a model's name without importing large libraries; return the part before the colon."""
+    """Validate a model's name without importing large libraries, and return the part before the colon."""
     kind, _, rest = name.partition(":")
     if kind == "recorded":
         open_recorded(name)

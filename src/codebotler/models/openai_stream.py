@@ -45,7 +45,7 @@ class Chunks:
 
     def __init__(self, stream: Any) -> None:  # noqa: ANN401 - of chat or text completions, or a wrapper
         self._stream = stream
-        self.source = getattr(stream, "source", stream)  # pydantic-ai closes it
+        self.source = getattr(stream, "source", stream)  # pydantic-ai closes the source
         self.usage: Any = None
         self.finish_reason: str | None = None
         self.error: object = None  # an error body that came instead of a chunk

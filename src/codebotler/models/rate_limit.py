@@ -44,11 +44,11 @@ class RateLimited:
     Args:
         model: the model to ask.
         concurrency: how many requests may run at the same time, at least 1.
-        requests_per_minute: how many tries may start per minute, evenly spaced; None for no limit.
+        requests_per_minute: how many tries may start per minute, evenly spaced, or None for no limit.
         retries: how many times to repeat a failed request, at least 0.
-        token_budget: the number of tokens after which no request starts; running requests complete. If the
+        token_budget: the number of tokens after which no request starts. Running requests complete. If the
             model does not count tokens, three characters are assumed per token. None for no limit.
-        first_wait: about how many seconds to wait before the second try; the wait doubles each time.
+        first_wait: about how many seconds to wait before the second try. The wait doubles each time.
 
     Raises:
         UserError: a limit is out of range.
@@ -94,7 +94,7 @@ class RateLimited:
         return self.model.settings
 
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
-        """Request one reply, with retries; each try calls `on_text` from the beginning again.
+        """Request one reply, with retries. Each try passes the reply to `on_text` from the beginning.
 
         Raises:
             ModelError: the last try failed.
@@ -124,7 +124,7 @@ class RateLimited:
     async def _try(self, prompt: Prompt, number: int, on_text: TextListener) -> Reply:
         self._check_budget()
         await self._wait_for_turn()
-        self._check_budget()  # other requests may have used it up in the meantime
+        self._check_budget()  # other requests may have used up the budget by now
         self.requests += 1
         length = 0
 

@@ -1,4 +1,4 @@
-"""Recorded models: programs written by hand for known instructions; no key or network needed."""
+"""Recorded models answer known instructions with hand-written programs, without a key or network."""
 
 from __future__ import annotations
 
@@ -56,13 +56,13 @@ class InstructionSolutions(BaseModel):
 
 
 class RecordedFile(BaseModel):
-    """The part of a solutions file that the recorded models need; the benchmark reads the rest."""
+    """The part of a solutions file that the recorded models need. The benchmark reads the rest."""
 
     recorded: tuple[InstructionSolutions, ...] = ()
 
 
 class UnknownInstructionError(ModelError):
-    """Raised if a recorded model has no program for an instruction; suggests similar instructions."""
+    """Raised if a recorded model has no program for an instruction. The message suggests similar ones."""
 
     def __init__(self, model: str, instruction: str, closest: Sequence[str]) -> None:
         similar = " or ".join(f'"{_short(known)}"' for known in closest)
@@ -86,12 +86,12 @@ class RecordedModel:
     settings: SamplingSettings = field(default_factory=partial(SamplingSettings, None, None))
 
     def solution(self, instruction: str, index: int) -> Solution:
-        """Return the reply for completion `index`, counted from 0; the replies repeat in a cycle."""
+        """Return the reply for completion `index`, counted from 0. The replies repeat in a cycle."""
         replies = self.replies[instruction]
         return replies[index % len(replies)]
 
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
-        """Return the recorded reply; it takes no time and no tokens."""
+        """Return the recorded reply, which takes no time and no tokens."""
         known = {_words(instruction): instruction for instruction in self.replies}
         instruction = known.get(_words(prompt.instruction))
         if instruction is None:
@@ -103,11 +103,11 @@ class RecordedModel:
         return Reply(program, program, Usage(), 0.0, "stop")
 
     async def close(self) -> None:
-        """Do nothing; there is nothing to close."""
+        """Do nothing, because there is nothing to close."""
 
 
 def find_closest(instruction: str, known: Iterable[str]) -> list[str]:
-    """Return the known instructions that share the most long words, in the same order, with `instruction`."""
+    """Return the known instructions that share the most long words with `instruction`, in the same order."""
     matcher = SequenceMatcher(a=(), b=LONG_WORD.findall(instruction.lower()), autojunk=False)
 
     def similarity(other: str) -> tuple[int, float]:
@@ -131,7 +131,7 @@ def is_recorded(name: str) -> bool:
 
 
 def open_recorded(name: str, folder: Path | None = None) -> RecordedModel:
-    """Open a recorded model by its name; `folder` may hold further solutions."""
+    """Open a recorded model by its name. `folder` may hold further solutions."""
     short = name.removeprefix("recorded").removeprefix(":") or RECORDED_NAMES[0]
     if short not in RECORDED_NAMES and Path(short).is_dir():
         own = _read(Path(short))
@@ -148,7 +148,7 @@ def open_recorded(name: str, folder: Path | None = None) -> RecordedModel:
 
 @cache
 def _read_suite(suite: str) -> tuple[InstructionSolutions, ...]:
-    """Read the instructions of a benchmark suite; the paper's suite includes this folder's instructions."""
+    """Read the instructions of a benchmark suite. The paper's suite includes this folder's instructions."""
     return _read(*_suite_folders(suite), *([RECORDED_FOLDER] if suite == "paper" else []))
 
 

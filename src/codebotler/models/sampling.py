@@ -12,7 +12,7 @@ from codebotler.core.errors import UserError
 
 MAX_TEMPERATURE = 100  # a higher temperature must be a typo
 PAPER_MAX_TOKENS = 512
-"""The paper's limit for a reply, in tokens; also the default for base models, which may never stop."""
+"""The paper's limit for a reply, in tokens, and also the default for base models, which may never stop."""
 CHAT_MAX_TOKENS = 16_384
 """The token limit for chat replies if the provider requires a limit and the user gives none."""
 
@@ -24,16 +24,16 @@ RESERVED_FIELDS = frozenset(
 
 @dataclass(frozen=True)
 class SamplingSettings:
-    """The settings of requests to a model; settings that are None are not sent.
+    """The settings of requests to a model. Settings that are None are not sent.
 
     Args:
-        temperature: from 0 (always the likeliest token) up to about 2; None for the model's default.
+        temperature: from 0 (always the likeliest token) up to about 2, or None for the model's default.
         top_p: the share of likely tokens to sample from, above 0 and up to 1; None for the model's default.
-        max_tokens: the limit for a reply, at least 1; None for the default of a chat model, or 512 for a
+        max_tokens: the limit for a reply, at least 1, or None for the default of a chat model, or 512 for a
             base model.
-        seed: the random seed, if the model supports one; reply number n gets `seed + n`.
+        seed: the random seed, if the model supports one. Reply number n gets `seed + n`.
         timeout: the limit for a complete request, in seconds.
-        base_url: the server's address, such as `http://localhost:8000/v1`; None for the provider's own.
+        base_url: the server's address, such as `http://localhost:8000/v1`, or None for the provider's own.
         reasoning_effort: the provider's name for how much a model reasons, such as `low`.
         extra_body: additional fields for the JSON body of each request.
 
@@ -71,7 +71,7 @@ class SamplingSettings:
         return None if self.seed is None else self.seed + number
 
     def for_base_model(self, name: str) -> SamplingSettings:
-        """Return the settings for a base model; raise UserError if there is a reasoning effort."""
+        """Return the settings for a base model, or raise UserError if they have a reasoning effort."""
         if self.reasoning_effort is not None:
             raise UserError(f"{name} is a base model and does not support a reasoning effort; remove it")
         return replace(self, max_tokens=self.max_tokens or PAPER_MAX_TOKENS)

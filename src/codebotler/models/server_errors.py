@@ -80,7 +80,7 @@ def timeout_error(name: str, seconds: float) -> ModelError:
 def status_error(
     name: str, status: int, body: object, *, retry_after: float | None = None, is_permanent: bool = False
 ) -> ModelError:
-    """Build the error for a status of 400 or more; a permanent error is not retried, whatever its status."""
+    """Build the error for a status of 400 or more. A permanent error is not retried, whatever its status."""
     message = f" ({text})" if (text := error_text(body)) else ""
     sentence = f"{name}: the server answered with status {status}{message}{STATUS_HINTS.get(status, '')}"
     may_pass = not is_permanent and (status >= SERVER_ERROR or status in RETRYABLE_STATUSES)

@@ -1,4 +1,4 @@
-"""Find the models that can be used now: keys in the environment, local servers, recorded programs."""
+"""Find the models that can be used now: those with an API key, on local servers, or recorded."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from codebotler.models.keys import read_key
 from codebotler.models.recorded import RECORDED_NAMES, is_recorded
 
 MODEL_SERVERS: Mapping[str, int] = {"Ollama": 11434, "LM Studio": 1234, "vLLM": 8000, "llama.cpp": 8080}
-"""Model servers and their default ports; all support OpenAI's protocol."""
+"""Model servers and their default ports. All of them support OpenAI's protocol."""
 
 KEY_VARIABLES: Mapping[str, str] = {
     "OPENAI_API_KEY": "openai-chat:gpt-5.1",
@@ -85,7 +85,7 @@ def _is_set(key: str) -> bool:
 
 
 def _list_models(server: str, port: int) -> list[UsableModel]:
-    """Ask a server for its models; return an empty list if it is not a running model server."""
+    """Ask a server for its models. Return an empty list if it is not a running model server."""
     connection = HTTPConnection("127.0.0.1", port, timeout=SERVER_TIMEOUT)
     try:
         connection.request("GET", "/v1/models", headers={"Accept": "application/json"})

@@ -23,7 +23,7 @@ class Sighting:
     Args:
         found: whether the image shows it.
         box: the box around the clearest match, or None if nothing was found.
-        score: the confidence, from 0 to 1; scores from different models are not comparable.
+        score: the confidence, from 0 to 1. Scores from different models are not comparable.
 
     Raises:
         ValueError: the score or box is out of range.
@@ -69,7 +69,7 @@ class Detector(Protocol):
 
 
 class PerceptionError(Exception):
-    """A detector failed; the sentence gives the reason and contains no API keys."""
+    """Raised when a detector fails. The sentence gives the reason and contains no API keys."""
 
     def __init__(self, sentence: str) -> None:
         super().__init__(sentence)
@@ -77,7 +77,7 @@ class PerceptionError(Exception):
 
 
 def check_label(label: str) -> str:
-    """Return the label as one line; raise UserError if it is empty, too long or not printable."""
+    """Return the label as one line, or raise UserError if it is empty, too long or not printable."""
     words = " ".join(label.split())
     if not words:
         raise UserError("the label is empty; name an object to look for")

@@ -40,7 +40,7 @@ FENCED_JSON = re.compile(r"```(?:json)?[^\S\n]*\n(.*)\n[^\S\n]*```", re.DOTALL)
 
 
 class ChatDetector:
-    """Asks a chat model what it sees; several threads may use it, but only one at a time."""
+    """Detects objects by asking a chat model. Threads may share a detector, but must take turns."""
 
     def __init__(self, model: Model) -> None:
         self._runner = asyncio.Runner()
@@ -86,7 +86,7 @@ class _DetectorAnswer(BaseModel):
 
 
 def parse_sighting(text: str) -> Sighting:
-    """Parse a JSON reply, with or without a code fence; raise ValueError if it is invalid."""
+    """Parse a JSON reply, with or without a code fence. Raise ValueError if it is invalid."""
     if len(text) > MAX_REPLY_CHARACTERS:
         raise ValueError(f"it has {len(text):,} characters")
     fenced = FENCED_JSON.fullmatch(text.strip())

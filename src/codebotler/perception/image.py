@@ -34,7 +34,7 @@ ENCODINGS: Mapping[str, tuple[str, str, int]] = {
 
 
 def image_of(data: bytes, name: str = "the picture") -> Image.Image:
-    """Decode a JPEG, PNG or WebP image upright and in RGB; raise UserError, which names it, if that fails."""
+    """Decode a JPEG, PNG or WebP image, upright and in RGB. Raise a UserError with `name` if that fails."""
     if not data:
         raise UserError(f"{name} is empty")
     if len(data) > MAX_IMAGE_BYTES:
@@ -56,14 +56,14 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
 
 
 def read_image(path: Path) -> Image.Image:
-    """Read an image file; raise UserError if that fails."""
+    """Read an image file, or raise UserError if that fails."""
     return image_of(read_bytes(path, MAX_IMAGE_BYTES + 1), str(path))
 
 
 def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> Image.Image:
     """Decode a sensor_msgs/CompressedImage, or a sensor_msgs/Image with a common encoding.
 
-    `data` must be in base64. Raise UserError, which names the image, if there is none or it is too large.
+    `data` must be in base64. Raise a UserError that contains `name` if there is no image or it is too large.
     """
     match message:
         case {"encoding": str(encoding), "width": int(width), "height": int(height), "step": int(step)}:
@@ -134,7 +134,7 @@ def _check_size(width: int, height: int, name: str) -> None:
 
 
 def _to_rgb(image: Image.Image) -> Image.Image:
-    """Convert an image to RGB; transparent parts become white."""
+    """Convert an image to RGB. Transparent parts become white."""
     if image.mode.startswith("I"):
         # Cameras rarely use all 16 bits, so scale the brightest grey to white.
         image = image.convert("I")

@@ -20,7 +20,7 @@ RobotArgument: TypeAlias = Scalar | tuple[Scalar, ...]
 """An argument of a skill: a single value, several values, or the options of a question."""
 
 RobotResult: TypeAlias = Scalar | list[str] | list[Scalar] | None
-"""The result of a skill; for a question, the text of the chosen option."""
+"""The result of a skill, or for a question, the text of the chosen option."""
 
 STOP_BY_HAND = "STOP THE ROBOT BY HAND"
 ROS_PYTHON = Path("/usr/bin/python3")
@@ -35,7 +35,7 @@ class CameraPicture:
 
 
 Feedback: TypeAlias = Callable[[str | CameraPicture], None]
-"""A callback for progress reports such as `at (3.1, 2.0)` and for pictures; any thread may call it."""
+"""A callback for progress reports such as `at (3.1, 2.0)` and for pictures. Any thread may call it."""
 
 
 def ignore_feedback(_: str | CameraPicture) -> None:
@@ -51,7 +51,7 @@ class Robot(Protocol):
 
     @property
     def address(self) -> str:
-        """The robot's address, such as a ROS master URI; empty if no other process can reach the robot."""
+        """The robot's address, such as a ROS master URI, or "" if no other process can reach the robot."""
 
     @property
     def if_tool_dies(self) -> str:
@@ -71,23 +71,23 @@ class Robot(Protocol):
 
     @property
     def missing(self) -> Mapping[str, str]:
-        """Why some skills are unavailable, by skill name; complete only after connecting."""
+        """The reason for each unavailable skill, by name. It is complete once the robot is connected."""
 
     @property
     def clock(self) -> Clock:
         """The clock that times a program's sleeps."""
 
     def connect(self) -> None:
-        """Prepare the robot at rest with its clock at 0, for the first time or again after `cancel`.
+        """Get the robot ready, at rest and with its clock at 0. Call this first, and again after `cancel`.
 
         Raises:
-            NotReadyError: the robot cannot be used; all resources have been released.
+            NotReadyError: the robot cannot be used. All resources have been released.
         """
 
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback, /
     ) -> RobotResult:
-        """Perform a skill and wait until it ends; only one thread at a time may call this method.
+        """Perform a skill and wait until it ends. Only one thread at a time may call this method.
 
         Args:
             skill: the name of the skill in the table.
@@ -95,7 +95,7 @@ class Robot(Protocol):
             feedback: a callback for progress reports and pictures.
 
         Raises:
-            RobotError: the skill failed; programs can catch this error.
+            RobotError: the skill failed. Programs can catch this error.
             CancelledError: `cancel` was called, or another client stopped the robot.
             RobotLostError: the robot no longer responds.
         """
@@ -103,12 +103,12 @@ class Robot(Protocol):
     def cancel(self) -> None:
         """Stop the current skill, if any, and refuse all others until the next `connect`.
 
-        This method is thread-safe and never raises. It returns once the stop command has been sent; a running
-        `perform` returns once the skill has ended.
+        This method is thread-safe and never raises. It returns once the stop command has been sent. A running
+        `perform` returns once its skill has ended.
         """
 
     def disconnect(self) -> None:
-        """Stop the current skill and release all resources; further calls have no effect."""
+        """Stop the current skill and release all resources. Further calls have no effect."""
 
 
 class _SentenceError(Exception):
@@ -118,11 +118,11 @@ class _SentenceError(Exception):
 
 
 class NotReadyError(_SentenceError):
-    """Raised when a robot cannot be used; the sentence says why and how to fix it."""
+    """Raised when a robot cannot be used. The sentence says why and how to fix that."""
 
 
 class RobotLostError(_SentenceError):
-    """Raised when a connected robot no longer responds; the sentence says why."""
+    """Raised when a connected robot no longer responds. The sentence says why."""
 
 
 class AnswerError(_SentenceError):
@@ -146,10 +146,10 @@ class Readiness:
 
 @dataclass(frozen=True)
 class Options:
-    """Options for opening a robot; each kind ignores the options it does not need."""
+    """Options for opening a robot. Each kind of robot ignores the options that it does not need."""
 
     world: World | None = None  # the world of a simulated robot
-    speed: float | None = 1.0  # clock seconds per real second; None to wait for nothing
+    speed: float | None = 1.0  # clock seconds per real second; None to skip all waits
     address: str = ""  # the robot's address, such as a ROS master URI; empty for the default
     ros_python: Path = ROS_PYTHON  # the Python interpreter of the robot's ROS installation
     skills: SkillTable = SKILLS  # the skills that programs may call

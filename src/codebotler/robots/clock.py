@@ -37,7 +37,7 @@ class Clock:
         return (time.monotonic() - self._start) * self.speed
 
     def wait(self, seconds: float) -> bool:
-        """Wait for a number of clock seconds, 0 or more; return False if the clock was stopped."""
+        """Wait for a number of clock seconds, 0 or more. Return False if the clock was stopped."""
         if self.speed is not None:
             self._stopped.wait(min(seconds / self.speed, threading.TIMEOUT_MAX))
         elif not self._stopped.is_set():
@@ -45,7 +45,7 @@ class Clock:
         return not self._stopped.is_set()
 
     def stop(self) -> None:
-        """Interrupt current waits, and make later ones return immediately until `restart`; thread-safe."""
+        """Interrupt all waits, and end later ones immediately until `restart`. This is thread-safe."""
         self._stopped.set()
 
     def restart(self) -> None:

@@ -33,7 +33,7 @@ MIN_SPEECH, MAX_SPEECH, CHARACTERS_PER_SECOND = 1.0, 10.0, 20.0  # the duration 
 
 @dataclass(frozen=True)
 class FaceSentence:
-    """A sentence that the robot said; sentences and questions are numbered together, from 1."""
+    """A sentence that the robot said. Sentences and questions share one numbering, which starts at 1."""
 
     number: int
     text: str
@@ -41,7 +41,7 @@ class FaceSentence:
 
 @dataclass(frozen=True)
 class FaceQuestion:
-    """A question that the robot asked; an answer must give the question's number."""
+    """A question that the robot asked. An answer must quote the question's number."""
 
     number: int
     person: str
@@ -62,7 +62,7 @@ class FaceState:
 
 
 class Face:
-    """Keeps the robot's sentences and questions; thread-safe, and only `ask` blocks.
+    """Keeps the robot's sentences and questions. It is thread-safe, and only `ask` blocks.
 
     Args:
         seconds: the time limit for an answer, in real seconds.
@@ -102,7 +102,7 @@ class Face:
             self._end("withdrawn")
 
     def say(self, text: str) -> None:
-        """Show a sentence; raise CancelledError if the mission has been stopped."""
+        """Show a sentence, or raise CancelledError if the mission has been stopped."""
         with self._lock:
             said = FaceSentence(self._next(), text)
             self._show(replace(self.shown, said=(*self.shown.said, said)[-MAX_SENTENCES:]))
@@ -133,13 +133,13 @@ class Face:
         return ended.answer
 
     def answer(self, number: int, option: int) -> None:
-        """Answer a question by its number; raise AnswerError if it is closed or the option does not exist."""
+        """Answer the question with this number, or raise AnswerError if it is closed or lacks the option."""
         with self._lock:
             question = self.shown.question
             if question is None or question.number != number:
                 raise AnswerError(self._too_late(number))
             if not 0 <= option < len(question.options):
-                raise AnswerError("that is not one of the options; choose one from the list")
+                raise AnswerError("the answer is not one of the options; choose one from the list")
             self._end("answered", option)
 
     def _too_late(self, number: int) -> str:
@@ -184,7 +184,7 @@ def _speech_of(skill: Skill) -> Recording | None:
 
 
 class RobotWithFace:
-    """Wraps a robot: a face performs the spoken skills, and the robot performs all others."""
+    """Wraps a robot so that a face performs the spoken skills, and the robot performs all others."""
 
     def __init__(self, robot: Robot, face: Face, skills: SkillTable = SKILLS) -> None:
         self._robot, self._face, self.skills = robot, face, skills
@@ -193,7 +193,7 @@ class RobotWithFace:
 
     @property
     def missing(self) -> Mapping[str, str]:
-        """Why the wrapped robot cannot perform some skills, without the spoken ones, by skill name."""
+        """The reason for each skill that the wrapped robot lacks, by name, without the spoken skills."""
         return {
             skill: why for skill, why in self._robot.missing.items() if _speech_of(self.skills[skill]) is None
         }
@@ -231,11 +231,11 @@ class RobotWithFace:
 
     @property
     def failed_stop(self) -> str:
-        """Why the wrapped robot did not stop; empty if it stopped or cannot report failed stops."""
+        """Why the wrapped robot did not stop, or "" if it stopped or cannot report failed stops."""
         return str(getattr(self._robot, "failed_stop", ""))
 
     def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
-        """Report the wrapped robot's position to a callback; return False if its position is never known."""
+        """Report the wrapped robot's position to a callback. Return False if its position is never known."""
         watch = getattr(self._robot, "watch", None)
         return watch is not None and bool(watch(on_pose))
 

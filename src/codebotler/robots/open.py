@@ -23,7 +23,7 @@ ROBOT_MODULES = {
 }
 """The module of each kind of robot, which must import quickly.
 
-Each module has the functions `readiness(ros_python)` and `robot(options)`; `robot` does not connect yet.
+Each module has the functions `readiness(ros_python)` and `robot(options)`, which does not connect yet.
 """
 
 

@@ -42,8 +42,8 @@ def is_own(name: str) -> bool:
 class OwnRobot:
     """Performs skills by calling the methods of a user's object.
 
-    Its `rooms()` must list the rooms. Its `stop()` must stop the robot at once; any thread may call it while
-    another method runs. To report a failure, a method raises RobotError or an exception with the name of an
+    Its `rooms()` must list the rooms. Its `stop()` must stop the robot at once. Any thread may call it while
+    another method runs. To report a failure, a method raises RobotError or an exception named after an
     error that the skill declares. Any other exception ends the mission.
 
     Args:
@@ -51,7 +51,7 @@ class OwnRobot:
         options: the options for opening the robot.
 
     Attributes:
-        failed_stop: why the robot could not be stopped; empty if it was stopped.
+        failed_stop: why the robot could not be stopped, or "" if it was stopped.
 
     Raises:
         UserError: the file or class does not exist, or a required method is missing.
@@ -81,7 +81,7 @@ class OwnRobot:
         self._running: Future[Any] | None = None
 
     def _method(self, skill: str) -> Callable[..., Any] | None:
-        """Return the method for a skill, or None; `rooms` is used for `get_all_rooms` if that is missing."""
+        """Return the method for a skill, or None. If there is no `get_all_rooms`, use `rooms` instead."""
         try:
             method = getattr(self._body, skill, None)
         except Exception as error:
@@ -188,7 +188,7 @@ class OwnRobot:
         self._thread.join(STOP_SECONDS)
 
     def _finish(self, result: Any, patience: float | None = None) -> Any:  # noqa: ANN401 - of a user's method
-        """Return the result of a method call; if the method is async, run it and wait for the result."""
+        """Return the result of a method call. If the method is async, run it and wait for the result."""
         if not inspect.iscoroutine(result):
             return result
         assert self._loop is not None, "the robot is connected"
@@ -230,7 +230,7 @@ def _run(loop: asyncio.AbstractEventLoop) -> None:
 
 
 def _make_body(path: Path, kind: str) -> Any:  # noqa: ANN401 - of a user's class
-    """Create an object of a class in a file; raise UserError if it cannot serve as a robot."""
+    """Create an object of a class in a file, or raise UserError if it cannot serve as a robot."""
     module = load_skill_module(path)
     classes = [
         n for n, one in vars(module).items() if inspect.isclass(one) and one.__module__ == module.__name__

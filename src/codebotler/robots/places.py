@@ -1,4 +1,4 @@
-"""Read a robot's places from our own file format, or from any YAML or JSON file with a mapping."""
+"""Read a robot's places from files in our own format or, through a mapping, from any YAML or JSON file."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class PlacesFile(_PlacesForm):
 
 
 class PlacesMapping(_PlacesForm):
-    """Describes how to find places in a file; a path is a list of keys and indices joined by dots."""
+    """Describes how to find places in a file. A path is a list of keys and indices joined by dots."""
 
     file: Name
     frame: Name = "map"
@@ -94,7 +94,7 @@ class PlacesMapping(_PlacesForm):
 
 
 def read_places(source: object, at: YamlFile) -> Places:
-    """Read the places of a robot; raise UserError if a file is invalid.
+    """Read the places of a robot, or raise UserError if a file is invalid.
 
     `source` is the value of `places` in the file `at`: a file name, a mapping, or a list of these.
     """
@@ -115,7 +115,7 @@ def read_places(source: object, at: YamlFile) -> Places:
             try:
                 found[name.casefold()] = _make_place(name, entry, mapping, found)
             except ValueError as error:
-                fix = f'correct it, or leave it out by "skip: [{name}]"'
+                fix = f'correct it, or leave it out with "skip: [{name}]"'
                 raise file.wrong(f'the place "{name}" cannot be read: {error}; {fix}', *where) from None
     return Places(frames[0], tuple(found.values()))
 
@@ -154,7 +154,7 @@ def _find_entries(mapping: PlacesMapping, data: object) -> Iterator[tuple[str, S
 def _make_place(
     name: str, entry: object, mapping: PlacesMapping, others: Mapping[str, NamedPlace]
 ) -> NamedPlace:
-    """Convert an entry to a place; raise ValueError if it is invalid."""
+    """Convert an entry to a place, or raise ValueError if it is invalid."""
     if other := others.get(name.casefold()):
         raise ValueError(f'the name is already taken by "{other.name}" (names are case-insensitive)')
     corners, paths, size = _find(entry, mapping.polygon), mapping.pose, mapping.resolution
@@ -179,7 +179,7 @@ def _make_place(
 
 
 def _numbers(value: Any) -> list[float]:  # noqa: ANN401 - of any file
-    """Return the numbers of a corner or a pose: x and y, then a yaw, or z and a quaternion, if given."""
+    """Return the numbers of a corner or a pose: x and y, then optionally a yaw, or z and a quaternion."""
     match value:
         case {"position": point, "orientation": {"x": x, "y": y, "z": z, "w": w}}:
             value = [*_numbers(point)[:2], 0.0, x, y, z, w]

@@ -28,8 +28,8 @@ LOOPBACK_ADDRESS = "127.0.0.1"
 class Reservation:
     """A context manager that locks and connects a robot.
 
-    For a robot with an address, the lock excludes all other processes of this user on this machine; without
-    an address, it excludes missions in the same folder. It is released when this process ends.
+    For a robot with an address, the lock excludes all other processes of this user on this machine. Without
+    an address, it excludes missions in the same folder. The lock is released when this process ends.
 
     Args:
         robot: the robot, not yet connected.
@@ -68,7 +68,7 @@ class Reservation:
             os.close(self._lock)
 
     def use(self) -> None:
-        """Claim this connection for a mission; raise NotReadyError if a mission has already used it."""
+        """Claim this connection for a mission, or raise NotReadyError if a mission has already used it."""
         if not self._is_used.acquire(blocking=False):
             raise NotReadyError(f"the robot {self.robot.name} has already run a mission; connect it again")
 
@@ -100,7 +100,7 @@ class Reservation:
 
 
 def robot_file(robot: str, address: str, kind: str) -> Path:
-    """Return the path of this user's file (of a kind such as lock) for the robot at an address."""
+    """Return the path of this user's file of some kind, such as `lock`, for the robot at an address."""
     digest = sha256(normalize_address(address).encode(errors="surrogatepass")).hexdigest()
     return lock_folder() / f"{robot} {digest}.{kind}"
 
@@ -137,8 +137,8 @@ def _is_ours(folder: Path) -> bool:
 def normalize_address(address: str) -> str:
     """Return the canonical form of an address: with a port, without user, capitals and trailing slashes.
 
-    All names of this machine map to one, and invalid addresses stay unchanged. Use the result only to compare
-    addresses, and connect to the original, since a server may listen on only one of its machine's names.
+    Invalid addresses stay unchanged, and all names of this machine become the same. Use the result only to
+    compare addresses. Connect to the original, since a server may listen on only one of its machine's names.
     """
     try:
         parts = urlsplit(address.strip())

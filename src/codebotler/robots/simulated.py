@@ -41,16 +41,16 @@ class Simulated:
 
     Args:
         world: the world that the robot works in.
-        speed: the robot's clock seconds per real second; None to wait for nothing.
+        speed: the robot's clock seconds per real second, or None to skip all waits.
         skills: the skills that programs may call.
-        metres_per_second: the driving speed, above 0; infinity makes drives instantaneous.
+        metres_per_second: the driving speed, above 0. Infinity makes drives instantaneous.
 
     Raises:
         UserError: the speed is out of range.
     """
 
     name, address, has_pose = "simulated", "", True
-    if_tool_dies, rooms_are_regexes = "the simulated robot ended with the tool", True
+    if_tool_dies, rooms_are_regexes = "the simulated robot ended as well", True
     missing: Mapping[str, str] = MappingProxyType({})
 
     def __init__(
@@ -96,7 +96,7 @@ class Simulated:
         self.clock.stop()
 
     def disconnect(self) -> None:
-        """Stop the robot; there is no connection to close."""
+        """Stop the robot, which has no connection to close."""
         self.cancel()
 
     def _drive(self, room: str, feedback: Feedback) -> None:
@@ -121,7 +121,7 @@ class Simulated:
 
 
 def perform_at_once(robot: SimulatedRobot, skill: str, arguments: Sequence[RobotArgument]) -> RobotResult:
-    """Perform a skill in the simulator without delays; options and the answer are plain strings."""
+    """Perform a skill in the simulator without delays. Options and the answer are plain strings."""
     taken = robot.skills[skill].parameters
     given = [
         tuple(Option(str(text)) for text in a) if parameter.is_options and isinstance(a, tuple) else a
@@ -140,7 +140,7 @@ def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
 
 
 def robot(options: Options) -> Simulated:
-    """Create a simulated robot; raise UserError if the options contain no world."""
+    """Create a simulated robot, or raise UserError if the options contain no world."""
     if options.world is None:
         raise UserError("the simulated robot needs a world; name one with --world FILE")
     return Simulated(options.world, speed=options.speed, skills=options.skills)

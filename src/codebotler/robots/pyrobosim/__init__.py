@@ -1,1 +1,1 @@
-"""A robot simulated in pyrobosim; start with `robot.py`. `world.py` and `floorplan.py` import slowly."""
+"""A robot simulated in pyrobosim. Start with `robot.py`, as `world.py` and `floorplan.py` import slowly."""

@@ -33,9 +33,9 @@ TABLE_POSITIONS = 12  # the number of positions to try along each axis of a room
 
 @dataclass(frozen=True)
 class Passage:
-    """A door between adjacent rooms, or a passage between rooms that do not touch."""
+    """A door between adjacent rooms, or a straight hallway between rooms that are apart."""
 
-    ends: tuple[int, int]  # the indices of the two floors it connects
+    ends: tuple[int, int]  # the indices of the two floors that it connects
     line: LineString  # the centre line, which starts inside one floor and ends inside the other
     width: float
 
@@ -70,7 +70,7 @@ class Table:
         ]
 
     def cells(self, count: int) -> tuple[list[XY], float]:
-        """Divide the top into at least `count` cells; return their centres and a cell's shorter side."""
+        """Divide the top into at least `count` cells. Return their centres and a cell's shorter side."""
         columns = math.ceil(math.sqrt(count))
         rows = math.ceil(count / columns)
         left, low, _, _ = self.area.bounds
@@ -83,13 +83,13 @@ class Table:
 class Floorplan:
     """The rooms of a world with their stopping positions, passages and tables."""
 
-    floors: tuple[Polygon, ...]  # the floor of each room in the order of the world, then that of a corridor
+    floors: tuple[Polygon, ...]  # the floor of each room in the order of the world, then the corridor, if any
     stands: tuple[Point, ...]  # the robot's stopping position on each floor
     passages: tuple[Passage, ...]
     tables: tuple[Table | None, ...]  # the table in each room, or None
 
     def corners(self, number: int) -> list[XY]:
-        """Return the corners of a floor's free space that a shortest path may turn at."""
+        """Return the corners of a floor's free space at which a shortest path may turn."""
         table = self.tables[number] if number < len(self.tables) else None
         space = orient(_without(_free(self.floors[number]), table))
         rings = (space.exterior, *space.interiors)
@@ -159,7 +159,7 @@ def _without(free: Polygon, table: Table | None) -> Polygon:
 
 
 def _right_turns(ring: Sequence[XY]) -> Iterator[XY]:
-    """Yield the corners at which a ring turns right, with the free space on its left."""
+    """Yield the corners at which a ring that has the free space on its left turns right."""
     for (ax, ay), (bx, by), (cx, cy) in zip(ring, [*ring[1:], ring[0]], [*ring[2:], *ring[:2]], strict=True):
         if (bx - ax) * (cy - by) - (by - ay) * (cx - bx) < 0:
             yield bx, by
@@ -186,7 +186,7 @@ def _passages(floors: Sequence[Polygon], stands: Sequence[Point]) -> list[Passag
 def _passage(
     ends: tuple[int, int], floors: Sequence[Polygon], stands: Sequence[Point], others: Sequence[Passage]
 ) -> Passage | None:
-    """Return the shortest unobstructed passage between two floors, or None; prefer those near both stops."""
+    """Return the shortest unobstructed passage between two floors, preferably near both stops, or None."""
     first, second = (floors[end] for end in ends)
     obstacles = [floor.buffer(WALL_THICKNESS / 2) for n, floor in enumerate(floors) if n not in ends]
     obstacles += [passage.area.buffer(WALL_THICKNESS / 2) for passage in others]
@@ -216,7 +216,7 @@ def _lines(first: Polygon, second: Polygon) -> Iterator[LineString]:
 
 
 def _table(floor: Polygon, keep_clear: Sequence[shapely.Geometry]) -> Table | None:
-    """Return the largest table that fits, as far from stops and passages as it can be, or None."""
+    """Return the largest table that fits, as far from stops and passages as possible, or None."""
     left, low, right, high = floor.bounds
     width, depth = (right - left) / TABLE_POSITIONS, (high - low) / TABLE_POSITIONS
     clear = shapely.union_all(keep_clear)

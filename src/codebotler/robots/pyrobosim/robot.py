@@ -31,7 +31,7 @@ class Pyrobosim(Simulated):
     """A simulated robot whose position and objects are kept in pyrobosim."""
 
     name = "pyrobosim"
-    if_tool_dies, rooms_are_regexes = "the robot in pyrobosim ended with the tool", True
+    if_tool_dies, rooms_are_regexes = "the robot in pyrobosim ended as well", True
     _drivable: DrivableWorld
 
     def connect(self) -> None:
@@ -52,7 +52,7 @@ class Pyrobosim(Simulated):
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Perform a skill; drives, picking and placing run in pyrobosim."""
+        """Perform a skill. Driving, picking and placing run in pyrobosim."""
         self._wait(0.0)
         self._update()
         if skill not in {"pick", "place"}:
@@ -87,7 +87,7 @@ def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
 
 
 def robot(options: Options) -> Pyrobosim:
-    """Create the robot; raise UserError without a world in the options or without pyrobosim."""
+    """Create the robot, or raise UserError if the options contain no world or pyrobosim is missing."""
     if options.world is None:
         raise UserError("the robot in pyrobosim needs a world; name one with --world FILE")
     if importlib.util.find_spec("pyrobosim") is None:

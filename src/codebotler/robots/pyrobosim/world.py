@@ -47,7 +47,7 @@ class DrivableWorld:
         self._clock, self._motor = clock, Motor(clock)
         self._world = Pyroworld(name="pyrobosim.world", inflation_radius=ROBOT_RADIUS, object_radius=0.0)
         self._floors = self._build(plan)
-        self._rooms = dict(zip(names, self._floors, strict=False))  # leaves out a corridor, which is nameless
+        self._rooms = dict(zip(names, self._floors, strict=False))  # leaves out a corridor, which has no name
         self._stands = dict(zip(names, plan.stands, strict=False))
         self._tables = {
             name: self._add_table(floor, table)
@@ -91,7 +91,7 @@ class DrivableWorld:
         self._navigate(self._pose(room), feedback, "GoToInvalidLocation", f'drive to "{room}"')
 
     def pick(self, thing: Object, name: str, feedback: Feedback) -> None:
-        """Drive to the table with the object and pick it up; `name` is the program's name for the object."""
+        """Drive to the table with the object and pick it up. `name` is the program's name for the object."""
         action = f'pick up "{name}"'
         self._navigate(thing.parent, feedback, "PickFailed", action)
         self._wait(SKILLS["pick"].seconds)
@@ -120,7 +120,7 @@ class DrivableWorld:
         return Pose(self._stands[room].x, self._stands[room].y)
 
     def _build(self, plan: Floorplan) -> list[Room]:
-        """Add all floors and passages to the pyrobosim world; return the floors."""
+        """Add all floors and passages to the pyrobosim world, and return the floors."""
         floors = []
         for number, floor in enumerate(plan.floors):
             corners = list(floor.exterior.coords)
@@ -184,9 +184,9 @@ class Roadmap(WorldGraphPlanner):
 
 
 class Motor(PathExecutor):
-    """Moves the robot along a path in the time of a clock, until the clock is stopped.
+    """Moves the robot along a path at the pace of a clock, until the clock is stopped.
 
-    pyrobosim's own executor reacts to a cancel with a delay, and ignores one that comes too early.
+    pyrobosim's own executor reacts to a cancel with a delay, and ignores a cancel that comes too early.
     """
 
     def __init__(self, clock: Clock) -> None:
@@ -215,7 +215,7 @@ class Motor(PathExecutor):
         return ExecutionResult(ExecutionStatus.SUCCESS if arrived else ExecutionStatus.CANCELED)
 
     def _moments(self, corners: list[float]) -> Iterator[float]:
-        """Yield the elapsed seconds of a drive as they pass, until its end or a stop."""
+        """Yield the elapsed seconds of a drive repeatedly, until the drive ends or is stopped."""
         speed, began, moment = self.clock.speed, self.clock.now, 0.0
         if speed is None:
             for corner in corners:

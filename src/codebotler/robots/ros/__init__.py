@@ -1,1 +1,1 @@
-"""Robots on ROS; `robot` contains what all kinds share, and each kind has its own module."""
+"""Robots on ROS: `robot` contains the code that all kinds share, and each kind has its own module."""

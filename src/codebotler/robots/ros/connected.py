@@ -45,7 +45,7 @@ class ConnectedRobot(RosRobot):
         self._looking = threading.Lock()  # held while a detector runs
 
     def connect(self) -> None:
-        """Open the detectors and connect; raise NotReadyError if poses are missing or in the wrong frame."""
+        """Open the detectors and connect. Raise NotReadyError if poses are missing or in the wrong frame."""
         self.disconnect()
         for _, model in self.connection.cameras.values():
             if model not in self._detectors:
@@ -67,7 +67,7 @@ class ConnectedRobot(RosRobot):
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Perform a skill: look at a camera picture, answer from places and pose, or call the robot."""
+        """Perform a skill by examining a picture, looking up places and the pose, or calling the robot."""
         connection = self.connection
         if skill in connection.cameras:
             topic, model = connection.cameras[skill]
@@ -83,7 +83,7 @@ class ConnectedRobot(RosRobot):
 
     @property
     def failed_stop(self) -> str:
-        """A message if the robot still moves after a stop; empty if it stands still or this is unknown."""
+        """A message if the robot is known to move after a stop, otherwise ""."""
         worker, until = self._worker, time.monotonic() + self._waits.patience * 0.8
         if worker is None or (self.connection.pose is None and self.connection.velocity is None):
             return ""
@@ -93,7 +93,7 @@ class ConnectedRobot(RosRobot):
         return f"it was told to stop but is still moving: {STOP_BY_HAND}" if motion.is_moving else ""
 
     def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
-        """Report positions (None if unknown) to a callback until disconnected; return False without poses."""
+        """Report positions (None if unknown) to a callback until `disconnect`. Return False without poses."""
         worker = self._worker
 
         def watch() -> None:
@@ -140,7 +140,7 @@ class ConnectedRobot(RosRobot):
         return "" if self.connection.pose is None else self.connection.pose.topic
 
     def _pose(self) -> Pose | None:
-        """Return the last pose, or wait for the first; return None if no pose arrives in time."""
+        """Return the last pose, or wait for the first one. Return None if no pose arrives in time."""
         worker, until = self._worker, time.monotonic() + self._waits.patience
         while worker is not None and worker.motion.pose is None and time.monotonic() < until:
             if self._stopped:
@@ -149,7 +149,7 @@ class ConnectedRobot(RosRobot):
         return None if worker is None else worker.motion.pose
 
     def _place(self, places: Places, feedback: Feedback) -> NamedPlace:
-        """Return the place the robot is in, or else the nearest place, after reporting the distance to it."""
+        """Return the place that the robot is in, or else the nearest place, whose distance is reported."""
         pose = self._pose()
         if pose is None or (self._worker is not None and self._worker.motion.is_unseen):
             raise RobotError("UnknownPose", f"no pose has arrived on {self._topic} since the robot moved")
@@ -195,7 +195,7 @@ def _detect(detector: Detector, message: Mapping[str, Any], label: str, topic: s
 
 
 def _place_values(places: Places, text: str) -> dict[str, Any]:
-    """Return the values of the variables, such as `$place.x`, for a place; RobotError if it is unknown."""
+    """Return a place's values for variables such as `$place.x`, or raise RobotError if it is unknown."""
     place = places.named(text)
     if place is None:
         known = ", ".join(one.name for one in places.places)

@@ -44,7 +44,7 @@ class SkillCall:
         return _fill(self.request, values)
 
     def answer(self, received: Values) -> Any:  # noqa: ANN401 - a mission checks its type
-        """Return the skill's result from the received message; raise RobotError if the skill failed."""
+        """Return the skill's result from the received message, or raise RobotError if the skill failed."""
         try:
             if self.success and not _get(received, self.success):
                 raise RobotError(self.failure, self.why(received) or f"{self.name} reports a failure")

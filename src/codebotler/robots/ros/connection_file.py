@@ -109,7 +109,7 @@ TYPE_FOLDERS = {"action": "action", "service": "srv", "topic": "msg"}
 
 
 def read_connection(path: Path, skills: SkillTable) -> Connection:
-    """Read a connection file with calls for some of the given skills; raise UserError if it is invalid."""
+    """Read a connection file with calls for some of the given skills, or raise UserError if it is invalid."""
     file = YamlFile.read(path)
     form = file.validate(ConnectionForm)
     places = None if form.places is None else read_places(form.places, file)

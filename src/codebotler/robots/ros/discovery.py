@@ -1,4 +1,4 @@
-"""List what a robot's nodes offer, and draft a file for `--connect` from that list."""
+"""List the actions, services and topics of a robot, and draft a file for `--connect` from them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ MAPPINGS = (
     (r"sends \S+ nav_msgs/Odometry", "velocity", "topic: NAME", ""),
 )
 """For each regex for offers: the key in the draft (empty to derive it from the offer's name), the value, and
-a task for the user; a line with a task is written as a comment.
+a task for the user. A line with a task becomes a comment.
 """
 
 INTERNAL_OFFERS = re.compile(
@@ -66,11 +66,11 @@ EXPECTED_KEYS = {
 
 
 def discover_offers(robot: str, address: str, python: Path) -> list[str]:
-    """List what a robot's nodes offer as strings "KIND NAME TYPE" (KIND: action, service, hears or sends).
+    """List the offers of a robot's nodes as strings "KIND NAME TYPE" (KIND: action, service, hears or sends).
 
     Args:
         robot: the version of ROS, ros1 or ros2.
-        address: the URI of a ROS 1 master or a ROS 2 domain number; empty for the default.
+        address: the URI of a ROS 1 master or a ROS 2 domain number, or "" for the default.
         python: the Python interpreter of the robot's ROS installation.
 
     Raises:
@@ -78,7 +78,7 @@ def discover_offers(robot: str, address: str, python: Path) -> list[str]:
         NotReadyError: ROS is not installed, or no master or no node was found.
     """
     if robot not in {"ros1", "ros2"}:
-        raise UserError(f'"{robot}" cannot be explored; use ros1 or ros2, on a machine with that ROS')
+        raise UserError(f'"{robot}" does not support discovery; use ros1 or ros2, on a machine with that ROS')
     if robot == "ros1":
         environment = {"ROS_MASTER_URI": ros1.master_uri(address)}
     else:
@@ -92,7 +92,7 @@ def discover_offers(robot: str, address: str, python: Path) -> list[str]:
 
 
 def draft_connection(robot: str, offers: Iterable[str]) -> str:
-    """Draft a file for `--connect`; lines that need completion and unused offers become comments."""
+    """Draft a file for `--connect`. Lines that the user must complete and unused offers become comments."""
     by_form = {re.sub("/(action|srv|msg)/", "/", offer): offer for offer in sorted(offers)}
     forms = [
         form
@@ -102,7 +102,7 @@ def draft_connection(robot: str, offers: Iterable[str]) -> str:
     rest = {by_form[form].partition(" ")[2] for form in forms}
     ready: set[str] = set()
     packages: set[str] = set()
-    lines: list[tuple[bool, str]] = []  # the lines of the draft, each with whether it defines a skill
+    lines: list[tuple[bool, str]] = []  # the lines of the draft, and whether each defines a skill
     for pattern, use, text, first in MAPPINGS:
         for form in (form for form in forms if re.fullmatch(pattern, form)):
             _, name, kind = by_form[form].split()

@@ -1,4 +1,4 @@
-"""Convert the rooms that house rules forbid to messages for Nav2's keepout filter."""
+"""Convert the rooms that house rules forbid into messages for Nav2's keepout filter."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def keepout_messages(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Build the keepout mask (a nav_msgs/OccupancyGrid) and its nav2_msgs/CostmapFilterInfo.
 
-    Only rules of the form `always: not tr.Exists(inside(...))` have an effect; `frame` is that of the rooms.
+    Only rules of the form `always: not tr.Exists(inside(...))` have an effect. `frame` is that of the rooms.
     """
     patterns = [element for rule in rules if rule.when == "always" for element in _forbidden(rule.formula)]
     zones = [r.footprint for r in rooms if r.footprint and any(e.text.matches(r.name) for e in patterns)]

@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-STILL_SECONDS = 0.5  # how long a robot must not move to count as standing still
+STILL_SECONDS = 0.5  # how long a robot must be motionless to count as standing still
 MIN_METRES, MIN_RADIANS = 0.02, 0.05  # smaller changes of the pose count as noise
 MAX_UNSEEN = 1.0  # the metres or radians a robot may move without a pose before its pose is unknown
 MAX_INTERVAL = 0.5  # the longest time in seconds for which a reported velocity is assumed to last
-MIN_SPEED_MOVING = 0.02  # the speed, in metres or radians per second, above which a robot moves
+MIN_SPEED_MOVING = 0.02  # the speed, in metres or radians per second, above which a robot counts as moving
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Pose:
 
 
 class Motion:
-    """Tracks a robot's motion from reported poses and velocities; thread-safe."""
+    """Tracks a robot's motion from reported poses and velocities. It is thread-safe."""
 
     def __init__(self) -> None:
         self.pose: Pose | None = None
@@ -60,7 +60,7 @@ class Motion:
 
     @property
     def is_silent(self) -> bool:
-        """Whether there were no recent reports; AMCL, for example, is silent while a robot stands still."""
+        """Whether there were no recent reports. AMCL, for example, is silent while a robot stands still."""
         return self._last_report < time.monotonic() - 2 * STILL_SECONDS
 
     @property

@@ -51,7 +51,7 @@ class RosRobot:
         name: the kind of robot, such as ros2.
         address: the robot's address, such as the URI of a ROS master.
         script: the worker's script: the name of a file in `workers/`, or a path.
-        options: the options for opening the robot; a speed other than 1 must match that of a virtual robot.
+        options: the options for opening the robot. A speed other than 1 must match the virtual robot's.
         environment: additional environment variables for the worker.
         waits: the time limits.
         node: the name of the worker's node, which must be unique on the ROS graph.
@@ -100,7 +100,7 @@ class RosRobot:
         self.missing = worker.about["missing"]
         if self.missing and self.missing.keys() == self.connection.calls.keys():
             worker.leave()
-            raise NotReadyError(f"the robot offers nothing: {next(iter(self.missing.values()))}")
+            raise NotReadyError(f"the robot offers no skills: {next(iter(self.missing.values()))}")
         self._worker, self._stopped, self._in_doubt = worker, False, False
         self.clock.restart()
 
@@ -146,12 +146,10 @@ class RosRobot:
         while True:
             match worker.receive(self._waits.patience * 2):
                 case None:
-                    raise RobotLostError(f"the worker of {self.name} does not answer; {self._rescue(worker)}")
+                    raise RobotLostError(f"the {self.name} worker does not answer; {self._rescue(worker)}")
                 case {"is": "ended"}:
                     how = worker.describe_end()
-                    raise RobotLostError(
-                        f"the worker of {self.name} has died ({how}); {self._rescue(worker)}"
-                    )
+                    raise RobotLostError(f"the {self.name} worker has died ({how}); {self._rescue(worker)}")
                 case {"is": "gone", "text": str(text)}:
                     self._in_doubt = True
                     raise RobotLostError(text)
@@ -167,7 +165,7 @@ class RosRobot:
                     return message
 
     def _send(self, request: WorkerMessage) -> tuple[RosWorker, int]:
-        """Send a request; return the worker and the request's number; raise CancelledError after a stop."""
+        """Send a request and return the worker and the request's number. Raise CancelledError if stopped."""
         with self._send_lock:
             if self._stopped:
                 raise CancelledError
@@ -177,7 +175,7 @@ class RosRobot:
             return self._worker, self._number
 
     def cancel(self) -> None:
-        """Have the worker cancel the goal; if the worker hangs, start a new one that cancels all goals."""
+        """Have the worker cancel the goal. If the worker hangs, start a new one that cancels all goals."""
         has_lock = self._send_lock.acquire(timeout=CANCEL_SECONDS)  # a hanging worker can block its owner
         try:
             self._stopped = True
@@ -215,7 +213,7 @@ class RosRobot:
         return RosWorker(self._python, self._script, start, self._environment)
 
     def _rescue(self, worker: RosWorker) -> str:
-        """Replace a lost worker with one that cancels all goals; return a clause that says if this worked."""
+        """Replace a lost worker with one that cancels all goals, and return a clause on the outcome."""
         with self._rescue_lock:
             if self._worker is not worker:
                 return NOT_CANCELLED if self._in_doubt else "all goals were cancelled"
@@ -235,7 +233,7 @@ class RosRobot:
 def ros_readiness(
     name: str, python: Path, needs: Sequence[str], mend: Callable[[Sequence[str]], str], note: str
 ) -> Readiness:
-    """Check whether an interpreter has the modules a worker needs; `mend` gets those it lacks."""
+    """Check whether an interpreter has a worker's modules. `mend` returns the fix for missing ones."""
     missing = find_missing(python, needs)
     if missing is None:
         return Readiness(

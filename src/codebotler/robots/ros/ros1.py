@@ -1,4 +1,4 @@
-"""A robot on ROS 1; its worker runs actionlib under the robot's Python."""
+"""A robot on ROS 1, whose worker runs actionlib under the robot's Python."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ INSTALL_ROS1 = (
 
 
 def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
-    """Create a robot on ROS 1; its address is the URI of a master, by default ROS_MASTER_URI."""
+    """Create a robot on ROS 1. Its address is the URI of a master, by default ROS_MASTER_URI."""
     uri = master_uri(options.address)
     return class_for(options)("ros1", uri, "ros1_worker.py", options, {"ROS_MASTER_URI": uri}, waits=waits)
 
 
 def master_uri(address: str = "") -> str:
-    """Return the given master URI, ROS_MASTER_URI, or the default; raise UserError if it is invalid."""
+    """Return the given master URI, ROS_MASTER_URI, or the default. Raise UserError if it is invalid."""
     uri = address or os.environ.get("ROS_MASTER_URI") or MASTER_URI
     try:
         parts = urlsplit(uri)

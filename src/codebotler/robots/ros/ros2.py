@@ -1,4 +1,4 @@
-"""A robot on ROS 2; its worker runs rclpy under the system's Python or under CodeBotler's own."""
+"""A robot on ROS 2, whose worker runs rclpy under the system's Python or under CodeBotler's own."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ INSTALL_ROS2 = "pip install 'codebotler[ros2]'"
 
 
 def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
-    """Create a robot on ROS 2; its address is a domain number, by default ROS_DOMAIN_ID or else 0."""
+    """Create a robot on ROS 2. Its address is a domain number, by default ROS_DOMAIN_ID or else 0."""
     domain = domain_of(options.address)
     options = replace(options, ros_python=choose_python(options.ros_python))
     variables = {"ROS_DOMAIN_ID": domain}
@@ -28,7 +28,7 @@ def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
 
 
 def domain_of(address: str = "") -> str:
-    """Return the given domain, or else ROS_DOMAIN_ID, or else 0; raise UserError if it is not a number."""
+    """Return the given domain, or else ROS_DOMAIN_ID, or else 0. Raise UserError if it is not a number."""
     domain = address or os.environ.get("ROS_DOMAIN_ID") or "0"
     if not domain.isdecimal():
         raise UserError(f'"{domain}" is not a ROS_DOMAIN_ID; write a number such as 0')
@@ -43,7 +43,7 @@ def choose_python(named: Path = ROS_PYTHON) -> Path:
 
 
 def readiness(python: Path = ROS_PYTHON) -> Readiness:
-    """Check whether the interpreter has rclpy; missing message types are built later."""
+    """Check whether the interpreter has rclpy. Missing message types are built later."""
     python = choose_python(python)
     return ros_readiness("ros2", python, ROS2_MODULES, find_fix, f"with {python}; see ROS_DOMAIN_ID")
 

@@ -1,4 +1,4 @@
-"""A robot behind a rosbridge server, which gives access to ROS over a websocket; needs no ROS here."""
+"""A robot behind a rosbridge server, which gives access to ROS over a websocket. It needs no ROS here."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ROSBRIDGE_NOTE = "with ROS 2, tested only against a simulated rosbridge"
 
 
 def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
-    """Create a robot behind a rosbridge, by default on this machine; the worker uses CodeBotler's Python."""
+    """Create a robot behind a rosbridge, by default on this machine. The worker uses CodeBotler's Python."""
     readiness()
     options = replace(options, ros_python=Path(sys.executable))
     address = options.address or ROSBRIDGE_ADDRESS
@@ -24,7 +24,7 @@ def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
 
 
 def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
-    """Report rosbridge as available; raise ModuleNotFoundError if websockets is not installed."""
+    """Report rosbridge as available, or raise ModuleNotFoundError if websockets is not installed."""
     if find_spec("websockets") is None:
         raise ModuleNotFoundError("websockets is not installed", name="websockets")
     return Readiness(

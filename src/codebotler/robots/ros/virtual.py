@@ -34,9 +34,9 @@ class VirtualRobot:
 
     Args:
         world: the world that the robot works in.
-        speed: the robot's clock seconds per real second; None to wait for nothing.
+        speed: the robot's clock seconds per real second, or None to skip all waits.
         ros: the version of ROS, 1 or 2.
-        port: the port of the ROS 1 master; None for the port in ROS_MASTER_URI.
+        port: the port of the ROS 1 master, or None for the port in ROS_MASTER_URI.
         python: a Python interpreter with rclpy, or with rospy (and rosmaster to start a master).
         show: a callback that receives a line of text when a goal starts and when it ends.
         skills: the skills to offer.
@@ -73,7 +73,7 @@ class VirtualRobot:
         self._ended = threading.Event()
 
     def start(self) -> bool:
-        """Offer the skills; return whether a master was started; raise NotReadyError if ROS is missing."""
+        """Offer the skills and return whether a master was started. Raise NotReadyError if ROS is missing."""
         worker = self._worker = self._ros1_servers() if self._ros == 1 else self._ros2_servers()
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)
@@ -86,7 +86,7 @@ class VirtualRobot:
         """Serve goals until the worker dies, then raise RobotLostError."""
         self._ended.wait()
         assert self._worker is not None, "the caller has started it"
-        raise RobotLostError(f"the worker of the virtual robot has died ({self._worker.describe_end()})")
+        raise RobotLostError(f"the virtual robot's worker has died ({self._worker.describe_end()})")
 
     def stop(self) -> None:
         """Stop the current skill and leave the ROS graph."""

@@ -34,7 +34,7 @@ ERROR_LINES = 5  # the number of lines of error output to keep for error message
 
 
 class RosWorker:
-    """A process that runs a script of `workers/`; `{"is": "ended"}` is always the last message received.
+    """A process that runs a script of `workers/`. `{"is": "ended"}` is always the last message received.
 
     It runs in its own session so that Ctrl-C does not end it before it has stopped the robot. If heartbeats
     from this process stop, the worker cancels the goal, since a suspended process cannot react to Ctrl-C.
@@ -83,7 +83,7 @@ class RosWorker:
         self.about = self._wait_until_ready(python)
 
     def send(self, message: WorkerMessage) -> None:
-        """Send a message; if the worker has died, a later `receive` says so."""
+        """Send a message. If the worker has died, a later `receive` reports this."""
         with self._writing, suppress(OSError, ValueError):
             self._stdin.write(json.dumps(message) + "\n")
             self._stdin.flush()
@@ -96,13 +96,13 @@ class RosWorker:
             return None
 
     def cancel(self, seconds: float) -> bool:
-        """Have the worker cancel the goal; return whether it did so within the given seconds."""
+        """Have the worker cancel the goal, and return whether it did so within the given seconds."""
         self._cancel_sent.clear()
         self.send({"do": "cancel"})
         return self._cancel_sent.wait(seconds)
 
     def leave(self) -> bool:
-        """End the worker by closing its input; return False if it failed or had to be killed."""
+        """End the worker by closing its input. Return False if it failed or had to be killed."""
         self._leaves.set()
         with self._writing, suppress(OSError):
             self._stdin.close()
@@ -167,7 +167,7 @@ class RosWorker:
     def _send_heartbeats(self) -> None:
         while not self._leaves.wait(HEARTBEAT_SECONDS):
             with suppress(OSError, ValueError):
-                if select.select([], [self._stdin], [], 0)[1]:  # otherwise, a hanging worker would block us
+                if select.select([], [self._stdin], [], 0)[1]:  # else a hanging worker would block us
                     self.send({"do": "alive"})
 
     def _keep_errors(self) -> None:
@@ -182,7 +182,7 @@ class RosWorker:
 
 
 def executable(python: Path) -> str:
-    """Return the command for an interpreter; a bare name is sought in the current folder, then in PATH."""
+    """Return the command for an interpreter. A bare name is sought in the current folder, then in PATH."""
     return str(python.absolute() if python.exists() else python)
 
 
@@ -197,7 +197,7 @@ def outer_environment() -> dict[str, str]:
 
 
 def find_missing(python: Path, modules: Sequence[str]) -> list[str] | None:
-    """Return the modules that an interpreter lacks, or None if it cannot run; nothing is imported."""
+    """Return the modules that an interpreter lacks, without importing any, or None if it cannot run."""
     code = "import sys, importlib.util as u; print(*(m for m in sys.argv[1:] if u.find_spec(m) is None))"
     try:
         done = subprocess.run(  # noqa: S603 - the interpreter that the user names

@@ -19,11 +19,11 @@ WRITE_SECONDS = 1.0  # the time limit for writing the last lines
 
 
 class SetupError(Exception):
-    """Raised when the robot cannot be used; the text says why and how to fix it."""
+    """Raised when the robot cannot be used. The text says why and how to fix that."""
 
 
 class Channel:
-    """Exchanges lines of JSON on standard input and output; all other output goes to standard error."""
+    """Exchanges lines of JSON on standard input and output. All other output goes to standard error."""
 
     def __init__(self) -> None:
         self._out = os.fdopen(os.dup(1), "w", encoding="utf-8")
@@ -33,14 +33,14 @@ class Channel:
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._writer = threading.Thread(target=self._write, daemon=True)
         self._writer.start()
-        self.last_sign = float("inf")  # when the last line arrived; infinite while the worker handles it
+        self.last_sign = float("inf")  # when the last line arrived; infinite while the line is handled
 
     def send(self, kind: str, **more: Any) -> None:
-        """Queue a message to CodeBotler; if CodeBotler has died, `lines` ends."""
+        """Queue a message to CodeBotler. If CodeBotler has died, `lines` ends."""
         self._lines.put(json.dumps({"is": kind, **more}, default=str) + "\n")
 
     def finish(self) -> None:
-        """Wait, for a short time only, until all queued lines are written."""
+        """Wait until all queued lines are written, but only for a short time."""
         self._lines.put(None)
         self._writer.join(WRITE_SECONDS)
 
@@ -61,7 +61,7 @@ class Channel:
 
 
 def serve(make_worker: Callable[[Channel, Fields], Any]) -> None:
-    """Create a worker from the first message, pass it all others, and stop the robot in the end."""
+    """Create a worker from the first message, pass it all others, and stop the robot at the end."""
     channel = Channel()
     worker, status = None, 1
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):

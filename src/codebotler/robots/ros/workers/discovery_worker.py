@@ -1,4 +1,4 @@
-"""List what a robot's nodes offer; run by a Python that has rclpy or rospy."""
+"""List the offers of a robot's nodes, under a Python that has rclpy or rospy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Offer = Tuple[str, str, str]  # the kind (action, service, sends or hears), the 
 
 
 class DiscoveryWorker:
-    """Sends all offers in its first message; the message it receives says whether `robot` is ros1 or ros2."""
+    """Sends all offers in its first message. The message it receives says whether `robot` is ros1 or ros2."""
 
     def __init__(self, channel: Channel, start: Fields) -> None:
         offers = set(offers_on_ros1()) if start["robot"] == "ros1" else offers_on_ros2()

@@ -16,7 +16,7 @@ ALIVE_SECONDS = 1.0  # the interval between two heartbeats to CodeBotler
 TOOL_SILENCE = 0.7  # the robot is stopped after this many seconds without a heartbeat from CodeBotler
 FEEDBACK_INTERVAL = 0.5  # the minimum time in seconds between two feedback messages to CodeBotler
 END_SECONDS = 1.0  # how long an ending worker waits for its cancelled goal to end
-PICTURE_SECONDS = 0.5  # how long to wait after a result for its picture, which has its own connection
+PICTURE_SECONDS = 0.5  # how long to wait after a result for its picture, which comes over its own connection
 MAX_PICTURE_BYTES = 2_000_000
 
 ROS1_ENDS = {2: "cancelled", 3: "succeeded", 4: "aborted", 5: "rejected", 8: "cancelled", 9: "lost"}
@@ -27,7 +27,7 @@ ROS2_ENDS = {4: "succeeded", 5: "cancelled", 6: "aborted"}
 
 
 class Goal:
-    """A goal and its progress; all times are those of the monotonic clock."""
+    """A goal and its progress. All times are those of the monotonic clock."""
 
     def __init__(self, number: int, server: Any) -> None:
         self.number, self.server = number, server
@@ -42,7 +42,7 @@ class Goal:
         self.end_event, self.picture_event = threading.Event(), threading.Event()
 
     def cancel(self) -> None:
-        """Cancel the goal; a goal that has not been sent yet is never sent."""
+        """Cancel the goal. If it has not been sent yet, it will never be sent."""
         with self.lock:
             self.cancelled = self.cancelled or time.monotonic()
             if self.stop is not None:
@@ -71,7 +71,7 @@ class Server:
 
 
 class SkillWorker:
-    """Performs skills, one at a time; subclasses implement at least `connect`, `send` and `listen`.
+    """Performs skills, one at a time. Subclasses implement at least `connect`, `send` and `listen`.
 
     The first message has the `address`, the `node` name, the `calls` by skill, folders of `packages`, topics
     for `pose`, `velocity` and `keepout`, whether to `cancel_all` goals, the path `sign` of a file that names
@@ -80,8 +80,8 @@ class SkillWorker:
 
     graph: Any
     servers: dict[str, Any]
-    settles = 0.0  # the seconds in addition to the patience that connecting to a server may take
-    silence_says = ""  # the reason to give for a dead server, if it is not missing status messages
+    settles = 0.0  # how many seconds beyond the patience connecting to a server may take
+    silence_says = ""  # the reason to give for a dead server, unless its status messages are missing
 
     def __init__(self, channel: Channel, start: Fields) -> None:
         self.channel = channel
@@ -108,17 +108,17 @@ class SkillWorker:
         self.channel.send("ready", missing=missing, cancelled_all=cancelled_all)
 
     def connect(self, start: Fields) -> bool:
-        """Set `graph` and `servers`; return whether a dead worker has left its node behind."""
+        """Set `graph` and `servers`, and return whether a dead worker has left its node behind."""
         raise NotImplementedError
 
     def send(self, goal: Goal, fields: Fields) -> None:
-        """Send a goal; the caller must hold the goal's lock."""
+        """Send a goal. The caller must hold the goal's lock."""
         raise NotImplementedError
 
     def listen(
         self, topic: str, hear: Callable[[Fields], object], *, is_needed: bool = True
     ) -> Callable[[], object] | None:
-        """Subscribe to a topic with messages as plain data; return a function that unsubscribes.
+        """Pass the messages of a topic to `hear` as plain data. Return a function that unsubscribes.
 
         If nothing publishes the topic, raise SetupError if `is_needed`, else return None.
         """
@@ -193,7 +193,7 @@ class SkillWorker:
             time.sleep(0.005)
 
     def cancel_all(self) -> bool:
-        """Cancel all goals of all clients; return whether this was possible."""
+        """Cancel all goals of all clients, and return whether this was possible."""
         for server in self.servers.values():
             server.cancel()
         time.sleep(WATCH_SECONDS)  # ROS sends messages in its own threads
@@ -261,7 +261,7 @@ class SkillWorker:
         self.end(goal, "result", values=values)
 
     def _look(self, goal: Goal, topic: str) -> None:
-        """Send the next picture on a topic; because pictures are large, subscribe only until it arrives."""
+        """Send the next picture on a topic. Because pictures are large, subscribe only until it arrives."""
         pictures: list[Fields] = []
         unsubscribe, deadline = None, time.monotonic() + self.patience
         text = f"no picture arrived on {topic}; is the camera's node running?"

@@ -15,7 +15,7 @@ MASTER_SECONDS, NODE_SECONDS = 5.0, 2.0  # the time limits for answers from the 
 
 
 class Ros1Graph:
-    """Our node, whose unique name reserves the robot; also asks the master about other nodes."""
+    """Our node, whose unique name reserves the robot. It also asks the master about other nodes."""
 
     def __init__(self, name: str) -> None:
         import netifaces  # noqa: F401 - if it is missing, fail here rather than later in a thread of rosgraph
@@ -27,7 +27,7 @@ class Ros1Graph:
         self._rosgraph = rosgraph
 
     def enter(self) -> bool:
-        """Register our node; return whether a dead worker has left a node with the same name behind."""
+        """Register our node, and return whether a dead worker has left behind a node with the same name."""
         import rospy
 
         if not self.is_online():
@@ -77,7 +77,7 @@ class Ros1Graph:
         return f"another node called {self.node} has taken over; stop it, and connect again"
 
     def nodes_of(self, server: str) -> list[str]:
-        """Return the nodes registered for an action, a topic or a service; they may be dead."""
+        """Return the nodes registered for an action, a topic or a service, even if they are dead."""
         _, subscribers, services = self._master.getSystemState()
         name = self._rosgraph.names.resolve_name(server, self.node)
         return [
@@ -113,7 +113,7 @@ class Ros1Graph:
 
 
 def no_master(uri: str) -> str:
-    """Return a message that no master answers, with advice."""
+    """Return a message that says that no master answers and what to do."""
     return f"no ROS master answers at {uri}; start one (roscore), or set ROS_MASTER_URI"
 
 

@@ -39,7 +39,7 @@ def action_types(actions: list[Fields]) -> dict[str, Any]:
 
 
 def import_type(whole: str, kind: str) -> Any:
-    """Import a type by its name and kind (msg or srv); raise SetupError if it is not installed."""
+    """Import a type by its name and kind (msg or srv), or raise SetupError if it is not installed."""
     package, name = parts_of(whole)
     try:
         return getattr(importlib.import_module(f"{package}.{kind}"), name)
@@ -48,7 +48,7 @@ def import_type(whole: str, kind: str) -> Any:
 
 
 def as_data(value: Any) -> Any:
-    """Convert a ROS 1 or ROS 2 message, or a field value, to plain data; bytes become base64."""
+    """Convert a ROS 1 or ROS 2 message, or a field value, to plain data. Bytes become base64."""
     if hasattr(value, "__slots__"):
         # In ROS 2, the names of slots differ from those of fields.
         fields = getattr(value, "get_fields_and_field_types", None)
@@ -68,7 +68,7 @@ def parts_of(kind: str) -> tuple[str, str]:
 
 
 def offer_of(kind: str) -> str:
-    """Return what provides a type, in words: `service` for std_srvs/srv/Trigger, for example."""
+    """Return the word for the provider of a type, such as `service` for std_srvs/srv/Trigger."""
     return OFFER_NAMES[kind.split("/")[1]]
 
 

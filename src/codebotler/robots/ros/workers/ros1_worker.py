@@ -13,7 +13,7 @@ from goals import ROS1_ENDS, Goal, Server, SkillWorker
 from graph import Ros1Graph
 from message_types import action_types, as_data, generate_type, import_type
 
-RESULT_DELAY = 0.2  # the seconds until a server sends results to a new client, which ROS does not report
+RESULT_DELAY = 0.2  # the assumed seconds until results reach a new client, since ROS does not report this
 
 
 class Ros1Server(Server):
@@ -77,7 +77,7 @@ class Ros1Server(Server):
 
 
 class Ros1Service(Server):
-    """A client for a service that performs a skill; a call cannot be cancelled."""
+    """A client for a service that performs a skill. Calls cannot be cancelled."""
 
     def __init__(self, worker: Ros1Worker, call: Fields) -> None:
         import rospy
@@ -119,7 +119,7 @@ class Ros1Topic(Server):
 
 
 def subscribe(topic: str, hear: Callable[[Fields], object]) -> Any:
-    """Subscribe to a topic with the type its publisher uses; call `hear` with each message as plain data."""
+    """Subscribe to a topic with its publisher's type, and pass each message to `hear` as plain data."""
     import rospy
 
     known: dict[str, Any] = {}
@@ -143,7 +143,7 @@ class Ros1Worker(SkillWorker):
     graph: Ros1Graph
 
     def connect(self, start: Fields) -> bool:
-        """Register our node and connect to all servers; return whether a dead worker left its node behind."""
+        """Register our node and connect to all servers. Return whether a dead worker left its node behind."""
         import rospy
 
         self.graph = Ros1Graph(start["node"])
@@ -157,7 +157,7 @@ class Ros1Worker(SkillWorker):
     def listen(
         self, topic: str, hear: Callable[[Fields], object], *, is_needed: bool = True
     ) -> Callable[[], object]:
-        """Subscribe to a topic; see `SkillWorker.listen`."""
+        """Subscribe to a topic, as `SkillWorker.listen` describes."""
         if is_needed and not self.graph.has_publisher(topic):
             raise SetupError(f"nothing publishes {topic}; start its publisher, or correct its name")
         unsubscribe: Callable[[], object] = subscribe(topic, hear).unregister
@@ -188,7 +188,7 @@ class Ros1Worker(SkillWorker):
         goal.stop = lambda: goal.server.cancel(goal_id)
 
     def _follow(self, goal: Goal, handle: Any) -> None:
-        """Process a state change of a goal; rospy calls this in its own thread."""
+        """Process a change in the state of a goal, in rospy's own thread."""
         from actionlib import CommState, TerminalState
 
         state = handle.get_comm_state()

@@ -23,7 +23,7 @@ NODE_IN_USE = "another codebotler is using this robot (the node {}); stop it fir
 
 
 class Ros2Graph:
-    """Our node on the graph, whose executor runs in a thread; its unique name reserves the robot."""
+    """Our node on the graph, whose executor runs in a thread. Its unique name reserves the robot."""
 
     def __init__(self, name: str, taken: str = NODE_IN_USE) -> None:
         import rclpy
@@ -36,7 +36,7 @@ class Ros2Graph:
         rclpy.init(args=None, signal_handler_options=SignalHandlerOptions.NO)
 
     def enter(self, *, is_rescue: bool = False) -> bool:
-        """Start our node; return whether a dead worker has left a node with the same name behind.
+        """Start our node, and return whether a dead worker has left behind a node with the same name.
 
         If workers on two machines start at the same time, both notice this and stop. A rescue does not look
         for another worker, because CodeBotler has just killed it.
@@ -49,7 +49,7 @@ class Ros2Graph:
         return self._is_left_behind
 
     def _has_dead_twin(self) -> bool:
-        """Return whether a dead node with our name is on the graph; raise SetupError if a live one is."""
+        """Return whether a dead node with our name is on the graph. Raise SetupError if a live one is."""
         probe = self._rclpy.create_node(f"{self.node}_looks_{os.getpid()}")
         time.sleep(DISCOVERY_SECONDS)
         is_there = self.node in probe.get_node_names()
@@ -60,7 +60,7 @@ class Ros2Graph:
         return is_there
 
     def spin(self) -> None:
-        """Start the executor's thread; call this only after creating all clients and servers.
+        """Start the executor's thread. Call this only after creating all clients and servers.
 
         rclpy exposes partially constructed clients and servers to the executor, which would crash its thread.
         """
@@ -68,7 +68,7 @@ class Ros2Graph:
         self._spinning.start()
 
     def leave(self) -> None:
-        """Destroy our node; after a shutdown alone, other nodes would still see it until its lease ends."""
+        """Destroy our node. If we only shut down, other nodes would still see it until its lease expires."""
         self._rclpy.shutdown()
         self._spinning.join(ROS2_EXIT_SECONDS)
         for action in list(self.ours.waitables):
@@ -110,7 +110,7 @@ class Ros2Graph:
     def listen(
         self, topic: str, hear: Callable[[Any], object], packages: list[str], patience: float | None
     ) -> Callable[[], object] | None:
-        """Subscribe to a topic with the type that its publishers use; return a function that unsubscribes.
+        """Subscribe to a topic with the type that its publishers use. Return a function that unsubscribes.
 
         Wait up to `patience` seconds for a publisher, then raise SetupError. If `patience` is None, do not
         wait, and return None if there is no publisher.
@@ -153,7 +153,7 @@ class Ros2Graph:
         return lock
 
     def _answers(self, probe: Any) -> bool:
-        """Return whether the node with our name is alive; a dead node stays on the graph for a while."""
+        """Return whether the node with our name is alive. A dead node stays on the graph for a while."""
         from rcl_interfaces.srv import ListParameters
 
         client = probe.create_client(ListParameters, f"/{self.node}/list_parameters")

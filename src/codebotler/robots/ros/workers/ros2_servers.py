@@ -1,4 +1,4 @@
-"""Action servers of a virtual robot on ROS 2, run by a Python that has rclpy; CodeBotler performs goals."""
+"""Action servers of a virtual robot on ROS 2, run by a Python that has rclpy. CodeBotler performs goals."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SERVERS_IN_USE = "there is another virtual robot (the node {}); stop it first"
 
 
 class Ros2ActionServers:
-    """Offers an action server per skill; the first message has the `node` name and `actions` by skill."""
+    """Offers an action server per skill. The first message has the `node` name and `actions` by skill."""
 
     def __init__(self, channel: Channel, start: Fields) -> None:
         import rclpy.action

@@ -57,7 +57,7 @@ def message_types(
         names: all types that the process needs, since a package is built with these types only.
         folders: the folders of packages to build if they are not installed, with action/, msg/ or srv/.
         tell: a callback that receives a sentence before a slow step.
-        actions: the texts of .action files by type name; an installed type must have the same fields.
+        actions: the texts of .action files by type name. An installed type must have the same fields.
 
     Raises:
         SetupError: a package or definition is missing or cannot be built, or an action's fields differ.
@@ -96,7 +96,7 @@ def fill(message: Any, values: Fields, where: str = "") -> Any:
 
     Args:
         message: the message to modify.
-        values: the values by field name; a float field accepts an integer.
+        values: the values by field name. A float field accepts an integer.
         where: the path of the message for error messages, with a dot at the end.
 
     Raises:
@@ -113,9 +113,7 @@ def fill(message: Any, values: Fields, where: str = "") -> Any:
         try:
             setattr(message, name, _fit(getattr(message, name), kinds[name], value, path))
         except (AssertionError, TypeError, ValueError, OverflowError):
-            raise SetupError(
-                f"the field {path} is {kinds[name]}, which {json.dumps(value)} does not fit"
-            ) from None
+            raise SetupError(f"the field {path} must be {kinds[name]}, not {json.dumps(value)}") from None
     return message
 
 
@@ -277,7 +275,7 @@ class _Build:
             generator.generate(self.package, files, includes, output_path=folder)
 
     def _units(self) -> Iterator[Path]:
-        """Yield the files to compile: one that includes all others, and descriptions, whose names collide."""
+        """Yield the files to compile: descriptions, whose names collide, and one that includes all others."""
         for suffix in COMPILERS:
             files = sorted(self.work.rglob("*" + suffix))
             together = [path for path in files if not path.stem.endswith("__description")]

@@ -23,7 +23,7 @@ ALL_GOALS = [0] * 16  # the goal id that means all goals in a cancel request
 
 
 class Ros2Goal:
-    """The ROS 2 state of a goal; only the executor's thread may change it."""
+    """The ROS 2 state of a goal, which only the executor's thread may change."""
 
     def __init__(self) -> None:
         self.uuid = list(uuid.uuid4().bytes)  # chosen by us, so that a goal can be cancelled early
@@ -59,7 +59,7 @@ class Ros2Server(Server):
         self.has_cancelled = False
 
     def last_sign(self) -> float:
-        """Return the current time if the server is on the graph, else 0; DDS removes dead servers late."""
+        """Return the current time if the server is on the graph, else 0. DDS removes dead servers late."""
         return time.monotonic() if self.client.server_is_ready() else 0.0
 
     def is_connected(self, _silence: float) -> bool:
@@ -71,7 +71,7 @@ class Ros2Server(Server):
         return bool(self._graph.ours.count_publishers(f"{self.name}/picture"))
 
     def cancel(self) -> None:
-        """Request the cancellation of all goals of all clients; the answer sets `has_cancelled`."""
+        """Request the cancellation of all goals of all clients. The answer sets `has_cancelled`."""
         self._graph.call_soon(lambda: self.request_cancel(ALL_GOALS).add_done_callback(self._confirm))
 
     def _confirm(self, done: Any) -> None:
@@ -79,14 +79,14 @@ class Ros2Server(Server):
             self.has_cancelled = True
 
     def request_cancel(self, number: list[int]) -> Any:
-        """Request to cancel a goal, or ALL_GOALS, and return a future; call this in the executor's thread."""
+        """Request to cancel a goal, or ALL_GOALS, and return a future. Call this in the executor's thread."""
         request = self._request()
         request.goal_info.goal_id.uuid = number
         return self._cancels.call_async(request)
 
 
 class Ros2Service(Server):
-    """A client for a service that performs a skill; a call cannot be cancelled."""
+    """A client for a service that performs a skill. Calls cannot be cancelled."""
 
     def __init__(self, worker: Ros2Worker, call: Fields, spec: Any) -> None:
         super().__init__(call)
@@ -131,7 +131,7 @@ class Ros2Worker(SkillWorker):
     silence_says = "it has left the graph; DDS reports a killed process only after its lease, by default 20 s"
 
     def connect(self, start: Fields) -> bool:
-        """Start our node and a client for each server; return whether a dead worker left its node behind."""
+        """Start our node and a client for each server. Return whether a dead worker left its node behind."""
         from rclpy.qos import DurabilityPolicy, QoSProfile
 
         calls, self._packages = start["calls"], start["packages"]
@@ -159,7 +159,7 @@ class Ros2Worker(SkillWorker):
         self.graph.call_soon(publisher.publish, fill(publisher.msg_type(), fields))
 
     def cancel_all(self) -> bool:
-        """Cancel all goals of all clients; return whether every server on the graph has confirmed this."""
+        """Cancel all goals of all clients and return whether every server on the graph has confirmed this."""
         waiting = [server for server in self.servers.values() if server.is_connected(self.silence)]
         deadline = time.monotonic() + self.patience
         while waiting and time.monotonic() < deadline:
@@ -206,7 +206,7 @@ class Ros2Worker(SkillWorker):
     def listen(
         self, topic: str, hear: Callable[[Fields], object], *, is_needed: bool = True
     ) -> Callable[[], object] | None:
-        """Subscribe to a topic; see `SkillWorker.listen`."""
+        """Subscribe to a topic, as `SkillWorker.listen` describes."""
         return self.graph.listen(topic, hear, self._packages, self.patience if is_needed else None)
 
     def _report(self, text: str) -> None:

@@ -25,7 +25,7 @@ CONNECTION_FAULTS = (OSError, ValueError, WebSocketException)
 
 
 class RosbridgeConnection:
-    """Sends messages, and runs a thread that passes goal updates to `hear` and calls `lost` at the end."""
+    """Sends messages, and runs a thread that passes goal updates to `hear` and calls `lost` when it ends."""
 
     def __init__(
         self,
@@ -42,7 +42,7 @@ class RosbridgeConnection:
         self._heard_first: dict[str, float] = {}
         self._listeners: dict[str, tuple[Callable[[Fields], object], ...]] = {}
         self.heard: dict[str, float] = {}  # when each server last sent its status
-        self.settled: set[str] = set()  # the servers whose results will arrive
+        self.settled: set[str] = set()  # the servers whose results will reach us
         self.is_lost = self.has_ended = False
         self.complaint = ""
         self.protocol: ActionProtocol = Ros1Protocol()
@@ -56,12 +56,12 @@ class RosbridgeConnection:
             self.send(message)
 
     def send(self, message: Fields) -> None:
-        """Send a message; if the connection is lost, `is_lost` becomes true."""
+        """Send a message. If the connection is lost, `is_lost` becomes true."""
         with suppress(ConnectionClosed):
             self._socket.send(json.dumps(message))
 
     def listen(self, topic: str, hear: Callable[[Fields], object]) -> Callable[[], None]:
-        """Subscribe to a topic; return a function that ends all subscriptions to this topic."""
+        """Subscribe to a topic, and return a function that ends all subscriptions to this topic."""
         if topic not in self._listeners:
             self.send({"op": "subscribe", "topic": topic})
         self._listeners[topic] = (*self._listeners.get(topic, ()), hear)
@@ -73,7 +73,7 @@ class RosbridgeConnection:
         return unsubscribe
 
     def insist(self, message: Fields) -> bool:
-        """Send a message repeatedly over a new connection; return whether this was possible."""
+        """Send a message repeatedly over a new connection, and return whether this was possible."""
         deadline, is_sent = time.monotonic() + INSIST_SECONDS, False
         while time.monotonic() < deadline:
             with (
@@ -100,7 +100,7 @@ class RosbridgeConnection:
         return self.has_ended
 
     def explain_end(self) -> str:
-        """Return a message that the connection was lost."""
+        """Return a message that says that the connection was lost."""
         return f"the connection to {self.address} was lost"
 
     def explain_missing(self, server: str, _type: str) -> str:

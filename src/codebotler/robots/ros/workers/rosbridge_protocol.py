@@ -75,7 +75,7 @@ class Ros1Protocol:
 
 
 class Ros2Protocol:
-    """ROS 2 actions, which rosbridge supports directly; tested only against a simulated rosbridge."""
+    """ROS 2 actions, which rosbridge supports directly. This is tested only against a simulated rosbridge."""
 
     has_status = False
 
@@ -110,7 +110,7 @@ class Ros2Protocol:
 
 
 def service_updates(message: Fields) -> Iterator[GoalUpdate]:
-    """Yield the end of the call if a received message is the answer of a service."""
+    """Yield the end of a service call if a received message is its answer."""
     match message:
         case {"op": "service_response", "id": str(goal), "result": True, **more}:  # `values` is optional
             yield GoalUpdate(goal, "ended", "succeeded", values=more.get("values") or {})

@@ -12,7 +12,7 @@ from message_types import parts_of
 from rosbridge_connection import CONNECTION_FAULTS, INSIST_SECONDS, SETTLE_SECONDS, RosbridgeConnection
 from rosbridge_protocol import GoalUpdate
 
-RESEND_SECONDS = 0.5  # how long to wait before sending a message again that had no effect
+RESEND_SECONDS = 0.5  # how long to wait before repeating a message that had no effect
 
 
 class RosbridgeServer(Server):
@@ -42,7 +42,7 @@ class RosbridgeServer(Server):
         return not has_status or self.name in self._connection.settled
 
     def cancel(self, goal: str = "") -> None:
-        """Cancel one goal, or all goals of all clients; services and topics ignore this."""
+        """Cancel one goal, or all goals of all clients. Services and topics ignore this."""
         if self.kind == "action":
             self._connection.send(self._connection.protocol.cancel(self.name, goal))
 
@@ -54,7 +54,7 @@ class RosbridgeWorker(SkillWorker):
     settles = SETTLE_SECONDS
 
     def connect(self, start: Fields) -> bool:
-        """Open the connection; return False, because dead workers leave no node behind."""
+        """Open the connection, and return False, because dead workers leave no node behind."""
         calls = start["calls"]
         actions = [call for call in calls.values() if call["kind"] == "action"]
         try:
@@ -72,7 +72,7 @@ class RosbridgeWorker(SkillWorker):
     def listen(
         self, topic: str, hear: Callable[[Fields], object], *, is_needed: bool = True
     ) -> Callable[[], object]:
-        """Subscribe to a topic; see `SkillWorker.listen`, except that missing publishers go unnoticed."""
+        """Subscribe to a topic as in `SkillWorker.listen`, except that missing publishers go unnoticed."""
         del is_needed
         return self.graph.listen(topic, hear)
 
@@ -81,7 +81,7 @@ class RosbridgeWorker(SkillWorker):
         return {}
 
     def cancel_all(self) -> bool:
-        """Cancel all goals repeatedly for a while; return False on ROS 2, where this is not possible."""
+        """Cancel all goals repeatedly for a while. Return False on ROS 2, where this is not possible."""
         if not self.graph.protocol.has_status:
             return False
         deadline = time.monotonic() + INSIST_SECONDS

@@ -1,4 +1,4 @@
-"""Action servers of a virtual robot on ROS 1, run by a Python that has rospy; CodeBotler performs goals."""
+"""Action servers of a virtual robot on ROS 1, run by a Python that has rospy. CodeBotler performs goals."""
 
 from __future__ import annotations
 
