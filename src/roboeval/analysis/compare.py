@@ -1,4 +1,4 @@
-"""Compares models on the same prompts: how much they differ, how significantly, and in which tasks."""
+"""Compares models on the same prompts: how much and how significantly they differ, and in which tasks."""
 
 from __future__ import annotations
 
