@@ -1,11 +1,12 @@
-"""How fast is this version compared with another one, each in its own environment?
+"""Compares the speed of this version with that of another one, each in its own environment.
 
     OTHER=../before/.venv/bin python bench/beside.py
 
-Both do the same in turns: `roboeval evaluate` of the published completions of two models (where
-CODEBOTLER_CORPUS names the corpus; else of the recorded models), and of 4,000 made from them by renaming
-variables; `reward` under `plus`; `check` of one program after the other in 5 worlds each, on an engine that
-is there, and with a new one. Printed are medians of TURNS turns and the ratio of this version to the other.
+Both versions do the same work in turns. They run `roboeval evaluate` on the published completions of two
+models in the corpus at CODEBOTLER_CORPUS (without a corpus, of the recorded models), and on 4,000 completions
+made from these by renaming variables. They compute `reward` under `plus`, and `check` programs in 5 worlds
+each, one program after another, first on a running engine and then with a new engine for each. The script
+prints the medians over TURNS turns and the ratio of this version to the other.
 """
 
 import os
@@ -81,7 +82,7 @@ def main() -> None:
     """Print a line for each measurement."""
     other = os.environ.get("OTHER")
     if other is None:
-        sys.exit("OTHER names the bin folder of the other environment")
+        sys.exit("set OTHER to the bin folder of the other environment")
     folders = Path(sys.executable).parent, Path(other)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -97,12 +98,12 @@ def main() -> None:
 
 
 def numbered(completions: list[Completion]) -> Iterator[Completion]:
-    """The same, so that no two have the same key."""
+    """Renumber completions so that no two of them have the same key."""
     return (replace(one, index=index) for index, one in enumerate(completions))
 
 
 def renamed(completions: list[Completion]) -> list[Completion]:
-    """So many that they are MANY; copies have another name for their first variable."""
+    """Repeat completions until there are MANY. In each copy, the first variable has a different name."""
     found = []
     for number, one in enumerate(islice(cycle(completions), MANY)):
         copy, variable = number // len(completions), FIRST_VARIABLE.search(one.program)
@@ -114,7 +115,7 @@ def renamed(completions: list[Completion]) -> list[Completion]:
 
 
 def evaluated(file: Path) -> Callable[[Path], float]:
-    """Time the whole command."""
+    """Return a function that times the whole command."""
 
     def time_it(folder: Path) -> float:
         start = time.perf_counter()
@@ -126,7 +127,7 @@ def evaluated(file: Path) -> Callable[[Path], float]:
 
 
 def told(script: str, file: Path) -> Callable[[Path], float]:
-    """Let a script time itself, without its imports."""
+    """Return a function that runs a script, which measures its own time without imports."""
 
     def time_it(folder: Path) -> float:
         command = [str(folder / "python"), "-c", script, str(file)]
@@ -136,10 +137,10 @@ def told(script: str, file: Path) -> Callable[[Path], float]:
 
 
 def compare(what: str, time_it: Callable[[Path], float], folders: tuple[Path, Path]) -> None:
-    """Time both versions in turns."""
+    """Time both versions in turns, and print the medians and their ratio."""
     times = [tuple(map(time_it, folders)) for _ in range(TURNS)]
     ours, theirs = (median(column) for column in zip(*times, strict=True))
-    print(f"{what}: {ours:.2f} s, the other {theirs:.2f} s: {ours / theirs:.2f} of its time", flush=True)
+    print(f"{what}: {ours:.2f} s, other {theirs:.2f} s, ratio {ours / theirs:.2f}", flush=True)
 
 
 if __name__ == "__main__":

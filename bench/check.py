@@ -1,9 +1,9 @@
-"""Which programs does the check reject, compared with the true worlds of their tasks, and at what cost?
+"""Measures which programs the check rejects, compared with the true worlds of their tasks, and at what cost.
 
-The programs are those that models wrote and those of recorded:careful, and apart from them those that were
-written by hand to show one fault or one odd way each (where CODEBOTLER_CORPUS names the corpus; else the
-recorded models). A program is right if it passes every world of its task. PART=10 takes every tenth program,
-SEEDS=20 checks each with so many seeds.
+The programs are those that models wrote, those of recorded:careful, and, as a separate collection, programs
+written by hand to show one fault or unusual approach each. They are in the corpus at CODEBOTLER_CORPUS.
+Without a corpus, the recorded models are used. A program is right if it passes in every world of its task.
+PART=10 takes every tenth program, and SEEDS=20 checks each program with 20 seeds.
 """
 
 import json
@@ -33,14 +33,14 @@ SEEDS = int(os.environ.get("SEEDS", "20"))
 PART = int(os.environ.get("PART", "1"))
 CERTAIN = frozenset({"GoToInvalidLocation", "SyntaxError", "NameError"})
 CAUGHT, LOST, LOST_IN_A_TASK = 0.95, 0.01, 0.05
-"""The aims: the least share of certain errors, and the largest share of right programs, that is rejected."""
+"""The targets: at least CAUGHT of all certain errors are rejected, and at most LOST of the right programs."""
 
 Source = tuple[str, str]
-"""A task's name and a program."""
+"""The name of a task, and a program."""
 
 
 def real(suite: Suite) -> list[Source]:
-    """The available programs of models, and the careful programs."""
+    """Return the available programs of models, and the careful programs."""
     found = [(c.task, c.program) for c in recorded_completions("recorded:careful", suite)]
     corpus = os.environ.get("CODEBOTLER_CORPUS")
     if corpus:
@@ -51,13 +51,13 @@ def real(suite: Suite) -> list[Source]:
 
 
 def by_hand() -> list[Source]:
-    """Programs written for demonstrations."""
+    """Return the programs that were written by hand for demonstrations."""
     corpus = os.environ.get("CODEBOTLER_CORPUS")
     return list(rows(Path(corpus, "tasks", "synthetic.jsonl"))) if corpus else []
 
 
 def rows(file: Path) -> Iterator[Source]:
-    """The programs of a file."""
+    """Yield the programs in a file."""
     for line in file.read_text(encoding="utf-8").splitlines():
         row = json.loads(line)
         yield row["task"], row["program"]
@@ -71,8 +71,8 @@ class Truth:
     """The results of a program in the true worlds of its task.
 
     Args:
-        passed: whether it is right in all of them.
-        kinds: the kinds of errors in which it ends in some of them; `no error` if it is wrong without any.
+        passed: whether it is right in all of these worlds.
+        kinds: the kinds of errors in which it ends in some of them, or `no error` if it is wrong without any.
     """
 
     passed: bool
@@ -100,7 +100,7 @@ def rejections(
     *,
     with_rooms: bool = True,
 ) -> list[list[bool]]:
-    """For each program and each seed, whether the check rejects it; the seeds of a program share its code."""
+    """Return, for each program and seed, whether the check rejects it. A program is compiled once for all."""
     plans = {name: RoomMap.of(task.scenarios[0].world) for name, task in suite.tasks.items()}
 
     def rejected(source: Source) -> list[bool]:
@@ -117,11 +117,11 @@ def rejections(
 
 @dataclass
 class Tally:
-    """How often checks rejected, and how many checks there were.
+    """Counts rejections.
 
     Args:
-        rejected: checks that rejected.
-        checks: all.
+        rejected: the number of checks that rejected a program.
+        checks: the number of all checks.
     """
 
     rejected: int = 0
@@ -134,7 +134,7 @@ class Tally:
 
     @property
     def share(self) -> float:
-        """The share of rejected programs, from 0 to 1."""
+        """Return the share of checks that rejected a program, from 0 to 1."""
         return self.rejected / self.checks if self.checks else 0.0
 
     def __str__(self) -> str:
@@ -143,13 +143,13 @@ class Tally:
 
 @dataclass
 class Rates:
-    """The rejected programs of one collection.
+    """Counts the rejected programs of one collection.
 
     Args:
-        certain: of those that end in an error of the kinds in CERTAIN.
-        right: of those that are right, all together.
-        by_task: of those that are right, by task.
-        by_kind: of those that are wrong, by the kind of error.
+        certain: rejections of programs that end in an error of the kinds in CERTAIN.
+        right: rejections of all right programs.
+        by_task: rejections of right programs, by task.
+        by_kind: rejections of wrong programs, by the kind of error.
     """
 
     certain: Tally = field(default_factory=Tally)
@@ -159,12 +159,12 @@ class Rates:
 
     @property
     def worst(self) -> tuple[str, Tally]:
-        """The task with the largest share of rejected right programs."""
+        """Return the task with the largest share of rejected right programs."""
         return max(self.by_task.items(), key=lambda item: item[1].share)
 
     @property
     def hold(self) -> bool:
-        """Whether all aims are met."""
+        """Whether all targets are met."""
         return (
             self.certain.share >= CAUGHT
             and self.right.share <= LOST
@@ -191,49 +191,47 @@ def rates(sources: Iterable[Source], true: Iterable[Truth], said: Iterable[Seque
 
 
 def report(name: str, sources: Sequence[Source], suite: Suite, pool: WorkerPool) -> bool:
-    """Print the rejected programs of a collection; return whether the aims are met."""
+    """Print how many programs of a collection are rejected. Return whether the targets are met."""
     start = time.perf_counter()
     true = truths(sources, suite)
     said = rejections(sources, suite, range(SEEDS), pool)
     found = rates(sources, true, said)
     spent = time.perf_counter() - start
-    print(
-        f"\n{name}: {len(sources)} programs, {SEEDS} seeds, {DEFAULT_SAMPLES} samples a check, {spent:.0f} s"
-    )
+    print(f"\n{name}: {len(sources)} programs, {SEEDS} seeds, {DEFAULT_SAMPLES} samples each, {spent:.0f} s")
     print(f"  {', '.join(sorted(CERTAIN))} in some world:")
-    print(f"    rejected             {found.certain}  (aim: at least {100 * CAUGHT:.0f} %)")
+    print(f"    rejected             {found.certain}  (target: at least {100 * CAUGHT:.0f} %)")
     print("  right in all worlds:")
-    print(f"    rejected             {found.right}  (aim: at most {100 * LOST:.0f} %)")
+    print(f"    rejected             {found.right}  (target: at most {100 * LOST:.0f} %)")
     for task, tally in sorted(found.by_task.items()):
         print(f"      {task:18} {tally}")
-    print(f"    worst task: {found.worst[0]} (aim: at most {100 * LOST_IN_A_TASK:.0f} %)")
+    print(f"    worst task: {found.worst[0]} (target: at most {100 * LOST_IN_A_TASK:.0f} %)")
     print("  wrong, by the kinds of errors in true worlds (a program may have several):")
     for kind, tally in sorted(found.by_kind.items(), key=lambda item: -item[1].checks):
         print(f"    {kind:20} {tally}")
     wrongly = Counter(
         task for (task, _), truth, each in zip(sources, true, said, strict=True) if truth.passed and any(each)
     )
-    print(f"  right programs that some seed rejects: {dict(wrongly) or 'none'}")
+    print(f"  right programs that are rejected with some seed: {dict(wrongly) or 'none'}")
     return found.hold
 
 
 def report_guessing(sources: Sequence[Source], suite: Suite, pool: WorkerPool) -> None:
-    """Print the rejected programs if rooms are taken from the programs themselves."""
+    """Print how many programs are rejected if the rooms are taken from the programs themselves."""
     true = truths(sources, suite)
     found = rates(sources, true, rejections(sources, suite, [0], pool, with_rooms=False))
-    print("\nthe same without rooms, one seed:")
+    print("\nthe same programs without known rooms, one seed:")
     print(f"    right, rejected      {found.right}, worst task {found.worst[0]} {found.worst[1]}")
     print(f"    certain, rejected    {found.certain}")
 
 
 def report_cost(sources: Sequence[Source], suite: Suite) -> None:
-    """Print the cost of a check, in runs of the same programs in one imagined world."""
+    """Print the cost of a check as a multiple of the cost of one run in one imagined world."""
     worker = Worker()
     plans = {name: RoomMap.of(task.scenarios[0].world) for name, task in suite.tasks.items()}
     once = checked = 0.0
     for task, program in sources:
         new_robot = partial(SampledRobot, plans[task], FactSampler())
-        worker.run(program, new_robot)  # compiles it, for both
+        worker.run(program, new_robot)  # compile the program before both measurements
         start = time.perf_counter()
         worker.run(program, new_robot)
         middle = time.perf_counter()
@@ -243,23 +241,23 @@ def report_cost(sources: Sequence[Source], suite: Suite) -> None:
     worker.close()
     print(
         f"\na check of {DEFAULT_SAMPLES} samples: {1000 * checked / len(sources):.2f} ms, a single run: "
-        f"{1000 * once / len(sources):.2f} ms; so it costs {checked / once:.1f} single runs "
+        f"{1000 * once / len(sources):.2f} ms; a check costs as much as {checked / once:.1f} single runs "
         f"(mean of {len(sources)} programs)"
     )
 
 
 def main() -> int:
-    """Print all parts; return 1 if an aim is missed."""
+    """Print all parts. Return 1 if a target is missed."""
     suite = load_suite()
     written = list(dict.fromkeys(real(suite)))[::PART]
     shown = [source for source in dict.fromkeys(by_hand()) if source not in set(written)][::PART]
     with WorkerPool(WORKERS) as pool:
         hold = report("written by models, and recorded:careful", written, suite, pool)
         if shown:
-            report("written by hand to show one thing each", shown, suite, pool)
+            report("written by hand for demonstrations", shown, suite, pool)
         report_guessing(written, suite, pool)
     report_cost(written[:: max(1, len(written) // 200)], suite)
-    print("\nas aimed at" if hold else "\nNOT as aimed at")
+    print("\nall targets met" if hold else "\ntargets MISSED")
     return 0 if hold else 1
 
 

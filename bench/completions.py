@@ -1,11 +1,11 @@
-"""How fast is an evaluation from end to end, and how does its memory grow?
+"""Measures the speed of a complete evaluation, and how its memory grows.
 
-The first part judges the two models whose published completions the corpus holds (where CODEBOTLER_CORPUS
-names it; else the recorded models): rows, runs and executed pairs of program and world in a second, of the
-whole command and of the evaluation alone. The paper's own code needs 0.354 s for a run, one after the other.
-The second part judges made-up completions of which nine in ten repeat another: time, and the largest memory
-that any of its processes held. The third judges completions of which none repeats another with 1, 2, 4 and 8
-workers; those beyond the cores of this machine only show what they cost.
+The first part judges the published completions of two models in the corpus at CODEBOTLER_CORPUS (without a
+corpus, of the recorded models). It prints how many rows, runs, and executed pairs of program and world the
+command and the evaluation alone process per second. The paper's own code does runs one by one, 0.354 s each.
+The second part judges synthetic completions, of which nine in ten repeat another one. It prints the time, and
+the memory of the largest process. The third part judges distinct completions with 1, 2, 4 and 8 workers. If
+there are more workers than cores, it only shows the overhead of the additional ones.
 """
 
 import json
@@ -23,17 +23,17 @@ from roboeval.evaluation.runs.completions import read_completions
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
-ORIGINAL = 0.354  # seconds a run
+ORIGINAL = 0.354  # seconds per run
 ROWS = tuple(int(n) for n in os.environ.get("ROWS", "1000,10000,100000").split(","))
 DIFFERENT = int(os.environ.get("DIFFERENT", "20000"))
-DISTINCT = 10  # one row in so many is a program of its own
+DISTINCT = 10  # one of this many rows has a new program
 WORKERS = os.environ.get("WORKERS", "2")
 TASK = "SayGoodDay"
 PROGRAM = "def task_program():\n    say('this is {number}')\n    go_to('lobby')\n"
 
 
 def evaluated(file: Path, workers: str = WORKERS) -> tuple[float, float]:
-    """Judge a file of completions; return seconds, and megabytes of the largest process."""
+    """Judge a file of completions. Return the seconds, and the megabytes of the largest process."""
     command = [
         sys.executable,
         "-m",
@@ -57,7 +57,7 @@ def evaluated(file: Path, workers: str = WORKERS) -> tuple[float, float]:
 
 
 def real(folder: Path) -> None:
-    """Print the figures of real models."""
+    """Print the figures for real models."""
     suite = load_suite()
     for name, file in models(folder).items():
         rows = [(c.task, c.program) for c in read_completions(file)]
@@ -73,7 +73,7 @@ def real(folder: Path) -> None:
 
 
 def judged(file: Path, suite: Suite) -> float:
-    """Judge a file of completions in this process; return seconds."""
+    """Judge a file of completions in this process, and return the seconds."""
     start = time.perf_counter()
     for _ in evaluate(read_completions(file), suite, workers=int(WORKERS)):
         pass
@@ -81,7 +81,7 @@ def judged(file: Path, suite: Suite) -> float:
 
 
 def models(folder: Path) -> dict[str, Path]:
-    """Files of completions, by model."""
+    """Return the files of completions by model."""
     corpus = os.environ.get("CODEBOTLER_CORPUS")
     if corpus:
         return {file.stem: file for file in sorted(Path(corpus, "corpus", "completions").glob("*.jsonl"))}
@@ -106,12 +106,12 @@ def growth(folder: Path) -> None:
         pairs = count // DISTINCT * len(load_suite().tasks[TASK].scenarios)
         print(
             f"{count:7} rows, {pairs:6} distinct pairs: {spent:6.1f} s, "
-            f"{1000 * spent / pairs:.2f} ms a pair, {largest:.0f} MB"
+            f"{1000 * spent / pairs:.2f} ms per pair, {largest:.0f} MB"
         )
 
 
 def scaling(folder: Path) -> None:
-    """Print the duration for increasing numbers of workers."""
+    """Print the time for increasing numbers of workers."""
     file = folder / "different.jsonl"
     with file.open("w") as rows:
         for number in range(DIFFERENT):

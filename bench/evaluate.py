@@ -1,10 +1,10 @@
-"""How fast is the engine, compared with no isolation and with a new interpreter for each run?
+"""Compares the speed of the engine with runs without isolation, and with a new interpreter for each run.
 
-The list is fixed: every distinct (program, world) pair of the corpus, where CODEBOTLER_CORPUS names it, or
-else of the recorded models; then those of every fourth program under the suite `plus`. Nothing is
-deduplicated; ours and the in-process way both compile each program once, while the clock runs. The three ways
-take turns over parts of the list, several times, so that the ratios hold on a machine whose speed drifts.
-Pairs that reach a limit, loops and programs that hang are printed apart.
+The list is fixed: every distinct pair of program and world from the corpus at CODEBOTLER_CORPUS (without a
+corpus, from the recorded models), and then the pairs of every fourth program under the suite `plus`. No runs
+are skipped as duplicates. Our engine and the in-process method both compile each program once, and this time
+counts. The three methods take turns over parts of the list, several times, so that the ratios hold on a
+machine whose speed drifts. Pairs that reach a limit, loops, and programs that hang are reported separately.
 """
 
 import json
@@ -39,7 +39,7 @@ Pair = tuple[str, World]
 
 
 def pairs(suite: Suite) -> list[Pair]:
-    """The fixed list of pairs, grouped by program."""
+    """Return the fixed list of pairs, grouped by program."""
     corpus = os.environ.get("CODEBOTLER_CORPUS")
     if corpus:
         lines = (Path(corpus) / "corpus" / "programs.jsonl").read_text().splitlines()
@@ -56,12 +56,12 @@ def pairs(suite: Suite) -> list[Pair]:
     )
 
 
-# --- the three ways
+# --- the three methods
 
 
 def isolated(pool: WorkerPool, settings: SimulationSettings, part: Sequence[Pair]) -> list[Status]:
-    """Our engine: isolated, a few programs per child process, each in all of its worlds."""
-    REPLAYED.clear()  # what other times have left
+    """Run pairs on our engine, isolated: a few programs per child process, each in all of its worlds."""
+    REPLAYED.clear()  # remove what earlier rounds have left
     programs = [list(same) for _, same in groupby(part, key=lambda pair: pair[0])]
 
     def run_all(worker: Worker, works: Sequence[Work]) -> list[list[Status]]:
@@ -83,8 +83,8 @@ def reused(world: World) -> Reused:
 
 
 @cache
-def forget(time: int) -> None:  # noqa: ARG001 - once for each time
-    """Compile all programs anew, which ours does, too: it keeps the code of few."""
+def forget(time: int) -> None:  # noqa: ARG001 - do this once for each round
+    """Forget all compiled programs, because our engine keeps the code of only a few."""
     compiled.cache_clear()
 
 
@@ -101,14 +101,14 @@ NOWHERE = World((Room("nowhere"),), "nowhere")
 def in_process(
     processes: ProcessPoolExecutor, times: Iterator[int], settings: SimulationSettings, part: Sequence[Pair]
 ) -> None:
-    """No isolation: the same programs in as many processes."""
+    """Run the same programs without isolation, in as many processes."""
     share = -(-len(part) // (8 * WORKERS))
     shares = [part[at : at + share] for at in range(0, len(part), share)]
     list(processes.map(run_bare, shares, repeat(next(times)), repeat(settings)))
 
 
 def fresh_interpreters(threads: ThreadPoolExecutor, part: Sequence[Pair]) -> None:
-    """One `python -c pass` for each pair."""
+    """Start `python -c pass` once for each pair."""
     command = [sys.executable, "-c", "pass"]
     list(threads.map(lambda _: subprocess.run(command, check=True), part))
 
@@ -117,21 +117,21 @@ def fresh_interpreters(threads: ThreadPoolExecutor, part: Sequence[Pair]) -> Non
 
 
 def seconds(way: Callable[[Sequence[Pair]], object], part: Sequence[Pair]) -> float:
-    """The duration of a method for a part of the list."""
+    """Return how long a method takes for a part of the list."""
     start = time.perf_counter()
     way(part)
     return time.perf_counter() - start
 
 
 def parts(whole: Sequence[Pair]) -> Iterator[list[Pair]]:
-    """Split the list into parts with programs from the whole list."""
+    """Split the list into parts that each have programs from the whole list."""
     programs = [list(same) for _, same in groupby(whole, key=lambda pair: pair[0])]
     for start in range(PARTS):
         yield [pair for program in programs[start::PARTS] for pair in program]
 
 
 def main() -> None:
-    """Print runs per second of the three ways, the two ratios, and what is apart."""
+    """Print the runs per second of the three methods, the two ratios, and the separate reports."""
     paper, plus = load_suite(), load_suite("plus")
     whole = pairs(paper)
     processes = ProcessPoolExecutor(WORKERS, multiprocessing.get_context("fork"))
@@ -158,7 +158,7 @@ def main() -> None:
         )
         if limited:
             at_limit = seconds(ours, limited) / len(limited)
-            print(f"{len(limited)} pairs that reach a limit, ours: {1000 * at_limit:.1f} ms a run")
+            print(f"{len(limited)} pairs that reach a limit, ours: {1000 * at_limit:.1f} ms per run")
         report_hanging(ours, honest[: len(honest) // PARTS])
     report_loops(honest)
 
@@ -166,14 +166,14 @@ def main() -> None:
 def by_limit(
     ours: Callable[[Sequence[Pair]], list[Status]], whole: Sequence[Pair]
 ) -> tuple[list[Pair], list[Pair]]:
-    """The pairs that end by themselves, and those that reach a limit."""
+    """Return the pairs that end by themselves, and those that reach a limit."""
     statuses = list(zip(whole, ours(whole), strict=True))
     honest = [pair for pair, status in statuses if status is not Status.TIMEOUT]
     return honest, [pair for pair, status in statuses if status is Status.TIMEOUT]
 
 
 def every_fourth(whole: Sequence[Pair]) -> list[Pair]:
-    """The pairs of every fourth program."""
+    """Return the pairs of every fourth program."""
     programs = list(dict.fromkeys(program for program, _ in whole))
     some = set(programs[::4])
     return [pair for pair in whole if pair[0] in some]
@@ -201,15 +201,15 @@ def report(pairs: int, times: dict[str, list[float]]) -> None:
 
 
 def ratios(times: dict[str, list[float]], other: int) -> str:
-    """The ratios of the rounds, the least first."""
+    """Format the ratios of the rounds in ascending order."""
     rounds = list(times.values())
     each = sorted(b / a for a, b in zip(rounds[0], rounds[other], strict=True))
     return ", ".join(f"{ratio:.3f}" for ratio in each)
 
 
-# --- what is apart
+# --- separate reports
 
-COPIES = 12  # of honest programs, so that all workers have work while one of them is held up
+COPIES = 12  # of honest programs, so that all workers have work while one of them is blocked
 HANGS = "def task_program():\n    sum(range(10**12))\n"
 LOOPS = {
     "200,000 turns of a loop": "def task_program():\n    for i in range(199_998): pass\n",
@@ -220,18 +220,18 @@ LOOPS = {
 
 
 def report_hanging(ours: Callable[[Sequence[Pair]], object], part: Sequence[Pair]) -> None:
-    """Print the delay that a hanging program of five processor seconds causes for others."""
+    """Print how long a program that hangs for five seconds of processor time delays other programs."""
     longer = [(f"{source}\n# {copy}\n", world) for copy in range(COPIES) for source, world in part]
     alone = seconds(ours, longer)
     beside = seconds(ours, [(HANGS, NOWHERE), *longer])
     print(
-        f"{len(longer)} honest runs: {alone:.1f} s; with one that hangs among them {beside:.1f} s "
-        f"(its share of {WORKERS} workers: {5 / WORKERS:.1f} s)"
+        f"{len(longer)} honest runs: {alone:.1f} s; with a program that hangs: {beside:.1f} s "
+        f"(5 s shared by {WORKERS} workers: {5 / WORKERS:.1f} s)"
     )
 
 
 def report_loops(honest: Sequence[Pair]) -> None:
-    """Print what loops cost, as multiples of the median honest run and of the same loop in-process."""
+    """Print the cost of loops as multiples of the median honest run, and of the same loop in-process."""
     worker = Worker()
 
     def one_by_one(part: Sequence[Pair]) -> None:
@@ -246,7 +246,7 @@ def report_loops(honest: Sequence[Pair]) -> None:
         bare = statistics.median(seconds(run_bare, [pair]) for _ in range(7))
         print(
             f"{name:26}{1000 * ours:8.1f} ms: {ours / median:5.1f} median runs, "
-            f"{ours / bare:5.2f} times in-process, {(ours - median) / bare:5.2f} less a median run"
+            f"{ours / bare:5.2f} times in-process, {(ours - median) / bare:5.2f} without a median run"
         )
     worker.close()
 

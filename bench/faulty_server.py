@@ -1,11 +1,11 @@
-"""What does a run cost if one request in ten fails, and is every completion stored exactly once?
+"""Measures the cost of a run if one request in ten fails, and tests that each completion is stored once.
 
     python bench/faulty_server.py [COMPLETIONS OF EACH PROMPT] [MODEL ...]
 
-`roboeval generate` asks for 80 prompts x 50 completions from a server of this process, over both protocols.
-Of the requests, one in ten meets an error, a refusal, a stream that breaks off, or nonsense. What is printed
-is the time from start to end, and the processor time of the command for each completion: with the client, the
-retries, and a reply on the disk before it counts. bench/generate.py says what of it the client takes.
+`roboeval generate` requests 50 completions of 80 prompts from a server in this process, over both protocols.
+One request in ten gets an error, a refusal, a stream that breaks off, or nonsense. The script prints the
+total time, and the processor time of the command per completion. This includes the client, retries, and
+writing each reply to the disk before it counts. bench/generate.py measures the client's share.
 """
 
 import json
@@ -22,7 +22,7 @@ sys.path.append(str(Path(__file__).parents[1] / "tests" / "codebotler" / "models
 
 from server import Fault, Request, Server
 
-SHARE = 0.1  # of the requests
+SHARE = 0.1  # share of requests that fail
 FAULTS = (Fault.SERVER_ERROR, Fault.TOO_MANY, Fault.CUT, Fault.INVALID_JSON, Fault.HUNG_UP, Fault.NOTHING)
 CONCURRENCY = 32
 
@@ -58,13 +58,13 @@ def main() -> None:
             keys = [(row["task"], row["prompt"], row["index"]) for row in map(json.loads, lines)]
             twice = json.loads(Path(folder, "run", "run.json").read_text())["possibly_paid_twice"]
             print(
-                f"{model}: {len(keys)} completions, {len(set(keys))} different ones of {80 * each}, by "
-                f"{len(server.requests)} requests of which {failed} failed, in "
+                f"{model}: {len(keys)} completions, {len(set(keys))} distinct of {80 * each}, from "
+                f"{len(server.requests)} requests, {failed} of which failed, in "
                 f"{time.perf_counter() - start:.1f} s; {1000 * used / len(keys):.1f} ms of processor time "
                 f"each; {twice} possibly paid twice"
             )
             if len(keys) != 80 * each or len(set(keys)) != 80 * each or not failed:
-                sys.exit("not every completion is there exactly once, or no request failed")
+                sys.exit("some completion is missing or stored twice, or no request failed")
 
 
 if __name__ == "__main__":

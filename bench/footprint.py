@@ -1,7 +1,7 @@
-"""How much download, disk space and time does each extra take?
+"""Measures how much has to be downloaded for each extra, and how much disk space and time it takes.
 
-For each extra that is named (all by default; `-` is the package without any) this downloads what it needs,
-makes an empty environment, and installs there from what was downloaded. It prints a table in Markdown.
+For each extra that is named (by default all; `-` is the package without extras), the script downloads the
+packages and installs them from there into an empty environment. It prints a table in Markdown.
 
     python bench/footprint.py dist/codebotler-0.1.0-py3-none-any.whl - inspect
 """
@@ -18,18 +18,18 @@ MEGABYTE = 1_000_000
 
 
 def size(folder: Path) -> int:
-    """The bytes of all files below a folder."""
+    """Return the number of bytes of all files below a folder."""
     return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
 
 
 def pip(environment: Path, *arguments: str) -> None:
-    """Run an environment's pip, quietly."""
+    """Run the pip of an environment quietly."""
     python = str(environment / "bin" / "python")
     subprocess.run([python, "-m", "pip", "--quiet", "--disable-pip-version-check", *arguments], check=True)
 
 
 def row(wheel: Path, extra: str, work: Path) -> str:
-    """A row of the table."""
+    """Measure an extra, and return its row of the table."""
     wanted = str(wheel) if extra == "-" else f"{wheel}[{extra}]"
     environment, downloads = work / "environment", work / "downloads"
     venv.create(environment, with_pip=True)

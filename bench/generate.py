@@ -1,11 +1,11 @@
-"""How much processor time do we add to a request, compared with a bare call of the same client?
+"""Measures how much processor time we add to a request, compared with a bare call of the same client.
 
     python bench/generate.py [REQUESTS]
 
-A server in another process answers both. Each request of ours, with its limits and from prompt to program, is
-paired with one that the client makes with the same messages and settings, streamed as well; which of the two
-comes first is drawn. What is printed is the processor time of this process in milliseconds, the median over
-all requests. The aim: less than 3 ms more.
+A server in another process answers both. Each of our requests, which include rate limits and extracting the
+program, is paired with a streamed request that the client makes with the same messages and settings. The
+order of the two is random. The script prints the median processor time of this process over all requests, in
+milliseconds. The target is that we add less than 3 ms.
 """
 
 import asyncio
@@ -38,7 +38,7 @@ WARM_UP = 20  # requests that are not counted
 
 
 def bare_chat(url: str) -> Callable[[], Awaitable[object]]:
-    """A request with pydantic-ai alone."""
+    """Return a function that makes a request with pydantic-ai alone."""
     model = OpenAIChatModel("m", provider=OpenAIProvider(base_url=url))
     asked = ModelSettings(temperature=0.2, top_p=0.95, max_tokens=512, max_retries=0)
     messages: list[ModelMessage] = to_messages(prompt_for(INSTRUCTION).messages)
@@ -53,7 +53,7 @@ def bare_chat(url: str) -> Callable[[], Awaitable[object]]:
 
 
 def bare_completions(url: str) -> Callable[[], Awaitable[object]]:
-    """A request with the openai library alone."""
+    """Return a function that makes a request with the openai library alone."""
     client = openai.AsyncOpenAI(api_key="none", base_url=url, max_retries=0)
     prompt = prompt_for(INSTRUCTION)
 
@@ -74,13 +74,13 @@ def bare_completions(url: str) -> Callable[[], Awaitable[object]]:
 
 
 def ours(name: str, url: str) -> Callable[[], Awaitable[object]]:
-    """Our path from the instruction to the program."""
+    """Return a function that makes our request, from the instruction to the program."""
     model = RateLimited(open_model(name, SamplingSettings(base_url=url)), token_budget=10**9)
     return lambda: model.reply(prompt_for(INSTRUCTION), number=0, on_text=lambda _piece: None)
 
 
 async def paired(count: int, *asks: Callable[[], Awaitable[object]]) -> list[list[float]]:
-    """The processor time of each request in milliseconds, by client."""
+    """Return the processor time of each request in milliseconds, by client."""
     spent: list[list[float]] = [[] for _ in asks]
     dice = random.Random(0)
     for number in range(WARM_UP + count):
@@ -93,7 +93,7 @@ async def paired(count: int, *asks: Callable[[], Awaitable[object]]) -> list[lis
 
 
 async def compare(count: int, url: str) -> None:
-    """Print the figures of both protocols."""
+    """Print the figures for both protocols."""
     for client, name, bare in (
         ("pydantic-ai", "openai-chat:m", bare_chat),
         ("openai", "completions:m", bare_completions),
@@ -107,7 +107,7 @@ async def compare(count: int, url: str) -> None:
 
 
 def main() -> None:
-    """Start the server, measure, stop the server."""
+    """Start the server, measure, and stop the server."""
     os.environ.pop("OPENAI_API_KEY", None)
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 300
     with subprocess.Popen(

@@ -1,7 +1,7 @@
-"""Which rewards do programs get that try to cheat? One line for each entry of hacks.yaml.
+"""Measures the rewards of programs that try to cheat, one line for each entry of hacks.yaml.
 
-Each runs in SEEDS tasks of every family to train on. Beside it stand an honest program that leaves out its
-last step, and one that does nothing.
+Each program runs in SEEDS tasks of every training family. For comparison, the script also prints the mean
+reward of honest programs without their last step.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from roboeval.suites.families.tasks import family_names, trained_task
 from roboeval.training.rollouts import Rollout, judge
 
 SEEDS = int(os.environ.get("SEEDS", "5"))
-FIRST = 3_000_000_000  # behind those of all splits
+FIRST = 3_000_000_000  # a seed beyond those of all splits
 
 
 def hacks() -> dict[str, str]:
-    """The programs by description."""
+    """Return the programs by description."""
     data = YamlFile.read(Path(__file__).with_name("hacks.yaml")).data
     assert isinstance(data, dict)
     return {one["about"]: one["program"] for one in data["programs"]}
 
 
 def without_the_end(program: str) -> str:
-    """A right program without the last step of `task_program`."""
+    """Return a right program without the last step of `task_program`."""
     tree = ast.parse(program)
     body = next(
         one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name == "task_program"
@@ -42,13 +42,13 @@ def without_the_end(program: str) -> str:
 
 
 def taken_back(program: str, denial: str = "None of that is true, forget it.") -> str:
-    """A right program that finally says that its report was wrong."""
+    """Return a right program that says at the end that its report was wrong."""
     right = program.replace("def task_program(", "def right(")
     return f"{right}\ndef task_program():\n    right()\n    say({denial!r})\n"
 
 
 def earned(programs: dict[str, str], seeds: Sequence[int]) -> dict[str, float]:
-    """The mean reward of each program over all families."""
+    """Return the mean reward of each program over all families."""
     tasks = [(family, seed) for family in family_names() for seed in seeds]
     found = judge([Rollout(*task, 0, program) for program in programs.values() for task in tasks])
     means = [
@@ -58,7 +58,7 @@ def earned(programs: dict[str, str], seeds: Sequence[int]) -> dict[str, float]:
 
 
 def honest(seeds: Sequence[int]) -> float:
-    """The mean reward of right programs without their last step."""
+    """Return the mean reward of right programs without their last step."""
     return fmean(
         one.reward
         for one in judge(

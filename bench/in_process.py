@@ -1,4 +1,4 @@
-"""The same programs without isolation: in this process, to be timed, or in an ordinary one, to compare."""
+"""Runs programs without isolation, in this process to time them or in an ordinary process to compare them."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ from codebotler.simulator.skill_protocol import describe_skills, run_parameters
 
 CPU_SECONDS = 30
 MEMORY = 2 * 1024**3
-DEEPER = 500  # a robot that is called as a function takes more of the stack than one that is asked by socket
-OPTION_OVERHEAD = 10  # characters that an option counts more than it has
+DEEPER = 500  # extra stack for a robot that is called as a function instead of through a socket
+OPTION_OVERHEAD = 10  # characters that count for an option in addition to its text
 Execution: TypeAlias = tuple[bytes, tuple[int, float, float, bool]]
 ORDINARY = Path(__file__).with_name("ordinary_process.py")
 
@@ -40,7 +40,7 @@ class Bare(ProgramRun):
     """A program that runs in this process and calls the simulated robot as a function.
 
     Args:
-        robot: who executes its skills.
+        robot: the robot that executes its skills.
     """
 
     def __init__(self, robot: SimulatedRobot) -> None:
@@ -50,32 +50,32 @@ class Bare(ProgramRun):
         self.fuel, self.seconds, self.left = self.limits.ticks, self.limits.seconds, self.limits.calls
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - as in ProgramRun
-        """Do what the engine would."""
+        """Execute a skill call as the engine would."""
         self.left -= 1
         if self.left < 0:
             self.request(name)
         return self.robot.perform(name, for_robot(arguments))
 
     def request(self, request: str) -> Any:  # noqa: ANN401, ARG002 - as in ProgramRun
-        """End the run: a limit is reached."""
+        """End the run, because a limit is reached."""
         self.spent = True
         raise LimitReachedError
 
 
 def for_robot(arguments: list[Any]) -> list[Argument]:
-    """What a program gives to a skill, as the robot takes it."""
+    """Convert a program's arguments for a skill to arguments for the robot."""
     return [
         tuple(Option(str(o), isinstance(o, str)) for o in value) if isinstance(value, list) else value
         for value in arguments
     ]
 
 
-# --- to be timed
+# --- programs to time
 
 
 @lru_cache(maxsize=100_000)
 def compiled(source: str) -> types.CodeType | BaseException:
-    """A program's code, or why there is none."""
+    """Compile a program. Return its code, or the error if it does not compile."""
     try:
         return prepared(source, lowercase=True)[0]
     except (SyntaxError, ValueError, MemoryError) as error:
@@ -83,10 +83,10 @@ def compiled(source: str) -> types.CodeType | BaseException:
 
 
 class Reused(Bare):
-    """Runs one program after the other, with all made before the first that can be, as the fork server does.
+    """Runs programs one after another. As in the fork server, everything possible is prepared only once.
 
     Args:
-        world: any.
+        world: any world.
     """
 
     def __init__(self, world: World) -> None:
@@ -113,14 +113,14 @@ class Reused(Bare):
             return
 
 
-# --- to be compared
+# --- programs to compare
 
 
 class Unwalled(Bare):
-    """A program that runs in this process and is told and judged all that the engine tells and judges.
+    """A program that runs in this process with the same answers and limits as in the engine.
 
     Args:
-        robot: who executes its skills.
+        robot: the robot that executes its skills.
     """
 
     def __init__(self, robot: SimulatedRobot) -> None:
@@ -130,7 +130,7 @@ class Unwalled(Bare):
         self.errors: list[RobotError] = []
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - as in ProgramRun
-        """Do what the engine would, and find the limits that it would."""
+        """Execute a skill call as the engine would, within the same limits."""
         given = for_robot(arguments)
         self.limit = self.limit or self.reached(given)
         if self.limit:
@@ -141,26 +141,26 @@ class Unwalled(Bare):
         try:
             return self.robot.perform(name, given)
         except RobotError as error:
-            self.errors.append(error.with_traceback(None))  # which would keep the program's frames alive
+            self.errors.append(error.with_traceback(None))  # a traceback would keep frames alive
         finally:
             sys.setrecursionlimit(limit)
         last = self.errors[-1]
         raise execution.robot_error(len(self.errors) - 1, last.kind, str(last))
 
     def request(self, request: str) -> Any:  # noqa: ANN401 - as in ProgramRun
-        """End the run: its time is over, or it waits for ever."""
+        """End the run, because its time is over or it waits forever."""
         self.limit = self.limit or self.too_late() or "it waits for something that can never happen"
         return super().request(request)
 
     def too_late(self) -> str | None:
-        """The limit of time, if it is reached."""
+        """Return the time limit in words if it is reached, or None."""
         if self.now <= self.limits.seconds:
             return None
         self.robot.now = self.limits.seconds
         return f"{self.limits.seconds:,.0f} seconds of simulated time"
 
     def reached(self, arguments: list[Argument]) -> str | None:
-        """The limit that a skill call goes beyond, in words."""
+        """Return the limit that a skill call exceeds, in words, or None."""
         texts = [t for a in arguments for t in (texts_in(a) if isinstance(a, tuple) else [str(a)])]
         if late := self.too_late():
             return late
@@ -175,7 +175,7 @@ class Unwalled(Bare):
         return None
 
     def prepare(self, source: str) -> Outcome | Execution:
-        """What to execute; or the outcome of what is no program."""
+        """Return what to execute, or an outcome if the source is not a valid program."""
         told = answer(source, lowercase=self.robot.settings.literals == "lowercase")
         if told[:1] == REFUSED:
             kind, message, line = json.loads(told[1:])
@@ -183,11 +183,11 @@ class Unwalled(Bare):
         return self.execution(told[1:])
 
     def execution(self, code: bytes) -> Execution:
-        """What to execute of a program that parses."""
+        """Return what to execute of a program that parses."""
         return code, run_parameters(self.robot)
 
     def ended(self, final: dict[str, Any]) -> Outcome:
-        """The outcome of a run that ended like this."""
+        """Return the outcome of a run, given the data about its end."""
         status = Status.TIMEOUT if self.limit else Status(final["end"])
         if status is Status.FINISHED:
             return Outcome(status, self.robot.trace)
@@ -203,13 +203,13 @@ class Unwalled(Bare):
 
 
 class OrdinaryProcess:
-    """A process without walls that runs programs; use as a context manager.
+    """A context manager for a process that runs programs without a sandbox.
 
-    Hashing is fixed as it is in the engine, so that sets have the same order. Addresses are not;
-    compare outcomes `without_addresses`.
+    Hashing is fixed as in the engine, so that sets have the same order. Addresses in memory vary, so compare
+    outcomes `without_addresses`.
 
     Args:
-        settings: how the worlds are simulated.
+        settings: the simulation settings.
     """
 
     def __init__(self, settings: SimulationSettings = PAPER_SETTINGS) -> None:
@@ -232,7 +232,7 @@ class OrdinaryProcess:
         """Run one program in one world.
 
         Raises:
-            EOFError: the program took the process down with it.
+            EOFError: the program killed the process.
         """
         assert self._process.stdin is not None
         assert self._process.stdout is not None
@@ -244,28 +244,28 @@ class OrdinaryProcess:
 
 
 def all_of(outcome: Outcome) -> str:
-    """Everything in an outcome, with the places and times that its comparison leaves out."""
+    """Format everything in an outcome, including the places and times that `==` ignores."""
     return f"{outcome!r} {outcome.trace!r}"
 
 
 def without_addresses(outcome: Outcome) -> str:
-    """Everything in an outcome but addresses."""
+    """Format everything in an outcome except addresses in memory."""
     return re.sub(r"0x[0-9a-fA-F]+", "0x", all_of(outcome))
 
 
 class StandIn(Protocol):
-    """What clocks and locks follow: the run that goes on, which is not there yet when they are made."""
+    """Holds the current run for clocks and locks, which are created before the run."""
 
     run: ProgramRun
 
 
-# The functions below call one another as those of the fork server do: how deep a program may call itself
-# depends on how deep it stands.
+# The functions below call one another as those of the fork server do, because the depth to which a program
+# may call itself depends on the depth at which it starts.
 
 
 def serve(stand_in: StandIn, input_: IO[bytes], output: IO[bytes]) -> None:
-    """Run one program after the other, until there is none any more."""
-    for _ in range(WARM_UP_RUNS):  # as the fork server does: what is learnt counts less towards the limit
+    """Run programs one after another until the input ends."""
+    for _ in range(WARM_UP_RUNS):  # as the fork server does, so that the bytecode is specialized here, too
         run = stand_in.run = Unwalled(SimulatedRobot(WARM_UP_WORLD))
         run.execute(*run.execution(WARM_UP_CODE))
     while one_run(stand_in, input_, output):
@@ -273,7 +273,7 @@ def serve(stand_in: StandIn, input_: IO[bytes], output: IO[bytes]) -> None:
 
 
 def one_run(stand_in: StandIn, input_: IO[bytes], output: IO[bytes]) -> bool:
-    """Fork for one program and wait for it; what it writes to the output is its outcome."""
+    """Fork a child for one program and wait for it. The child writes the outcome to the output."""
     try:
         source, world, settings = pickle.load(input_)
     except EOFError:
@@ -288,7 +288,7 @@ def one_run(stand_in: StandIn, input_: IO[bytes], output: IO[bytes]) -> bool:
 
 
 def child(stand_in: StandIn, source: str, robot: SimulatedRobot, output: IO[bytes]) -> None:
-    """Run the program and say how it ended."""
+    """Run the program, and write its outcome to the output."""
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     sys.setrecursionlimit(PROGRAM_RECURSION_LIMIT)

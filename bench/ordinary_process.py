@@ -1,7 +1,7 @@
-"""The ordinary process of `in_process`: forks for each program, closes no walls, asks the robot directly.
+"""The ordinary process of `in_process`, which forks for each program, without a sandbox or a skill protocol.
 
-Clocks, chance and locks are replaced first, as in the fork server, before the modules that take them for
-their own are imported.
+As in the fork server, clocks, random numbers and locks are replaced before the modules that use them are
+imported.
 """
 
 import sys
@@ -13,32 +13,32 @@ from codebotler.simulator.sandbox.stdlib import load_stdlib
 
 
 class Current:
-    """The run that goes on; clocks and locks are made before it is."""
+    """Holds the current run for clocks and locks, which are created before it."""
 
     def __init__(self) -> None:
         self.run = ProgramRun()
 
     def sleep(self, seconds: object, /) -> None:
-        """Let time pass in it."""
+        """Let time pass in the current run."""
         self.run.sleep(seconds)
 
     def wait_for_ever(self) -> None:
-        """Wait in it."""
+        """Wait forever in the current run."""
         self.run.wait_for_ever()
 
     @property
     def now(self) -> float:
-        """What its clock shows."""
+        """Return the time on the clock of the current run."""
         return self.run.now
 
     @property
     def start(self) -> float:
-        """When it began."""
+        """Return the time at which the current run began."""
         return self.run.start
 
 
 def main() -> None:
-    """Be the ordinary process."""
+    """Replace clocks, random numbers and locks, then serve programs."""
     input_, output = sys.stdin.buffer, sys.stdout.buffer
     current = Current()
     run = cast("ProgramRun", current)
@@ -47,7 +47,7 @@ def main() -> None:
     load_stdlib(run)
     sys.setrecursionlimit(limit)
 
-    import in_process  # noqa: PLC0415 - only now
+    import in_process  # noqa: PLC0415 - after the replacements
 
     in_process.serve(current, input_, output)
 

@@ -1,8 +1,9 @@
-"""How long from a click on STOP to the robot, and from the last key to a program's problems?
+"""Measures the delay from a click on STOP to the robot, and from the last key to a program's problems.
 
-A simulated robot drives, and STOP is clicked in a browser (the system's Chromium). Printed are the worst of
-STOPS=20 and the middle one, in milliseconds: until the robot was told, and until what it did had ended, by
-the time in the mission's events. As often a program with a problem is typed, until that stands at its line.
+While a simulated robot drives, STOP is clicked in a browser (the system's Chromium). The script prints the
+largest and the median delay of STOPS=20, in milliseconds, until the robot received the stop and until its
+action ended, by the times in the mission's events. It also types as many programs with a problem, and
+measures the time until the problem is shown at its line.
 """
 
 import os
@@ -28,7 +29,7 @@ CLICK = "() => { const now = Date.now(); document.getElementById('stop').click()
 
 
 def stopped(page: Page, home: Path, number: int) -> tuple[float, float]:
-    """Stop a driving robot; return the seconds until it receives the stop, and until it has stopped."""
+    """Stop a driving robot. Return the seconds until it receives the stop, and until it has stopped."""
     page.locator(".cm-content").click()
     page.keyboard.press("Control+a")
     page.keyboard.insert_text(f"{PROGRAM}# {number}\n")
@@ -44,7 +45,7 @@ def stopped(page: Page, home: Path, number: int) -> tuple[float, float]:
 
 
 def rechecked(page: Page, number: int) -> float:
-    """Seconds from a program's last key until its problem, another one each time, stands at its line."""
+    """Return the seconds from a program's last key until its problem, new each time, is shown at its line."""
     page.locator(".cm-content").click()
     page.keyboard.press("Control+a")
     page.keyboard.insert_text(f"def task_program():\n    go_to('cellar {number}')\n")
@@ -55,7 +56,7 @@ def rechecked(page: Page, number: int) -> float:
 
 @contextmanager
 def served(home: Path) -> Iterator[str]:
-    """The link to a page for a simulated robot whose missions are in a folder."""
+    """Serve a page for a simulated robot whose missions are in a folder, and yield its link."""
     (home / "world.yaml").write_text(WORLD)
     command = [sys.executable, "-m", "codebotler", "serve", "--port", "0", "--world", "world.yaml"]
     environment = {**os.environ, "CODEBOTLER_HOME": str(home)}
@@ -68,7 +69,7 @@ def served(home: Path) -> Iterator[str]:
 
 
 def main() -> int:
-    """Print both; return 1 if an aim is missed."""
+    """Print both delays. Return 1 if a target is missed."""
     with (
         tempfile.TemporaryDirectory() as folder,
         sync_playwright() as playwright,
@@ -82,13 +83,13 @@ def main() -> int:
         times = [stopped(page, Path(folder), number) for number in range(STOPS)]
         checks = [1000 * rechecked(page, number) for number in range(STOPS)]
     told, ended = ([1000 * each for each in some] for some in zip(*times, strict=True))
-    print(f"from a click on STOP to the robot, worst of {STOPS}, in ms (aim: ended in less than {AIM:.0f})")
-    for what, each in (("told", told), ("ended", ended)):
-        print(f"{what:6} {max(each):7.2f} (middle {median(each):.2f})")
-    print(f"from the last key to the problem at its line (aim: less than {AIM_OF_CHECKS:.0f})")
-    print(f"{'shown':6} {max(checks):7.2f} (middle {median(checks):.2f})")
+    print(f"from a click on STOP, worst of {STOPS}, in ms (target: ended in less than {AIM:.0f})")
+    for what, each in (("heard", told), ("ended", ended)):
+        print(f"{what:6} {max(each):7.2f} (median {median(each):.2f})")
+    print(f"from the last key to the problem at its line (target: less than {AIM_OF_CHECKS:.0f})")
+    print(f"{'shown':6} {max(checks):7.2f} (median {median(checks):.2f})")
     holds = max(ended) < AIM and max(checks) < AIM_OF_CHECKS
-    print("as aimed at" if holds else "NOT as aimed at")
+    print("all targets met" if holds else "targets MISSED")
     return 0 if holds else 1
 
 

@@ -1,4 +1,4 @@
-"""Random robot programs, written by the rules of grammar.txt, and texts that once were such programs."""
+"""Writes random robot programs by the rules of grammar.txt, and texts that are damaged programs."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class Rule:
     """A rule of the grammar.
 
     Args:
-        weight: how often it is drawn, compared with its neighbours.
-        text: its Python.
-        uses: for a definition, further rules, with what they are for.
+        weight: how often it is chosen, relative to the other rules of its kind.
+        text: its Python text.
+        uses: for a definition, the kinds and texts of further rules that use it.
     """
 
     weight: int
@@ -39,7 +39,7 @@ class Rule:
 
 
 def read_grammar(text: str) -> dict[str, list[Rule]]:
-    """The rules of a grammar, by what they are for."""
+    """Parse a grammar, and return its rules by kind."""
     grammar: dict[str, list[Rule]] = {}
     rules: list[Rule] = []
     for line in text.splitlines():
@@ -59,13 +59,13 @@ def read_grammar(text: str) -> dict[str, list[Rule]]:
 
 @dataclass
 class Grammar:
-    """What programs are drawn from.
+    """The rules from which programs are generated.
 
     Args:
-        weighed: the rules for expressions, by what they are for.
-        statements: those for statements.
-        definitions: those for functions and classes, of which each is as likely.
-        strange: rules for statements of which a program may have one, if any.
+        weighed: the rules for expressions, by kind.
+        statements: the rules for statements.
+        definitions: the rules for functions and classes, all equally likely.
+        strange: rules for statements of which a program may contain at most one.
     """
 
     weighed: dict[str, Rules]
@@ -75,12 +75,12 @@ class Grammar:
 
     @cached_property
     def without_blocks(self) -> Rules:
-        """The statements that hold no others."""
+        """Return the rules for statements that contain no other statements."""
         return tuple(rule for rule in self.statements if "BLOCK" not in rule[1])
 
     @classmethod
     def of(cls, rules: dict[str, list[Rule]], definitions: list[Rule], strange: Rules = ()) -> Grammar:
-        """The grammar of some rules."""
+        """Create a grammar from rules."""
         weighed = {
             kind: tuple((rule.weight, rule.text) for rule in of_kind) for kind, of_kind in rules.items()
         }
@@ -88,7 +88,7 @@ class Grammar:
 
 
 def is_tame_rule(text: str) -> bool:
-    """Whether what a rule says is tame, if all that is drawn for it is; no set is."""
+    """Whether a rule yields tame code if all its parts are tame. Sets are never tame."""
     if re.search(r"\bSET\b", text):
         return False
     tree = ast.parse(text)
@@ -98,7 +98,7 @@ def is_tame_rule(text: str) -> bool:
 def tame_grammar(
     rules: dict[str, list[Rule]], definitions: list[Rule], further: dict[str, list[Rule]]
 ) -> Grammar:
-    """The tame rules of a grammar, and further ones; the others are strange."""
+    """Return a grammar of the tame rules and further ones, with the other statements as strange ones."""
     tame = {
         kind: [rule for rule in (*of_kind, *further.get(kind, ())) if is_tame_rule(rule.text)]
         for kind, of_kind in rules.items()
@@ -124,7 +124,7 @@ TAME = tame_grammar(GRAMMAR, DEFINITIONS, FURTHER)
 MODULES = "collections contextlib copy dataclasses enum functools itertools json math random re"
 VARIABLES = {"T": "TEXT", "N": "NUMBER", "L": "LIST", "D": "DICT"}
 PARAMETERS = {"a": "TEXT", "b": "NUMBER", "c": "LIST"}
-COUNT = 3  # variables of each kind at module level; functions write only the first
+COUNT = 3  # number of variables of each kind in a module, of which functions assign only the first
 START = {"T": "'kitchen'", "N": "2", "L": "['yes', 'no']", "D": "{'a': 1}"}
 UNUSUAL_ENDS = (
     "del task_program",
@@ -139,13 +139,13 @@ UNUSUAL_ENDS = (
 
 @dataclass
 class Scope:
-    """What a function, a class or the module knows while its text is written.
+    """The names that are known in a function, a class or the module while it is written.
 
     Args:
-        kind: `module`, `global`, `local` or `nonlocal`: what the variables that it assigns are.
-        readable: names that hold a text and so on.
-        uses: rules for what was defined.
-        loops: how many loops its statement stands in.
+        kind: the kind of the variables that it assigns: `module`, `global`, `local` or `nonlocal`.
+        readable: the names that can be read, by the kind of their value.
+        uses: rules that use what was defined, by kind.
+        loops: the number of loops around the current statement.
     """
 
     kind: str
@@ -156,12 +156,12 @@ class Scope:
 
 @dataclass
 class Writer(ast.NodeTransformer):
-    """Writes one program: replaces the capitals in rules by what is drawn.
+    """Writes one program by replacing the names in capitals in rules with random code.
 
     Args:
-        draw: draws from a strategy.
+        draw: the function of Hypothesis that draws from a strategy.
         grammar: the rules.
-        modules: those that programs import first.
+        modules: the modules that programs import first.
     """
 
     draw: Any
@@ -178,7 +178,7 @@ class Writer(ast.NodeTransformer):
     may_be_strange: bool = False
 
     def program(self) -> str:
-        """The text of a program."""
+        """Return the text of a random program."""
         names = {kind: [f"{name.lower()}{i}" for i in range(COUNT)] for name, kind in VARIABLES.items()}
         self.scopes = [Scope("module", names, {})]
         tree = ast.parse(f"import {', '.join(self.modules.split())}")
@@ -202,11 +202,11 @@ class Writer(ast.NodeTransformer):
     # --- drawing
 
     def number(self, below: int) -> int:
-        """A number from 0 and below another; 0 is the simplest."""
+        """Return a random number from 0 to less than `below`, where 0 gives the simplest program."""
         return int(self.draw(numbers(below)))
 
     def pick(self, choices: Sequence[tuple[int, str]]) -> str:
-        """One of the choices, by weight."""
+        """Return one of the choices at random, by weight."""
         at = self.number(sum(weight for weight, _ in choices))
         for weight, rule in choices:
             at -= weight
@@ -216,16 +216,16 @@ class Writer(ast.NodeTransformer):
 
     @property
     def here(self) -> Scope:
-        """The scope that is being written."""
+        """Return the scope that is being written."""
         return self.scopes[-1]
 
     def used(self, kind: str) -> list[tuple[int, str]]:
-        """The rules for what was defined."""
+        """Return the rules of a kind that use what was defined."""
         weight = sum(weight for weight, _ in self.grammar.statements) // 12 if kind == "STATEMENT" else 8
         return [(weight, use) for scope in self.scopes for use in scope.uses.get(kind, ())]
 
     def expression(self, kind: str) -> ast.expr:
-        """A random expression."""
+        """Return a random expression."""
         names = [(3, name) for name in self.here.readable.get(kind, ())]
         given = self.grammar.weighed[kind]
         if self.plain and names:
@@ -242,11 +242,11 @@ class Writer(ast.NodeTransformer):
         return node  # type: ignore[no-any-return]  # as `visit` is typed
 
     def statements(self, count: int) -> list[ast.stmt]:
-        """Random statements."""
+        """Return random statements."""
         return [node for _ in range(count) for node in self.statement()]
 
     def statement(self) -> list[ast.stmt]:
-        """A random statement, or several that belong together."""
+        """Return a random statement, or several that belong together."""
         given = self.grammar.without_blocks if self.blocks >= DEEPEST_BLOCK else self.grammar.statements
         if self.may_be_strange and self.number(9) == 8:  # noqa: PLR2004 - one in nine
             self.may_be_strange, given = False, self.grammar.strange
@@ -262,7 +262,7 @@ class Writer(ast.NodeTransformer):
         return nodes
 
     def jump(self) -> ast.stmt:
-        """What leaves a block, as far as it may stand here."""
+        """Return a random statement that leaves a block and is allowed here, or `pass`."""
         choices = [(2, "pass")]
         if self.here.loops:
             choices += [(6, "break"), (3, "continue")]
@@ -271,11 +271,11 @@ class Writer(ast.NodeTransformer):
         return self.filled_statements(self.pick(choices))[0]
 
     def definitions(self) -> list[ast.stmt]:
-        """Functions and classes for the head of a scope."""
+        """Return random functions and classes for the beginning of a scope."""
         return [node for _ in range(self.number(4 - len(self.scopes))) for node in self.definition()]
 
     def definition(self) -> list[ast.stmt]:
-        """A function or class, which can be used from then on."""
+        """Return a random function or class, which later code in the scope can use."""
         definition = self.grammar.definitions[self.number(len(self.grammar.definitions))]
         self.defined += 1
         name = f"f{self.defined}"
@@ -289,19 +289,19 @@ class Writer(ast.NodeTransformer):
     # --- filling rules
 
     def filled(self, node: ast.AST) -> Any:  # noqa: ANN401 - a node of the same kind
-        """A rule with its capitals replaced; each use of `T` in it is the same variable."""
+        """Replace the names in capitals in a rule. All uses of `T` in it become the same variable."""
         chosen, self.chosen = self.chosen, {}
         node = self.visit(node)
         self.chosen = chosen
         return node
 
     def filled_statements(self, rule: str) -> list[ast.stmt]:
-        """Statements, with their capitals replaced."""
+        """Return the statements of a rule with their names in capitals replaced."""
         module: ast.Module = self.filled(ast.parse(rule))
         return module.body
 
-    def visit(self, node: ast.AST) -> Any:  # noqa: ANN401 - what takes its place
-        """Replace what a node stands for."""
+    def visit(self, node: ast.AST) -> Any:  # noqa: ANN401 - the replacement may have any type
+        """Replace a node with random code if it is a placeholder."""
         match node:
             case ast.Name():
                 return self.name(node)
@@ -315,7 +315,7 @@ class Writer(ast.NodeTransformer):
                 self.looped(node)
             case ast.FunctionDef() | ast.Lambda():
                 self.function(node)
-            case ast.JoinedStr():  # only names: before Python 3.12, it may not hold quotes of its own
+            case ast.JoinedStr():  # only names, because f-strings before Python 3.12 cannot nest quotes
                 plain, self.plain = self.plain, True
                 self.generic_visit(node)
                 self.plain = plain
@@ -324,7 +324,7 @@ class Writer(ast.NodeTransformer):
         return node
 
     def name(self, node: ast.Name) -> ast.expr:
-        """What a name in capitals stands for."""
+        """Return what replaces a name in capitals."""
         if node.id in self.grammar.weighed:
             return self.expression(node.id)
         if node.id in VARIABLES or node.id == "T2":
@@ -335,7 +335,7 @@ class Writer(ast.NodeTransformer):
         return ast.Name(f"i{self.items}", node.ctx) if node.id == "ITEM" else node
 
     def comprehended(self, node: ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp) -> None:
-        """A comprehension; its first iterable knows nothing of its variables."""
+        """Fill a comprehension. Its first iterable cannot use the variables of the comprehension."""
         walrus, self.walrus = self.walrus, False
         first = node.generators[0]
         first.iter = self.visit(first.iter)
@@ -355,14 +355,14 @@ class Writer(ast.NodeTransformer):
 
     @contextmanager
     def known(self, names: dict[str, list[str]]) -> Iterator[None]:
-        """Let some more names be read for a while."""
+        """Let the block read some more names."""
         before = self.here.readable
         self.here.readable = {kind: before[kind] + names.get(kind, []) for kind in before}
         yield
         self.here.readable = before
 
     def looped(self, node: ast.For | ast.While) -> None:
-        """A loop; its `else` is no part of it."""
+        """Fill a loop. Its `else` branch is not inside the loop."""
         for part in ("target", "iter", "test"):
             if hasattr(node, part):
                 setattr(node, part, self.visit(getattr(node, part)))
@@ -372,12 +372,12 @@ class Writer(ast.NodeTransformer):
         node.orelse = self.visited(node.orelse)
 
     def visited(self, body: list[ast.stmt]) -> list[ast.stmt]:
-        """Statements, with what each of them becomes."""
-        module: ast.Module = self.generic_visit(ast.Module(body, []))  # type: ignore[assignment]  # the same
+        """Return the statements that replace the given ones."""
+        module: ast.Module = self.generic_visit(ast.Module(body, []))  # type: ignore[assignment]  # a module
         return module.body
 
     def function(self, node: ast.FunctionDef | ast.Lambda) -> None:
-        """A function, whose body knows its parameters."""
+        """Fill a function, whose body can use the parameters."""
         if isinstance(node, ast.FunctionDef):
             node.decorator_list = [self.visit(one) for one in node.decorator_list]
         node.args = self.visit(node.args)
@@ -391,7 +391,7 @@ class Writer(ast.NodeTransformer):
                 self.walrus = walrus
 
     def function_body(self, write: Callable[[], list[ast.stmt]]) -> list[ast.stmt]:
-        """The body of a function: what its variables are, perhaps functions of its own, then the rest."""
+        """Return the body of a function: its variables, perhaps inner functions, then other statements."""
         outer = self.here.kind
         kinds = ["local", "global", *(["nonlocal"] if outer in ("local", "nonlocal") else [])]
         kind = kinds[self.number(len(kinds))]
@@ -414,18 +414,18 @@ class Writer(ast.NodeTransformer):
 
 @cache
 def numbers(below: int) -> st.SearchStrategy[int]:
-    """Numbers from 0."""
+    """Return a strategy for numbers from 0 to less than `below`."""
     return st.integers(0, max(0, below - 1))
 
 
 @cache
 def is_leaf(rule: str) -> bool:
-    """Whether nothing is left to draw in a rule."""
+    """Whether a rule has no names to replace."""
     return not re.search(r"\b(?:[A-Z]{3,}|[TNLD])\b", rule)
 
 
 def parameters(given: ast.arguments) -> dict[str, list[str]]:
-    """The names of parameters, by what they hold."""
+    """Return the names of parameters by the kind of their value."""
     found: dict[str, list[str]] = {}
     for one in (*given.posonlyargs, *given.args, *given.kwonlyargs):
         if one.arg in PARAMETERS:
@@ -435,19 +435,19 @@ def parameters(given: ast.arguments) -> dict[str, list[str]]:
 
 @st.composite
 def programs(draw: st.DrawFn, *, deep: bool = True) -> str:
-    """Programs that parse, mostly do something and often finish.
+    """Generate programs that parse, mostly do something, and often finish.
 
     Args:
-        draw: given by Hypothesis.
-        deep: whether to draw also such as end differently under different versions of Python, because they
-            call themselves through C until the stack is full.
+        draw: a function that Hypothesis provides.
+        deep: whether to include programs that end differently under different versions of Python, because
+            they call themselves through C until the stack is full.
     """
     return Writer(draw, DEEP if deep else USUAL).program()
 
 
 @st.composite
 def tame_programs(draw: st.DrawFn) -> str:
-    """Programs that parse, of which most are tame, and the others but for one statement."""
+    """Generate programs that parse. Most of them are tame, and the others are so except for one statement."""
     return Writer(draw, TAME, "time").program()
 
 
@@ -461,7 +461,7 @@ FOREIGN = (
 
 @st.composite
 def broken_programs(draw: st.DrawFn) -> str:
-    """Programs with lines and tokens gone, twice there or swapped, and foreign characters among them."""
+    """Generate programs with missing, duplicated or swapped lines and tokens, and with foreign characters."""
     text = draw(programs())
     for _ in range(draw(st.integers(1, 4))):
         pieces = text.splitlines(keepends=True) if draw(st.booleans()) else TOKENS.findall(text)

@@ -1,7 +1,7 @@
-"""What bench/ros1.py compares with: goals sent one by one by actionlib's own client, in the robot's Python.
+"""Sends goals one by one with actionlib's own client, in the robot's Python, as a baseline of bench/ros1.py.
 
-Prints the seconds of each as JSON. It is told the folder of the worker, whose messages it uses, the action's
-definition and how many goals to send.
+The arguments are the folder of the worker, whose messages the script uses, the definition of the action, and
+the number of goals. The script prints the seconds of each goal as JSON.
 """
 
 import json
@@ -26,7 +26,7 @@ goal = type(spec().action_goal.goal)
 
 
 def seconds() -> float:
-    """Send a goal, and wait for its end."""
+    """Send a goal, wait until it has ended, and return the seconds."""
     done = threading.Event()
 
     def changed(handle: Any) -> None:

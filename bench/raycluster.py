@@ -1,9 +1,9 @@
-"""What does a Ray cluster cost on one machine, and how much can one process feed to it?
+"""Measures the overhead of a Ray cluster on one machine, and how many programs a process can dispatch to it.
 
 The recorded programs are judged by the local engine and on a cluster of this machine, in turns, with the same
-number of cores; printed is the ratio of the medians. Then calls that do nothing but give back a row of usual
-length are counted: so many programs a second one process can hand out and take back, whatever judges them.
-The last lines say what that means for a million completions.
+number of cores. The script prints the ratio of the medians. Then it counts calls per second that only return
+a row of typical length. This is how many programs one process can dispatch and collect, no matter how they
+are judged. The last lines say what this means for a million completions.
 """
 
 import json
@@ -29,19 +29,19 @@ MILLION = 1_000_000
 
 @contextmanager
 def opened(engine: Engine) -> Iterator[Engine]:
-    """An engine that stays open."""
+    """Yield an engine that is already open, and leave it open."""
     yield engine
 
 
 def seconds(engine: Engine, completions: list[Completion], suite: Suite) -> tuple[float, list[str]]:
-    """Judge completions; return the seconds and the rows."""
+    """Judge completions, and return the seconds and the rows."""
     start = time.perf_counter()
     rows = [json.dumps(row) for row in evaluate(completions, suite, engine=opened(engine))]
     return time.perf_counter() - start, rows
 
 
 def fed(cluster: Engine, row: str) -> float:
-    """The calls per second that one process can dispatch and collect."""
+    """Return the number of calls per second that one process can dispatch and collect."""
 
     def give(_worker: Worker, works: Sequence[Work]) -> list[str]:
         return [row[: -1 - int(number) % 2] for _, number in works]
@@ -52,7 +52,7 @@ def fed(cluster: Engine, row: str) -> float:
 
 
 def main() -> int:
-    """Print the measurements; return 1 if rows differ."""
+    """Print the measurements. Return 1 if rows differ."""
     suite = load_suite(sys.argv[1] if len(sys.argv) > 1 else "paper")
     models = ("recorded:careful", "recorded:hasty")
     completions = [c for model in models for c in recorded_completions(model, suite)]
@@ -61,7 +61,7 @@ def main() -> int:
     rows: dict[str, list[str]] = {}
     with Local(cores) as local, RayCluster() as cluster:
         for engine in (local, cluster):
-            seconds(engine, completions[:40], suite)  # processes start
+            seconds(engine, completions[:40], suite)  # start the processes
         for number in range(ROUNDS):
             for name, engine in (("local", local), ("ray", cluster)):
                 spent, rows[name] = seconds(engine, completions, suite)
@@ -70,16 +70,12 @@ def main() -> int:
         a_second = fed(cluster, sorted(rows["ray"], key=len)[len(completions) // 2])
     here, there = (statistics.median(times) for times in took.values())
     each = cores * here / len(completions)
-    print(
-        f"{len(completions)} programs, suite {suite.name}, {cores} cores: {here:.1f} s, by Ray {there:.1f} s"
-    )
+    print(f"{len(completions)} programs, suite {suite.name}, {cores} cores: {here:.1f} s, Ray {there:.1f} s")
     print(f"Ray takes {there / here:.2f} times as long")
-    print(f"one process hands out and takes back {a_second:,.0f} programs a second")
+    print(f"one process dispatches and collects {a_second:,.0f} programs per second")
     hours, least = MILLION * each * there / here / 3600, MILLION / a_second / 60
-    print(
-        f"a million different programs take {hours:,.1f} hours of a core, and at least {least:,.0f} minutes,"
-    )
-    print(f"which {a_second * each:,.0f} cores reach; more would wait for the process that hands out")
+    print(f"a million distinct programs take {hours:,.1f} core hours and at least {least:,.0f} minutes;")
+    print(f"{a_second * each:,.0f} cores suffice for this, and more would wait for the dispatching process")
     return rows["local"] != rows["ray"]
 
 

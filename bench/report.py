@@ -1,9 +1,9 @@
-"""How long does a report of five models with 4,000 completions each take, in how much memory?
+"""Measures the time and memory of a report on five models with 4,000 completions each.
 
-The runs are made up: verdicts on the programs that ship with the package, repeated with other texts in them,
-so that four in five programs of a run differ. What a check says is made up as well, so that no program runs:
-checking is `roboeval resample`'s, and is done once for a run. It prints the share of each step, and compares
-with a minute, 1 GB, and 5 MB of the page.
+The runs are synthetic: they repeat the verdicts on the programs that ship with the package. Texts in the
+programs are changed, so that four in five programs of a run are distinct. The results of checks are synthetic
+as well, so that no program runs, because `roboeval resample` checks the programs of a run once. The script
+prints the share of each step, and compares the totals with one minute, 1 GB, and a page of 5 MB.
 """
 
 import os
@@ -30,7 +30,7 @@ from roboeval.report.writing import headline, sections, write_report
 from roboeval.suites.load import Suite, load_suite
 
 MODELS = int(os.environ.get("MODELS", "5"))
-COMPLETIONS = int(os.environ.get("COMPLETIONS", "50"))  # of each prompt
+COMPLETIONS = int(os.environ.get("COMPLETIONS", "50"))  # per prompt
 SECONDS, MEGABYTES, PAGE = 60, 1024, 5_000_000
 
 
@@ -44,19 +44,19 @@ def timed(what: str, spent: dict[str, float]) -> Iterator[None]:
 
 @cache
 def verdicts() -> list[Row]:
-    """On the recorded programs, in their order."""
+    """Return the verdicts on the recorded programs, in order."""
     return list(evaluate(recorded(), load_suite(), workers=2))
 
 
 @cache
 def recorded() -> list[Completion]:
-    """The programs that ship with the package."""
+    """Return the programs that ship with the package."""
     names = ("recorded:careful", "recorded:hasty")
     return [completion for name in names for completion in recorded_completions(name, load_suite())]
 
 
 def made_up(folder: Path, number: int, suite: Suite) -> RunFolder:
-    """A run with synthetic completions, judged like the recorded ones that they copy."""
+    """Create a run with synthetic completions, which have the verdicts of the recorded ones they copy."""
     run = RunFolder(folder / f"model-{number}")
     rows = verdicts()
     by_prompt: dict[tuple[str, int], list[int]] = {}
@@ -82,14 +82,14 @@ def made_up(folder: Path, number: int, suite: Suite) -> RunFolder:
 
 
 def read(run: RunFolder, suite: Suite) -> JudgedRun:
-    """Read a run like the command, with a check that rejects programs that end in an error."""
+    """Read a run as the command does, as if the check rejected all programs that end in an error."""
     results = read_results(run, "paper", suite)
     accepted = pl.col("failure_check").is_not_null() | pl.col("passed")
     return JudgedRun(results, results.table.with_columns(accepted=accepted))
 
 
 def main() -> None:
-    """Print the shares."""
+    """Print the share of each step, and the totals."""
     suite = load_suite()
     spent: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as name:
@@ -97,7 +97,7 @@ def main() -> None:
         runs = [made_up(folder, number, suite) for number in range(MODELS)]
         with timed("reading", spent):
             judged = name_runs([read(run, suite) for run in runs])
-        with timed("putting together", spent):
+        with timed("assembling", spent):
             parts = sections(judged, command="bench")
         written = write_report(*headline(judged), parts, folder / "report")
         before = time.perf_counter()

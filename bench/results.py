@@ -1,8 +1,8 @@
-"""How long does it take to read a judged run of 100,000 completions as one table?
+"""Measures how long it takes to read a judged run of 100,000 completions as one table.
 
-The run is made up: verdicts on programs that ship with the package, repeated under other indices. It prints
-the processor time of `load_results` beside that of parsing the same files with `json` and no more, and of one
-page of numbers.
+The run is synthetic: it repeats the verdicts on programs that ship with the package under new indices. The
+script prints the processor time of `load_results`, of only parsing the same files with `json`, and of
+computing some statistics.
 """
 
 import json
@@ -25,16 +25,16 @@ ROWS = int(os.environ.get("ROWS", "100000"))
 
 
 def timed(what: str, function: Callable[[], object]) -> float:
-    """Call a function; print and return its processor time in seconds."""
+    """Call a function. Print and return its processor time in seconds."""
     start = time.process_time()
     function()
     spent = time.process_time() - start
-    print(f"{what:40} {spent:6.2f} s of processors")
+    print(f"{what:40} {spent:6.2f} s of processor time")
     return spent
 
 
 def made_up(folder: Path) -> RunFolder:
-    """Create a judged run with a number of rows."""
+    """Create a judged run with about ROWS rows."""
     run, suite = RunFolder(folder), load_suite()
     completions = list(recorded_completions("recorded:hasty", suite))
     rows = list(evaluate(completions, suite, workers=2))
@@ -55,7 +55,7 @@ def made_up(folder: Path) -> RunFolder:
 
 
 def main() -> None:
-    """Read, count and compare."""
+    """Print the measurements and the ratio to parsing."""
     with tempfile.TemporaryDirectory() as folder:
         run = made_up(Path(folder))
         paths = (run.completions, run.rows("paper"))

@@ -1,11 +1,11 @@
-"""How many distinct programs per minute are rewarded, in batches of 64?
+"""Measures how many distinct programs per minute are rewarded, in batches of 64.
 
-Beside it stands what one call of `evaluate` does with the same programs, as what could be reached. Both are
-printed for the suites `paper` and `plus`; under `plus`, which has more worlds, a quarter as many programs.
-They are those that models wrote, where CODEBOTLER_CORPUS names the corpus, and the recorded ones, of which
-one in ten was written to use all of Python, and has a process for each run. Then PROMPTS prompts of the
-families to train on are made, and some of their tasks, and ROLLOUTS rollouts are judged at once, with 1 to 8
-workers in turns.
+For comparison, one call of `evaluate` judges the same programs, which shows what could be reached. Both rates
+are printed for the suites `paper` and `plus`. Under `plus`, which has more worlds, there are only a quarter
+of the programs. They are those that models wrote, if CODEBOTLER_CORPUS names the corpus, and the recorded
+ones. One in ten recorded programs was written to use all of Python, and needs a process for each run. Then
+the script generates PROMPTS prompts of the training families and some of their tasks, and judges ROLLOUTS
+rollouts at once, with 1 to 8 workers in turns.
 """
 
 import os
@@ -40,7 +40,7 @@ def main() -> None:
         suite = load_suite(name)
         if os.environ.get("CODEBOTLER_CORPUS"):
             by_models = [one for file in models(Path()).values() for one in read_completions(file)]
-            measure("what models wrote", suite, by_models[::5], count)
+            measure("programs of models", suite, by_models[::5], count)
         recorded = [
             completion
             for model in ("recorded:careful", "recorded:hasty")
@@ -52,7 +52,7 @@ def main() -> None:
 
 
 def measure_prompts() -> None:
-    """Print the duration of prompts, as a ratio to generating their tasks with all worlds."""
+    """Print the time for generating prompts, and its ratio to generating their tasks with all worlds."""
     began = time.monotonic()
     rows = load_prompts("test", count=PROMPTS)
     prompts = time.monotonic() - began
@@ -60,11 +60,11 @@ def measure_prompts() -> None:
     for row in rows[-TASKS:]:
         trained_task(row["family"], row["seed"])
     tasks = (time.monotonic() - began) * PROMPTS / TASKS
-    print(f"{PROMPTS:,} prompts: {prompts:.1f} s, {prompts / tasks:.2f} times what their tasks would take")
+    print(f"{PROMPTS:,} prompts: {prompts:.1f} s, {prompts / tasks:.2f} times the time of their tasks")
 
 
 def measure_families() -> None:
-    """Print the rollouts per minute by number of workers, as ratios to one worker."""
+    """Print the rollouts per minute by number of workers, and the ratios to one worker."""
     took: dict[int, list[float]] = defaultdict(list)
     for turn in range(TURNS):
         rows = load_prompts("test", count=ROLLOUTS, seed=turn)
@@ -80,12 +80,12 @@ def measure_families() -> None:
     for workers, seconds in took.items():
         rate, ratio = 60 * ROLLOUTS / median(seconds), median(map(float.__truediv__, took[1], seconds))
         print(
-            f"  {workers} workers: {rate:,.0f} programs a minute, {per_core(rate)}, {ratio:.2f} times one's"
+            f"  {workers} workers: {rate:,.0f} programs per minute, {per_core(rate)}, {ratio:.2f} times one"
         )
 
 
 def rollout(row: dict[str, Any], name: str) -> Rollout:
-    """A unique right or wrong program."""
+    """Create a rollout with a unique program, which is right or wrong."""
     task = trained_task(row["family"], row["seed"])
     programs = [task.solution, *(one.program for one in task.wrong)]
     program = f"{programs[row['seed'] % len(programs)]}\n# {name}\n"
@@ -93,12 +93,12 @@ def rollout(row: dict[str, Any], name: str) -> Rollout:
 
 
 def per_core(rate: float) -> str:
-    """How many that are for each core."""
+    """Format a rate per core."""
     return f"{rate / cores():,.0f} for each of {cores()} cores"
 
 
 def measure(what: str, suite: Suite, given: Sequence[Completion], count: int) -> None:
-    """Print both for some completions, as often as makes that many programs."""
+    """Print both rates for `count` programs, which repeat the given completions under unique names."""
     written: dict[str, list[str]] = {}
     for number, completion in enumerate(islice(cycle(given), count)):
         written.setdefault(completion.task, []).append(f"{completion.program}\n# {number} of {what}\n")
@@ -110,13 +110,13 @@ def measure(what: str, suite: Suite, given: Sequence[Completion], count: int) ->
             reward(task, 0, programs[start : start + BATCH], suite=suite)
     took = time.monotonic() - began
     rate = 60 * count / took
-    print(f"{suite.name}, {what}, {count:,} distinct ones: {rate:,.0f} programs a minute, {per_core(rate)}")
+    print(f"{suite.name}, {what}, {count:,} distinct: {rate:,.0f} programs per minute, {per_core(rate)}")
     print(f"the first call, which starts the engine: {began - first:.2f} s")
     began = time.monotonic()
     for task, programs in written.items():
         for start in range(0, len(programs), BATCH):
             reward(task, 0, programs[start : start + BATCH], suite=suite)
-    print(f"the same again, remembered: {60 * count / (time.monotonic() - began):,.0f} programs a minute")
+    print(f"the same again, cached: {60 * count / (time.monotonic() - began):,.0f} programs per minute")
     completions = [
         Completion(task=task, prompt=0, index=index, program=program)
         for task, programs in written.items()
@@ -126,7 +126,7 @@ def measure(what: str, suite: Suite, given: Sequence[Completion], count: int) ->
     for _ in evaluate(completions, suite, workers=WORKERS):
         pass
     took = time.monotonic() - began
-    print(f"evaluate, {WORKERS} workers, one call: {60 * count / took:,.0f} programs a minute")
+    print(f"evaluate, {WORKERS} workers, one call: {60 * count / took:,.0f} programs per minute")
 
 
 if __name__ == "__main__":

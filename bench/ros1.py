@@ -1,7 +1,7 @@
-"""What does the tool cost above raw actionlib, and is any goal lost?
+"""Measures the overhead of the tool compared with raw actionlib, and tests that no goal is lost.
 
-A virtual robot on a ROS graph of its own executes GOALS times the same skill for actionlib's own client in
-the robot's Python, and as often for the tool; in rounds that alternate, since the machine may be busy.
+A virtual robot on its own ROS graph executes the same skill GOALS times for actionlib's own client in the
+robot's Python, and as often for the tool. The two take turns, because the machine may be busy.
 """
 
 import json
@@ -28,13 +28,13 @@ from codebotler.robots.ros.worker import WORKERS_FOLDER
 GOALS = int(os.environ.get("GOALS", "500"))
 ROUNDS = 5
 OVERHEAD = 0.005
-"""What is aimed at, in seconds: the most that a skill may cost more."""
+"""The target: the overhead of a skill is less than this, in seconds."""
 
 WORLD = World((Room("hall"), Room("kitchen")), "hall")
 
 
 def raw(robot: VirtualRobot, goals: int) -> list[float]:
-    """The seconds that each goal takes by actionlib's own client."""
+    """Return the seconds that each goal takes with actionlib's own client."""
     script = str(Path(__file__).with_name("raw_actionlib.py"))
     action = json.dumps(calls_data(default_connection(SKILLS))["say"])
     done = subprocess.run(
@@ -48,7 +48,7 @@ def raw(robot: VirtualRobot, goals: int) -> list[float]:
 
 
 def ours(robot: Robot, goals: int) -> list[float]:
-    """The seconds that each goal takes by the tool."""
+    """Return the seconds that each goal takes with the tool."""
     took = []
     for _ in range(goals):
         start = time.perf_counter()
@@ -58,7 +58,7 @@ def ours(robot: Robot, goals: int) -> list[float]:
 
 
 def told(name: str, took: list[float]) -> None:
-    """Print one row."""
+    """Print one row of figures."""
     ms = [1000 * seconds for seconds in took]
     most = quantiles(ms, n=20)[-1]
     print(f"  {name:18} median {median(ms):6.2f} ms   p95 {most:6.2f} ms   worst {max(ms):7.2f} ms")
@@ -66,7 +66,7 @@ def told(name: str, took: list[float]) -> None:
 
 @contextmanager
 def on_a_graph() -> Iterator[tuple[VirtualRobot, Robot]]:
-    """A virtual robot with a master of its own, and the tool's robot, connected to it."""
+    """Yield a virtual robot with its own ROS master, and the tool's robot, which is connected to it."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -82,7 +82,7 @@ def on_a_graph() -> Iterator[tuple[VirtualRobot, Robot]]:
 
 
 def main() -> int:
-    """Print all figures; 1 if what is aimed at is missed."""
+    """Print all figures. Return 1 if the target is missed."""
     os.environ["ROS_HOSTNAME"] = "localhost"
     plain: list[float] = []
     through: list[float] = []
@@ -97,7 +97,7 @@ def main() -> int:
     print(f"{len(through)} goals in a row, {GOALS - len(through)} lost")
     told("raw actionlib", plain)
     told("through the tool", through)
-    print(f"  a skill costs {1000 * more:.2f} ms more (median; aim: under {1000 * OVERHEAD:g} ms)")
+    print(f"  a skill costs {1000 * more:.2f} ms more (median; target: under {1000 * OVERHEAD:g} ms)")
     return int(more >= OVERHEAD or len(through) < GOALS)
 
 

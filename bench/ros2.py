@@ -1,8 +1,8 @@
-"""Is any goal lost on ROS 2 while both cores are busy, and how much slower is one then?
+"""Tests that no goal is lost on ROS 2 while all cores are busy, and measures how much slower goals are then.
 
-A virtual robot on a graph of its own executes GOALS goals in each of CONNECTIONS connections, while a busy
-loop runs on each core; before that, it does so in ten connections on the idle machine. ROS2_PYTHON names a
-Python that has rclpy.
+A virtual robot on its own ROS graph executes GOALS goals in each of CONNECTIONS connections, while a busy
+loop runs on each core. Before that, it does so in ten connections on the idle machine. ROS2_PYTHON is the
+path of a Python that has rclpy.
 """
 
 import os
@@ -25,14 +25,14 @@ from codebotler.robots.ros.virtual import VirtualRobot
 
 CONNECTIONS = int(os.environ.get("CONNECTIONS", "200"))
 GOALS = int(os.environ.get("GOALS", "10"))
-IDLE = 10  # connections
+IDLE = 10  # number of connections on the idle machine
 PYTHON = Path(os.environ.get("ROS2_PYTHON") or choose_python())
 WORLD = World((Room("hall"), Room("kitchen")), "hall")
 LOST = (NotReadyError, RobotError, RobotLostError)
 
 
 class Figures:
-    """Times of goals and connections in seconds, and the errors of those that were lost."""
+    """The times of goals and connections in seconds, and the errors of lost ones."""
 
     def __init__(self) -> None:
         self.goals: list[float] = []
@@ -59,7 +59,7 @@ class Figures:
 
 @contextmanager
 def busy() -> Iterator[None]:
-    """A busy loop on each core."""
+    """Run a busy loop on each core."""
     loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() or 1)]
     try:
         yield
@@ -70,14 +70,14 @@ def busy() -> Iterator[None]:
 
 
 def print_ratios(name: str, idle: list[float], loaded: list[float]) -> None:
-    """Print one row."""
+    """Print one row of ratios."""
     middle = median(loaded) / median(idle)
     most = quantiles(loaded, n=20)[-1] / quantiles(idle, n=20)[-1]
     print(f"  {name:10} median {middle:4.1f} times   p95 {most:4.1f} times   worst {max(loaded):.2f} s")
 
 
 def main() -> int:
-    """Print all figures; 1 if anything was lost."""
+    """Print all figures. Return 1 if anything was lost."""
     os.environ.setdefault("ROS_DOMAIN_ID", "100")
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     virtual = VirtualRobot(WORLD, speed=None, ros=2, python=PYTHON)
@@ -95,7 +95,7 @@ def main() -> int:
     print(f"{wanted} goals in {CONNECTIONS} connections on busy cores, {wanted - len(loaded.goals)} lost")
     goal, connection = 1000 * median(idle.goals), median(idle.connections)
     print(f"  idle: a goal {goal:.1f} ms, a connection {connection:.2f} s (median)")
-    print("  with a busy loop on each core, compared to that:")
+    print("  with a busy loop on each core, compared with the idle machine:")
     print_ratios("goal", idle.goals, loaded.goals)
     print_ratios("connection", idle.connections, loaded.connections)
     for why in idle.lost + loaded.lost:

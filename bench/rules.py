@@ -1,11 +1,11 @@
-"""What do house rules do: do they stop all that breaks them, and nothing else, and at what cost?
+"""Measures whether house rules stop every action that breaks them, and no others, and what they cost.
 
-The rules are those of rules.yaml, of eight kinds. The programs are those that models wrote (where
-CODEBOTLER_CORPUS names the corpus), the recorded and the reference programs, and MUTANTS of these, about
-2,000 by default. They run in all worlds of their tasks without rules, with each rule that concerns them (a
-mutant with every fourth of these), and with all rules at once. Without the corpus, mutants are left out. What
-breaks a rule is found by `holds`, on each prefix of the run without rules. Further worlds help to tell if a
-program breaks one at all: the same rooms, with what is in them in `plus`. PART=10 takes every tenth program.
+The rules in rules.yaml are of eight kinds. The programs are those that models wrote (if CODEBOTLER_CORPUS
+names the corpus), the recorded and the reference programs, and about MUTANTS=2000 mutants of these (only
+with the corpus). They run in all worlds of their tasks without rules, with each rule that concerns them (a
+mutant with every fourth of these rules), and with all rules at once. Violations are found by applying
+`holds` to each prefix of the run without rules. Further worlds, with the same rooms and their contents in
+`plus`, help to find out whether a program breaks a rule at all. PART=10 takes every tenth program.
 """
 
 from __future__ import annotations
@@ -52,13 +52,13 @@ WORKERS = int(os.environ.get("WORKERS", "2"))
 PART = int(os.environ.get("PART", "1"))
 MUTANTS = int(os.environ.get("MUTANTS", "2000"))
 SOME_OF = 4
-AT_ONCE = 8  # programs that are measured together
+AT_ONCE = 8  # number of programs that are measured together
 MOST_REMEMBERED = 3_000
-ALL = "all at once"  # the kind of all rules together
+ALL = "all at once"  # the kind for all rules together
 REJECTED, LOST = 0.97, 0.01
 MICROSECONDS = 50.0
-"""What is aimed at: the least share of programs that break a rule, and the largest of those that break none,
-to be rejected before they run; the most that ten rules may cost for each skill call."""
+"""The targets: of the programs that break a rule, at least REJECTED are rejected before they run, and at most
+LOST of the others. Ten rules cost less than MICROSECONDS per skill call."""
 
 
 # --- programs
@@ -66,7 +66,7 @@ to be rejected before they run; the most that ten rules may cost for each skill 
 
 @cache
 def programs() -> list[Source]:
-    """All distinct programs."""
+    """Return all distinct programs."""
     suite = load_suite()
     found = real(suite)
     found += [(c.task, c.program) for c in recorded_completions("recorded:hasty", suite)]
@@ -76,7 +76,7 @@ def programs() -> list[Source]:
 
 @cache
 def all_mutants() -> list[Source]:
-    """The mutants that are no other programs."""
+    """Return the mutants that are not among the other programs."""
     if not os.environ.get("CODEBOTLER_CORPUS"):
         return []
     suite = load_suite()
@@ -86,7 +86,7 @@ def all_mutants() -> list[Source]:
 
 
 def mutated(suite: Suite, name: str) -> list[Source]:
-    """Mutants of the right programs of a task."""
+    """Return mutants of the right programs of a task."""
     task = suite.tasks[name]
     context = Context.of([scenario.world for scenario in task.scenarios], task.prompts)
     some = sample_mutants(mutants(originals(task), context), MUTANTS // len(suite.tasks), 1)
@@ -98,11 +98,11 @@ def mutated(suite: Suite, name: str) -> list[Source]:
 
 @dataclass(frozen=True)
 class House:
-    """Rules that are in force together.
+    """House rules that are in force together.
 
     Args:
-        kind: what they are about.
-        rules: the rules, one but for all at once.
+        kind: what the rules are about.
+        rules: a single rule, or all rules.
     """
 
     kind: str
@@ -110,24 +110,24 @@ class House:
 
     @property
     def name(self) -> str:
-        """The name of its rule."""
+        """Return the name of the rule, or ALL for several."""
         return self.rules[0].name if len(self.rules) == 1 else ALL
 
     def concerns(self, events: Iterable[Event]) -> bool:
-        """Whether an event is of a kind, and has a text, of which a rule speaks."""
+        """Whether the kind and text of any event match an event that a rule is about."""
         about = [element for rule in self.rules for element in speaks_of(rule.formula)]
         all_meant = set(chain.from_iterable(map(meant, events)))
         return any(is_match(element, event, 0) for event in all_meant for element in about)
 
 
 def houses() -> list[House]:
-    """Each rule of the file, and all of them together."""
+    """Return each rule of the file on its own, and then all rules together."""
     rules = read_rules(Path(__file__).with_name("rules.yaml"))
     return [*(House(rule.name.split("-")[0], (rule,)) for rule in rules), House(ALL, rules)]
 
 
 def speaks_of(formula: Formula) -> list[EventPattern]:
-    """The events that a rule forbids or ties to a condition, wherever they happen and however they end."""
+    """Return patterns for the events that a rule restricts, wherever they happen and however they end."""
     tests = list(tests_of(formula))
     last = [test for test in tests if isinstance(test, Last)] or tests
     return [
@@ -137,7 +137,7 @@ def speaks_of(formula: Formula) -> list[EventPattern]:
 
 
 def tests_of(formula: Formula) -> Iterator[Test]:
-    """The tests of a formula."""
+    """Yield the tests in a formula."""
     match formula:
         case And(parts) | Or(parts):
             yield from chain.from_iterable(map(tests_of, parts))
@@ -147,11 +147,11 @@ def tests_of(formula: Formula) -> Iterator[Test]:
             yield formula
 
 
-# --- what is true
+# --- the true verdicts
 
 
 def further_worlds(task: Task, plus: Suite) -> list[World]:
-    """The rooms of a task with what is in them in the suite `plus`; none if it has other rooms there."""
+    """Return worlds with the rooms of a task and their contents in `plus`. Skip worlds that lack a room."""
     rooms = rooms_of(task.scenarios[0].world)
     drawn = [{room.name: room for room in one.world.rooms} for one in plus.tasks[task.name].scenarios]
     start = task.scenarios[0].world.robot
@@ -159,22 +159,22 @@ def further_worlds(task: Task, plus: Suite) -> list[World]:
 
 
 def rooms_of(world: World) -> list[str]:
-    """The names of its rooms."""
+    """Return the names of the rooms of a world."""
     return [room.name for room in world.rooms]
 
 
 def all_seen(outcomes: Sequence[Outcome], worlds: Sequence[World]) -> list[Trace]:
-    """What a program does in each world, as rules are about it."""
+    """Return the trace of a program in each world, in the form that rules judge."""
     return [seen(one.trace, rooms_of(world)) for one, world in zip(outcomes, worlds, strict=True)]
 
 
 def seen(trace: Trace, rooms: Sequence[str]) -> Trace:
-    """A trace as rules are about it: a drive has the room that it reached, and knows which it may mean."""
+    """Return a trace in the form that rules judge, in which drives name all rooms that they may mean."""
     return tuple(driven(event, rooms) if event.kind == "goto" else event for event in trace)
 
 
 def driven(event: Event, rooms: Sequence[str]) -> Event:
-    """A drive to the room that it reached; all that its words may mean stand in a field of questions."""
+    """Return a drive with the room that it reached as its text, and all rooms that it may mean in `to`."""
     reached = resolve_room(rooms, event.text) or event.text
     wanted = event.text.strip().lower()
     named = [room for room in rooms if room.lower() == wanted]
@@ -183,19 +183,19 @@ def driven(event: Event, rooms: Sequence[str]) -> Event:
 
 
 def meant(event: Event) -> list[Event]:
-    """An event once for each room that it may mean, if it is a drive."""
+    """Return a copy of a drive for each room that it may mean, or any other event unchanged."""
     names = (event.to or "").split("\n") if event.kind == "goto" else [event.text]
     return [replace(event, text=name) for name in names]
 
 
 def breaking(rule: Rule, trace: Trace) -> int | None:
-    """The position of the first event that breaks a rule, in some room; one that cannot be judged does."""
+    """Return the index of the first event that breaks a rule. An event that cannot be judged breaks it."""
     each = ([(*trace[:at], event) for event in meant(trace[at])] for at in range(len(trace)))
     return next((at for at, ends in enumerate(each) if not all(is_kept(rule, end) for end in ends)), None)
 
 
 def is_kept(rule: Rule, trace: Trace) -> bool:
-    """Whether a rule is kept by a trace, whatever came before its end."""
+    """Whether a rule holds for a whole trace, even if it does not hold for a prefix."""
     try:
         return holds(rule.formula, trace)
     except Inconclusive:
@@ -203,7 +203,7 @@ def is_kept(rule: Rule, trace: Trace) -> bool:
 
 
 def is_foreseeable(rule: Rule, trace: Trace, at: int) -> bool:
-    """Whether an event breaks a rule however it turns out."""
+    """Whether an event breaks a rule whatever its result is."""
     event = trace[at]
     if event.kind == "goto":
         return True
@@ -217,13 +217,13 @@ def is_foreseeable(rule: Rule, trace: Trace, at: int) -> bool:
 
 @dataclass
 class Truth:
-    """What a program does without rules.
+    """The behaviour of a program without rules.
 
     Args:
-        outcomes: how it ends in each world of its task.
-        traces: what it does there, as rules are about it.
-        further: what it does in further worlds that its task may have.
-        passed: whether it is right in all of its task.
+        outcomes: its outcome in each world of its task.
+        traces: its traces in these worlds, in the form that rules judge.
+        further: its traces in further worlds that the task may have.
+        passed: whether it is right in all worlds of its task.
     """
 
     outcomes: Sequence[Outcome]
@@ -237,9 +237,9 @@ class GuardedRun:
     """A run with rules.
 
     Args:
-        outcome: how it ended.
-        trace: what the robot did, as rules are about it.
-        refused: what the robot was kept from, if anything.
+        outcome: the outcome of the run.
+        trace: its trace, in the form that rules judge.
+        refused: the event that the rules prevented, if any.
     """
 
     outcome: Outcome
@@ -248,17 +248,17 @@ class GuardedRun:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether a rule ended it."""
+        """Whether a rule ended the run."""
         return self.outcome.error is not None and self.outcome.error.kind == VIOLATION
 
 
 class WatchedGuard(RuleGuard):
-    """A guard that keeps what it has refused."""
+    """A guard that records which event it has refused."""
 
     refused: Event | None = None
 
     def judge(self, *attempts: Event) -> None:
-        """Judge an attempt, as always."""
+        """Judge an attempt, and record it if it is refused."""
         try:
             super().judge(*attempts)
         except RuleViolationError:
@@ -266,27 +266,27 @@ class WatchedGuard(RuleGuard):
             raise
 
 
-# --- what rules do to one program
+# --- the effect of rules on one program
 
 
 @dataclass
 class Effect:
-    """What rules do to one program.
+    """The effect of rules on one program.
 
     Args:
         source: the program.
         house: the name of the rules.
-        broken: in how many worlds it breaks them.
-        breaks: whether it breaks them in some world, a further one or not.
-        foreseeable: in how many of these that is certain before the event that does so.
-        executed: in how many worlds a foreseeable violation is executed in spite of the rules.
-        unseen: in how many worlds an unforeseeable one does not end the run.
-        altered: in how many worlds it is kept from something that would have broken nothing.
-        failing: in how many worlds it is kept from something that would have failed.
-        passed: whether it is right without the rules, and with them.
-        rejected: whether the check rejects it.
-        reason: why, if a rule is to blame: the worlds, in words.
-        is_true: whether `holds` agrees in the sampled world.
+        broken: the number of worlds in which the program breaks the rules.
+        breaks: whether it breaks them in any world, including further ones.
+        foreseeable: the number of worlds in which the violation is certain before the event that causes it.
+        executed: the number of worlds in which a foreseeable violation is executed despite the rules.
+        unseen: the number of worlds in which an unforeseeable violation does not end the run.
+        altered: the number of worlds in which the rules prevent an event that breaks none of them.
+        failing: the number of worlds in which they prevent an event that would have failed anyway.
+        passed: whether the program is right without the rules, and with them.
+        rejected: whether the check rejects the program.
+        reason: the facts of the world in which a rule makes the check reject it, in words, if any.
+        is_true: whether `holds` agrees with the rejection in the sampled world.
     """
 
     source: Source
@@ -305,17 +305,17 @@ class Effect:
 
 
 class Measuring:
-    """Measures programs, in a process of its own."""
+    """Measures programs in one process."""
 
     def __init__(self) -> None:
         self.suite, self.houses, self.worker = load_suite(), houses(), Worker()
         plus = load_suite("plus")
         self.numbers = {house.name: number for number, house in enumerate(self.houses)}
         self.further = {name: further_worlds(task, plus) for name, task in self.suite.tasks.items()}
-        self.breaking = lru_cache(MOST_REMEMBERED)(self._breaking)  # many programs do the same
+        self.breaking = lru_cache(MOST_REMEMBERED)(self._breaking)  # many programs have the same traces
 
     def effects(self, sources: Sequence[Source], mutants: frozenset[Source]) -> list[Effect]:
-        """What each house does to each program that it concerns."""
+        """Return the effect of each house on each program that it concerns."""
         truths = [self.truth(source) for source in sources]
         found: list[Effect] = []
         for source, truth in zip(sources, truths, strict=True):
@@ -333,28 +333,28 @@ class Measuring:
         return breaking(house.rules[0], trace) if house.concerns(trace) else None
 
     def first_break(self, house: House, trace: Trace) -> tuple[int, Rule] | None:
-        """The first event that breaks a rule, and the rule."""
-        key = tuple((event.place, event.holding, event.to) for event in trace)  # which `==` leaves out
+        """Return the index of the first event that breaks a rule, and the rule."""
+        key = tuple((event.place, event.holding, event.to) for event in trace)  # `==` ignores these fields
         numbers = (self.numbers[rule.name] for rule in house.rules)
         each = ((self.breaking(n, key, trace), self.houses[n].rules[0]) for n in numbers)
         return min(((at, rule) for at, rule in each if at is not None), key=lambda one: one[0], default=None)
 
     def robots(self, worlds: Sequence[World]) -> list[partial[SimulatedRobot]]:
-        """What makes the robots of some worlds."""
+        """Return a function for each world that creates its robot."""
         return [partial(SimulatedRobot, world, self.suite.settings) for world in worlds]
 
     def worlds(self, task: str) -> list[World]:
-        """The worlds of a task."""
+        """Return the worlds of a task."""
         return [scenario.world for scenario in self.suite.tasks[task].scenarios]
 
     def passed(self, task: str, outcomes: Sequence[Outcome]) -> bool:
-        """Whether a program is right in all worlds."""
+        """Whether a program is right in all worlds of its task."""
         return all(
             judge(*one).satisfied for one in zip(outcomes, self.suite.tasks[task].scenarios, strict=True)
         )
 
     def truth(self, source: Source) -> Truth:
-        """What a program does without rules."""
+        """Run a program without rules."""
         task, program = source
         worlds = [*self.worlds(task), *self.further[task]]
         (outcomes,) = self.worker.run_all([(program, self.robots(worlds))])
@@ -363,13 +363,13 @@ class Measuring:
         return Truth(outcomes[:own], traces[:own], traces[own:], self.passed(task, outcomes[:own]))
 
     def guarded(self, source: Source, truth: Truth, concerned: Sequence[House]) -> list[Effect]:
-        """What a program does with rules, in all worlds of its task."""
+        """Run a program with rules, in all worlds of its task."""
         task, program = source
         makers = self.robots(self.worlds(task))
         guards: dict[tuple[int, int], WatchedGuard] = {}
 
         def new_robot(number: int, world: int) -> SimulatedRobot:
-            guards[number, world] = WatchedGuard(concerned[number].rules)  # the latest: a run may be repeated
+            guards[number, world] = WatchedGuard(concerned[number].rules)  # replaced if a run is repeated
             return makers[world](guard=guards[number, world])
 
         runs: list[NewRobot] = [
@@ -391,7 +391,7 @@ class Measuring:
         return found
 
     def compare(self, effect: Effect, house: House, truth: Truth, world: int, run: GuardedRun) -> None:
-        """Compare the runs in a world without and with rules."""
+        """Compare the runs in a world without and with rules, and update the effect."""
         free, end = truth.traces[world], len(run.trace)
         without, despite = self.first_break(house, free), self.first_break(house, run.trace)
         if without is not None:
@@ -407,7 +407,7 @@ class Measuring:
         if not run.is_stopped:
             effect.altered += run.outcome != truth.outcomes[world]
             return
-        # The event that was refused would be the next one; what could not be foreseen is the last one.
+        # A refused event would be the next one. A violation that could not be foreseen is the last event.
         stopped_at = end - 1 if run.refused is None else end
         if run.trace == free[:end] and without is not None and without[0] == stopped_at:
             return
@@ -418,10 +418,10 @@ class Measuring:
         else:
             effect.altered += 1
 
-    # --- the check before
+    # --- the check before a run
 
     def check(self, effects: Sequence[Effect], house: House) -> None:
-        """Check programs by rules, in sampled worlds."""
+        """Check programs in sampled worlds with rules, and update the effects."""
         plans = [RoomMap.of(self.worlds(effect.source[0])[0]) for effect in effects]
         works = [(effect.source[1], plan) for effect, plan in zip(effects, plans, strict=True)]
         settings = CheckSettings(house_rules=house.rules)
@@ -438,14 +438,14 @@ class Measuring:
     def is_true(
         self, effect: Effect, house: House, plan: RoomMap, sample: Sample, found: CheckResult
     ) -> bool:
-        """Whether a program breaks the rules in a sampled world, if nothing keeps it from that."""
+        """Whether a program breaks the rules in a sampled world if nothing prevents it."""
         sampler = FactSampler(found.seed, sample.number, forced=sample.draws)
         outcome = self.worker.run(effect.source[1], partial(SampledRobot, plan, sampler))
         return self.first_break(house, seen(outcome.trace, plan.rooms)) is not None
 
 
 def would_fail(attempt: Event, follows: Trace, rooms: Sequence[str]) -> bool:
-    """Whether what was refused would have failed, by what follows where nothing is refused."""
+    """Whether a refused event would have failed, judging by what follows in the run without rules."""
     if attempt.kind == "goto":
         return resolve_room(rooms, attempt.text) is None
     if not follows or (follows[0].kind, follows[0].text) != (attempt.kind, attempt.text):
@@ -455,7 +455,7 @@ def would_fail(attempt: Event, follows: Trace, rooms: Sequence[str]) -> bool:
 
 @cache
 def measuring() -> Measuring:
-    """What measures in this process."""
+    """Return the only instance of this process."""
     return Measuring()
 
 
@@ -465,7 +465,7 @@ def measured(sources: Sequence[Source], mutants: frozenset[Source]) -> list[Effe
 
 
 def all_effects(sources: Sequence[Source], mutants: frozenset[Source]) -> Iterator[Effect]:
-    """What rules do to programs, which several processes measure."""
+    """Measure programs in several processes, and yield their effects."""
     shares = [sources[at : at + AT_ONCE] for at in range(0, len(sources), AT_ONCE)]
     start = time.perf_counter()
     with ProcessPoolExecutor(WORKERS) as processes:
@@ -476,14 +476,14 @@ def all_effects(sources: Sequence[Source], mutants: frozenset[Source]) -> Iterat
                 print(f"{number} of {len(shares)} shares, {spent:.0f} s", file=sys.stderr)
 
 
-# --- what a skill call costs
+# --- the cost of a skill call
 
 SIZES = 0, 1, 10, 100
 ROUNDS, RUNS = 9, 5
 
 
 def cost(rules: Sequence[Rule], world: World, number: Iterator[int]) -> tuple[float, float]:
-    """Microseconds of the processor for a skill call with rules, and for making the guard of a run."""
+    """Return the microseconds of processor time for a skill call with rules, and for creating a guard."""
     making = spent = 0.0
     calls = 0
     for _ in range(RUNS):
@@ -501,7 +501,7 @@ def cost(rules: Sequence[Rule], world: World, number: Iterator[int]) -> tuple[fl
 
 
 def errand_of(number: int) -> list[tuple[str, list[str | tuple[Option, ...]]]]:
-    """The skill calls of an errand; what is said is new each time."""
+    """Return the skill calls of an errand, with texts that depend on its number."""
     calls: list[tuple[str, list[str | tuple[Option, ...]]]] = []
     for room in ("bob's office", "charlie's office", "david's office"):
         calls += [
@@ -521,14 +521,14 @@ def errand_of(number: int) -> list[tuple[str, list[str | tuple[Option, ...]]]]:
 
 
 def costs() -> dict[int, tuple[float, float]]:
-    """Microseconds for each skill call and for each run, by the number of rules; they take turns."""
+    """Return the microseconds per skill call and per run by the number of rules. The sizes take turns."""
     person = Person("somebody", ("yes",))
     owners = ("bob", "charlie", "david")
     offices = tuple(Room(f"{owner}'s office", people=(person,)) for owner in owners)
     world = World((*offices, Room("pantry", ("cup",) * len(owners)), Room("hall")), "hall")
     kept = [rule for rule in houses()[-1].rules if lets_pass(rule, world)]
     rules = [
-        Rule(f"{rule.name}-{again}", rule.says, parse(str(rule.formula)))  # with regexes of its own
+        Rule(f"{rule.name}-{again}", rule.says, parse(str(rule.formula)))  # with its own regexes
         for again in range(max(SIZES))
         for rule in kept
     ]
@@ -558,13 +558,13 @@ def lets_pass(rule: Rule, world: World) -> bool:
 
 
 def share(some: Sequence[bool]) -> str:
-    """How many, of how many, in percent."""
+    """Format the number of true values, the number of all, and the percentage."""
     percent = 100 * sum(some) / len(some) if some else 0.0
     return f"{sum(some):5} of {len(some):5} {percent:6.2f} %"
 
 
 def row(name: str, effects: Sequence[Effect]) -> str:
-    """What rules of a kind do."""
+    """Format the effects of rules of a kind as a row."""
     broken = [effect for effect in effects if effect.breaks]
     kept = [effect for effect in effects if not effect.breaks]
     sums = [
@@ -583,17 +583,17 @@ HEAD = (
     f"{'altered':>8}{'failing':>8}{'right, keep':>15}{'right, break':>15}"
 )
 LEGEND = """
-programs: that a rule concerns, once for each rule; break: those that break it in some world, or a further one
-runs: that break a rule in the worlds of their task, where nothing stops them
-certain: of which the event that does so was certain to
-done: certain violations in spite of rules; unseen: others that do not end the run
-altered: runs kept from what would have broken nothing; failing: kept from what would have failed
-right: programs that do their task, without > with rules, of those that keep the rule and those that break it
+programs: concerned by a rule, counted for each rule; break: those that break it in any world
+runs: without rules, runs in the worlds of the task that break the rule
+certain: runs in which the violation was certain before the event that causes it
+done: certain violations despite the rules; unseen: other violations that do not end the run
+altered: runs in which an event that breaks nothing was prevented; failing: an event that would have failed
+right: right programs without > with rules, among those that keep the rule and those that break it
 """
 
 
 def report(effects: Sequence[Effect], kinds: dict[str, str]) -> list[tuple[str, bool]]:
-    """Print what rules do; each aim, and whether it is reached."""
+    """Print the effects of rules. Return each target, and whether it is met."""
     by_kind: defaultdict[str, list[Effect]] = defaultdict(list)
     for effect in effects:
         by_kind[kinds[effect.house]].append(effect)
@@ -614,42 +614,42 @@ def report(effects: Sequence[Effect], kinds: dict[str, str]) -> list[tuple[str, 
     report_rules(single)
     missed = [one for one in single if one.breaks and not one.rejected]
     blamed = [one for one in single if not one.breaks and one.reason is not None]
-    report_examples("break a rule, and are not rejected", missed)
-    report_examples("break none, and are rejected", blamed)
+    report_examples("programs that break a rule and are not rejected", missed)
+    report_examples("programs that break no rule and are rejected", blamed)
     caught = [not one.executed and not one.unseen for one in missed if one.broken]
-    print(f"  missed by the check, and caught by the guard in worlds of their task: {share(caught)}")
+    print(f"  missed by the check but caught by the guard in worlds of their task: {share(caught)}")
     true = [one.is_true for one in effects if one.reason is not None]
-    print(f"  rejected by a rule, and broken in that sampled world: {share(true)}")
+    print(f"  rejected by a rule that is broken in that sampled world: {share(true)}")
     right = [one for one in effects if not one.broken]
     rejected = statistics.fmean(one.rejected for one in single if one.breaks)
     lost = statistics.fmean(one.reason is not None for one in single if not one.breaks)
     return [
         ("certain violations with rules: 0", not any(one.executed for one in effects)),
-        ("others end the run at once", not any(one.unseen for one in effects)),
-        ("runs altered that would have broken nothing: 0", not any(one.altered for one in effects)),
+        ("other violations end the run at once", not any(one.unseen for one in effects)),
+        ("runs altered that would have broken no rule: 0", not any(one.altered for one in effects)),
         (
-            "tasks of those that keep the rules done as before",
+            "programs that keep the rules are right as before",
             all(a == b for a, b in (e.passed for e in right)),
         ),
         (
-            f"rejected before, of those that break: {rejected:.2%}, at least {REJECTED:.0%}",
+            f"rejected before running, of those that break a rule: {rejected:.2%}, at least {REJECTED:.0%}",
             rejected >= REJECTED,
         ),
-        (f"rejected by a rule, of those that keep: {lost:.2%}, at most {LOST:.0%}", lost <= LOST),
-        ("missed by the check, caught by the guard: all", all(caught)),
+        (f"rejected by a rule, of those that keep it: {lost:.2%}, at most {LOST:.0%}", lost <= LOST),
+        ("missed by the check but caught by the guard: all", all(caught)),
     ]
 
 
 def report_rules(effects: Sequence[Effect]) -> None:
     """Print how many of the programs that a rule concerns break it."""
-    print("\nrules, and the programs that break them, of those that they concern")
+    print("\nprograms that break a rule, of those that it concerns")
     for name in dict.fromkeys(house.name for house in houses()[:-1]):
         broken = [one.breaks for one in effects if one.house == name]
         print(f"  {name:32}{share(broken)}")
 
 
 def report_examples(what: str, some: Sequence[Effect], most: int = 12) -> None:
-    """Print of which rules and tasks programs are, and why the first of each were rejected."""
+    """Print programs by rule and task, with the most frequent reason for their rejection."""
     groups: defaultdict[tuple[str, str], list[Effect]] = defaultdict(list)
     for one in some:
         groups[one.house, one.source[0]].append(one)
@@ -660,24 +660,24 @@ def report_examples(what: str, some: Sequence[Effect], most: int = 12) -> None:
 
 
 def report_costs() -> list[tuple[str, bool]]:
-    """Print what a skill call costs; each aim, and whether it is reached."""
+    """Print the cost of a skill call. Return each target, and whether it is met."""
     found = costs()
-    print("\nrules   a skill call, microseconds      the guard of a run, microseconds")
+    print("\nrules   microseconds per skill call     microseconds per guard of a run")
     for size, (call, making) in found.items():
         print(f"{size:5}   {f'{call:.1f}' if not size else f'+{call:.1f}':>12}   {making:28.0f}")
     return [
         (
-            f"10 rules: {found[10][0]:.1f}, less than {MICROSECONDS:.0f} microseconds a call",
+            f"10 rules: {found[10][0]:.1f}, less than {MICROSECONDS:.0f} microseconds per call",
             found[10][0] < MICROSECONDS,
         )
     ]
 
 
 def main() -> int:
-    """Print all parts; 1 if what is aimed at is missed."""
+    """Print all parts. Return 1 if a target is missed."""
     suite = load_suite()
     written, made = programs(), all_mutants()
-    sources = sorted([*written, *made], key=lambda source: digest(*source))  # so that shares are alike
+    sources = sorted([*written, *made], key=lambda source: digest(*source))  # so that shares are similar
     kinds = {house.name: house.kind for house in houses()}
     start = time.perf_counter()
     effects = list(all_effects(sources, frozenset(made)))
@@ -690,7 +690,7 @@ def main() -> int:
     for aim, is_reached in aims:
         print(f"{'ok    ' if is_reached else 'MISSED'}  {aim}")
     hold = all(is_reached for _, is_reached in aims)
-    print("\nas aimed at" if hold else "\nNOT as aimed at")
+    print("\nall targets met" if hold else "\ntargets MISSED")
     return 0 if hold else 1
 
 

@@ -1,10 +1,10 @@
-"""How much misuse of a user's own skills does the check find before a robot moves?
+"""Measures how much misuse of custom skills the check finds before a robot moves.
 
-Each right program of the five sets in `examples/skills` is changed by the operators that are about own
-skills, and by swapping steps. A changed program is a misuse if it passes what a skill does not take, or if it
-ends in an error or breaks the set's house rules in some of WORLDS worlds whose facts are drawn. Printed are,
-for each operator, how many changed programs are a misuse, how many of these the check of 5 worlds finds, how
-many others it rejects, and each misuse that it misses.
+Each right program of the five sets in `examples/skills` is changed by the operators for custom skills, and by
+swapping steps. A changed program is a misuse if it passes an argument that a skill does not accept, or if it
+ends in an error or breaks a house rule of the set in any of WORLDS sampled worlds. For each operator, the
+script prints how many changed programs are a misuse, how many of these the check finds in 5 worlds, and how
+many others it rejects. It also prints each misuse that the check misses.
 """
 
 import os
@@ -36,23 +36,23 @@ ALWAYS = {
     "pass-another-type",
     "pass-no-choice",
     "forget-an-argument",
-}  # a misuse even where errors are caught
+}  # always a misuse, even if errors are caught
 
 
 def operators() -> list[Operator]:
-    """Those about own skills, and the one about the order of steps."""
+    """Return the operators for custom skills, and the one that swaps steps."""
     return [*operators_in(misuse), *(one for one in operators_in(control_flow) if one.name == SWAP)]
 
 
 def changed(suite: Suite) -> Iterator[Mutant]:
-    """The changed programs of a set."""
+    """Yield the changed programs of a set."""
     for task in suite.tasks.values():
         worlds = [scenario.world for scenario in task.scenarios]
         yield from mutants(originals(task), Context.of(worlds, task.prompts), operators())
 
 
 def is_misuse(pool: WorkerPool, program: str, suite: Suite, world: World, rules: tuple[Rule, ...]) -> bool:
-    """Whether it ends in an error or breaks a rule in some world."""
+    """Whether a program ends in an error or breaks a rule in some world."""
     rooms = RoomMap.of(world)
 
     def robot(number: int) -> SimulatedRobot:
@@ -93,7 +93,7 @@ def main() -> None:
     share = found.total() / bad.total()
     print(f"{'all':28}{all_of.total():>9}{bad.total():>9}{found.total():>9}{wrongly.total():>18}")
     print(
-        f"found before running: {share:.1%} of {bad.total()}, by {WORLDS} worlds each; missed: {len(missed)}"
+        f"found before running: {share:.1%} of {bad.total()}, in {WORLDS} worlds each; missed: {len(missed)}"
     )
     for folder_name, mutant in missed:
         print(f"\n{folder_name}, {mutant.operator}, of {mutant.original.name!r}\n{mutant.diff}")

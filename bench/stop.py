@@ -1,9 +1,9 @@
-"""How long does it take from a stop to the robot?
+"""Measures the delay from a stop to the robot.
 
-A mission has the robot drive, and is stopped in the middle of it: by `Mission.stop`, as a page does it, and
-by Ctrl-C at a tool of its own. Printed are the worst of STOPS=50 and the middle one, in milliseconds: until
-the robot was told (`cancel` is called; on ROS until the action server had heard it), and until what it did
-had ended.
+A mission that makes the robot drive is stopped in the middle of the drive, by `Mission.stop` as a page does,
+and by Ctrl-C in a separate command. The script prints the largest and the median delay of STOPS=50, in
+milliseconds, until the robot received the stop (`cancel` was called or, on ROS, the action server received
+it), and until its action had ended.
 """
 
 import json
@@ -56,23 +56,23 @@ skills:
   go_to: {{action: /navigate_to_pose, type: nav2_msgs/action/NavigateToPose, goal: {{pose: $place}}}}
 """
 Times = tuple[float, float]
-"""Until the robot was told, and until it had ended what it did, in milliseconds."""
+"""The delays until the robot received the stop, and until its action had ended, in milliseconds."""
 
 
 class Timed(Simulated):
-    """A simulated robot that remembers when it was told to stop, and when it had."""
+    """A simulated robot that records when it was told to stop, and when it had stopped."""
 
     told = ended = 0.0
 
     def cancel(self) -> None:
-        """Remember when, the first time."""
+        """Record the time of the first call."""
         self.told = self.told or time.perf_counter()
         super().cancel()
 
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], told: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Remember when it was ended."""
+        """Record when a cancelled skill ended."""
         try:
             return super().perform(skill, arguments, told)
         except CancelledError:
@@ -81,7 +81,7 @@ class Timed(Simulated):
 
 
 def by_call(home: Path) -> Iterator[Times]:
-    """Stop missions of this process."""
+    """Stop missions in this process."""
     for _ in range(STOPS):
         robot, drives = Timed(WORLD), threading.Event()
 
@@ -94,7 +94,7 @@ def by_call(home: Path) -> Iterator[Times]:
 
 
 def by_ros1(home: Path) -> Iterator[Times]:
-    """Stop missions whose robot drives on a real ROS graph."""
+    """Stop missions of a robot on a real ROS graph."""
     os.environ.update({"ROS_HOSTNAME": "localhost", "ROS_HOME": str(home), "ROS_LOG_DIR": str(home)})
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -111,10 +111,10 @@ def by_ros1(home: Path) -> Iterator[Times]:
 
 
 class Server(VirtualRobot):
-    """Action servers that notice when the robot drives, and when a cancel is heard.
+    """Action servers that record when the robot drives, and when they receive a cancel request.
 
     Args:
-        port: of the ROS master.
+        port: the port of the ROS master.
     """
 
     heard = ended = 0.0
@@ -137,13 +137,13 @@ class Server(VirtualRobot):
 def stopped(
     robot: Robot, home: Path, drives: threading.Event, told: Callable[[LogLine], None] = lambda _: None
 ) -> float:
-    """When the mission was stopped, which has the robot drive; it has ended.
+    """Run a mission that makes the robot drive, stop it, and return the time of the stop.
 
     Args:
-        robot: not connected.
+        robot: the robot, not connected yet.
         home: the folder of missions.
-        drives: set as soon as the robot drives.
-        told: told what happens.
+        drives: an event that is set as soon as the robot drives.
+        told: a listener for the events of the mission.
     """
     with Reservation(robot, home) as reserved, Mission(home, robot.name, on_event=told) as mission:
         mission.draft(PROGRAM)
@@ -159,7 +159,7 @@ def stopped(
 
 
 def by_signal(home: Path) -> Iterator[Times]:
-    """Stop missions of a tool with Ctrl-C, as its events tell."""
+    """Stop missions of a separate command with Ctrl-C, and read the times from their events."""
     program, world = home / "program.py", home / "world.yaml"
     program.write_text(PROGRAM)
     world.write_text(WORLD.to_yaml())
@@ -183,7 +183,7 @@ def by_signal(home: Path) -> Iterator[Times]:
 
 
 def by_pyrobosim(home: Path) -> Iterator[Times]:
-    """Stop missions of a robot in pyrobosim, as their events tell."""
+    """Stop missions of a robot in pyrobosim, and read the times from their events."""
     for _ in range(STOPS):
         lines: list[LogLine] = []
         drives = threading.Event()
@@ -201,7 +201,7 @@ def by_pyrobosim(home: Path) -> Iterator[Times]:
 
 
 def by_nav2(home: Path) -> Iterator[Times]:
-    """Stop missions of a robot that a file connects, with a stand-in for Nav2 that says what it hears."""
+    """Stop missions of a robot from a connection file, with a stand-in for Nav2 that reports its requests."""
     stand_in, packages = TESTS / "nav2_stand_in.py", TESTS / "nav2_msgs"
     path = home / "robot.yaml"
     path.write_text(NAV2.format(packages=packages))
@@ -236,18 +236,18 @@ def by_nav2(home: Path) -> Iterator[Times]:
 
 
 def report(name: str, times: Sequence[Times]) -> bool:
-    """Print the worst and the middle; whether the worst is as aimed at."""
+    """Print the largest and the median delays. Return whether the largest one meets the target."""
     told, ended = [time for time, _ in times], [time for _, time in times]
     print(
-        f"{name:24} told {max(told):7.2f} (middle {median(told):.2f})   "
-        f"ended {max(ended):7.2f} (middle {median(ended):.2f})"
+        f"{name:24} received {max(told):7.2f} (median {median(told):.2f})   "
+        f"ended {max(ended):7.2f} (median {median(ended):.2f})"
     )
     return max(told) < AIM
 
 
 def main() -> int:
-    """Print all; 1 if what is aimed at is missed."""
-    print(f"from a stop to the robot, worst of {STOPS}, in ms (aim: told in less than {AIM:.0f})")
+    """Print all delays. Return 1 if the target is missed."""
+    print(f"delay of a stop, worst of {STOPS}, in ms (target: received in less than {AIM:.0f})")
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         hold = [
@@ -260,8 +260,8 @@ def main() -> int:
             if works[name]:
                 hold.append(report(f"{name}, Mission.stop", list(rows(home))))
             else:
-                print(f"{name}: there is none here")
-    print("as aimed at" if all(hold) else "NOT as aimed at")
+                print(f"{name}: not installed")
+    print("all targets met" if all(hold) else "targets MISSED")
     return 0 if all(hold) else 1
 
 

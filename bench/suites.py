@@ -1,8 +1,8 @@
-"""What does a (program, world) pair cost under the suite `plus`, compared with one under `paper`?
+"""Compares the cost of judging a program in one world under the suites `plus` and `paper`.
 
-Every third recorded program is judged by both, in turns, program by program, so that the ratio holds on a
-machine whose speed drifts. A pair is run and its trace is judged. Printed: milliseconds of a pair under each,
-the ratio of the medians over rounds, and the seconds of all pairs.
+Every third recorded program is judged under both suites, in turns, so that the ratio holds on a machine whose
+speed drifts. For each pair of program and world, the program is run and its trace is judged. The script
+prints the milliseconds per pair under each suite, the ratio of the medians over rounds, and the total time.
 """
 
 import statistics
@@ -20,13 +20,13 @@ ROUNDS = 3
 
 
 def programs(suite: Suite) -> list[tuple[str, str]]:
-    """The fixed list."""
+    """Return the fixed list of programs with their tasks."""
     models = ("recorded:careful", "recorded:hasty")
     return sorted({(c.task, c.program) for model in models for c in recorded_completions(model, suite)})[::3]
 
 
 def seconds(pool: WorkerPool, suite: Suite, task: str, program: str) -> tuple[float, int]:
-    """How long it takes to judge a program, and in how many worlds that is."""
+    """Judge a program, and return the seconds and the number of worlds."""
     scenarios = suite.tasks[task].scenarios
     start = time.perf_counter()
     for scenario in scenarios:
@@ -35,7 +35,7 @@ def seconds(pool: WorkerPool, suite: Suite, task: str, program: str) -> tuple[fl
 
 
 def main() -> int:
-    """Print the figures; 1 where a pair costs more than it may."""
+    """Print the figures. Return 1 if a pair under `plus` costs too much."""
     suites = [load_suite("paper"), load_suite("plus")]
     chosen = programs(suites[0])
     means: list[list[float]] = [[], []]
@@ -53,10 +53,10 @@ def main() -> int:
             told = [f"{s.name} {spent[i]:.1f} s for {pairs[i]:,} pairs" for i, s in enumerate(suites)]
             print("; ".join(told), file=sys.stderr)
     paper, plus = map(statistics.median, means)
-    costs = f"{plus:.2f} ms, and {paper:.2f} ms under paper"
+    costs = f"{plus:.2f} ms and {paper:.2f} ms"
     print(f"a pair costs {plus / paper:.2f} times as much under plus as under paper ({costs})")
     counted = f"{pairs[0]:,} pairs under paper, {pairs[1]:,} under plus"
-    print(f"{len(chosen)} programs: {counted}, {spent[1]:.1f} s for these in all")
+    print(f"{len(chosen)} programs: {counted}, the latter in {spent[1]:.1f} s")
     return plus / paper > MOST
 
 

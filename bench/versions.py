@@ -1,10 +1,11 @@
-"""Do random programs end alike under several versions of Python?
+"""Tests that random programs end in the same way under several versions of Python.
 
     python bench/versions.py 1000 7 ../venv-3.12/bin/python ../venv-3.13/bin/python
 
-This runs 1,000 programs, drawn with seed 7, under this Python and the others, which need what this one has.
-It compares status, kind of error, line and trace, and prints the programs that differ; what the message of an
-error says is Python's own. Best run under the oldest: programs are in the syntax of the one that draws.
+This command runs 1,000 random programs with seed 7 under this Python and the others, which need the same
+packages. It compares status, kind of error, line and trace, and prints the programs that differ. It does not
+compare error messages, because they depend on the version. Run it under the oldest version, because the
+programs use the syntax of the Python that generates them.
 """
 
 import json
@@ -33,10 +34,10 @@ WORLD = World(
 
 
 def drawn(count: int, seed: int) -> list[str]:
-    """Distinct random programs."""
-    import hypothesis  # noqa: PLC0415 - the other versions need not have it
+    """Return distinct random programs."""
+    import hypothesis  # noqa: PLC0415 - not needed under the other versions
 
-    from random_programs import programs  # noqa: PLC0415 - the same
+    from random_programs import programs  # noqa: PLC0415 - imports hypothesis
 
     found: dict[str, None] = {}
 
@@ -53,18 +54,18 @@ def drawn(count: int, seed: int) -> list[str]:
 
 
 def compared(outcome: Outcome) -> list[object]:
-    """What must be the same."""
+    """Return the parts of an outcome that must not depend on the version."""
     trace = [PYTHONS_OWN.sub("", repr(event)) for event in outcome.trace]
     return [outcome.status, outcome.error and outcome.error.kind, outcome.line, trace]
 
 
 def outcomes(sources: list[str]) -> list[list[object]]:
-    """What comes of programs under this version."""
+    """Run programs under this version, and return the parts of their outcomes that are compared."""
     return [compared(outcome) for outcome in run([(s, WORLD) for s in sources], workers=1, settings=SETTINGS)]
 
 
 def compare(sources: list[str], pythons: list[str]) -> int:
-    """Run programs under several versions, print those that differ, and count them."""
+    """Run programs under several versions. Print and count those that differ."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "programs.json")
         file.write_text(json.dumps(sources), encoding="utf-8")
@@ -84,7 +85,7 @@ def compare(sources: list[str], pythons: list[str]) -> int:
 
 
 def main() -> int:
-    """Compare, or be one of those that are compared."""
+    """Compare several versions, or run programs for the comparison."""
     match sys.argv[1:]:
         case ["--outcomes", file]:
             print(json.dumps(outcomes(json.loads(Path(file).read_text(encoding="utf-8")))))

@@ -1,4 +1,4 @@
-"""How good are language models at writing programs for service robots?"""
+"""Measures how well language models write programs for service robots."""
 
 from __future__ import annotations
 

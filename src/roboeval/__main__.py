@@ -1,4 +1,4 @@
-"""`python -m roboeval` is the command `roboeval`."""
+"""Runs the command `roboeval` when called as `python -m roboeval`."""
 
 from roboeval.cli.app import main
 

@@ -1,4 +1,4 @@
-"""Breaks pass rates down by required ability, by whether the robot must report back, and by phrasing."""
+"""Breaks down pass rates by required ability, by whether the robot must report back, and by phrasing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NO_SUCH_ROOM_ERROR = "GoToInvalidLocation"
 
 
 def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Estimate, Mapping[str, float]]]:
-    """Break results down by the abilities that tasks require (paper, section V.B).
+    """Break down results by the abilities that tasks require (paper, section V.B).
 
     Yields each ability, the number of judged tasks that require it, their pass@1 with its interval over
     tasks, and the share of their completions that fail in each class.
@@ -40,11 +40,11 @@ def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Es
 
 
 def compare_report_back(results: Results) -> pl.DataFrame:
-    """Compare tasks that end with a report to all other tasks (paper, section V.B).
+    """Compare the tasks that end with a report to all other tasks (paper, section V.B).
 
-    Returns one row for each value of `reports`, or no rows if no task ends with a report. Besides `pass@1`,
-    the columns count the `completions` and those that `failed`, and among the failures the robots that
-    `never_returned` to their first room and those sent to a room that does not exist (`lost`).
+    Returns one row for each value of `reports`, or no rows if no task ends with a report. The other columns
+    are `pass@1`, the number of `completions`, how many of them `failed`, and in how many of the failures the
+    robot never came back to its starting room (`never_returned`) or was sent to an unknown room (`lost`).
     """
     suite = results.known_suite
     reports = pl.col("task").is_in(
@@ -76,7 +76,7 @@ def _mean(lists: str) -> pl.Expr:
 
 
 def never_returned(row: Row) -> bool:
-    """Whether the robot left its first room and never returned, in the world where the completion failed.
+    """Whether the robot left its starting room for good in the world where the completion failed.
 
     Returns False if the trace was too long to be stored.
     """
@@ -94,7 +94,7 @@ def spread_by_task(table: pl.DataFrame) -> pl.DataFrame:
     """Compute the spread of pass@1 over the prompts of each task with several prompts (paper, section V.A).
 
     Columns: `task`, `spread`, `worst_prompt` with its pass@1 `worst`, and `best_prompt` with its pass@1
-    `best`. Of several equal prompts, the first is reported.
+    `best`. If several prompts are equally good or bad, the first of them is reported.
     """
     prompt, score = pl.col("prompt"), pl.col("pass@1")
     return (
@@ -115,8 +115,8 @@ def spread_by_task(table: pl.DataFrame) -> pl.DataFrame:
 def compare_phrasings(scores: pl.DataFrame) -> pl.DataFrame:
     """Compare each prompt with the mean of its task, for tasks with several prompts (paper, section V.A).
 
-    `scores` has the columns `model`, `task`, `prompt` and `pass@1`. The result tells by how much a prompt is
-    `better` than its task, averaged over models, and how many of the `models` it `hurts`.
+    `scores` has the columns `model`, `task`, `prompt` and `pass@1`. For each prompt, the result says by how
+    much it is `better` than its task, averaged over models, and how many of the `models` it `hurts`.
     """
     several = scores.filter(pl.col("prompt").n_unique().over("task") > 1)
     means = several.group_by("model", "task").agg("pass@1").with_columns(mean=_mean("pass@1"))

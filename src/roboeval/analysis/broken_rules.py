@@ -13,16 +13,16 @@ from roboeval.analysis.counts import task_scores
 from roboeval.analysis.metrics import DIFFERENCE, Estimate, over_tasks, overall, pass_at_1
 from roboeval.evaluation.runs.completions import KEY
 
-RULE_NAME = r'^the rule "([^"]+)"'  # messages start with this
+RULE_NAME = r'^the rule "([^"]+)"'  # how messages about broken rules begin
 
 
 @dataclass(frozen=True)
 class BrokenRules:
-    """Tells how often programs break house rules, and what this costs in pass@1."""
+    """Describes how often programs break house rules, and by how much the rules change pass@1."""
 
     broken: Estimate  # share of programs that break a rule in at least one world
-    by_rule: Mapping[str, int]  # number of programs that each rule stops in some world, largest first
-    cost: Estimate | None  # pass@1 with rules minus pass@1 without, or None if not judged without
+    by_rule: Mapping[str, int]  # programs that each rule stops in at least one world, largest number first
+    cost: Estimate | None  # pass@1 with rules minus pass@1 without; None if not judged without rules
 
 
 def count_broken_rules(table: pl.DataFrame, without: pl.DataFrame | None = None) -> BrokenRules:

@@ -1,4 +1,4 @@
-"""Compares models by their differences on the same prompts: size, significance and contributing tasks."""
+"""Compares models on the same prompts: how much and how significantly they differ, and in which tasks."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Comparison:
 
 
 def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
-    """Compare two models on their common prompts; raise UserError if there are none."""
+    """Compare two models on their common prompts. Raise UserError if there are none."""
     keys = [key for key in first if key in second]
     if not keys:
         raise UserError("the runs have no prompt in common, so they cannot be compared")
@@ -96,7 +96,7 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
 def pairs_to_compare(
     runs: Sequence[RunLike], pass_at_1: Callable[[RunLike], float]
 ) -> list[tuple[RunLike, RunLike]]:
-    """Return all pairs of runs, or each run paired with the best if there are too many pairs."""
+    """Return all pairs of runs. If there are too many, pair each run only with the best one."""
     pairs = list(combinations(runs, 2))
     if len(pairs) <= MAX_PAIRS:
         return pairs
@@ -172,7 +172,7 @@ def _short(value: object) -> str:
 
 @dataclass(frozen=True)
 class ComparedRun:
-    """Further results of a compared run besides its pass@1."""
+    """The results of a compared run other than its pass@1."""
 
     name: str
     coverage: Coverage

@@ -15,7 +15,7 @@ from roboeval.evaluation.runs.table import MILLION, Price
 
 
 class RunCost(NamedTuple):
-    """The cost of completions in total and per passing program; values that were not recorded are None."""
+    """The cost of completions in total and per passing program. Values that were not recorded are None."""
 
     completions: int
     passed: int
@@ -52,7 +52,7 @@ def _tokens(completions: pl.DataFrame) -> tuple[int, int] | tuple[None, None]:
 
 
 class Budget(NamedTuple):
-    """How many passing programs a budget yields with rejection sampling."""
+    """The number of passing programs that a budget yields with rejection sampling."""
 
     retries: int
     requests: float  # mean number per program
@@ -62,7 +62,7 @@ class Budget(NamedTuple):
 
 
 def budgets(table: pl.DataFrame, price: Price | None, limits: Sequence[int] = LIMITS) -> Iterator[Budget]:
-    """Yield a budget for each limit of retries (paper, section VI); all programs must have been checked."""
+    """Yield a budget for each limit on retries (paper, section VI). All programs must have been checked."""
     completions, prompts = completions_of(table), trials_by_prompt(table)
     counts = pl.col("input_tokens", "output_tokens").fill_null(0)
     means = completions.group_by("task", "prompt").agg(counts.mean())

@@ -27,7 +27,7 @@ def prompt_scores(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-    """Compute the scores of tasks and prompts (paper, section IV.C); tasks not in `order` come last."""
+    """Compute the scores of tasks and prompts (paper, section IV.C). Tasks not in `order` come last."""
     return tally_of(table).scores(order)
 
 

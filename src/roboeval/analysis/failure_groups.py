@@ -38,7 +38,7 @@ class Fix:
 
 @dataclass(frozen=True)
 class FailureGroup:
-    """Completions of one task whose similar programs fail due to the same check or error."""
+    """Completions of one task whose programs are similar and fail because of the same check or error."""
 
     task: str
     failure: Mapping[str, Any]  # class, kind and check of the representative's failure
@@ -62,14 +62,15 @@ class FailureGroup:
 
     @property
     def prompts(self) -> list[int]:
-        """The sorted numbers of the prompts of its completions."""
+        """The numbers of the prompts that the completions answer, in ascending order."""
         return sorted({prompt for _, prompt, _ in self.members})
 
 
 def group_failures(failed: Iterable[Row], programs: Mapping[CompletionKey, str]) -> list[list[Row]]:
-    """Group failing completions, largest groups first; groups of equal size alternate between tasks.
+    """Group failing completions, with the largest groups first.
 
-    Replies without a program form one group for each task and kind of failure.
+    Groups of equal size alternate between tasks. Replies without a program form one group for each task and
+    kind of failure.
     """
     causes: defaultdict[Cause, list[Row]] = defaultdict(list)
     for row in failed:
@@ -84,7 +85,7 @@ def group_failures(failed: Iterable[Row], programs: Mapping[CompletionKey, str])
 
 
 def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[FailureGroup]:
-    """Explain the failure of each group, and find the smallest fix."""
+    """Explain the failure of each group, and find the smallest fix for it."""
     programs = results.programs
     candidates = cache(partial(_passing_of_task, results))
     for rows in groups:
@@ -105,7 +106,7 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
 
 
 def nearest_fix(results: Results, key: CompletionKey) -> Fix | None:
-    """Find the smallest fix for a completion; return None if its program was removed or no program passes."""
+    """Find the smallest fix for a completion, or None if its program was removed or no program passes."""
     program = results.programs.get(key)
     return None if program is None else shortest_fix(program, _passing_of_task(results, key[0]))
 
@@ -189,7 +190,7 @@ NAMES_USED: Mapping[type[ast.AST], str] = {**NAMES_BOUND, ast.MatchAs: "name", a
 
 
 def _names_in_order(nodes: Iterable[ast.AST], bound: Container[str]) -> list[str]:
-    """Return the names that a program binds in order of appearance, except its entry point."""
+    """Return the names that a program binds, except its entry point, in order of appearance."""
     named = [(node, getattr(node, NAMES_BOUND[type(node)])) for node in nodes if type(node) in NAMES_BOUND]
     found = sorted((node.lineno, node.col_offset, name) for node, name in named if name in bound)  # type: ignore[attr-defined]  # nodes with names have positions
     return list(dict.fromkeys(name for _, _, name in found))
@@ -220,7 +221,7 @@ class PassingProgram:
 
 
 def passing_programs(named: Iterable[tuple[str, str]]) -> list[PassingProgram]:
-    """Return the distinct programs, each under the first of its names."""
+    """Return the distinct programs. A program with several names keeps the first."""
     first: dict[ProgramLines, str] = {}
     for name, program in named:
         first.setdefault(_split(program), name)

@@ -22,7 +22,7 @@ ROUNDING_ERROR = 1e-9
 
 
 def pass_at_k(n: int, c: int, k: int) -> float:
-    """Estimate without bias the probability that at least one of k completions passes.
+    """Return an unbiased estimate of the probability that at least one of k completions passes.
 
     Args:
         n: The number of judged completions.
@@ -78,7 +78,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class PromptScore:
-    """Counts the `n` judged and `c` passed completions of a prompt; prompts are numbered from 0."""
+    """Counts the `n` judged and `c` passed completions of a prompt. Prompts are numbered from 0."""
 
     task: str
     prompt: int
@@ -86,7 +86,7 @@ class PromptScore:
     c: int
 
     def pass_at(self, k: int) -> float:
-        """Return pass@k of the prompt; raise ValueError if it has fewer than k completions."""
+        """Return pass@k of the prompt. Raise ValueError if it has fewer than k completions."""
         if k > self.n:
             raise ValueError(
                 f"{self.task}, prompt {self.prompt}: pass@{k} cannot be estimated from {self.n} completions"
@@ -102,7 +102,7 @@ class TaskScore:
     prompts: tuple[PromptScore, ...]
 
     def pass_at(self, k: int) -> Estimate:
-        """Return the mean pass@k; raise ValueError if a prompt has fewer than k completions."""
+        """Return the mean pass@k. Raise ValueError if a prompt has fewer than k completions."""
         return by_formula([[prompt.pass_at(k)] for prompt in self.prompts])
 
     def lowest(self, k: int) -> float:
@@ -144,7 +144,7 @@ def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
 
 
 def over_tasks(values: Iterable[tuple[str, float]], *, within: tuple[float, float] = SHARE) -> Estimate:
-    """Return the mean of pairs of a task and a value, with its 95% interval over tasks."""
+    """Return the mean of values, given with their tasks, and its 95% interval over tasks."""
     by_task: dict[str, list[float]] = {}
     for task, value in values:
         by_task.setdefault(task, []).append(value)
@@ -164,7 +164,7 @@ def percent(share: float) -> str:
 
 
 def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
-    """Return thresholds from 1 down, each with the share of prompts that reach it (paper, section V.A)."""
+    """Return thresholds, largest first, with the share of prompts that reach each (paper, section V.A)."""
     thresholds = sorted({1.0, *(value for value in values if value > ROUNDING_ERROR)}, reverse=True)
     return [(threshold, share_at_least(values, threshold)) for threshold in thresholds]
 
@@ -175,8 +175,8 @@ def by_formula(
     """Return the mean of all values with a cluster-robust interval, clipped to `within`.
 
     The variance of the mean is G / (G - 1) * sum over clusters of (sum of (value - mean))**2 / N**2, for G
-    clusters with N values; the interval uses Student's t with G - 1 degrees of freedom. With one value per
-    cluster it is the usual interval of a mean. For a single cluster, the interval is the whole range.
+    clusters with N values. The interval uses Student's t with G - 1 degrees of freedom. With one value per
+    cluster, it is the usual interval of a mean. For a single cluster, it is the whole range.
     """
     mean, count = mean_of(clusters), len(clusters)
     if count == 1:
@@ -189,7 +189,7 @@ def by_formula(
 
 
 def mean_of(clusters: Clusters) -> float:
-    """Return the mean of all values; there must be at least one."""
+    """Return the mean of all values. There must be at least one."""
     return math.fsum(value for values in clusters for value in values) / sum(map(len, clusters))
 
 

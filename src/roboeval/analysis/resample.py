@@ -1,7 +1,7 @@
-"""Rejection sampling: the pass rate if programs rejected by the check are requested again (section VI).
+"""Computes the pass rate if programs that the check rejects are requested again (paper, section VI).
 
-If all completions of a run are checked and judged, the result is computed exactly: completions of a prompt
-are sampled with replacement until one of them is accepted or the limit of retries is reached.
+This rejection sampling draws completions of a prompt with replacement until one of them is accepted or the
+limit on retries is reached. If all completions of a run were checked and judged, the result is exact.
 """
 
 from __future__ import annotations
@@ -79,8 +79,8 @@ class CheckedPrompt:
 
 
 def trials_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
-    """Group completions by prompt, sorted by task and prompt; all of them must have been checked."""
-    # A timeout is not an error in a world where programs may wait forever, since it was judged there.
+    """Group completions by prompt, sorted by task and prompt. All of them must have been checked."""
+    # A timeout that was judged like a normal end, because programs may wait forever, is not an error.
     judged = pl.col("satisfied") | pl.col("failed_checks").is_not_null()
     completions = table.group_by(KEY, maintain_order=True).agg(
         pl.col("accepted").first(),
@@ -95,7 +95,7 @@ def trials_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
 
 @dataclass(frozen=True)
 class RetryResult:
-    """The result of rejection sampling over all prompts, for one limit of retries."""
+    """The result of rejection sampling over all prompts, for one limit on retries."""
 
     retries: int
     passed: Estimate  # pass@1
@@ -106,7 +106,7 @@ class RetryResult:
 
 
 def resample(prompts: Sequence[CheckedPrompt], retries: int) -> RetryResult:
-    """Compute the result of rejection sampling for one limit of retries."""
+    """Compute the result of rejection sampling for one limit on retries."""
     each = tuple(final_chances(prompt.trials, retries) for prompt in prompts)
     return RetryResult(
         retries=retries,

@@ -41,7 +41,7 @@ class TraceMatch:
 
 
 def search(lines: Sequence[bytes], query: TraceQuery, *, workers: int = 1) -> Iterator[TraceMatch]:
-    """Match rows against a query and yield the matches in order; use `workers` processes for many rows."""
+    """Match rows against a query and yield the matches in order. Many rows are split among `workers`."""
     match = partial(match_rows, query=query)
     if workers == 1 or len(lines) < ROWS_FOR_PROCESSES:
         return iter(match(lines))
@@ -54,7 +54,7 @@ def count_searched(table: pl.DataFrame, task: str | None) -> int:
 
 
 def matches_by_task(found: Sequence[TraceMatch], table: pl.DataFrame) -> pl.DataFrame:
-    """Count for each `task` the completions that were `found`, and those among them that `passed`."""
+    """Count for each `task` the completions that were `found`, and how many of these `passed`."""
     keys = pl.DataFrame(
         [one.key for one in found], schema={name: table.schema[name] for name in KEY}, orient="row"
     )

@@ -59,7 +59,7 @@ def by_bootstrap(
 def p_by_signs(clusters: Clusters, *, seed: int = BOOTSTRAP_SEED, draws: int = 100_000) -> float:
     """Return the p-value of a two-sided permutation test that flips the signs of whole clusters.
 
-    The test is exact for up to 20 clusters; for more, signs are sampled. With G clusters, p is at least
+    The test is exact for up to 20 clusters. For more, signs are sampled. With G clusters, p is at least
     2 / 2**G, so a difference between few clusters cannot be significant.
     """
     sums = np.array([math.fsum(values) for values in clusters])
@@ -89,8 +89,8 @@ def sample_sizes(pairs: Sequence[tuple[float, float]]) -> SampleSizes:
     """Compute the sample sizes needed to detect the mean difference between pairs of pass@1 with 80% power.
 
     With n completions per prompt, the difference has the variance (w / n) / m on m given prompts, where w is
-    the mean of a (1 - a) + b (1 - b); on m random prompts it has v / m, where v is the variance of the
-    differences. A difference is detected if it is at least (z(level) + z(power)) standard errors.
+    the mean of a (1 - a) + b (1 - b). On m random prompts, the variance is v / m, where v is the variance of
+    the differences. A difference is detected if it is at least (z(level) + z(power)) standard errors.
     """
     m = len(pairs)
     differences = [b - a for a, b in pairs]

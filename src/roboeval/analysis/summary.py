@@ -82,7 +82,7 @@ class Missing:
 def summarise(
     tally: Tally, suite: Suite, scope: JudgingScope, *, k: Sequence[int] = (1,), ablated: bool = False
 ) -> EvaluationSummary:
-    """Summarise an evaluation; raise UserError if nothing was judged or if k is too large for a prompt."""
+    """Summarise an evaluation. Raise UserError if nothing was judged or if k is too large for a prompt."""
     tasks = tally.scores(suite.tasks)
     if not tasks:
         raise UserError(f"0 of {how_many(scope.total)} judged; there are no results yet")
@@ -107,7 +107,7 @@ def _missing(tasks: Sequence[str], scope: JudgingScope) -> Missing:
 
 
 def failures(tally: Tally) -> tuple[Failures, ...]:
-    """Count failures by class and kind (paper, section V.B); at least one completion must be judged."""
+    """Count failures by class and kind (paper, section V.B). At least one completion must be judged."""
     failed: dict[str, Counter[str]] = defaultdict(Counter)
     for (name, kind), count in tally.failed.items():
         failed[name][kind] = count
@@ -128,7 +128,7 @@ PASSED, ALL = "passed", "all"
 
 @dataclass(frozen=True)
 class Causes:
-    """The outcomes of completions as shares of classes and kinds."""
+    """The shares of completions in each class of outcome, and of failures of each kind within a class."""
 
     classes: Mapping[str, float]  # shares of all completions, including PASSED
     kinds: Mapping[str, Mapping[str, float]]  # shares of the failures in a class
@@ -136,7 +136,7 @@ class Causes:
 
 
 def causes(tally: Tally) -> Causes:
-    """Compute the shares of outcomes (paper, section V.B); at least one completion must be judged."""
+    """Compute the shares of outcomes (paper, section V.B). At least one completion must be judged."""
     found = failures(tally)
     kinds = {one.name: sorted((k.name, k.count) for k in one.kinds if k.count) for one in found}
     return Causes(
@@ -148,7 +148,7 @@ def causes(tally: Tally) -> Causes:
 
 
 def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
-    """Return the kinds of a class that occur, known kinds first."""
+    """Return the kinds of failure that occur in a class, with known kinds first."""
     occurring = {kind for one in found for kind in one.kinds.get(name, {})}
     known = [kind for kind in FAILURE_CLASSES[name].kinds if kind in occurring]
     return [*known, *sorted(occurring - {*known})]

@@ -31,7 +31,7 @@ class Tally:
             self.first_failed = key_of(row)
 
     def scores(self, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-        """Compute the scores of tasks and prompts (paper, section IV.C); tasks not in `order` come last."""
+        """Compute the scores of tasks and prompts (paper, section IV.C). Tasks not in `order` come last."""
         prompts: dict[str, list[PromptScore]] = {task: [] for task in order}
         for (task, prompt), n in self.judged.items():
             prompts.setdefault(task, []).append(PromptScore(task, prompt, n, self.passed[task, prompt]))

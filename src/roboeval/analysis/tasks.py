@@ -52,7 +52,7 @@ def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
 
 
 def prompt_counts(completions: pl.DataFrame, condition: pl.Expr) -> pl.DataFrame:
-    """Count for each prompt the completions that are `written`, `judged`, and `counted` (meet a condition).
+    """Count the completions of each prompt: `written`, `judged`, and `counted` if they meet a condition.
 
     The input has the columns `written` and `passed` (null if not judged). `share` is the share of judged
     completions that meet the condition, or null if none was judged.

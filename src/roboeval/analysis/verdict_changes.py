@@ -1,4 +1,4 @@
-"""Compares verdicts under two suites: which completions and which ranks of runs change."""
+"""Compares verdicts under two suites, and finds how completions and the ranking of runs change."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class VerdictChanges:
     suites: tuple[str, str]
     comparison: Comparison  # difference in pass@1, second suite minus first
     tasks: tuple[TaskChanges, ...]
-    first_only: tuple[FailureGroup, ...]  # pass under the first suite only; failures under the second
-    second_only: tuple[FailureGroup, ...]  # pass under the second suite only; failures under the first
+    first_only: tuple[FailureGroup, ...]  # pass under the first suite, and why they fail under the second
+    second_only: tuple[FailureGroup, ...]  # pass under the second suite, and why they fail under the first
     programs: int  # number of distinct programs whose verdict changes
     left_out: int  # number of completions judged with one suite only
 
@@ -54,7 +54,7 @@ class VerdictChanges:
 
 
 def verdict_changes(name: str, first: Results, second: Results) -> VerdictChanges:
-    """Find the completions whose verdicts differ; raise UserError if none was judged with both suites."""
+    """Find the completions whose verdicts differ. Raise UserError if none was judged with both suites."""
     one, other = completions_of(first.table), completions_of(second.table)
     both = one.select(*KEY, "passed").join(other.select(*KEY, then="passed"), on=KEY).sort(KEY)
     if both.is_empty():
@@ -95,13 +95,13 @@ def _by_task(both: pl.DataFrame, order: Iterable[str]) -> Iterator[TaskChanges]:
 
 
 def rank(name: str, scores: Mapping[str, float]) -> int:
-    """Return the rank of a run, starting at 1; runs with equal scores share a rank."""
+    """Return the rank of a run, starting at 1. Runs with equal scores share a rank."""
     return 1 + sum(score > scores[name] + ROUNDING_ERROR for score in scores.values())
 
 
 @dataclass(frozen=True)
 class RankChange:
-    """Two runs whose order changes between two suites, or that tie under only one of them."""
+    """Two runs that are ranked in a different order by two suites, or that tie under only one of them."""
 
     one: str  # the better run under the second suite, or under the first in case of a tie
     other: str
@@ -151,7 +151,7 @@ def describe_run(found: VerdictChanges) -> str:
 
 
 def describe_ranking(found: Sequence[VerdictChanges]) -> list[str]:
-    """Describe changes in the ranking; return nothing for a single run."""
+    """Describe changes in the ranking. Return nothing for a single run."""
     if len(found) < 2:  # noqa: PLR2004 - a ranking requires two runs
         return []
     first, second = found[0].suites

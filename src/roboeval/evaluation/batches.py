@@ -42,7 +42,7 @@ from roboeval.evaluation.runs.source import MAX_ANSWER_BYTES
 from roboeval.suites.load import Suite
 
 BEGINNING = b'{"custom_id": '
-IDENTITY = ("model", "settings", "template", "suite")  # the entries of run.json that identify a batch
+IDENTITY = ("model", "settings", "template", "suite")  # entries of run.json that identify a batch
 REQUEST_ID = re.compile(r"(?P<task>.+)/(?P<prompt>\d{1,9})/(?P<index>\d{1,9})/[0-9a-f]{8}", re.ASCII)
 
 
@@ -54,10 +54,10 @@ def write_requests(
     *,
     progress: Callable[[int], object] = bool,
 ) -> int:
-    """Start a run, write the requests for its missing completions to a file, and return their number.
+    """Start a run, write requests for its missing completions to a file, and return the number of requests.
 
     `progress` is called with the number of requests written so far. Raises UserError if no completion is
-    missing, the run was generated differently, or an existing file holds something other than requests.
+    missing, the run was generated with other settings, or an existing file holds anything but requests.
     """
     expect_replaceable(path, BEGINNING)
     with run.writing():
@@ -80,7 +80,7 @@ def write_requests(
 
 
 def request_id(about: Mapping[str, Any], key: CompletionKey, instruction: str) -> str:
-    """Return a request name that is unique among runs: a hash of its instruction and of run.json."""
+    """Return a name for a request that is unique among all runs: a hash of its instruction and run.json."""
     mark = hashlib.sha256(to_line([*(about.get(name) for name in IDENTITY), instruction])).hexdigest()[:8]
     task, prompt, index = key
     return f"{task}/{prompt}/{index}/{mark}"
@@ -110,9 +110,9 @@ def import_answers(
 ) -> ImportResult:
     """Add the completions in a file of answers to the run that `write_requests` started.
 
-    The run keeps its earlier completions; if a request has several replies, the first one counts.
+    The run keeps its earlier completions. If a request has several replies, the first one counts.
     `progress` is called with the number of answers read so far. Raises UserError, and adds nothing, if the
-    run was generated differently or a line is not an answer to one of its requests.
+    run was generated with other settings or a line is not an answer to one of its requests.
     """
     about = _expect_begun(run, suite)
     plans = [_plan(suite, batch) for batch in batches(about)]
@@ -184,7 +184,7 @@ class _Replies:
                 self.refused[key] = error
 
     def keep_refused(self) -> None:
-        """Record requests that the endpoint refused permanently, if it accepted at least one other."""
+        """Record the requests that the endpoint refused permanently, if it accepted at least one request."""
         if self.there or self.lines:
             for key, error in self.refused.items():
                 if key not in self.lines:

@@ -32,7 +32,7 @@ def check_programs(
     samples: int,
     seed: int,
 ) -> Iterator[tuple[ProgramKey, list[str]]]:
-    """Yield the problems of each program; check only those not yet checked with these settings.
+    """Yield the problems of each program, and check only programs not yet checked with these settings.
 
     The check uses the rooms of the task's first world and the suite's house rules.
     """

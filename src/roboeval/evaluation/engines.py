@@ -37,7 +37,7 @@ class Engine(Protocol):
 OpenEngine = AbstractContextManager[Engine]
 
 
-GC_THRESHOLD = 100_000  # allocations between garbage collections: nearly all objects are short-lived events
+GC_THRESHOLD = 100_000  # allocations between garbage collections; high because most objects are short-lived
 
 
 class Local:
@@ -72,7 +72,7 @@ class Local:
 
 @cache
 def own_worker(*, require_isolation: bool = False, one_process_per_run: bool = False) -> Worker:
-    """Return the worker of this process; start it on the first call."""
+    """Return the worker of this process, which is started on the first call."""
     worker = Worker(one_process_per_run=one_process_per_run)
     if require_isolation and not worker.has_seccomp:
         worker.close()

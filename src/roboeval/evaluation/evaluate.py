@@ -1,4 +1,4 @@
-"""Judges a run's completions; continues an earlier evaluation if the suite and the tool are unchanged."""
+"""Judges a run's completions, and continues an earlier evaluation if the suite and the tool are unchanged."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def evaluate_run(
     engine: OpenEngine | None = None,
     completions: Iterable[Completion] | None = None,
 ) -> Iterator[Row]:
-    """Judge the completions that have no row yet; yield the rows of all completions of the selected tasks.
+    """Judge the completions that have no row yet, and yield all rows of the selected tasks.
 
-    Rows of other tasks are kept. A completion that takes too long to judge gets no row, so the next
+    Rows of other tasks are kept. A completion that takes too long to judge gets no row, so that the next
     evaluation tries it again. Pass `completions` if the run has already been read.
     """
     key = evaluation_key(suite, ablated=ablated)
@@ -143,7 +143,7 @@ def _selected(tasks: frozenset[str] | None, was: Mapping[str, Any] | None) -> fr
 
 
 def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:
-    """Return the content of KEY.json, or None if it is missing; raise UserError if suite or tool differ."""
+    """Return the content of KEY.json, or None if it is missing. Raise UserError if suite or tool differ."""
     key = evaluation_key(suite, ablated=ablated)
     path, rows = run.manifest(key), run.rows(key)
     if not path.exists():

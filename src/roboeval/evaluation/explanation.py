@@ -23,7 +23,7 @@ OF_SUITE = "the suite's current prompt is:"
 PROGRAM_GONE = "the judged program is no longer in this run"
 SUITE_CHANGED = "the suite has changed since this was judged"
 TRACE_CUT = "the trace was too long to save, so this cannot be explained"
-TRACES_TOO_LONG = "the traces of this program are too long to explain this check, too"
+TRACES_TOO_LONG = "the traces of this program are too long to explain this check"
 
 LOWERCASED_NOTE = "This suite lower-cases strings before running; shown as judged."
 MAX_PROGRAM_LINES = 1_000
@@ -69,7 +69,7 @@ def suite_instruction(suite: Suite | None, task: str, prompt: int) -> str | None
 
 
 def instruction_shown(recorded: str | None, of_suite: str | None) -> tuple[str | None, str | None]:
-    """Return the instruction, or None if unknown, preceded by a note on its origin, or None if not needed."""
+    """Return a note on the origin of an instruction, and the instruction. Each is None if there is none."""
     if recorded is not None or of_suite is None:
         return INSTRUCTION_NOT_RECORDED if recorded is None else None, recorded
     return f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}", of_suite
@@ -87,7 +87,7 @@ class ExplanationBudget:
         self._left = MAX_EXPLAINED_SIZE
 
     def covers(self, trace: Trace) -> bool:
-        """Subtract a trace from the budget; return whether the budget suffices to explain a check on it."""
+        """Subtract a trace from the budget, and return whether enough was left to explain a check on it."""
         self._left -= sum(map(_weight, trace))
         return self._left >= 0
 
@@ -145,13 +145,13 @@ def error_sentence(verdict: Mapping[str, Any]) -> str:
 
 
 def first_lines(program: str) -> tuple[str, int]:
-    """Shorten a program for display; return it with the number of omitted lines."""
+    """Shorten a program for display, and return it with the number of omitted lines."""
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
     shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MAX_PROGRAM_LINES])
     return shown, max(0, len(lines) - MAX_PROGRAM_LINES)
 
 
 def cut_sentence(cut: Mapping[str, Any]) -> str:
-    """Return a sentence about the number of steps that were not saved."""
+    """Return a sentence that says how many steps were not saved."""
     were = "was" if cut["events"] == 1 else "were"
     return f"{counted(cut['events'], 'more step')} {were} not saved, because the trace is too long"

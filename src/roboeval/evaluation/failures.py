@@ -28,7 +28,7 @@ class FailureClass:
     label: str  # the name shown to users
     plural: str
     kinds: tuple[str, ...]  # kinds that tables always show; other kinds appear only if they occurred
-    ending: str = ""  # how a program of this class ends; by default "in a" and the label
+    ending: str = ""  # how a program of this class ends; by default "in a" plus the label
     is_always_shown: bool = True  # whether tables show the class even if it did not occur
 
 
@@ -76,7 +76,7 @@ FAILURE_CLASSES: Mapping[str, FailureClass] = {
         FailureClass(TASK_ERROR_CLASS, "failed check", "failed checks", get_args(Category)),
     )
 }
-"""All classes by name; the kind of a failed check is the check's category."""
+"""All classes by name. The kind of a failed check is the category of the check."""
 
 
 def label_of(name: str) -> str:
@@ -95,7 +95,7 @@ def ending_of(name: str) -> str:
 
 
 def classes_to_show(happened: Collection[str]) -> list[str]:
-    """Return the paper's three classes, which make runs comparable, and all other classes that occurred."""
+    """Return the paper's three classes, so that runs are comparable, and all other classes that occurred."""
     return [name for name, one in FAILURE_CLASSES.items() if one.is_always_shown or name in happened]
 
 
@@ -126,8 +126,8 @@ class Verdict:
 def failure_of_verdicts(verdicts: Sequence[Verdict]) -> Failure | None:
     """Return the failure of a completion in its first unsatisfied world, or None if it passes.
 
-    The failure is the error in that world, or without an error the first failed check. In a world where
-    programs may wait for ever, reaching a limit is not an error.
+    The failure is the error in that world or, if there is none, the first failed check. In a world where
+    programs may wait forever, reaching a limit is not an error.
     """
     for index, verdict in enumerate(verdicts):
         if not verdict.satisfied:

@@ -1,4 +1,4 @@
-"""Generates the completions of a run, and continues after an interruption."""
+"""Generates the completions of a run, and continues a run that was interrupted."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Pace:
 
 @dataclass
 class GenerationProgress:
-    """How far the generation of a run has come."""
+    """Progress towards the completions that a run should have."""
 
     total: int
     found: int  # completions present at the start
@@ -71,7 +71,7 @@ class GenerationProgress:
 
     @property
     def missing(self) -> str | None:
-        """Return a sentence on how many completions are missing, and why, or None if none is."""
+        """Return a sentence that says how many completions are missing and why, or None if none are."""
         left = self.total - self.done
         reason = self.stopped or next(iter(self.failures.values()), "they were not requested")
         return f"{how_many(left)} {'is' if left == 1 else 'are'} missing: {reason}" if left else None
@@ -185,7 +185,7 @@ class _Generation:
                     group.create_task(self._request_each(waiting))
             if self.progress.stopped is None and self.progress.done:
                 self._keep_refused()
-            if self._budget is not None:  # the requests that were still pending have used more tokens since
+            if self._budget is not None:  # pending requests have used more tokens in the meantime
                 self.progress.stopped = BudgetSpentError(self._budget, self._paced.tokens_used).sentence
         except BaseExceptionGroup as errors:
             raise errors.exceptions[0] from None

@@ -39,11 +39,11 @@ def roboeval(
     worlds: int | None = None,
     seed: int | None = None,
 ) -> Task:
-    """Ask for programs for service robots and judge each in every world of its task; a sample is a prompt.
+    """Ask for programs for service robots, and judge each in every world of its task. A sample is a prompt.
 
     Args:
         suite: the name or folder of a suite.
-        tasks: tasks to select; all by default.
+        tasks: the tasks to select, by default all.
         worlds: the number of worlds, 1 to 10,000, if the suite samples worlds.
         seed: the random seed for sampling worlds.
     """
@@ -78,7 +78,7 @@ def prompting(suite: str = "paper") -> Solver:
     known = load_suite(suite)
     rules = known.house_sentences
 
-    async def prompt(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001 - another solver generates
+    async def prompt(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001 - the next solver generates
         state.messages = [
             getattr(model, f"ChatMessage{message.role.title()}")(content=message.text)
             for message in prompt_for(state.input_text, rules=rules, skills=known.skills).messages

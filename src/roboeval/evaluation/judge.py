@@ -1,4 +1,4 @@
-"""Runs programs in worlds and judges their traces; no other module decides whether a program is right."""
+"""Runs programs in worlds and judges their traces. No other module decides whether a program is right."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ JUDGEMENT_CACHE: ResultCache[tuple[bytes, ...]] = ResultCache()
 def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
     """Judge a run in a world by the requirements of all prompts.
 
-    A run that ends in an error fails, whatever it did before. A run that reaches a limit also fails, except
-    in a world where programs may wait for ever: there the requirements decide.
+    A run that ends in an error fails, whatever it did before. A run that reaches a limit also fails, unless
+    programs may wait forever in that world. In that case, the requirements decide.
     """
     if not may_satisfy(outcome, scenario):
         return Verdict(scenario.world.about, outcome, (), satisfied=False)
@@ -46,7 +46,7 @@ def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
 
 
 def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
-    """Whether the requirements decide: the run ended normally, or was allowed to wait for ever."""
+    """Whether the requirements decide, because the run ended normally or was allowed to wait forever."""
     waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
     return waited or outcome.status is Status.FINISHED
 
@@ -62,7 +62,7 @@ def are_met(outcome: Outcome, scenario: Scenario) -> tuple[bool, ...]:
 
 
 def is_met(requirement: Requirement, trace: Trace) -> bool:
-    """Whether a trace satisfies a requirement; if that is inconclusive, it does not."""
+    """Whether a trace satisfies a requirement. An inconclusive result counts as not satisfied."""
     try:
         return holds(requirement.formula, trace)
     except Inconclusive:
@@ -78,10 +78,10 @@ def evaluate(
     require_isolation: bool = False,
     engine: OpenEngine | None = None,
 ) -> Iterator[Row]:
-    """Judge completions and yield a row for each, in input order; equal programs of a task run once.
+    """Judge completions and yield a row for each, in input order. Equal programs of a task run once.
 
-    A completion that takes more than 60 seconds of processor time to judge gets no row but a logged
-    warning; this limit applies only in the main thread.
+    A completion that takes more than 60 seconds of processor time to judge gets no row, and a warning is
+    logged. This limit applies only in the main thread.
 
     Args:
         completions: completions for tasks of the suite; an iterator is consumed lazily.
@@ -103,7 +103,7 @@ def evaluate(
 def judgements(
     completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
 ) -> Iterator[tuple[Completion, bytes | None]]:
-    """Yield each completion and its judgement as JSON; None, with a warning, if judging takes too long."""
+    """Yield each completion and its judgement as JSON, or None and a warning if judging takes too long."""
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[tuple[str, str]]:
@@ -143,7 +143,7 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
 def run_in_worlds(
     suite: Suite, worker: Worker, works: Sequence[tuple[str, str]], *, ablated: bool
 ) -> list[tuple[str, Sequence[Outcome]]]:
-    """Run programs in the worlds of their tasks; return the task and the outcomes of each program."""
+    """Run programs in the worlds of their tasks, and return the task and the outcomes of each program."""
     jobs = [
         (program, [partial(robot_in, one.world, suite) for one in scenarios])
         for task, program in works

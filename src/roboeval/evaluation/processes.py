@@ -24,10 +24,10 @@ JobKey = TypeVar("JobKey")
 
 
 class Processes:
-    """Runs programs in processes that each have a worker, and replay and judge its programs themselves.
+    """Runs programs in several processes, each of which replays and judges the programs of its own worker.
 
-    With threads, a single core would replay and judge for all workers. Each process starts when there is
-    work for it. The caller must warn if programs are not fully isolated.
+    With threads instead of processes, a single core would replay and judge for all workers. A process starts
+    when there is work for it. The caller must warn if programs are not fully isolated.
     """
 
     def __init__(self, workers: int, **isolation: bool) -> None:
@@ -57,7 +57,7 @@ def map_in_processes(
 ) -> Iterator[WorkResult]:
     """Call a function in worker processes on a few keys at a time, and yield the results in order.
 
-    `name` returns a short, unique name for a key; duplicate keys are passed to the function only once.
+    `name` returns a short, unique name for a key. Duplicate keys are passed to the function only once.
     """
     with process_pool(workers) as processes:
 
@@ -73,7 +73,7 @@ def map_in_processes(
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Start a process pool that ends with the block, or together with this process."""
+    """Start a process pool that ends with the block, or with this process if that ends first."""
     context = get_context("spawn")
     with ExitStack() as held:
         with starting_processes():
@@ -87,7 +87,7 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 @contextmanager
 def starting_processes() -> Iterator[None]:
-    """Make processes started in the block ignore Ctrl-C; raise EngineError if they cannot start."""
+    """Make processes started in the block ignore Ctrl-C. Raise EngineError if they cannot start."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # child processes inherit the mask
     try:
         yield
@@ -116,5 +116,5 @@ def run_batch(functions: bytes, isolation: Mapping[str, bool], works: Sequence[W
 
 @lru_cache(maxsize=1)
 def load_functions(functions: bytes) -> tuple[RunPrograms[Any], Callable[[Any], Any]]:
-    """Unpickle functions, cached because they refer to a whole suite."""
+    """Unpickle functions. They are cached because they refer to a whole suite."""
     return pickle.loads(functions)  # type: ignore[no-any-return] # noqa: S301 - pickled by our own parent process

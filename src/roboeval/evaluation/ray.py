@@ -27,10 +27,10 @@ RAY_CONNECT_SECONDS = 5
 
 
 class RayCluster:
-    """Runs programs on the Ray cluster at RAY_ADDRESS, or by default on the one this machine belongs to.
+    """Runs programs on the Ray cluster at RAY_ADDRESS, or by default on the cluster of this machine.
 
     Without a cluster, or if RAY_ADDRESS is "local", it starts a cluster that only this machine can reach,
-    and stops it at the end. By default it submits two shards per core.
+    and stops that cluster at the end. By default, it submits two shards per core.
 
     Raises UserError if Ray is not installed or no cluster answers at the address.
     """
@@ -132,7 +132,7 @@ def run_shard(
     versions: str,  # a machine with other versions might judge differently
     isolation: Mapping[str, bool],
 ) -> tuple[list[WorkResult], str | None]:
-    """Run programs in a Ray process; return results, and a warning or None if isolation was complete."""
+    """Run programs in a Ray process. Return the results, and a warning if isolation was incomplete."""
     machine = platform.node()
     if versions != VERSIONS:
         raise EngineError(f"{machine} has {VERSIONS}, not {versions}")

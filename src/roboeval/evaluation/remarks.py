@@ -1,4 +1,4 @@
-"""Remarks on runs that repeated steps until a limit, or whose questions got the wrong answers."""
+"""Describes runs that repeated steps until a limit, or whose questions got answers meant for others."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MAX_CYCLE_STEPS = 100
 def remarks_on(
     verdict: Mapping[str, Any], trace: Trace, world: World | None, settings: SimulationSettings | None
 ) -> list[str]:
-    """Return sentences that help to explain a run, in addition to its failed checks."""
+    """Return sentences that help to explain a run beyond its failed checks."""
     remarks = []
     if verdict["status"] == Status.TIMEOUT and (cycle := cycle_at_end(trace)) is not None:
         more = " times: " if verdict.get("cut") is None else " times or more: "
@@ -41,14 +41,14 @@ class Cycle:
 
     @property
     def sentence(self) -> str:
-        """Return a sentence about the repeated steps, where they begin, and how often they were repeated."""
+        """Return a sentence that says which steps were repeated, from where on, and how often."""
         those = "" if len(self.steps) == 1 else f"{counted(len(self.steps), 'step')} "
         deeds = ", ".join(elide_list([*(phrase(step, "base") for step in self.steps)]))
         return f"From step {self.first} on, it repeated {those}{self.times:,} times: {deeds}."
 
 
 def cycle_at_end(trace: Trace) -> Cycle | None:
-    """Return the cycle that covers most of a trace's end, or None; among equals, return the shortest."""
+    """Return the cycle that covers most steps at the end of a trace, or None. Prefer short cycles."""
     numbers: dict[Event, int] = {}
     each = [numbers.setdefault(event, len(numbers)) for event in trace]
     most, found = 0, None

@@ -65,7 +65,7 @@ class GenerationPlan:
         return {}
 
     def completed(self, run: RunFolder) -> Iterator[Completion]:
-        """Read the completions of a run; raise UserError if an instruction differs from the suite's."""
+        """Read the completions of a run. Raise UserError if an instruction differs from the suite's."""
         if not run.completions.is_file() or not run.completions.stat().st_size:
             return
         for completion in read_completions(run.completions, self.suite):
@@ -83,13 +83,13 @@ def no_usage() -> Counter[str]:
 
 
 def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> None:
-    """Add the token counts of a row to the total; models that do not count tokens record null."""
+    """Add the token counts of a row to the total. They are null if the model does not count tokens."""
     for name in total:
         total[name] += (usage or {}).get(name) or 0
 
 
 def run_metadata(run: RunFolder, plan: GenerationPlan, model: Model | BatchModel) -> dict[str, Any]:
-    """Return the content of run.json; raise UserError if existing completions were generated differently."""
+    """Return the content of run.json. Raise UserError if existing completions have other settings."""
     suite = plan.suite
     fixed = {
         "model": model.name,
@@ -129,7 +129,7 @@ def _recorded(settings: SamplingSettings) -> dict[str, Any]:
 def with_batch(
     earlier: list[dict[str, Any]], plan: GenerationPlan, settings: SamplingSettings
 ) -> list[dict[str, Any]]:
-    """Append the batch of a plan, unless the last batch is the same one, interrupted."""
+    """Append the batch of a plan, unless the last batch is the same one and was interrupted."""
     batch = {
         "tasks": None if plan.tasks is None else sorted(plan.tasks),
         "num_completions": plan.num_completions,
@@ -183,13 +183,13 @@ class RequestLog:
     """Logs each request before it is sent, and each failure.
 
     A request with neither a failure nor a completion was pending when the run was interrupted, and may be
-    billed twice. The first line counts the requests lost in earlier interruptions, so that each is counted
-    once. The file is deleted when a run ends normally.
+    billed twice. The first line counts the requests lost in earlier interruptions, so that none of them is
+    counted twice. The file is deleted when a run ends normally.
     """
 
     def __init__(
         self, path: Path, done: set[CompletionKey], lost: int
-    ) -> None:  # `lost`: the count in run.json
+    ) -> None:  # `lost` is the number of lost requests in run.json
         self.path = path
         lost_before, pending = self._read()
         self.interrupted = len(pending - done)  # requests pending at the last interruption
@@ -209,7 +209,7 @@ class RequestLog:
             self.path.unlink()
 
     def sent(self, key: CompletionKey) -> None:
-        """Log a request before it is sent; if the disk is full, the OSError prevents the request."""
+        """Log a request before it is sent. If the disk is full, the OSError prevents the request."""
         self._file.append(to_line({"sent": key}))
         self.under_way.add(key)
 

@@ -10,11 +10,11 @@ from codebotler.core.trace import Outcome
 CachedResult = TypeVar("CachedResult")
 
 
-MAX_RESULTS, MAX_RESULT_EVENTS = 2_048, 128  # entries, and total events in the runs of an entry
+MAX_RESULTS, MAX_RESULT_EVENTS = 2_048, 128  # limits on entries, and on all events in an entry's runs
 
 
 class ResultCache(Generic[CachedResult]):
-    """Caches results by runs, because many programs behave identically in a world or in similar worlds."""
+    """Caches results by run, because many programs behave identically in a world or in similar worlds."""
 
     def __init__(self) -> None:
         # Keys contain object ids, which must not be reused, so entries keep the objects alive.
@@ -27,7 +27,7 @@ class ResultCache(Generic[CachedResult]):
         runs: Iterable[Outcome],
         compute: Callable[[], CachedResult],
     ) -> CachedResult:
-        """Return the cached result for the runs, or compute it; the entry keeps `keep_alive` alive."""
+        """Return the cached result for the runs, or compute it. The entry keeps `keep_alive` alive."""
         known = self._known.get(key)  # another thread may clear the cache at any moment
         if known is not None:
             return known[0]

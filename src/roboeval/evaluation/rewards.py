@@ -1,4 +1,4 @@
-"""Computes rewards for training, from 0 to 1: how much of a task a program does."""
+"""Computes rewards for training. A reward, from 0 to 1, measures how much of a task a program does."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from roboeval.evaluation.runs.completions import find_key_fault
 from roboeval.suites.load import Scenario, Suite, load_suite
 
 Judged = TypeVar("Judged")
-ERROR_FACTOR = 0.5  # factor for a run that ends in an error: returning early would have been better
+ERROR_FACTOR = 0.5  # factor for a run that ends in an error, so that returning early would earn more
 
 MAX_CACHED_REWARDS = 100_000  # a policy often repeats a program
 
@@ -41,11 +41,11 @@ def reward(
 
     In each world, the reward is the share of requirements that the program satisfies, not counting those
     that hold before the robot moves (such as "never say it in the lobby"). It is multiplied by the share of
-    the latter that still hold at the end, and halved if the run ends in an error. The result is the mean
-    over all worlds; it depends only on the arguments.
+    these initial requirements that still hold at the end, and halved if the run ends in an error. The result
+    is the mean over all worlds, and depends only on the arguments.
 
-    Worker processes live until this process ends. Calls from many threads are safe; forked processes start
-    their own workers.
+    Worker processes live until this process ends. The function can be called from many threads. Forked
+    processes start their own workers.
 
     Args:
         task: the name of the task.
@@ -105,8 +105,8 @@ def requirements_of(suite: Suite, task: str, prompt: int) -> list[tuple[Scenario
 def total(shares: Sequence[Share]) -> float:
     """Compute the reward over all worlds of a task.
 
-    A world with nothing to gain counts like the mean of the others; if no world has anything to gain,
-    doing nothing is right.
+    A world with nothing to gain counts like the mean of the others. If no world has anything to gain, a
+    program that does nothing gets the full reward.
     """
     earned = [share.gained * share.kept for share in shares if share.gained is not None]
     elsewhere = fmean(earned) if earned else 1.0
@@ -171,7 +171,7 @@ def split_programs(programs: Sequence[str], workers: int) -> list[Sequence[str]]
 
 
 def judge_programs(suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
-    """Compute the rewards of programs; call this in a thread with a worker."""
+    """Compute the rewards of programs. The calling thread must have a worker."""
     asked = requirements_of(suite, task, prompt)
     robots = [partial(robot_in, scenario.world, suite) for scenario, _ in asked]
     ran = shared_pool().here().run_all([(program, robots) for program in programs])

@@ -1,7 +1,7 @@
 """Plans further rounds of a run, which regenerate or repair rejected programs (paper, section VI).
 
-Each round is a run in its own folder: it copies the programs that the check accepts and requests new versions
-of the others.
+Each round is a run in its own folder. It copies the programs that the check accepts and requests new
+versions of the others.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from roboeval.evaluation.requests import GenerationPlan
 from roboeval.evaluation.runs.completions import Completion, CompletionKey
 from roboeval.evaluation.runs.folder import RunFolder
 
-ROUND = "round"  # the entry in rows with a program's round; missing in the first round
+ROUND = "round"  # the entry of a row with its program's round; missing in the first round
 SAMPLE_STRIDE = 1_000_000  # offset of sample numbers between rounds, so that all seeds differ
 
 
@@ -35,7 +35,7 @@ class RoundPlan(GenerationPlan):
     problems: Mapping[CompletionKey, Sequence[str]] = field(repr=False)
 
     def prompt(self, key: CompletionKey) -> Prompt:
-        """Return the prompt for a completion; when repairing, it includes the rejected program."""
+        """Return the prompt for a completion. For a repair, it includes the rejected program."""
         first, program = super().prompt(key), self.earlier[key].program
         return first.after(program, self.problems[key]) if self.repairs and program.strip() else first
 

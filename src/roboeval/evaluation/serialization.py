@@ -24,7 +24,7 @@ FAILED_PREFIX = b'{"passed": false, '  # how `judgement` starts a failed judgeme
 
 
 def add_reply_fault(completion: Completion, judgement_json: bytes) -> bytes:
-    """If the reply contained no program, make that the failure in a judgement, which is given as JSON.
+    """Set the failure in a judgement, given as JSON, to the lack of a program if the reply contained none.
 
     Running such a reply ends in an error or a failed check, but that is not why the completion fails.
     """
@@ -47,7 +47,7 @@ def row_line(completion: Completion, judgement_json: bytes) -> bytes:
 
 
 def judgements_for(verdicts: list[Verdict], prompts: int) -> tuple[bytes, ...]:
-    """Return the judgement on a program for each prompt; equal judgements are the same object."""
+    """Return the judgement on a program for each prompt. Equal judgements are the same object."""
     known_judgements: list[tuple[list[Verdict], bytes]] = []
     chosen = []
     for prompt in range(prompts):
@@ -86,7 +86,7 @@ def verdict_data(verdict: Verdict) -> dict[str, Any]:
 
 
 def limit_size(judgement: Mapping[str, Any]) -> bytes:
-    """Return a judgement as JSON that fits into a row; each world's trace is cut to an equal share."""
+    """Return a judgement as JSON that fits into a row. Each world's trace is cut to an equal share."""
     whole = _json(judgement)
     verdicts = judgement["verdicts"]
     most = max(ROW_BYTES, WORLD_BYTES * len(verdicts)) - ROW_HEADER_BYTES

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 from types import FrameType
 
-CLOCK_CHECKS = 100  # clock checks per limit; each also lets other threads run
+CLOCK_CHECKS = 100  # number of clock checks before the limit; each also lets other threads run
 
 
 class TimeLimitExceeded(Exception):  # noqa: N818 - a signal, not an error
@@ -18,7 +18,7 @@ class TimeLimitExceeded(Exception):  # noqa: N818 - a signal, not an error
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Limit the seconds of processor time that this thread spends in the block; only in the main thread."""
+    """Limit the processor time, in seconds, of the block. In other threads than the main one, do nothing."""
     if threading.current_thread() is not threading.main_thread():  # only the main thread receives signals
         yield
         return
@@ -27,7 +27,7 @@ def time_limit(seconds: float) -> Iterator[None]:
     def check_clock(_signal: int, _frame: FrameType | None) -> None:
         if time.thread_time() > end:
             raise TimeLimitExceeded
-        time.sleep(0)  # a regex search would not let other threads run
+        time.sleep(0)  # let other threads run, because a regex search does not
 
     before = signal.signal(signal.SIGVTALRM, check_clock)
     try:
@@ -36,7 +36,7 @@ def time_limit(seconds: float) -> Iterator[None]:
             yield
         finally:
             signal.signal(signal.SIGVTALRM, signal.SIG_IGN)
-    finally:  # even if the limit is reached just as the work ends
+    finally:  # also if the limit is reached just as the work ends
         signal.signal(signal.SIGVTALRM, signal.SIG_IGN)
         signal.setitimer(signal.ITIMER_VIRTUAL, 0)
         signal.signal(signal.SIGVTALRM, before)

@@ -1,4 +1,4 @@
-"""The linter of tasks: finds requirements that cannot hold, checks that never fail, and dead regexes.
+"""Lints tasks: finds requirements that cannot hold, checks that never fail, and dead regexes.
 
 Start with `lint.py`.
 """

@@ -28,7 +28,7 @@ def absent_names(requirement: Requirement, scenario: Scenario, task: Task) -> It
 def _names(
     requirement: Requirement, rooms: Sequence[Room], task: Task
 ) -> Iterator[tuple[str, str, Sequence[str]]]:
-    """Yield the category and name of everything that a requirement names, and the category's known names."""
+    """Yield the category and name of everything that a requirement names, and all names in that category."""
     objects = [label for room in rooms for label in room.objects]
     people = [person.name for room in rooms for person in room.people]
     known_names = {
@@ -67,7 +67,7 @@ def _mentioned(element: EventPattern, task: Task) -> Iterator[str]:
 
 
 def _people(task: Task) -> set[str]:
-    """Return the lower-case names of people in a task's worlds, and of the owners of offices and labs."""
+    """Return the lower-case names of all people in a task's worlds, and of the owners of offices and labs."""
     scenarios = (*task.scenarios, *(task.ablation or ()))
     rooms = [room for scenario in scenarios for room in scenario.world.rooms]
     names = [*(person.name for room in rooms for person in room.people), *_owners(rooms)]
@@ -93,7 +93,7 @@ _CHOICE = re.compile(r"(?<!\\)\((?:\?:)?([\w' ]+(?:\|[\w' ]+)+)\)(?![?*+{])")
 
 
 def _alternatives(pattern: str) -> Iterator[str]:
-    """Yield the alternatives of a regex; yield a regex with backreferences or no alternatives unchanged."""
+    """Yield the alternatives of a regex, or the regex itself if it has backreferences or no alternatives."""
     if _BACKREFERENCE.search(pattern):
         yield pattern
         return

@@ -1,4 +1,4 @@
-"""Splits prompts into clauses, each with the checks that cover it or the reason why none does."""
+"""Splits prompts into clauses, and finds the checks that cover each clause or the reason why none does."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from roboeval.suites.load import Task
 
 MIN_CLAUSE_WORDS = 4  # shorter clauses are merged with a neighbour in the same sentence
-_SENTENCE = re.compile(r"(?:[!?]|(?<!\w\.\w)\.)[\"”)]*\s+")  # but not within "e.g. a cup" or "5 p.m. sharp"
+_SENTENCE = re.compile(r"(?:[!?]|(?<!\w\.\w)\.)[\"”)]*\s+")  # does not split "e.g. a cup" or "5 p.m. sharp"
 _JOINT = re.compile(r"[,;:]+[\"”]?\s+|\s+(?=(?:and|but)\s)")
 _WORD = re.compile(r"\w+")
 _SKIP = re.compile(r"(?<!\\)\.\*\??|\[\^[^\]]+\]\*\??")  # parts of a regex that match any words
@@ -35,8 +35,8 @@ class Clause:
 def clauses_of(task: Task) -> Iterator[Clause]:
     """Yield the clauses of all prompts, in order.
 
-    A check covers a clause if they share a word: the task lists a fact for the check and the fact's regex
-    matches the word, except by `.*`, or a requirement with the check quotes the word.
+    A check covers a clause if they share a word. They share it if a requirement with the check quotes the
+    word, or if the task lists a fact for the check and the fact's regex matches the word other than by `.*`.
     """
     for number, prompt in enumerate(task.prompts):
         text = " ".join(prompt.split())
@@ -67,7 +67,7 @@ def _covering(task: Task, number: int, text: str) -> Iterator[tuple[Span, tuple[
 
 
 def _find(words: str, text: str) -> Iterator[Span]:
-    """Yield the spans that a regex matches, except for parts such as `.*` that match any words."""
+    """Yield the spans that a regex matches, without the parts that match any words, such as `.*`."""
     marked = _SKIP.sub(lambda skip: f"(?P<skip{skip.start()}>{skip[0]})", words)
     for match in re.finditer(marked, text, re.IGNORECASE):
         skipped = (match.span(name) for name in match.re.groupindex if name.startswith("skip"))

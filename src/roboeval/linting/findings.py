@@ -40,7 +40,7 @@ class Finding:
 
     @property
     def name(self) -> str:
-        """Return the name that a task file accepts the finding by, such as `implied: comes_back`."""
+        """Return the name under which a task file accepts the finding, such as `implied: comes_back`."""
         return f"{self.kind}: {self.subject}"
 
     def rendered(self) -> str:
@@ -52,7 +52,7 @@ class Finding:
 
 
 def render(findings: Iterable[Finding], *, accepted: bool = False) -> str:
-    """Format findings as lines; accepted ones are listed with their reasons, or only counted."""
+    """Format findings as lines. Accepted findings are listed with their reasons, or only counted."""
     every = [*findings]
     lines = [one.rendered() for one in every if accepted or one.accepted is None]
     if hidden := len(every) - len(lines):

@@ -46,14 +46,14 @@ def _unused(task: Task) -> Iterator[Finding]:
 
 
 def _unsaid(task: Task) -> Iterator[Finding]:
-    """Yield a finding for each fact that a prompt omits, or mentions although it is common sense."""
+    """Yield a finding for each fact that a prompt omits, or that it mentions although it is common sense."""
     file = YamlFile.read(task.path)
     own = len(file.data.get("facts", ())) if isinstance(file.data, dict) else 0
     for number, fact in enumerate(task.facts[len(task.facts) - own :]):
         for prompt, text in enumerate(task.prompts):
             word = next((word for word in fact.words if re.search(word, text, re.IGNORECASE)), None)
             if word is None and not fact.commonsense:
-                wrong = f'does not mention "{fact.fact}" by any of its words; add one of these'
+                wrong = f'contains none of the words for "{fact.fact}"; add one of them'
             elif word is not None and fact.commonsense:
                 wrong = (
                     f'mentions "{fact.fact}" by "{word}", but it is marked as common sense; remove the words'
@@ -65,7 +65,7 @@ def _unsaid(task: Task) -> Iterator[Finding]:
 
 
 def _uncovered(task: Task) -> Iterator[Finding]:
-    """Yield a finding for each fact or clause that no check covers, for tasks with `covered_by`."""
+    """Yield a finding for each fact or clause that no check covers, if the task has `covered_by`."""
     if not task.covered_by:
         return
     line = YamlFile.read(task.path).line(("covered_by",))
@@ -96,11 +96,11 @@ def _unworded(task: Task) -> Iterator[Finding]:
 
 
 def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    if task.borrows:  # these programs were written for other requirements
+    if task.borrows:  # borrowed programs were written for other requirements
         return
     for solution, judged in zip(
         solutions(task), verdicts, strict=False
-    ):  # ignore the verdicts on an ablation, which follow
+    ):  # ignore the verdicts in the worlds of an ablation, which follow
         failed = _by_some_prompt(judged, len(task.prompts))
         if (None if failed is None else failed["kind"]) == solution.fails:
             continue
@@ -128,7 +128,7 @@ def _by_some_prompt(verdicts: Verdicts, prompts: int) -> Failure | None:
 
 
 def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """Yield a finding for each check, with or without `not`, that no wrong solution fails."""
+    """Yield a finding for each check, or its negation by `not`, that no wrong solution fails."""
     wrong = [one for one in verdicts if not all(verdict.satisfied for verdict in one)]
     if not wrong:
         message = f'"{task.name}" has no wrong solution to show that its checks can fail; add one'
@@ -168,7 +168,7 @@ def _slow(task: Task) -> Iterator[Finding]:
 
 
 def searched_regexes(task: Task) -> Iterator[SearchedRegex]:
-    """Yield the regexes in a task's requirements, and those that match labels and answers in its worlds."""
+    """Yield the regexes in a task's requirements, and those for labels and answers in its worlds."""
     lines = {check.name: check.line for check in task.checks}
     for requirement in {one.text: one for one in _required(task)}.values():
         for element in elements(requirement.formula):

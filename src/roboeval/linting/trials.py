@@ -13,7 +13,7 @@ from roboeval.evaluation.judge import judge, robot_in
 from roboeval.suites.load import Scenario, Suite, Task
 from roboeval.suites.solutions import solutions
 
-Verdicts: TypeAlias = Sequence[Verdict]  # on one program, in all worlds of a task or of its ablation
+Verdicts: TypeAlias = Sequence[Verdict]  # verdicts on a program in all worlds of a task or of its ablation
 
 
 def judge_solutions(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdicts]:

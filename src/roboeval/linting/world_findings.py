@@ -1,7 +1,7 @@
 """Finds likely mistakes in the requirements of one world: conflicts, implications and dead regexes.
 
-`codebotler.rtl.reasoning` decides `unsatisfiable` and `implied`, first for visits that each name one room of
-the world, then for any visits.
+`codebotler.rtl.reasoning` decides whether requirements are unsatisfiable or implied. It first considers only
+visits that each name one room of the world, then any visits.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class JudgedWorld:
     def _unsatisfiable(self, involved: Sequence[Requirement], condition: str) -> Finding:
         subject = " and ".join(r.text for r in involved)
         together = "" if len(involved) == 1 else " together"
-        message = f'"{subject}" can probably not hold{together} in {self.name}{condition}'
+        message = f'"{subject}" probably cannot hold{together} in {self.name}{condition}'
         line = involved[-1].line if condition or together else self._line_of_fault(involved[0])
         return self.finding("unsatisfiable", subject, message, line)
 
@@ -104,7 +104,7 @@ class JudgedWorld:
         return self.finding("undecided", subject, f"{what} takes too long to decide", line)
 
     def _line_of_fault(self, requirement: Requirement) -> int | None:
-        """Return the line to fix: the check's if it has no parameters, since every world has the mistake."""
+        """Return the line to fix. A check without parameters is wrong in every world, so this is its line."""
         check = self._check(requirement)
         return requirement.line if check.parameters else check.line
 
@@ -114,7 +114,7 @@ class JudgedWorld:
     def _conflict(
         self, formulas: Sequence[Formula], denied: Formula | None = None
     ) -> tuple[list[Formula], str] | None:
-        """Return formulas that conflict, or that imply the denied one, and the condition for that."""
+        """Return formulas that contradict each other or imply the denied one, and under which condition."""
         conflict = self._plain_moves.conflict(formulas, denied)
         if conflict is None:
             return None
@@ -136,12 +136,12 @@ class JudgedWorld:
 
     @cached_property
     def _requests(self) -> list[str]:
-        """Return a short request for each room that leads there."""
+        """Return a short request for each room that makes the robot drive there."""
         rooms = self._rooms
         return [next((t for t in samples(r) if resolve_room(rooms, t) == r), r) for r in rooms]
 
     def dead_regexes(self, requirement: Requirement) -> Iterator[Finding]:
-        """Yield findings about a requirement's regexes that match nothing, and visits that lead nowhere."""
+        """Yield findings about regexes in a requirement that match nothing, and visits that lead nowhere."""
         line = self._check(requirement).line
         for element in dict.fromkeys(elements(requirement.formula)):
             for text in [element.text] if element.options is None else [element.text, element.options]:
@@ -154,7 +154,7 @@ class JudgedWorld:
                     yield self.finding("dead-regex", subject, message, line)
 
     def by_prompt(self) -> list[JudgedWorld]:
-        """Return the world once for each distinct set of requirements that a prompt has."""
+        """Return a copy of the world for each distinct set of requirements of a prompt."""
         asked = {self.scenario.asked_by(prompt): None for prompt in range(len(self.task.prompts))}
         return [replace(self, scenario=scenario) for scenario in asked]
 

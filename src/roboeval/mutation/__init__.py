@@ -1,5 +1,5 @@
-"""Mutation testing of a suite: which wrong programs pass its checks?
+"""Measures which wrong programs pass the checks of a suite, by mutating right programs.
 
-Operators turn the right solutions of a task into mutants; `trials.py` runs these in the worlds of the task.
-Start with `operator.py`.
+Operators turn the right solutions of a task into mutants, and `trials.py` runs the mutants in the worlds of
+the task. Start with `operator.py`.
 """

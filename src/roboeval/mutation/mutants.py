@@ -60,7 +60,7 @@ class Mutant:
 
 
 def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, ...]:
-    """Collect the right solutions of a task and further programs; equal syntax trees count once."""
+    """Collect the right solutions of a task and further programs. Equal syntax trees count once."""
     right = (Original(one.about, one.program) for one in solutions(task) if one.fails is None or one.right)
     distinct: dict[str, Original] = {}
     for original in chain(right, further):
@@ -71,7 +71,7 @@ def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, .
 def mutants(
     right: Sequence[Original], context: Context, operators: Iterable[Operator] = MUTATION_OPERATORS
 ) -> Iterator[Mutant]:
-    """Yield all distinct mutants of right programs, except mutants that equal a right program."""
+    """Yield all distinct mutants of right programs, except those that are equal to a right program."""
     seen = {original.text for original in right}
     for original in right:
         if (tree := original.tree) is None:

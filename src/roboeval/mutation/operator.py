@@ -1,4 +1,4 @@
-"""Defines mutation operators and the information about a task that they use."""
+"""Defines mutation operators, and collects the information about a task that they use."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def operators_in(module: ModuleType) -> Iterator[Operator]:
 
 
 def only_if(condition: Condition) -> Callable[[Mutate], Mutate]:
-    """Apply an operator only to tasks that meet a condition; other tasks do not require what it changes."""
+    """Apply an operator only to tasks that meet a condition. Other tasks do not require what it changes."""
 
     def conditional(edits: Mutate) -> Mutate:
         @wraps(edits)
@@ -78,13 +78,13 @@ def only_if(condition: Condition) -> Callable[[Mutate], Mutate]:
 
 
 def prompt_matches(pattern: str) -> Condition:
-    """Return a condition that holds if any prompt matches; programs may omit what no prompt asks for."""
+    """Return a condition that holds if any prompt matches, so that only what prompts ask for is changed."""
     compiled = re.compile(pattern)
     return lambda context: not context.prompts or any(map(compiled.search, context.prompts))
 
 
 def next_names(names: Sequence[str], name: str, most: int = 2) -> tuple[str, ...]:
-    """Return up to `most` names that follow a name in a list, starting over at its end."""
+    """Return up to `most` names that follow a name in a list, and start over at the end of the list."""
     folded = [one.lower() for one in names]
     at = folded.index(name.lower()) if name.lower() in folded else -1
     around = [*names[at + 1 :], *names[: max(at, 0)]]

@@ -39,7 +39,7 @@ def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
 
 
 def operators_view(scores: Sequence[MutationScore]) -> RenderableType:
-    """Return a table that counts, for each operator, the mutants that change behaviour."""
+    """Return a table with the number of mutants of each operator that change behaviour."""
     table = _table("operator", "mutants", "killed", "survived")
     tried = (one for score in scores for one in score.mutants)
     counts = Counter((one.mutant.operator, one.result.status) for one in tried)

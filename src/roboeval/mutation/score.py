@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 from roboeval.mutation.mutants import Mutant, Original
 
 MIN_RELIABLE_MUTANTS = 60  # a score from fewer mutants that change behaviour is unreliable
-MAX_EQUIVALENT_SHARE = 0.15  # of the mutants that change behaviour
+MAX_EQUIVALENT_SHARE = 0.15  # largest share of equivalent mutants for which the score is reliable
 
 
 class MutantStatus(StrEnum):
-    """Whether the checks reject a mutant, or why it is not counted."""
+    """Whether the checks reject a mutant, or the reason why it is not counted."""
 
     KILLED = "killed"
     SURVIVED = "survived"

@@ -22,7 +22,7 @@ DEFAULT_MUTANT_WORLDS = 200  # number of sampled worlds by default
 WORLDS_PER_BATCH = 16  # after a batch, killed mutants skip the remaining worlds
 CRASH_STATUSES = frozenset({Status.PYTHON_ERROR, Status.KILLED})
 
-ProgressBar: TypeAlias = Callable[[Iterable[Any], str, int], Iterator[Any]]  # items, label and count
+ProgressBar: TypeAlias = Callable[[Iterable[Any], str, int], Iterator[Any]]  # takes items, label and count
 
 
 def mutation_score(
@@ -82,13 +82,13 @@ def mutation_score(
 
 
 def _satisfied(scenarios: Sequence[Scenario], faults: Sequence[MutantResult | None]) -> tuple[Scenario, ...]:
-    """Restrict scenarios to the requirements of the prompts that an original satisfies."""
+    """Return the scenarios with only the requirements of the prompts that an original satisfies."""
     fitting = [prompt for prompt, fault in enumerate(faults) if fault is None]
     return tuple(one.asked_by(*fitting) for one in scenarios)
 
 
 def mutation_worlds(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
-    """Return the worlds for mutants; if worlds are sampled, the seed differs from that of the suite."""
+    """Return the worlds for mutants. If worlds are sampled, they have another seed than the suite's."""
     if suite.worlds is not None:
         return (
             suite.with_worlds(count or DEFAULT_MUTANT_WORLDS, seed + 1 + (suite.seed or 0))

@@ -1,4 +1,4 @@
 """Creates reports: figures, tables and a page that show how models perform and why their programs fail.
 
-Start with `writing.py`, which assembles the sections; `page.yaml` contains their text.
+Start with `writing.py`, which assembles the sections. Their text is in `page.yaml`.
 """

@@ -40,7 +40,7 @@ def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table that compares tasks that end with a report to all others."""
+    """Build the table that compares the tasks that end with a report to all other tasks."""
     rows: list[list[Cell]] = []
     for run in runs:
         for reports, completions, failed, away, lost, passed in compare_report_back(run.results).iter_rows():
@@ -70,7 +70,7 @@ def phrasings(runs: Sequence[JudgedRun]) -> Section:
 
 
 def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of the spread of pass@1 over the prompts of each task and run, widest first."""
+    """Build the table of the spread of pass@1 over the prompts of each task and run, widest spread first."""
     order = tasks_of(runs)
     found = [(run, row) for run in runs for row in spread_by_task(run.table).iter_rows()]
     rows = []
@@ -81,7 +81,7 @@ def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def distinct_words(one: str | None, other: str | None) -> tuple[str, str]:
-    """Return the words that occur only in the first text, and those that occur only in the second."""
+    """Return the words that occur only in the first text, and the words that occur only in the second."""
     if one is None or other is None:
         return NO_INSTRUCTION, NO_INSTRUCTION
     words = (re.findall(r"[^\W_]+(?:['\u2019][^\W_]+)*", text.lower()) for text in (one, other))

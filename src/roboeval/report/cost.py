@@ -31,13 +31,13 @@ def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
 
 
 def retry_curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float, float]]]:
-    """Compute the share of prompts that reach each threshold of pass@1, for each limit of retries."""
+    """Compute, for each limit on retries, the share of prompts that reach each threshold of pass@1."""
     found = {limit: resample(prompts, limit).by_prompt for limit in LIMITS}
     return {limit: threshold_curve([one.passed for one in each]) for limit, each in found.items()}
 
 
 def retries_sheet(checked: Mapping[str, Sequence[CheckedPrompt]]) -> Sheet:
-    """Build the table of pass@1 by run and limit of retries."""
+    """Build the table of pass@1 by run and limit on retries."""
     rows: list[list[Cell]] = []
     for name, prompts in checked.items():
         for at in (resample(prompts, limit) for limit in LIMITS):
@@ -73,7 +73,7 @@ def cost_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
 
 
 def cost_sentence(run: JudgedRun, prices: Mapping[str, Price]) -> str:
-    """Describe the cost per passing program; return an empty string if no cost was recorded."""
+    """Describe the cost per passing program. Return an empty string if no cost was recorded."""
     cost = cost_of(run.table, price_of(run, prices))
     each = []
     if cost.money_per_pass is not None:
@@ -86,14 +86,14 @@ def cost_sentence(run: JudgedRun, prices: Mapping[str, Price]) -> str:
 
 
 def budget_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
-    """Build the table of passing programs per budget, for runs whose programs were checked."""
+    """Build a table that shows how many passing programs a budget buys, for runs with checked programs."""
     checked = [run for run in runs if run.trials]
     rows = [[run.name, *one] for run in checked for one in budgets(run.table, price_of(run, prices))]
     return sheet("budget", rows)
 
 
 def read_prices(texts: Sequence[str]) -> dict[str, Price]:
-    """Parse prices written as `MODEL=INPUT/OUTPUT`, and return them by model."""
+    """Parse prices of the form `MODEL=INPUT/OUTPUT`, and return them by model."""
     prices: dict[str, Price] = {}
     for text in texts:
         model, _, numbers = text.rpartition("=")
@@ -108,12 +108,12 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
 
 
 def price_of(run: JudgedRun, prices: Mapping[str, Price]) -> Price | None:
-    """Return the price given for a run's folder, name or model, or None if there is none."""
+    """Return the price that was given for a run's folder, name or model, or None if none was given."""
     return next((prices[name] for name in (run.folder, run.name, run.model or "") if name in prices), None)
 
 
 def expect_known(prices: Mapping[str, Price], runs: Sequence[JudgedRun]) -> None:
-    """Raise UserError if a price is given for a model that none of the runs used."""
+    """Raise UserError if a price is given for a model that no run used."""
     for model, price in prices.items():
         if not any(price_of(run, {model: price}) for run in runs):
             names = ", ".join(run.name for run in runs)

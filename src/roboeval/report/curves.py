@@ -29,7 +29,7 @@ from roboeval.report.drawing import (
 from roboeval.report.runs import JudgedRun
 
 LABELLED_POWERS = (0.1, 0.01, 0.001)  # tick labels of the threshold axis
-MAX_SHORT_AXIS, EXTRA_LABELS = 20, (0.5, 0.2)  # extra tick labels if no prompt has more completions
+MAX_SHORT_AXIS, EXTRA_LABELS = 20, (0.5, 0.2)  # add tick labels if no prompt has more completions than this
 MIN_LABEL_RATIO = 1.6  # two labels with a smaller ratio would overlap
 
 Points: TypeAlias = Sequence[tuple[float, float]]
@@ -47,7 +47,7 @@ def draw_thresholds(runs: Sequence[JudgedRun]) -> Figure:
 
 
 def most_completions(runs: Sequence[JudgedRun]) -> int:
-    """Return the largest number of completions of a prompt, but at least 2 so that the axis has a length."""
+    """Return the largest number of completions of a prompt, but at least 2, so that the axis has a length."""
     return max(2, *(prompt.n for run in runs for score in run.scores for prompt in score.prompts))
 
 
@@ -72,7 +72,7 @@ def _plot_lines(
     height: float,
     **style: Any,  # noqa: ANN401 - passed on to matplotlib
 ) -> Figure:
-    """Draw one line per model; if there are too many models, only the best are coloured."""
+    """Draw one line per model. If there are too many models, only the best ones are coloured."""
     is_narrow = len(lines) <= MAX_COLOURED_RUNS
     columns = 1 if is_narrow and max(len(short_name(name)) for name in lines) > MAX_LEGEND_NAME else 2
     figure = new_figure(
@@ -102,7 +102,7 @@ def _steps(points: Points, most: int) -> Points:
 
 
 def _threshold_axes(axes: Axes, most: int) -> None:
-    """Set the scale and labels of a threshold axis; axes that share it follow."""
+    """Set the scale and labels of a threshold axis. Axes that share it follow."""
     axes.set_xscale("log")
     axes.set_xlim(1, 1 / most)
     shown = (*(EXTRA_LABELS if most <= MAX_SHORT_AXIS else ()), *LABELLED_POWERS)
@@ -112,7 +112,7 @@ def _threshold_axes(axes: Axes, most: int) -> None:
 
 
 def _threshold_labels(axes: Axes, most: int) -> None:
-    axes.minorticks_off()  # without them, drawing is much faster
+    axes.minorticks_off()  # drawing is much faster without minor ticks
     marks = (digit * power for power in LABELLED_POWERS for digit in range(2, 10))
     between = [mark for mark in marks if mark > 1 / most]
     small: dict[str, Any] = {"marker": TICKDOWN, "markersize": 1.5, "markeredgewidth": 0.6}
@@ -123,7 +123,7 @@ def _threshold_labels(axes: Axes, most: int) -> None:
 
 
 def draw_limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure:
-    """Draw the share of prompts that reach each threshold of pass@1, by model and limit of retries."""
+    """Draw the share of prompts that reach each threshold of pass@1, by model and limit on retries."""
     columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3 if len(curves) <= MAX_COLOURED_RUNS else 5)
     rows = math.ceil(len(curves) / columns)
     figure = new_figure(PAGE_WIDTH if columns > 1 else COLUMN_WIDTH, 1.75 * rows + 0.55)

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from codebotler.core.terminal import visible
 
 PAGE_WIDTH, COLUMN_WIDTH = 7.16, 3.5  # widths of a page and of a column of a paper, in inches
-DPI, POINTS = 300, 72  # per inch
+DPI, POINTS = 300, 72  # pixels and points per inch
 
 BACKGROUND, FOREGROUND, PALE, MUTED = "#ffffff", "#1b1b1f", "#d5d5da", "#6f6f78"
 BLACK, WHITE = "#010101", "#fefefe"  # matplotlib omits #000000 from SVG, so `darken` would miss it
@@ -33,7 +33,7 @@ DARK_COLOURS = {
     MUTED: "#8f919b",
     BLACK: "#ffffff",
 }
-# The palette by Okabe and Ito, whose colours are distinguishable for colour-blind readers.
+# The palette by Okabe and Ito, whose colours can be told apart by colour-blind readers.
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", BLACK, "#F0E442")
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
@@ -84,12 +84,12 @@ def use_style() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Create an empty figure with automatic layout; `width` and `height` are in inches."""
+    """Create an empty figure with automatic layout. `width` and `height` are in inches."""
     return Figure(figsize=(width, height), dpi=DPI, layout="constrained")
 
 
 def render(figure: Figure) -> dict[str, bytes]:
-    """Render a figure as png, pdf and svg without dates and versions; the layout is computed only once."""
+    """Render a figure as png, pdf and svg without dates and versions. The layout is computed only once."""
     if (layout := figure.get_layout_engine()) is not None:
         layout.execute(figure)
         figure.set_layout_engine(None)
@@ -136,7 +136,7 @@ def darken(svg: bytes) -> bytes:
 
 
 def short_name(name: str, most: int = MAX_FIGURE_NAME) -> str:
-    """Shorten a name for a figure by omitting its middle; beginnings and ends distinguish names best."""
+    """Shorten a name for a figure. Omit the middle, because names differ most at their ends."""
     name, end = visible(name), (most - 1) // 2
     return name if len(name) <= most else f"{name[: most - 1 - end]}…{name[-end:]}"
 

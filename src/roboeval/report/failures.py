@@ -1,4 +1,4 @@
-"""Builds the sections on causes of failures, groups of similar failures, and verdicts of another suite."""
+"""Builds the sections on causes of failures, groups of similar failures, and verdicts under another suite."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MAX_GROUPS_PER_RUN, MIN_GROUPS_PER_RUN, MAX_GROUPS_SHOWN = (
     100,
     4,
     200,
-)  # groups shown on the page: maximum and minimum per run, and total
+)  # number of groups on the page: at most and at least per run, and in total
 
 
 # --- causes
@@ -45,7 +45,7 @@ def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple
 
 
 def most_frequent(run: JudgedRun) -> str:
-    """Describe the most frequent kind of failure; return an empty string if no completion fails."""
+    """Describe the most frequent kind of failure. Return an empty string if no completion fails."""
     counts = {key: count for key, count in causes(tally_of(run.table)).counts.items() if key[1] != ALL}
     if not counts:
         return ""
@@ -71,7 +71,7 @@ def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
 
 
 def published_notes(runs: Sequence[JudgedRun]) -> list[str]:
-    """Describe the limits of comparing runs with published causes."""
+    """Describe the limitations of comparing runs with published causes."""
     known = [run for run in runs if paper.model_of(run) is not None]
     if not known:
         return ["None of these runs uses a model of the paper, so no published causes are shown."]
@@ -85,7 +85,7 @@ def published_notes(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def failures_section(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on groups of similar failures; the page shows the largest groups of each run."""
+    """Build the section on groups of similar failures. The page shows the largest groups of each run."""
     most = max(MIN_GROUPS_PER_RUN, min(MAX_GROUPS_PER_RUN, MAX_GROUPS_SHOWN // len(runs)))
     every: list[tuple[str, FailureGroup]] = []
     shown: list[tuple[str, FailureGroup]] = []
@@ -120,7 +120,7 @@ def _cells(one: FailureGroup) -> list[Cell]:
 
 
 def other_suite(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section that compares the verdicts of this suite with those of another suite."""
+    """Build the section that compares the verdicts under this suite with those under another suite."""
     found = [
         verdict_changes(run.name, run.results, run.other_suite) for run in runs if run.other_suite is not None
     ]
@@ -151,7 +151,7 @@ def changed_tasks_sheet(found: Sequence[VerdictChanges]) -> Sheet:
 
 
 def reversals_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """Build the table of groups of completions that pass under only one suite."""
+    """Build the table of groups of completions that pass under only one of two suites."""
     rows: list[list[Cell]] = []
     for one in found:
         sides = zip(one.suites, (one.first_only, one.second_only), strict=True)

@@ -37,7 +37,7 @@ from roboeval.report.runs import JudgedRun, tasks_of
 HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "", "++++")  # distinguish bars in print
 TASKS_PER_ROW = 8
 MIN_TASK_SLOTS = 4  # minimum width in tasks, so that a single bar does not fill the page
-BAR_FILL = 0.82  # share of a task's width that is filled by its bars
+BAR_FILL = 0.82  # share of a task's width that its bars fill
 MAX_PANELS_PER_ROW = 3  # leaves enough room for the labels between panels
 MAX_NUMBERED_CELLS = 14  # tables with more rows or columns have no numbers in their cells
 DARK_CELL_SHARE = 0.75  # cells with a larger share have white text
@@ -75,7 +75,7 @@ def _whisker(cap: float) -> dict[str, Any]:
 
 
 def draw_task_scores(runs: Sequence[JudgedRun]) -> Figure:
-    """Draw pass@1 by task and model with intervals over prompts, and ablated tasks in a second panel."""
+    """Draw pass@1 by task and model, with intervals over prompts. A second panel shows ablated tasks."""
     tasks = tasks_of(runs)
     judged = {score.task for run in runs for score in run.ablated_scores}
     ablated = [task for task in runs[0].suite.tasks if task in judged]
@@ -157,7 +157,7 @@ def _two_lines(task: str) -> str:
 
 
 def _heat_of_tasks(runs: Sequence[JudgedRun], tasks: Sequence[str], ablated: Sequence[str]) -> Figure:
-    """Draw pass@1 by task as a heat map with one row per model, since there are too few colours for bars."""
+    """Draw pass@1 by task as a heat map with one row per model, because bars would need too many colours."""
     figure = new_figure(PAGE_WIDTH, 1.3 + 0.16 * len(runs))
     widths = [len(tasks), *([len(ablated)] if ablated else [])]
     grid = figure.add_gridspec(1, len(widths), width_ratios=widths)
@@ -247,7 +247,7 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]], shown: Sequence[st
 
 
 def _looks() -> dict[str, tuple[str, str]]:
-    """Map each outcome to a colour and a hatch, which are fixed for the classes of the paper."""
+    """Map each outcome to a colour and a hatch. Those of the paper's classes are always the same."""
     others = [name for name in FAILURE_CLASSES if name != NO_PROGRAM_CLASS]
     colours = cycle(COLOURS[at] for at in (1, 0, 3, 2, 4, 5))
     hatches = cycle(("", "////", "\\\\\\\\", "....", ""))

@@ -20,7 +20,7 @@ def house(runs: Sequence[JudgedRun]) -> Section:
 
 
 def rules_sheet(found: Sequence[tuple[JudgedRun, BrokenRules]]) -> Sheet:
-    """Build the table of the share of programs that break a rule, and of pass@1 without and with rules."""
+    """Build the table of the share of programs that break rules, and of pass@1 without and with the rules."""
     rows: list[list[Cell]] = []
     notes = []
     for run, one in found:

@@ -32,7 +32,7 @@ from roboeval.report.sheets import (
 from roboeval.suites.task import check_label
 
 MAX_TEXT, MAX_REPORTED_PROGRAM, MAX_DIFF_LINES = 500, 6_000, 80  # limits for text written by models
-MAX_TABLE_ROWS = 1_000  # on the page; the CSV file contains all rows
+MAX_TABLE_ROWS = 1_000  # rows on the page; the CSV file contains all rows
 MAX_UNFOLDED_ROWS = 24  # larger tables are folded
 LONG_CELL = 70  # characters; longer cells are wrapped
 PAGE_STYLE = Path(__file__).with_name("page.css")
@@ -43,7 +43,7 @@ DrawnFigures = Mapping[str, DrawnFigure]
 
 
 def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawings: DrawnFigures) -> str:
-    """Render the page as HTML; all text is escaped, so text written by models has no effect."""
+    """Render the page as HTML. All text is escaped, so that text written by models cannot do any harm."""
     script = PAGE_SCRIPT.read_text()
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'"
@@ -66,7 +66,7 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawings:
 
 
 def _text(words: str) -> str:
-    """Escape text for HTML; unprintable characters, such as lone surrogates, are shown as escapes."""
+    """Escape text for HTML. Unprintable characters, such as lone surrogates, are shown as escapes."""
     plain = "".join(
         c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in words
     )

@@ -23,7 +23,7 @@ def published() -> dict[str, Any]:
 
 
 def model_of(run: JudgedRun) -> str | None:
-    """Return the model of the paper that a run used, by its recorded name or folder, or None if unsure."""
+    """Return the paper's model that a run used, judged by its recorded name or folder, or None if unsure."""
     if run.results.manifest.get("suite") != PAPER_SUITE or run.is_mixed:
         return None
     provider, colon, name = (run.model or run.folder).lower().partition(":")
@@ -39,7 +39,7 @@ def recognised_models(runs: Iterable[JudgedRun]) -> list[str]:
 
 
 def uses_authors_prompts(run: JudgedRun) -> bool:
-    """Whether the completions are imported ones that answer the authors' prompts instead of the suite's."""
+    """Whether the completions were imported and answer the authors' prompts instead of the suite's."""
     ours = {prompt for task in run.suite.tasks.values() for prompt in task.prompts}
     return "settings" not in run.results.about and not ours & {*run.instructions.values()}
 

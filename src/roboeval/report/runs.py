@@ -25,7 +25,7 @@ MAX_RUN_NAME = 100
 
 @dataclass(frozen=True, eq=False)
 class JudgedRun:
-    """A judged run, with results under further requirements if available."""
+    """A judged run, with its results under other requirements if available."""
 
     results: Results
     table: pl.DataFrame  # the column `accepted` is null for unchecked programs
@@ -98,7 +98,7 @@ class JudgedRun:
 
     @cached_property
     def trials(self) -> tuple[CheckedPrompt, ...]:
-        """The checked completions of each prompt; empty unless all completions were checked."""
+        """The checked completions of each prompt. Empty unless all completions were checked."""
         return () if self.table["accepted"].null_count() else trials_by_prompt(self.table)
 
 
@@ -109,7 +109,7 @@ def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
-    """Describe the coverage of each run for captions, without repeating equal sentences."""
+    """Describe the coverage of each run for captions. If all runs have the same, describe it once."""
     sentences: dict[str, list[str]] = {}
     for run in runs:
         sentences.setdefault(run.coverage_sentence, []).append(run.name)
@@ -120,7 +120,7 @@ def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
-    """Parse labels written as `RUN=TEXT`, and return them by the index of the run with that folder."""
+    """Parse labels of the form `RUN=TEXT`, and return them by the index of the run with that folder."""
     labels: dict[int, str] = {}
     names = [{str(path), path.resolve().name} for path in paths]
     for text in texts:
@@ -136,7 +136,7 @@ def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
 
 
 def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
-    """Name each run by its label or model, and make duplicate names unique by the folder or a number."""
+    """Name each run after its label or model. Add the folder or a number to names that would be equal."""
     given = {at: short_name(label, MAX_RUN_NAME) for at, label in labels.items()}
     plain = [
         given.get(at) or short_name(run.model or run.folder, MAX_RUN_NAME) for at, run in enumerate(runs)

@@ -142,7 +142,7 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
 
 
 def leader(runs: Sequence[JudgedRun]) -> list[str]:
-    """Compare the two best runs in a sentence; return nothing for a single run."""
+    """Compare the two best runs in a sentence. Return nothing for a single run."""
     if len(runs) == 1:
         return []
     best, second, *_ = sorted(runs, key=lambda run: -run.mean)

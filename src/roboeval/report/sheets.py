@@ -59,7 +59,7 @@ class Sheet(NamedTuple):
 def sheet(
     name: str, rows: Sequence[Sequence[Any]], *, notes: Sequence[str] = (), shares: Sequence[str] = ()
 ) -> Sheet:
-    """Create a table described in page.yaml; `shares` adds columns of shares, such as one per model."""
+    """Create a table that page.yaml describes. `shares` adds columns of shares, such as one per model."""
     kinds = page_text("tables", name)["columns"]
     columns = [Column(head, kind) for part in kinds for kind, heads in part.items() for head in heads]
     return Sheet(name, [*columns, *(Column(head, "share") for head in shares)], rows, notes)
@@ -141,7 +141,7 @@ def write_csv(table: Sheet, folder: Path) -> None:
 
 
 def _heads(columns: Sequence[Column]) -> list[str]:
-    """Return the headings of columns, made unique by numbers because a model may be named `task`."""
+    """Return the headings of columns. Numbers make them unique, because a model may be named `task`."""
     heads: list[str] = []
     for column in columns:
         plain = storable(column.head)

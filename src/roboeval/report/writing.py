@@ -140,7 +140,7 @@ def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
 
 
 def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], out: Path) -> Iterator[str]:
-    """Write a report to a folder and yield the name of each part; the page comes last."""
+    """Write a report to a folder, and yield the name of each part. The page comes last."""
     parts = [part for section in sections for part in section.parts]
     (out / "tables").mkdir(parents=True, exist_ok=True)
     if not (out / PAGE_FILE).exists():

@@ -1,4 +1,4 @@
-"""Supports training with prompts, and with rewards and their components.
+"""Provides prompts for training models, and rewards with their components.
 
 Start with `prompts.py`. Tasks come from families, never from the suites that ship with RoboEval.
 """

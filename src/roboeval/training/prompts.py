@@ -1,4 +1,4 @@
-"""Generates training prompts as rows of a data set, and extracts programs from a policy's completions."""
+"""Generates prompts for training as rows of a data set, and extracts programs from a policy's completions."""
 
 from __future__ import annotations
 
@@ -25,19 +25,20 @@ def load_prompts(
     form: PromptForm = "chat",
     progress: Callable[[int], object] | None = None,
 ) -> list[dict[str, Any]]:
-    """Generate any number of prompts for programs; the result is reproducible.
+    """Generate any number of prompts that ask for programs. The result is reproducible.
 
     Args:
         split: `train`, `validation` or `test`, which share no task.
         count: the number of prompts.
-        seed: each seed, from 0, gives entirely different tasks.
+        seed: the random seed, from 0. Each seed gives entirely different tasks.
         only: names or `.yaml` files of families; by default all families that ship with RoboEval.
         form: `chat` for messages, or `text` for a single text that a base model continues.
-        progress: called with the number of prompts so far.
+        progress: a function that is called with the number of prompts so far.
 
     Returns:
-        Rows with `prompt` (messages with `role` and `content`, or a text); `family`, `seed` and
-        `prompt_index`, which identify the task; and `opening`, the program's first line if the prompt has it.
+        Rows with `prompt` (messages with `role` and `content`, or a text), with `family`, `seed` and
+        `prompt_index`, which identify the task, and with `opening`, the first line of the program if the
+        prompt ends with it.
 
     Raises:
         UserError: the split or a family does not exist, or the count or seed is out of range.
@@ -58,7 +59,7 @@ def load_prompts(
 
 
 def _row(families: Sequence[str], seed: int, form: PromptForm) -> dict[str, Any]:
-    """Return the row for a seed; families and their prompts take turns."""
+    """Return the row for a seed. From seed to seed, families and their prompts take turns."""
     turn, number = divmod(seed, len(families))
     family = families[number]
     prompts = trained_prompts(family, seed)

@@ -37,8 +37,8 @@ class Components:
     Args:
         reward: the value of `roboeval.reward`: 1 if and only if the program passes, 0 if it does nothing.
         passed: 1 if all requirements hold in all worlds.
-        requirements: the share of requirements that hold, averaged over worlds; not a reward by itself,
-            because some requirements hold for a program that does nothing.
+        requirements: the share of requirements that hold, averaged over worlds. It is not a reward by
+            itself, because some requirements hold for a program that does nothing.
         without_errors: the share of worlds where the program ends without an error.
         parses: 1 if the program is valid Python.
         rules_kept: the share of worlds where the program breaks no house rule.
@@ -62,10 +62,10 @@ def judge(
     """Judge a policy's programs in the worlds of their tasks, a few batches at a time.
 
     Args:
-        rollouts: the programs; equal programs are judged once.
+        rollouts: the programs. Equal programs are judged once.
         worlds: the minimum number of worlds per task, 1 to 10,000.
-        house: house rules; a program that breaks a rule is stopped.
-        progress: called with the number of distinct rollouts judged so far.
+        house: the house rules. A program that breaks a rule is stopped.
+        progress: a function that is called with the number of distinct rollouts judged so far.
 
     Raises:
         UserError: a family or prompt does not exist.
@@ -104,7 +104,7 @@ def _key(one: Rollout, worlds: int, house: HouseRules | None) -> bytes:
 
 
 def _judge_batch(worlds: int, house: HouseRules | None, batch: Sequence[Rollout]) -> list[Components]:
-    """Judge programs for one prompt; call this in a thread with a worker."""
+    """Judge programs for one prompt. The calling thread must have a worker."""
     first = batch[0]
     task = trained_task(first.family, first.seed, worlds=worlds)
     task.expect_prompt(first.prompt_index)

@@ -24,7 +24,7 @@ REPORT_POLICY = (
     "script-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
-TABLE_NAME = re.compile(r"[\w-]{1,100}")  # excludes names that lead to another folder
+TABLE_NAME = re.compile(r"[\w-]{1,100}")  # excludes paths to other folders
 
 FilterQuery: TypeAlias = Annotated[CompletionFilter, Depends()]
 EvaluationQuery: TypeAlias = Annotated[
@@ -62,7 +62,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         offset: Annotated[int, Query(ge=0, description="Number of completions to skip.")] = 0,
         limit: Annotated[int, Query(ge=1, le=MAX_PAGE_SIZE, description="Maximum number to return.")] = 100,
     ) -> Response:
-        """List completions of a run page by page, optionally those of a prompt or with a kind of failure."""
+        """List completions of a run page by page, optionally only those of a prompt or kind of failure."""
         found = store.open(run, evaluation).select(chosen)
         part = [entry_data(row) for row in found[offset : offset + limit].iter_rows(named=True)]
         return _json({"total": found.height, "offset": offset, "completions": part})

@@ -70,7 +70,7 @@ def _read(
 
 
 def _worlds(run: Snapshot, task: str) -> dict[str, World]:
-    """Return the worlds of a task by description, or nothing if the suite is unavailable."""
+    """Return the worlds of a task by their descriptions, or nothing if the suite is unavailable."""
     if run.suite is None or task not in run.suite.tasks:
         return {}
     scenarios = run.suite.tasks[task].judged_in(ablated=run.results.is_ablated)
@@ -189,7 +189,7 @@ def _draw_reasons(data: Mapping[str, Any], anchor: str) -> None:
 
 
 def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> None:
-    """Draw what happened in a world; `anchor` is the prefix of the ids of its steps."""
+    """Draw what happened in a world. The HTML IDs of its steps start with `anchor`."""
     _draw_reasons(data, anchor)
     steps, cut = data["steps"], data.get("cut")
     wrong = {check["step"] for check in data["failed_checks"]} - {None}
@@ -221,7 +221,7 @@ def _draw_check(check: Mapping[str, Any], anchor: str) -> None:
 
 
 def _draw_folded(head: Callable[[], object], draw: Callable[[], None]) -> None:
-    """Draw a foldable section whose content is drawn when it is first unfolded."""
+    """Draw a foldable section, whose content is not drawn until it is first unfolded."""
     with html.details() as details:
         with ui.element("summary"):
             head()

@@ -33,11 +33,11 @@ class TaskRow:
     task: str
     shares: tuple[float, float]  # mean pass@1 over common prompts
     difference: Estimate  # second minus first; interval over prompts, or over tasks for all tasks
-    differing: tuple[tuple[CompletionKey, bool], ...]  # passed in one run only; True if in the second
+    differing: tuple[tuple[CompletionKey, bool], ...]  # pass in one run only, True for the second run
 
 
 def task_rows(first: Snapshot, second: Snapshot) -> list[TaskRow]:
-    """Compare the tasks that both runs have in common, largest differences first."""
+    """Compare the tasks that two runs have in common, and return the largest differences first."""
     scores = [pass_at_1(run.scores) for run in (first, second)]
     prompts: dict[str, list[tuple[float, float]]] = {}
     for key in scores[0]:
@@ -78,7 +78,7 @@ class Difference:
 
 
 def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
-    """Compare pairs of judged runs, and a single pair also by task; large runs may take seconds."""
+    """Compare pairs of judged runs, and a single pair also by task. For large runs, this may take seconds."""
     pairs = pairs_to_compare(runs, lambda run: 0.0 if run.pass_at_1 is None else run.pass_at_1.mean)
     return [_difference(*pair, by_task=len(runs) == RUNS_IN_PAIR) for pair in pairs]
 

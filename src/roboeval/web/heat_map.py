@@ -21,7 +21,7 @@ EMPTY_CELL = {"text": "", "shade": "none"}
 
 
 def shade(share: float | None, *, bad: bool) -> str:
-    """Return the CSS class of a cell with a share from 0 to 1, or None if the share is unknown."""
+    """Return the CSS class of a cell. Its share is from 0 to 1, or None if it is unknown."""
     if share is None:
         return "waits"
     step = (
@@ -40,7 +40,7 @@ def run_address(run: str) -> str:
 
 
 def models_of(run: Snapshot) -> str:
-    """Format the models of a run, shortened if there are many."""
+    """Format the names of a run's models. If there are many, shorten the list."""
     if not run.models:
         return "model not recorded"
     return shortened(", ".join(run.models), MAX_MODELS_TEXT) + recorded_suffix(run.models)
@@ -57,7 +57,7 @@ def failure_text(chosen: CompletionFilter) -> str | None:
 
 
 class TaskCells:
-    """Computes the cells of a run in a heat map of tasks by prompts, with the selected cell marked."""
+    """Computes the cells of a run in a heat map of tasks by prompts, and marks the selected cell."""
 
     def __init__(self, run: Snapshot, chosen: CompletionFilter, evaluation: str | None = None) -> None:
         self._run, self._filter, self._evaluation = run, chosen, evaluation

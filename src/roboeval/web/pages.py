@@ -25,7 +25,7 @@ from roboeval.web.widgets import page_of
 
 
 def pages(suites: Sequence[Suite] = ()) -> Pages:
-    """Create the pages; `suites` are available in addition to the suites in the package."""
+    """Create the pages. `suites` are available in addition to the suites in the package."""
 
     def add(site: Site) -> None:
         store = RunStore(site.runs, suites)

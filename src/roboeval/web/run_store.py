@@ -23,7 +23,7 @@ REPORT_PAGE, MAX_REPORT_BYTES = (
     "index.html",
     20_000_000,
 )  # file name of a report, and its maximum size in bytes
-REST_FACTOR = 10  # pause between two reads of a run, as a multiple of the duration of a read
+REST_FACTOR = 10  # pause between two reads of a run, as a multiple of the time that a read takes
 OUTSIDE_FOLDER = "leads outside the folder of runs; move it into the folder"
 
 FileStamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
@@ -34,7 +34,7 @@ class MissingError(UserError):
 
 
 class RunStore:
-    """Provides the runs in a folder, which may also be a run itself or not exist yet; thread-safe."""
+    """Provides the runs in a folder, which may itself be a run or not exist yet. It is thread-safe."""
 
     def __init__(self, folder: Path, suites: Sequence[Suite] = ()) -> None:
         self.folder = folder
@@ -46,7 +46,7 @@ class RunStore:
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """Read a run or reuse a snapshot; `key` defaults to the first evaluation that is not an ablation."""
+        """Read a run, or reuse a snapshot. By default, `key` is the first evaluation that is no ablation."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:
@@ -54,7 +54,7 @@ class RunStore:
         return self._reader(name, None).version()
 
     def report(self, name: str, part: str = REPORT_PAGE) -> bytes | None:
-        """Read the page or another part of a run's report; return None if it cannot be read."""
+        """Read the page or another part of a run's report. Return None if it cannot be read."""
         path = self._reader(name, None).folder / "report" / part
         if _stamp(path, self.folder.resolve()) is None:
             return None
@@ -74,7 +74,7 @@ class RunStore:
             return False
 
     def suite(self, name: str) -> Suite | None:
-        """Load a built-in, installed or given suite; return None if it is unavailable."""
+        """Load a built-in, installed or given suite. Return None if it is unavailable."""
         if name not in self._suites:
             try:
                 self._suites[name] = load_suite(name) if has_suite(name) else None
@@ -95,7 +95,7 @@ class RunStore:
             raise UserError(f"cannot be read ({error.strerror})", file=self.folder) from None
 
     def _reader(self, name: str, key: str | None) -> _Reader:
-        path = self._folders().get(name)  # looked up among entries, so a name cannot lead to another folder
+        path = self._folders().get(name)  # looking up names prevents paths to other folders
         if path is None or not _is_run(path):
             raise MissingError(f'this folder has no run "{shortened(name)}"; it may have been deleted')
         if not path.resolve().is_relative_to(self.folder.resolve()):

@@ -83,7 +83,7 @@ def run_data(run: Snapshot) -> dict[str, Any]:
 
 
 def settings_text(about: Mapping[str, Any]) -> str:
-    """Format the settings in run.json, without settings that were not sent to the model."""
+    """Format the settings in run.json, except those that were not sent to the model."""
     settings = about.get("settings")
     named = settings.items() if isinstance(settings, dict) else ()
     return ", ".join(
@@ -100,7 +100,7 @@ def date_of(about: Mapping[str, Any]) -> str | None:
 
 
 def notes(run: Snapshot) -> list[str]:
-    """Describe the problems of a run in sentences."""
+    """Describe the problems of a run, one sentence each."""
     results, stale = run.results, len(run.results.stale)
     faults = [UserError(f.sentence, file=Path(str(f.file)).name, line=f.line) for f in results.faults]
     found = [str(fault) for fault in faults[:MAX_FAULTS_SHOWN]]
@@ -124,14 +124,14 @@ def notes(run: Snapshot) -> list[str]:
 
 
 class RunList:
-    """Summarises the runs of a store, and updates a summary only when its run changes."""
+    """Summarises the runs in a store, and updates a summary only if its run has changed."""
 
     def __init__(self, store: RunStore) -> None:
         self._store = store
         self._known: dict[str, tuple[Hashable, dict[str, Any]]] = {}
 
     def data(self, seconds: float = math.inf) -> list[dict[str, Any]]:
-        """Summarise all runs, or say why a run cannot be read; stop reading runs after `seconds`."""
+        """Summarise all runs, or say why a run cannot be read. After `seconds`, read no further runs."""
         until = time.monotonic() + seconds
         return [self._run_data(name, may_read=time.monotonic() < until) for name in self._store.names()]
 

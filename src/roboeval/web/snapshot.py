@@ -1,4 +1,4 @@
-"""Snapshots of a run: judged and unjudged completions, and their counts."""
+"""Takes snapshots of a run: its judged and unjudged completions, and their counts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from roboeval.suites.load import Suite
 from roboeval.suites.task import check_label
 
 HAS_NO_PROGRAM = pl.col("failure_class").eq_missing(NO_PROGRAM_CLASS)
-# A sign for the result of a program in a world: + satisfied, - not satisfied, ! error.
+# The sign for the result of a program in a world is + if satisfied, - if not satisfied, and ! for an error.
 WORLD_SIGN = (
     pl.when("satisfied")
     .then(pl.lit("+"))
@@ -33,7 +33,7 @@ WORLD_SIGN = (
     .then(pl.lit("-"))
     .otherwise(pl.lit("!"))
 )
-# The cause of a failure: a failed check, the limit that stopped the program, or an error.
+# The cause of a failure is a failed check, the limit that stopped the program, or an error.
 ERROR_MESSAGE = pl.col("error_message")
 FAILURE_CAUSE = (
     pl.when(HAS_NO_PROGRAM)
@@ -49,7 +49,7 @@ INT64_LIMIT = 2**63
 
 @dataclass(frozen=True)
 class CompletionFilter:
-    """Selects completions by values of columns; pages and the API accept it as a query."""
+    """Selects completions by the values of columns. Pages and the API accept a filter as a query."""
 
     task: Annotated[str | None, Query(description="Only this task.")] = None
     prompt: Annotated[
@@ -107,8 +107,8 @@ class Snapshot:
     def completions(self) -> pl.DataFrame:
         """One row for each completion in the order of the suite, even if only its verdict still exists.
 
-        `passed` is null if the completion was not judged, `worlds` contains a sign for each world, `why` is
-        the check or error that caused the failure, and `written` tells whether the completion still exists.
+        `passed` is null if the completion was not judged. `worlds` contains a sign for each world. `why` is
+        the check or error that caused the failure. `written` says whether the completion still exists.
         """
         judged = self.results.table.group_by(KEY, maintain_order=True).agg(
             pl.col("passed", "^failure_.*$", "stale").first(),
@@ -129,7 +129,7 @@ class Snapshot:
         return judged.join(written, on=KEY, how="full", coalesce=True).with_columns(*filled).sort(place, *KEY)
 
     def row(self, name: str) -> dict[str, Any] | None:
-        """Find the row of a completion by its name; return None if there is no such completion."""
+        """Find the row of a completion by its name. Return None if there is no such completion."""
         found = self.completions.filter(pl.format("{}/{}/{}", *KEY) == name)
         return found.row(0, named=True) if found.height else None
 
@@ -140,13 +140,13 @@ class Snapshot:
     def neighbours(
         self, key: CompletionKey, chosen: CompletionFilter
     ) -> tuple[CompletionKey | None, CompletionKey | None]:
-        """Return the previous and the next completion in the filtered list, each None if there is none."""
+        """Return the previous and the next completion in the filtered list, or None where there is none."""
         keys = [None, *self.select(chosen).select(KEY).iter_rows(), None]
         at = keys.index(key) if key in keys else None
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
     def prompts(self, chosen: CompletionFilter) -> list[dict[str, Any]]:
-        """Count for each prompt the completions `written`, `judged`, and `counted` (matching the filter)."""
+        """Count the completions of each prompt: `written`, `judged`, and `counted` (matching the filter)."""
         return prompt_counts(self.completions, chosen.verdict.condition).to_dicts()
 
     @property
@@ -171,7 +171,7 @@ class Snapshot:
 
     @property
     def cut_off(self) -> CutOff:
-        """Counts of the replies that were cut off."""
+        """The replies that were cut off."""
         return cut_off_replies(self.failures, self.scope)
 
     @cached_property

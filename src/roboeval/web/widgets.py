@@ -1,4 +1,4 @@
-"""Elements shared by the pages: heat maps, lists, programs, and the progress of runs."""
+"""Defines elements that the pages share: heat maps, lists, programs, and the progress of runs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MAX_PAGE_TITLE = 80
 
 @contextmanager
 def page_of(frame: Frame, title: str) -> Iterator[None]:
-    """Draw a page of the benchmark; errors for users are shown as sentences on the page."""
+    """Draw a page of the benchmark. The page shows each UserError as a sentence."""
     frame(shortened(title, MAX_PAGE_TITLE), "/runs")
     ui.add_head_html(STYLESHEET_LINK.format(prefix=outside("")))
     with ui.element("div").classes("benchmark"):
@@ -51,7 +51,7 @@ class _DataElement(Element):
 
 
 class HeatMap(_DataElement, component="static/heat.js"):
-    """A table of shaded shares; clicking a cell follows its link or calls `chosen` with task and prompt.
+    """A table of shaded shares. A click on a cell follows its link, or calls `chosen` with task and prompt.
 
     Its properties are `groups` with `name`, `href` and `columns` (`name`, `title`, `href`), and `rows` with
     `name` and `cells` (`text`, `shade`, `title`, `href`, `at`).
@@ -68,7 +68,7 @@ class HeatMap(_DataElement, component="static/heat.js"):
 
 
 class CompletionList(_DataElement, component="static/rows.js"):
-    """A list of completions, of which the browser fetches only those in view.
+    """A list of completions. The browser fetches only those in view.
 
     Its properties are `source` (the URL of the API), `base` and `query` (parts of the URLs of completion
     pages), and `version`, which changes when the completions change.
@@ -76,7 +76,7 @@ class CompletionList(_DataElement, component="static/rows.js"):
 
 
 class ProgramView(Element, component="static/code.js"):
-    """A program with some lines marked, numbered from 1; the text need not be valid Python."""
+    """A program in which some lines, numbered from 1, are marked. The text need not be valid Python."""
 
     def __init__(self, program: str, marked: Iterable[int]) -> None:
         super().__init__()
@@ -136,7 +136,7 @@ def interval_text(estimate: Estimate, form: str = ".2f") -> str:
 
 
 def score_text(data: Mapping[str, Any]) -> str:
-    """Format pass@1 of a run; return an empty string if nothing was judged."""
+    """Format pass@1 of a run. Return an empty string if nothing was judged."""
     mean = data.get("pass@1")
     if mean is None:
         return ""

@@ -71,7 +71,7 @@ class Completion:
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Completion:
-        """Create a completion from a row; raise UserError if an entry is missing or invalid."""
+        """Create a completion from a row. Raise UserError if an entry is missing or invalid."""
         more = dict(row)
         known = {name: more.pop(name) for name in FIELDS if name in more}
         for name in REQUIRED:
@@ -103,10 +103,10 @@ class Completion:
 
     @property
     def no_program(self) -> NoProgram | None:
-        """Return why the reply contained no program, or None if it contained one or this is unknown.
+        """Return why the reply contained no program, or None if it contained one or the reason is unknown.
 
-        Rows written by other tools are classified like new replies. Raises EngineError if this needs an
-        isolated process and none can be started.
+        Rows written by other tools are classified like new replies. Raises EngineError if an isolated process
+        is needed for this and cannot be started.
         """
         if NO_PROGRAM_COLUMN in self.more:
             kind: NoProgram | None = self.more[NO_PROGRAM_COLUMN]
@@ -183,7 +183,7 @@ def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completio
 
 
 def _is_of_other(completion: Completion, suite: Suite) -> str | None:
-    """Return an error if a completion belongs to another seed or version of task families."""
+    """Return an error message if a completion belongs to another seed or version of the task families."""
     if suite.families is None or completion.instruction is None:
         return None
     if completion.instruction == suite.tasks[completion.task].prompts[completion.prompt]:
@@ -208,7 +208,7 @@ def check_length(row: Mapping[str, Any], file: object, line: int | None = None) 
 
 
 def find_key_fault(key: CompletionKey, suite: Suite) -> str | None:
-    """Return an error if a suite lacks a task or prompt, whose types may also be wrong; otherwise None."""
+    """Return an error message if a suite lacks a task or prompt, or None. Their types may also be wrong."""
     task = suite.tasks.get(str(key[0]))
     if task is None:
         return f'the suite "{suite.name}" has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'

@@ -1,4 +1,4 @@
-"""Manages the folder of a run, whose completions and evaluations survive every interruption."""
+"""Manages the folder of a run, so that completions and evaluations survive every interruption."""
 
 from __future__ import annotations
 
@@ -64,17 +64,17 @@ class RunFolder:
         return sorted({key.removesuffix(ABLATED) for key in keys})
 
     def houses(self, suite: str) -> list[str]:
-        """Return the sorted names of the house rules that were used to judge the run with a suite."""
+        """Return the sorted names of the house rules with which a suite has judged the run."""
         before = f"{suite}{RULES_INFIX}"
         return [key.removeprefix(before) for key in self.judged_by() if key.startswith(before)]
 
     def read(self, suite: Suite | None = None) -> Iterator[Completion]:
-        """Read the completions; if a suite is given, they must belong to it."""
+        """Read the completions, which must belong to the suite if one is given."""
         return read_completions(self.completions, suite, growing=True)
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Lock this run so that no other process can write to it; raise UserError if one already does."""
+        """Lock this run so that no other process can write to it. Raise UserError if one already does."""
         self._expect_no_others()
         made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         lock = self.path / ".lock"
@@ -106,7 +106,7 @@ class RunFolder:
 
     @property
     def is_being_written(self) -> bool:
-        """Whether a process is writing to this run. Checking takes the lock briefly; writers wait for it."""
+        """Whether a process is writing to this run. The check holds the lock briefly, so writers may wait."""
         flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
         try:
             descriptor = os.open(self.path / ".lock", flags)
@@ -132,7 +132,7 @@ class RunFolder:
             )
 
     def keep(self, completions: Sequence[Completion]) -> None:
-        """Copy completions into this run; raise UserError and change nothing if it holds different ones."""
+        """Copy completions into this run. Raise UserError, and change nothing, if it holds different ones."""
         models = {completion.model for completion in completions}
         lines = (to_line(completion.row) for completion in completions)
         with self.writing():
@@ -161,7 +161,7 @@ LOCK_PAUSE_SECONDS = 0.05
 
 
 def _locked(descriptor: int) -> bool:
-    """Try to lock a file; retry briefly, because children of a killed process may still hold the lock."""
+    """Try to lock a file, for a short time because children of a killed process may still hold the lock."""
     for _ in range(LOCK_ATTEMPTS):
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -196,7 +196,7 @@ def about_of(run: RunFolder) -> dict[str, Any]:
 
 
 def evaluation_key(suite: Suite, *, ablated: bool) -> str:
-    """Return the name that an evaluation's files start with."""
+    """Return the name with which the files of an evaluation start."""
     named = suite.house is not None and suite.house.name
     rules = f"{RULES_INFIX}{named}" if named else ""
     return suite.name + rules + ABLATED * ablated
@@ -205,7 +205,7 @@ def evaluation_key(suite: Suite, *, ablated: bool) -> str:
 def tasks_to_judge(
     suite: Suite, names: str | None, *, ablated: bool
 ) -> tuple[frozenset[str] | None, tuple[str, ...]]:
-    """Parse a list of task names; return the tasks to judge, None for all, and those without an ablation."""
+    """Parse task names, and return the tasks to judge (None for all) and those without an ablation."""
     wanted = [*suite.tasks] if names is None else [suite.task(name.strip()).name for name in names.split(",")]
     if not ablated:
         return (None if names is None else frozenset(wanted)), ()
@@ -217,7 +217,7 @@ def tasks_to_judge(
 
 
 def with_judged_worlds(run: RunFolder, suite: Suite, *, ablated: bool) -> Suite:
-    """Return the suite with the same sampled worlds as when the run was judged."""
+    """Return the suite with the sampled worlds in which the run was judged."""
     path = run.manifest(evaluation_key(suite, ablated=ablated))
     drawn = suite.worlds, suite.seed
     if suite.worlds is None or not path.is_file():

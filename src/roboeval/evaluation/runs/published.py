@@ -36,7 +36,7 @@ File: TypeAlias = tuple[str, Callable[[], str]]  # the name of a file, and a fun
 def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Completion]:
     """Read the completions in a folder or zip of files named `TASK_PROMPT_INDEX.py`.
 
-    The files assign strings to `prompt` and `completion`; they are parsed but never imported. Raises
+    The files assign strings to `prompt` and `completion`. They are parsed but never imported. Raises
     UserError if there are none, one is invalid or unknown to the suite, or a zip is damaged or too large.
     """
     with _files(path) as files:
@@ -134,7 +134,7 @@ def _assigned(text: str, name: str) -> dict[str, str]:
 def _text(written: ast.expr, what: str, name: str) -> str:
     match written:
         case ast.Constant(str(text)):
-            # Join surrogate pairs like JSON does.
+            # Join surrogate pairs as JSON does.
             return text.encode("utf-16", errors="surrogatepass").decode("utf-16", errors="surrogatepass")
     raise UserError(
         f"`{what}` is not a plain string; write a single string literal", file=name, line=written.lineno

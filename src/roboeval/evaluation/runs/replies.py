@@ -1,4 +1,4 @@
-"""Extracts what rows of completions.jsonl recorded about replies."""
+"""Extracts the information about replies from rows of completions.jsonl."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ MAX_RECORDED = 10**12  # tokens or seconds; larger numbers cannot be measurement
 
 
 def reply_data(completion: Completion | None) -> dict[str, Any] | None:
-    """Return what was recorded about a completion's reply, or None if nothing was.
+    """Return the information recorded about a completion's reply, or None if there is none.
 
     The entries are `finish_reason` in the server's words, `cut_off`, `input_tokens`, `output_tokens`,
-    `reasoning_tokens`, `latency_s`, `reasoning` and `raw_reply`; each may be None.
+    `reasoning_tokens`, `latency_s`, `reasoning` and `raw_reply`. Each may be None.
     """
     more = {} if completion is None else completion.more
     if completion is None or not any(more.get(name) for name in ("finish_reason", "raw_reply", "reasoning")):

@@ -1,4 +1,4 @@
-"""Loads a judged run as one table, with a row per completion and world, for all statistics."""
+"""Loads a judged run as one table with a row per completion and world, from which statistics are computed."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Results:
 
     @property
     def known_suite(self) -> Suite:
-        """Return the suite; call this only if the evaluation was read with one."""
+        """Return the suite. The evaluation must have been read with one."""
         assert self.suite is not None, "only web pages show runs without their suite"
         return self.suite
 
@@ -107,7 +107,7 @@ class Results:
         return {key: c.program for key, c in self.completions.items() if key not in stale}
 
     def row(self, key: CompletionKey) -> Row:
-        """Read a row from the file, with all its traces; raise UserError if the file was replaced."""
+        """Read a row from the file, with all its traces. Raise UserError if the file was replaced."""
         at, size = self.places[key]
         path = self.run.rows(self.key or "")
         try:
@@ -127,7 +127,7 @@ class Results:
 
 
 ShowProgress: TypeAlias = Callable[[Iterator[LocatedRow], int], Iterable[LocatedRow]]
-"""A function that passes rows through and shows progress; the second argument is the number of rows."""
+"""A function that passes rows through and shows progress. The second argument is the number of rows."""
 
 
 def read_results(
@@ -142,17 +142,17 @@ def read_results(
     on_line: Callable[[bytes], None] | None = None,
     progress: ShowProgress = lambda lines, _: lines,
 ) -> Results:
-    """Read an evaluation of a run; each file is read once.
+    """Read an evaluation of a run. Each file is read once.
 
     Args:
         run: the run.
         key: the name of the evaluation, or None if the run has not been judged.
         suite: the suite that judged the run, or None if it is not available.
-        task: the only task to read rows for; all by default.
+        task: the only task whose rows are read, by default all tasks.
         reuse_from: another evaluation of the same run whose completions can be reused.
         keep_failed: whether to keep the failed rows, which may need much memory.
-        faults: a list that collects errors in files; by default, they are raised.
-        on_line: called with the line of each row.
+        faults: a list that collects errors in files, which are raised by default.
+        on_line: a function that is called with the line of each row.
         progress: a function that passes rows through and shows progress.
     """
     if reuse_from:

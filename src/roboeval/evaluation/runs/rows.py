@@ -17,11 +17,11 @@ from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Status
 
-MAX_LINE_BYTES = 1_000_000_000  # longer than any row with many worlds
+MAX_LINE_BYTES = 1_000_000_000  # enough for a row with very many worlds
 EVENT_KINDS = frozenset(SKILLS.recordings)
 NO_ROW = "this line is not an evaluation row"
 BROKEN = "was damaged or changed after the evaluation was finished"
-# The group matches escapes of lone surrogates; the rest matches similar text.
+# The group matches escapes of lone surrogates. The alternatives before it match backslashes and whole pairs.
 ESCAPES = re.compile(rb"\\\\|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(\\u[dD][89a-fA-F]..)")
 
 
@@ -50,9 +50,10 @@ Numbered: TypeAlias = list[Annotated[list[int | str | None], msgspec.Meta(min_le
 
 
 class WorldVerdict(TypedDict):
-    """The judgement in one world; the last five entries describe the events of `trace`.
+    """The judgement in one world.
 
-    A trace that is too long for its row ends early and has a `cut`.
+    The last five entries describe the events of `trace`. If the trace is too long for the row, it ends early,
+    and `cut` describes the rest.
     """
 
     world: str
@@ -92,7 +93,7 @@ class Row(TypedDict):
 
 
 def add_or_raise(fault: UserError, faults: list[UserError] | None) -> None:
-    """Append a fault to the list, or raise it if there is no list."""
+    """Append an error to the list, or raise it if there is no list."""
     if faults is None:
         raise fault from None
     faults.append(fault)
@@ -110,7 +111,7 @@ def failure_of(row: Row) -> Failure:
 
 
 def decode_row(line: bytes, *, check_kinds: bool = False) -> Row:
-    """Decode and validate a row of an evaluation; `check_kinds` also validates the kinds of events."""
+    """Decode and validate a row of an evaluation, including the kinds of its events if `check_kinds`."""
     try:
         data = _decoded(line)
         row = msgspec.convert(data, Row)
@@ -175,7 +176,7 @@ def read_lines_of(
     on_line: Callable[[bytes], None] | None = None,
     faults: list[UserError] | None = None,
 ) -> Iterator[LocatedRow]:
-    """Read the rows of an evaluation, or of one task; ignore an incomplete last line; add or raise faults."""
+    """Read the rows of all tasks, or of one task. Ignore an incomplete last line, and add or raise faults."""
     name = b"" if task is None else to_line(task).removesuffix(b"\n")
     seal = seal or Seal()
     at, is_reported = 0, False
@@ -198,7 +199,7 @@ def read_lines_of(
 
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
-    """Yield the key and the problems of each checked program; a key is a task and a hash."""
+    """Yield the key of each checked program, which is its task and its hash, and its problems."""
     for number, row in read_rows(path, growing=True):
         match row:
             case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:

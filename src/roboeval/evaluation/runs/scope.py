@@ -1,4 +1,4 @@
-"""Counts which completions of a run were requested, exist and were judged."""
+"""Counts how many completions of a run were requested, exist, and were judged."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from roboeval.suites.load import Suite
 
 @dataclass(frozen=True)
 class Coverage:
-    """The number of completions that a result covers, and the number it should cover."""
+    """The number of completions that a result covers, and the number that it should cover."""
 
     judged: int
     there: int  # completions now in the run
@@ -27,7 +27,7 @@ class Coverage:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the result covers all of these completions."""
+        """Whether the result covers all completions that it should cover."""
         return self.judged == self.total
 
     def __str__(self) -> str:
@@ -45,7 +45,7 @@ class JudgingScope:
 
     completions: Mapping[str, int]  # the number for each task, selected or not
     tasks: frozenset[str] | None = None  # selected tasks; None for all
-    models: frozenset[str | None] = frozenset()  # models of the selected tasks; None if not recorded
+    models: frozenset[str | None] = frozenset()  # models used for the selected tasks; None if not recorded
     requested: Mapping[str, int] | None = None  # requested completions of each task, from run.json
     cut_off: int = 0  # replies for selected tasks that ended at the token limit
     limit: int | None = None  # the token limit, if it was set
@@ -80,7 +80,7 @@ class JudgingScope:
         return self.tasks is None or task in self.tasks
 
     def coverage(self, judged: int, task: str | None = None) -> Coverage:
-        """Return the coverage of a number of judged completions, for one task or for all selected tasks."""
+        """Return the coverage of a task or of all selected tasks, given the number of judged completions."""
         if task is not None:
             requested = None if self.requested is None else self.requested.get(task, 0)
             return Coverage(judged, self.completions.get(task, 0), requested)
@@ -126,7 +126,7 @@ class CutOff:
     """The replies of a run that ended at the token limit."""
 
     replies: int  # replies that were cut off, even after a complete program
-    without_program: int  # cut-off replies without a program
+    without_program: int  # replies that were cut off and contain no program
     of: int
     limit: int | None
 
@@ -137,7 +137,7 @@ class CutOff:
 
     @property
     def warning(self) -> str | None:
-        """Return a warning with a remedy, or None if only few replies were cut off."""
+        """Return a warning that says what to do, or None if only few replies were cut off."""
         if self.share <= MAX_CUT_OFF_SHARE:
             return None
         at = "the model's own limit" if self.limit is None else f"{self.limit:,} tokens"

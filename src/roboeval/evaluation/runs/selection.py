@@ -1,4 +1,4 @@
-"""Parses selections of a part of a run: a task, a prompt or one completion."""
+"""Parses the selection of a part of a run: a task, a prompt or one completion."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Selection:
-    """A part of a run: a task, a prompt or one completion; the whole run if all fields are None."""
+    """A part of a run: a task, a prompt or one completion. If all fields are None, it is the whole run."""
 
     task: str | None = None
     prompt: int | None = None
@@ -27,7 +27,7 @@ class Selection:
 
     @property
     def key(self) -> CompletionKey:
-        """Return the key of the selected completion; call this only if a single completion is selected."""
+        """Return the key of the selected completion. A single completion must be selected."""
         assert self.task is not None and self.prompt is not None and self.index is not None  # noqa: PT018 - a single condition
         return self.task, self.prompt, self.index
 
@@ -40,7 +40,7 @@ class Selection:
 
 
 def parse_selection(text: str | None, suite: Suite) -> Selection:
-    """Parse TASK, TASK/PROMPT or TASK/PROMPT/INDEX; None selects the whole run."""
+    """Parse TASK, TASK/PROMPT or TASK/PROMPT/INDEX. None selects the whole run."""
     if not text:
         return Selection()
     name, *numbers = text.removesuffix("/").split("/")
@@ -60,5 +60,5 @@ def parse_selection(text: str | None, suite: Suite) -> Selection:
 
 
 def names_completion(text: str) -> bool:
-    """Whether a selection has all three parts and so names one completion."""
+    """Whether a selection names one completion, because it has all three parts."""
     return text.removesuffix("/").count("/") == 2  # noqa: PLR2004 - two slashes separate three parts

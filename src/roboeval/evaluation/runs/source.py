@@ -17,7 +17,7 @@ from roboeval.suites.load import Suite
 
 @dataclass(frozen=True)
 class Source:
-    """Completions, and the run that contains them if they come from a run."""
+    """Completions, with the run that contains them if they come from a run."""
 
     completions: Sequence[Completion]  # all completions for tasks of the suite
     run: RunFolder | None = None
@@ -51,7 +51,7 @@ MAX_ANSWER_BYTES = 10 * MAX_ROW  # an answer may contain more than we keep
 
 
 def is_answers(path: Path) -> bool:
-    """Whether a file starts like the requests to a batch endpoint or like its answers."""
+    """Whether a file starts like requests to a batch endpoint, or like answers from one."""
     if not path.is_file():
         return False
     _, line = next(read_lines(path, limit=MAX_ANSWER_BYTES), (0, b""))
@@ -59,7 +59,7 @@ def is_answers(path: Path) -> bool:
 
 
 def recorded_model_for(name: str, suite: Suite) -> RecordedModel:
-    """Open a recorded model with the solutions of a suite; raise UserError if the model does not exist."""
+    """Open a recorded model with the solutions of a suite. Raise UserError if the model does not exist."""
     model = open_recorded(name, None if suite.folder is None else suite.folder / "solutions")
     short = model.name.removeprefix("recorded:")
     if short not in RECORDED_NAMES:
@@ -69,7 +69,7 @@ def recorded_model_for(name: str, suite: Suite) -> RecordedModel:
 
 
 def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
-    """Yield all replies of a recorded model to a suite's prompts.
+    """Yield all replies of a recorded model to the prompts of a suite.
 
     Raises UserError if the model does not exist or has no reply to any prompt.
     """

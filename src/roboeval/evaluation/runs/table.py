@@ -43,7 +43,7 @@ COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "cost": pl.Float64,
     "accepted": pl.Boolean,
 }
-"""The columns that describe a completion; see docs/results.md."""
+"""The columns that describe a completion. They are explained in docs/results.md."""
 
 WORLD_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "world_number": pl.Int64,
@@ -68,7 +68,7 @@ class Price(NamedTuple):
 
     @classmethod
     def read(cls, text: str) -> Price:
-        """Parse `INPUT/OUTPUT`; raise ValueError unless both are numbers from 0 to a million."""
+        """Parse `INPUT/OUTPUT`. Raise ValueError unless both are numbers from 0 to a million."""
         try:
             price = cls(*map(float, text.split("/")))
         except TypeError as error:
@@ -93,7 +93,7 @@ def keys_where(table: pl.DataFrame, column: str) -> list[CompletionKey]:
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
-    """Return the table with the column `accepted`: whether the check found no problem in the program."""
+    """Return the table with the column `accepted`, which says whether the check found no problem."""
     names = ["task", "program_sha256"]
     answers = [(*key, not found) for key, found in problems.items()]
     accepted = pl.DataFrame(
@@ -200,20 +200,20 @@ TABLE_BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")  # the first bytes of 
 
 
 def kind_of(path: Path | None) -> str:
-    """Return the table format for a file name's ending; csv by default."""
+    """Return the table format for the ending of a file name, by default csv."""
     ending = "" if path is None else path.suffix.removeprefix(".").lower()
     return ending if ending in TABLE_FORMATS else TABLE_FORMATS[0]
 
 
 def write_table(frame: pl.DataFrame, path: Path, kind: str) -> None:
-    """Write a table to a file as csv or parquet; equal tables produce equal bytes."""
+    """Write a table to a file as csv or parquet. Equal tables produce equal bytes."""
     if kind not in TABLE_FORMATS:
         raise UserError(f'unknown format "{kind}"; choose one of {", ".join(TABLE_FORMATS)}')
     if not path.parent.is_dir():
         raise UserError("there is no such folder", file=path.parent)
     content = io.BytesIO()
     if kind == "csv":
-        # Spreadsheets treat such cells as formulas; OWASP recommends prepending an apostrophe.
+        # Spreadsheets treat such cells as formulas, so OWASP recommends prepending an apostrophe.
         frame.with_columns(pl.col(pl.String).str.replace(r"^([=+\-@\t\r\n])", "'${1}")).write_csv(content)
     else:
         frame.write_parquet(content)

@@ -1,4 +1,4 @@
-"""Stores the circumstances of events, such as the room, separately from a trace."""
+"""Stores the circumstances of events, such as the room, separately from the trace."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ CIRCUMSTANCES = ("places", "holding", "to", "destinations")
 
 
 def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
-    """Return the changes in circumstances that formulas refer to; events are numbered from 1.
+    """Return the changes in the circumstances that formulas refer to. Events are numbered from 1.
 
-    `places` is always present, the other entries only if they are not empty:
+    `places` is always present. The other entries are present only if they are not empty:
 
     - `places`: `[number, room]`, the room from that event on; the last number may be one more than the
       number of events.
-    - `holding`: `[number, thing]`, what the robot holds from that event on; initially empty for nothing.
-    - `to`: `[number, person]`, whom events of this kind ask from that event on; null for nobody.
-    - `destinations`: `[number, room]`, the goal of a drive if it differs from the place of the next event;
+    - `holding`: `[number, thing]`, what the robot holds from that event on, or an empty text for nothing; at
+      the start, it holds nothing.
+    - `to`: `[number, person]`, whom events of this kind ask from that event on, or null for nobody.
+    - `destinations`: `[number, room]`, the goal of a drive if it differs from the place of the next event, or
       null if the drive failed.
     """
     places = [event.place for event in trace]
@@ -53,7 +54,7 @@ def _changes_by_kind(trace: Trace) -> list[list[Any]]:
 
 
 def first_events(verdict: Mapping[str, Any], count: int) -> dict[str, Any]:
-    """Cut the data of a verdict to its first `count` events, but keep the place after the last of them."""
+    """Cut a verdict, given as data, to its first `count` events, but keep the place after the last one."""
     known = {name: verdict[name] for name in CIRCUMSTANCES if name in verdict}
     kept = {
         name: [entry for entry in entries if entry[0] <= count + (name == "places")]
@@ -63,7 +64,7 @@ def first_events(verdict: Mapping[str, Any], count: int) -> dict[str, Any]:
 
 
 def without_trace(verdict: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the data of a verdict without its events and their circumstances."""
+    """Return a verdict, given as data, without its events and their circumstances."""
     return {name: value for name, value in verdict.items() if name not in CIRCUMSTANCES} | {"trace": []}
 
 

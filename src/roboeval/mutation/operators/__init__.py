@@ -1,1 +1,1 @@
-"""Mutation operators, grouped by kind of mistake; every public function of a module is an operator."""
+"""Mutation operators, grouped by kind of mistake. Every public function of a module is an operator."""

@@ -61,8 +61,8 @@ def negate_a_condition(program: ProgramTree, _: Context) -> Edits:
 
 
 def drop_a_condition(program: ProgramTree, _: Context) -> Edits:
-    """Replaces a condition by true, so that the program always acts."""
-    of_loops = {loop.test for loop in program.loops if isinstance(loop, ast.While)}  # mutants would never end
+    """Replaces a condition with true, so that the program always acts."""
+    of_loops = {loop.test for loop in program.loops if isinstance(loop, ast.While)}  # loops would never end
     for test in _tests(program):
         if test not in of_loops and not isinstance(test, ast.Constant):
             yield {test: expression("True")}
@@ -73,7 +73,7 @@ def drop_a_condition(program: ProgramTree, _: Context) -> Edits:
 
 
 def never(program: ProgramTree, _: Context) -> Edits:
-    """Replaces a condition by false, so that the program never acts."""
+    """Replaces a condition with false, so that the program never acts."""
     for test in _tests(program):
         if not (isinstance(test, ast.Constant) and test.value is False):
             yield {test: expression("False")}

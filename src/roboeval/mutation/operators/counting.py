@@ -23,7 +23,7 @@ def off_by_one(program: ProgramTree, _: Context) -> Edits:
 
 
 def _is_exact(node: ast.AST) -> bool:
-    """Whether numbers in a node are used to count, compare or scale; other numbers may be arbitrary."""
+    """Whether numbers in a node are used to count, compare or scale. Other numbers may be arbitrary."""
     match node:
         case ast.Compare() | ast.Subscript() | ast.AugAssign():
             return True

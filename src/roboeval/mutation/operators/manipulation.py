@@ -17,7 +17,7 @@ PUTTING_DOWN = re.compile(
 
 
 def _is_put_down(context: Context) -> bool:
-    """Whether each prompt that asks to bring something here also asks to put it down."""
+    """Whether every prompt that asks to bring something here also asks to put it down."""
     return not any(BRINGING_HERE.search(one) and not PUTTING_DOWN.search(one) for one in context.prompts)
 
 
@@ -46,7 +46,7 @@ def place_by_words(program: ProgramTree, _: Context) -> Edits:
 
 
 def wrong_thing(program: ProgramTree, context: Context) -> Edits:
-    """Replaces an object by a different one."""
+    """Replaces an object with a different one."""
     things = [argument(call, 0) for _, call in program.steps("pick", "place")]
     named = next((name for thing in things if (name := text_of(thing))), "")
     if len(context.things) > 1 and things:

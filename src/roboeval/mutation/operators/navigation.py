@@ -45,7 +45,7 @@ def skip_the_last(program: ProgramTree, _: Context) -> Edits:
 
 
 def _return_places(program: ProgramTree) -> dict[ast.Call, ast.expr]:
-    """Find the calls that drive to a location stored earlier, and map each to its argument."""
+    """Find the calls that drive to a location that was stored earlier, and map each to its argument."""
     kept = set()
     for node in program.nodes:
         match node:
@@ -69,7 +69,7 @@ def drop_a_drive(program: ProgramTree, _: Context) -> Edits:
 
 
 def wrong_room(program: ProgramTree, context: Context) -> Edits:
-    """Replaces a room by another one."""
+    """Replaces a room with another one."""
     for node in program.nodes:
         room = (text_of(node) or "").lower().removeprefix("the ")
         if room in {one.lower() for one in context.rooms}:
@@ -85,7 +85,7 @@ def return_elsewhere(program: ProgramTree, context: Context) -> Edits:
 
 @only_if(COMING_BACK)
 def return_to_here(program: ProgramTree, _: Context) -> Edits:
-    """Replaces the drive back by a drive to the current location."""
+    """Replaces the drive back with a drive to the current location."""
     return ({place: expression("get_current_location()")} for place in _return_places(program).values())
 
 
@@ -131,7 +131,7 @@ def plural_rooms(program: ProgramTree, _: Context) -> Edits:
 
 
 def _looks(program: ProgramTree) -> list[ast.Call]:
-    """Find the looks whose result is used, except operands of `or`."""
+    """Find the calls of `is_in_room` whose result is used, except operands of `or`."""
     choices = (node for node in program.nodes if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.Or))
     idle = {value for choice in choices for value in choice.values}
     idle |= {call for _, call in program.steps("is_in_room")}
@@ -165,7 +165,7 @@ def look_once(program: ProgramTree, _: Context) -> Edits:
 
 
 def look_at_first_only(program: ProgramTree, _: Context) -> Edits:
-    """Looks in the first two iterations of a loop only, then assumes success."""
+    """Looks only in the first two iterations of a loop, then assumes success."""
     for loop, look in _looks_in_loops(program):
         after = rewrite(loop, {look: expression("turns > 2 or look", look=look)})
         after.body.insert(0, statement("turns += 1"))
@@ -173,7 +173,7 @@ def look_at_first_only(program: ProgramTree, _: Context) -> Edits:
 
 
 def look_afterwards(program: ProgramTree, _: Context) -> Edits:
-    """Acts before looking, whatever the robot would see."""
+    """Acts before looking, so that what the robot sees makes no difference."""
     looks = set(_looks(program))
     for node in program.nodes:
         match node:
@@ -196,7 +196,7 @@ def look_for_another(program: ProgramTree, context: Context) -> Edits:
 
 
 def look_at_the_name(program: ProgramTree, _: Context) -> Edits:
-    """Searches the name of a room instead of the room."""
+    """Searches in the name of a room instead of in the room itself."""
     for loop, look in _looks_in_loops(program):
         wanted = argument(look, 0)
         if isinstance(loop, ast.For) and isinstance(loop.target, ast.Name) and wanted is not None:

@@ -105,7 +105,7 @@ def forget_an_option(program: ProgramTree, _: Context) -> Edits:
 
 
 def vague_question(program: ProgramTree, _: Context) -> Edits:
-    """Replaces a question by one that does not name its subject."""
+    """Replaces a question with one that does not name its subject."""
     for call in program.calls("ask"):
         question, options = argument(call, 1), argument(call, 2)
         offered = [text for node in ast.walk(options) if (text := text_of(node))] if options else []
@@ -114,7 +114,7 @@ def vague_question(program: ProgramTree, _: Context) -> Edits:
 
 
 def wrong_person(program: ProgramTree, context: Context) -> Edits:
-    """Replaces the name of a person by another name."""
+    """Replaces the name of a person with another name."""
     for node in program.nodes:
         text = text_of(node) or ""
         for name in context.people:
@@ -148,7 +148,7 @@ def unknown_option(program: ProgramTree, _: Context) -> Edits:
 
 
 def _messages(program: ProgramTree) -> Iterator[ast.AST]:
-    """Find all nodes that may be part of a message, which excludes calls of other skills."""
+    """Find all nodes that may be part of a message. Calls of other skills are excluded."""
     other_calls = (node for node in program.nodes if skill_of(node) not in {None, "say"})
     elsewhere = {inner for call in other_calls for inner in ast.walk(call)}
     return (node for node in program.nodes if node not in elsewhere)
@@ -177,7 +177,7 @@ def forget_to_say(program: ProgramTree, _: Context) -> Edits:
 
 @only_if(TELLING)
 def say_nothing_of_it(program: ProgramTree, _: Context) -> Edits:
-    """Replaces a message by one without information."""
+    """Replaces a message with one without information."""
     return ({step: statement('say("Done.")')} for step, _call in program.steps("say"))
 
 

@@ -1,4 +1,4 @@
-// Shows a program with line numbers and coloured syntax; everything is inserted as text.
+// Shows a program with line numbers and coloured syntax. Everything is inserted as text.
 const MOST_COLOURED = 100_000;
 
 // The text may be invalid Python, for example with unterminated strings.

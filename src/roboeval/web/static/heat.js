@@ -1,4 +1,4 @@
-// A table with a shade and a number for each share; cells link to their completions.
+// Shows a table with a shade and a number for each share. Cells link to their completions.
 export default {
   props: { prefix: String, label: String, corner: String, groups: Array, rows: Array, chooses: Boolean },
   emits: ["choose"],

@@ -1,4 +1,4 @@
-// A virtual list of completions: rows are fetched shortly before they scroll into view.
+// Shows a virtual list of completions, whose rows are fetched shortly before they scroll into view.
 const PAGE = 200;
 const BEYOND = 12;
 const LOST = "The server cannot be reached. Is it still running?";
