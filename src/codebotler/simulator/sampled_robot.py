@@ -1,4 +1,4 @@
-"""A robot in a sampled world: its rooms are known, and other facts are drawn when a program first asks."""
+"""A robot in a sampled world, whose rooms are known and whose other facts are drawn at their first use."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ class ExploredRoom:
     people: set[str] = field(default_factory=set)
 
     def lacks(self, name: str) -> bool:
-        """Return whether a name is known to be absent; a missed longer name covers its parts."""
+        """Return whether a name, or a longer name that contains it, is known to be absent."""
         return name in self.missed or any(name in missed for missed in self.missed if name != SOMEBODY)
 
 
@@ -167,12 +167,12 @@ class RoomSearch:
 
 
 class SampledRobot(SimulatedRobot):
-    """A robot in a world whose facts are drawn while the program runs; a fact, once drawn, never changes.
+    """A robot in a world whose facts are drawn while the program runs, and never change once drawn.
 
-    Whether a person or thing that the program looks for is present is random. Without a look, the program's
-    assumptions hold: a person answers, and a thing can be picked up. Answers are random options.
+    If the program looks for a person or thing, their presence is random. Otherwise, the program's assumptions
+    hold: a person answers, and a thing can be picked up. Answers are random options.
 
-    A program that searches several rooms assumes that the thing is in one of them. If that is not so,
+    A program that searches several rooms assumes that the thing is in one of them. If the thing is in none,
     `excuses` holds the resulting errors, which are not the program's fault.
     """
 
@@ -272,11 +272,11 @@ class SampledRobot(SimulatedRobot):
     # --- effects of skills
 
     def room_for(self, request: str) -> str | None:
-        """Return the room that a request refers to; on a guessed map, every place exists."""
+        """Return the room that a request refers to. On a guessed map, every place exists."""
         return self.room_map.room(request)
 
     def look(self, entity: str) -> bool:
-        """Look for an object or a person; the first look draws whether they are present."""
+        """Look for an object or a person. The first look draws whether they are present."""
         name, room = normalized(entity), self.here
         found = self.is_here(name)
         if found is None and (name in room.gone or (is_name(entity) and room.lacks(SOMEBODY))):
@@ -294,7 +294,7 @@ class SampledRobot(SimulatedRobot):
         return found
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
-        """Ask a person, who is present unless an earlier look failed to find them; the answer is random."""
+        """Ask a person, who is present unless an earlier look failed to find them. The answer is random."""
         person, options = as_text(person), to_options(options)
         who = normalized(person)
         if not options or not self._answers(who):

@@ -1,4 +1,4 @@
-"""Checks that the names and expressions in a program are allowed in tame programs; see `tame`."""
+"""Checks that a program has only names and expressions that tame programs may have (see `tame`)."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def parameters_of(given: ast.arguments) -> list[str]:
 
 
 class ExpressionVerifier:
-    """Raises WildError for an expression that is not allowed; `VALUES` has a check per allowed kind."""
+    """Raises WildError for an expression that is not allowed. `VALUES` has a check per allowed kind."""
 
     def __init__(self, nodes: Nodes, skills: frozenset[str]) -> None:
         self.skills = skills
@@ -169,7 +169,7 @@ class ExpressionVerifier:
                 self._check_annotation(arg.annotation)
 
     def _check_annotation(self, node: ast.expr) -> None:
-        """Allow an annotation; programs cannot read annotations."""
+        """Allow an annotation of a usual form, since programs cannot read annotations."""
         match node:
             case ast.Constant(value) if value is None or value is ... or isinstance(value, str):
                 pass
@@ -218,7 +218,7 @@ class ExpressionVerifier:
                 wild()
 
     def _check_call_of_builtin(self, node: ast.Call, *, uses_up: bool, calls_key: bool) -> None:
-        """Allow data as arguments; the builtin may consume its first argument, and call `key`."""
+        """Allow data as arguments. The builtin may also consume its first argument, and call `key`."""
         for number, each in enumerate(node.args):
             if uses_up and number == 0:
                 self._check_iterable(each)
@@ -269,7 +269,7 @@ class ExpressionVerifier:
         self._check_value(node.value)
 
     def _check_comparison(self, node: ast.Compare) -> None:
-        """Allow a comparison of data; `in` may search an iterator."""
+        """Allow a comparison of data. `in` may also search an iterator."""
         sides = [node.left, *node.comparators]
         self._check_value(node.left)
         for operator, left, right in zip(node.ops, sides, sides[1:], strict=False):
