@@ -53,7 +53,7 @@ async def _update(console: Console, page: _MissionPage) -> None:
 
 
 def timeline(events: Sequence[LogLine]) -> Iterator[tuple[LogLine, str]]:
-    """Yield the visible events with their descriptions; a stop includes the activity that it interrupted."""
+    """Yield the visible events with their descriptions. A stop includes the activity that it interrupted."""
     doing, is_stopped = "", False
     for number, line in enumerate(events):
         event = line["event"]
