@@ -92,7 +92,7 @@ def judged_run(
 ) -> JudgedRun:
     """Read a run with any verdicts of its ablation, of another suite and with house rules.
 
-    The engine checks programs; without an engine, earlier results of the check are also left out.
+    The engine checks the programs. Without an engine, earlier results of the check are left out, too.
     """
     import polars as pl
 
