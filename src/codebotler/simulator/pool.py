@@ -180,7 +180,7 @@ def map_batches(
     stay busy. An error from the keys or from a call is raised when its result is due.
 
     Args:
-        submit: starts a call for a few keys; the call returns one result per key.
+        submit: starts a call that takes a few keys and returns one result per key.
         keys: the keys, of which a few are read in advance.
         workers: the number of calls that run at the same time.
         name: returns a short, unique name for a key.

@@ -167,7 +167,7 @@ class RuleGuard:
         return None
 
     def _take(self, robot: SimulatedRobot, events: Sequence[Event], request: str | None = None) -> None:
-        """Add the current call's events to the history; `request` is the goal of a built-in drive."""
+        """Add the current call's events to the history. `request` is the goal of a built-in drive."""
         kinds = [event.kind for event in robot.events[self._start :]]
         is_one_move = sum(kind in KINDS_OF_MOVES for kind in kinds) == 1
         thing = self._held or robot.taken if is_one_move else None

@@ -57,7 +57,7 @@ class RoomMap:
 
     @classmethod
     def of_places(cls, world: World) -> RoomMap:
-        """Make the map of a robot that plans its own routes; it starts at the first place."""
+        """Make the map of a robot that plans its own routes, and starts at the first place."""
         names = tuple(room.name for room in world.rooms)
         plan = tuple(Room(room.name, (), (), room.footprint) for room in world.rooms)
         return cls(names, names[0], plain=True, plan=plan)
@@ -72,7 +72,7 @@ class RoomMap:
         return same[0] if same else next(within, (wanted or None) if self.guessed else None)
 
     def possible_rooms(self, request: str) -> list[str]:
-        """Return all known rooms that a request may refer to; for an exact name, only where it would lead."""
+        """Return all known rooms that a request may refer to. An exact name refers only to where it leads."""
         wanted, leads_to = request.strip().casefold(), self.room(request)
         named = [room for room in self.rooms if room.strip().casefold() == wanted]
         if named:
@@ -226,7 +226,7 @@ class SampledRobot(SimulatedRobot):
 
     @contextmanager
     def excused(self, *, when: bool) -> Iterator[None]:
-        """Excuse any error raised in this context if random facts caused it and not the program."""
+        """Excuse any error raised in this context if random facts, and not the program, caused it."""
         try:
             yield
         except RobotError as error:

@@ -23,7 +23,7 @@ Matching: TypeAlias = Literal["label-in-request", "whole-words"]
 
 @dataclass(frozen=True)
 class Limits:
-    """The resources that one run may use; beyond any limit it ends with status `timeout`."""
+    """The resources that one run may use. Beyond any limit, it ends with status `timeout`."""
 
     seconds: float = 3600.0  # simulated seconds
     calls: int = 1_000  # skill calls; sleeping does not count
@@ -34,7 +34,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class SimulationSettings:
-    """How a suite simulates its worlds; the defaults are the settings of the paper's suite."""
+    """How a suite simulates its worlds. The defaults are the settings of the paper's suite."""
 
     # `lowercase` converts a program's string literals before the run, as the authors of the paper did.
     literals: Literal["lowercase", "as-written"] = "lowercase"

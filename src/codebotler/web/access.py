@@ -89,7 +89,7 @@ class Access:
         return self._of(value, _cookie_value)
 
     def cookie(self, role: Role) -> str:
-        """Return the cookie for a role, from which its token cannot be derived."""
+        """Return a role's cookie, from which the token cannot be derived."""
         return _cookie_value(self.face if role is Role.FACE else self.operator or "")
 
     def _of(self, shown: str, form: Callable[[str], str]) -> Role | None:

@@ -144,7 +144,7 @@ class Console:
     def check(
         self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()
     ) -> CheckResult:
-        """Check one program at a time. Without a map, use the rooms that the program names."""
+        """Check a program once no other check runs. Without a map, use the rooms that the program names."""
         with self._checking:
             if self._pool is None:
                 self._pool = self._held.enter_context(WorkerPool(1))

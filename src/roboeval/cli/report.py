@@ -44,7 +44,7 @@ def report(
 ) -> None:
     """Write a report with figures, tables and a web page.
 
-    It has the paper's figures. The page also shows why programs fail and how certain the numbers are.
+    The report has the paper's figures. Its page also shows why programs fail and how certain the numbers are.
     """
     import atexit
     import gc

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 __all__ = ["get_ready", "serve"]
 
-# A program with its own process may recurse far deeper, so a run that is too deep here is repeated in one.
+# A run that recurses too deep here is repeated in its own process, where it may recurse far deeper.
 BATCH_RECURSION_LIMIT = 400
 MAX_PLAIN_CALLS = 50  # in a longer transcript, equal calls are written only once
 MAX_CALL_BYTES = 50_000  # bytes of a skill's arguments, which must fit into a frame
@@ -242,7 +242,7 @@ def _robot_argument(kind: str, value: Any) -> Argument:  # noqa: ANN401 - a skil
 
 
 def _is_plain(given: Argument) -> bool:
-    """Return whether the argument's text is short and has no lone surrogates, which JSON could join."""
+    """Return whether the argument's text is short and without lone surrogates, which JSON could join."""
     if isinstance(given, tuple):
         text = "".join([str(each[0] if isinstance(each, Option) else each) for each in given])
     else:

@@ -6,4 +6,4 @@ class LostProcessError(Exception):
 
 
 class ProtocolError(Exception):
-    """The program wrote to the channel, since our own code never sends a message like this."""
+    """The program must have written to the channel, since our own code never sends this message."""

@@ -194,7 +194,7 @@ class BatchServer(ForkServer):
             self._next.hang_up()
 
     def _set_up(self) -> None:
-        """Send programs that specialize its bytecode. Tame programs cannot observe how its heap changes."""
+        """Specialize the bytecode. The heap need not be stable, since tame programs cannot observe it."""
         rehearsal = message([(WARM_UP_CODE, [SimulatedRobot(WARM_UP_WORLD)])])
         setup = marshal.dumps((rehearsal, WARM_UP_RUNS), WITHOUT_REFERENCES)
         self._door.sendall(len(setup).to_bytes(HEADER, "big") + setup)

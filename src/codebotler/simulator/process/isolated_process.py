@@ -146,7 +146,7 @@ class IsolatedProcess:
             self.hang_up()
 
     def end_gently(self) -> int:
-        """Let the process exit, or soon kill it, and return its exit status or negative signal number."""
+        """Kill the process unless it exits soon, and return its exit status or negative signal number."""
         for _ in range(50):
             if _stat(self.pid)[:1] in ([], ["Z"]):
                 break

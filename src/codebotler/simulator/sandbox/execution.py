@@ -35,7 +35,7 @@ UNAWAITED = "task_program is a coroutine, which nobody awaits; write def, not as
 
 
 class ProgramRun:
-    """Runs one program; the fork server prepares as much as possible before the fork."""
+    """Runs one program. The fork server prepares as much as possible before the fork."""
 
     recursion_limit = PROGRAM_RECURSION_LIMIT
 

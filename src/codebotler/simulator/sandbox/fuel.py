@@ -56,8 +56,8 @@ def prepared(
 def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
     """Return the nodes of a tree by type, without operators and contexts.
 
-    Raise MemoryError or SyntaxError if it is nested too deeply, since Python's own limits
-    depend on its version.
+    Raise MemoryError or SyntaxError if it is nested too deeply, since Python's own limits depend on the
+    version.
     """
     nodes: defaultdict[type[ast.AST], list[Any]] = defaultdict(list)
     waiting: list[tuple[ast.AST, int, int]] = [(tree, 0, 0)]
@@ -117,7 +117,7 @@ def _use_fuel(nodes: dict[type[ast.AST], list[Any]]) -> None:
 
 
 def _note_entries(statement: ast.stmt) -> None:
-    """Insert calls that record when a module function, which may be the task by another name, is entered."""
+    """Insert calls that record each entry of a module function, which may be the task by another name."""
     waiting: list[ast.AST] = [statement]
     while waiting:
         node = waiting.pop()

@@ -20,7 +20,7 @@ from roboeval.suites.task import Task
 
 SEEDS_PER_SPLIT = 1_000_000_000
 FIRST_SEEDS = {"train": 0, "validation": SEEDS_PER_SPLIT, "test": 2 * SEEDS_PER_SPLIT}
-"""The first seed of each split; a split has SEEDS_PER_SPLIT seeds."""
+"""The first seed of each split, which has SEEDS_PER_SPLIT seeds."""
 
 MAX_FAMILY_TASKS = 100
 FAMILY_SUITE_NAME = re.compile(r"families-([a-z]+)-(\d{1,9})(?:-(\d{1,3}))?", re.ASCII)
@@ -29,8 +29,8 @@ FAMILY_SUITE_NAME = re.compile(r"families-([a-z]+)-(\d{1,9})(?:-(\d{1,3}))?", re
 def first_seed(split: str, seed: int, count: int, what: str) -> int:
     """Return the first of `count` consecutive seeds of a split.
 
-    Each `seed` selects entirely different ones, and `what` names the counted items. Raises UserError if the
-    split does not exist or a number is out of range.
+    Each `seed` selects entirely different ones. Raises UserError, in which `what` names the counted items, if
+    the split does not exist or a number is out of range.
     """
     if split not in FIRST_SEEDS:
         raise UserError(f'unknown split "{split}"; use {listed(list(FIRST_SEEDS))}')
