@@ -43,7 +43,7 @@ class RoomMap:
     rooms: tuple[str, ...]  # in the order in which the robot lists them
     start: str
     guessed: bool = False  # the rooms are a guess: any other place a program drives to exists as well
-    plain: bool = False  # names are plain text, not regexes; names of real robots and guesses always are
+    plain: bool = False  # names are plain text and not regexes, as always on real robots and guessed maps
     plan: tuple[Room, ...] = ()  # footprints, and stopping points if the robot drives straight between rooms
 
     def __post_init__(self) -> None:

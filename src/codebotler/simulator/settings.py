@@ -47,7 +47,7 @@ class SimulationSettings:
     # who say yes choose an option that has neither, if there is only one.
     words_for_yes: tuple[str, ...] = ()
     words_for_no: tuple[str, ...] = ()
-    # Whether events record the words of the request, or the name of the actual room or thing; `as-happened`
+    # Whether events record the words of the request, or the name of the actual room or thing. `as-happened`
     # records no event for a drive to an unknown room.
     events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: Limits = field(default_factory=Limits)

@@ -43,7 +43,7 @@ class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 ReplayKey: TypeAlias = tuple[Any, ...]  # a received transcript, and the ids of the parts of its robot
 MAX_REPLAYS, MAX_REPLAY_BYTES = 2_048, 4_096  # cached transcripts, and bytes of each
-# Cached outcomes; each entry keeps the objects of its key alive so that their ids are not reused.
+# Cached outcomes. Each entry keeps the objects of its key alive so that their ids are not reused.
 REPLAYED: dict[ReplayKey | None, tuple[Outcome, SkillTable, Setup]] = {}
 LAST_MOMENT = (-1, 0.0)  # marks the end of a transcript's moments
 ONLY_TIME: SkillAnswer = ("time", None)

@@ -19,7 +19,7 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-# Consumers use up their first argument immediately; all other functions take only data.
+# Consumers use up their first argument immediately. All other functions take only data.
 CONSUMERS = _words("all any dict len list max min next sorted sum tuple")
 FUNCTIONS = CONSUMERS | _words("abs bool chr divmod float int ord pow print range repr round str")
 ITERATORS = _words("enumerate filter map reversed zip")
@@ -32,7 +32,7 @@ ERRORS = _words(
     """
 )
 GIVEN = FUNCTIONS | ITERATORS | ERRORS | {"isinstance"}  # all builtins that a tame program can use
-# Names that programs may have without binding them; every program has `__name__`, with data.
+# Names that programs may have without binding them. In every program, `__name__` is data.
 EXISTING = frozenset({*dir(builtins), "exit", "quit", "sys", "time"}) - {"__name__"}
 
 TEXT_METHODS = _words(
