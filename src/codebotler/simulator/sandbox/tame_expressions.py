@@ -32,7 +32,7 @@ ERRORS = _words(
     """
 )
 GIVEN = FUNCTIONS | ITERATORS | ERRORS | {"isinstance"}  # all builtins that a tame program can use
-# Names that programs may have without binding them. In every program, `__name__` is data.
+# Names that programs may have without binding them, except `__name__`, which always holds data.
 EXISTING = frozenset({*dir(builtins), "exit", "quit", "sys", "time"}) - {"__name__"}
 
 TEXT_METHODS = _words(
