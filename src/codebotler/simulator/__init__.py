@@ -1,4 +1,4 @@
-"""Runs programs in simulated worlds, in isolated processes; `worker.py` is a good place to start reading."""
+"""Runs programs in simulated worlds, in isolated processes. Start reading with `worker.py`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 def run(program: str, world: World, *, require_isolation: bool = False) -> Outcome:
-    """Run one program in one world with the paper's settings; `engine.run` is faster for many.
+    """Run one program in one world with the paper's settings. For many programs, `engine.run` is faster.
 
     Args:
         program: the source code, valid or not.

@@ -1,4 +1,4 @@
-"""Runs pairs of a program and a world in isolation, duplicate pairs only once, and keeps their order."""
+"""Runs each distinct pair of a program and a world once, in isolation, and returns the outcomes in order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Draws random facts for sampled worlds; each depends only on the seed, the sample number and its name."""
+"""Draws random facts for sampled worlds, each from the seed, the sample number and the fact's name only."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ EIGHTS = 8
 
 @dataclass(frozen=True)
 class FactSampler:
-    """Draws the facts of one sampled world; the order of the draws does not matter."""
+    """Draws the facts of one sampled world, which do not depend on the order of the draws."""
 
     seed: int = 0
     sample: int = 0  # number of this world among the worlds with the same seed
     strict: bool = False  # also draw facts that the program takes for granted; otherwise they hold
     lucky: bool = False  # in seven of eight draws, things and people are present, and people agree
-    forced: tuple[Draw, ...] = ()  # facts whose results are given instead of random
+    forced: tuple[Draw, ...] = ()  # facts whose results are given instead of drawn
 
     def draw(self, count: int, *fact: str) -> int:
         """Draw a number from 0 to `count - 1` for a fact."""
@@ -26,7 +26,7 @@ class FactSampler:
         return int.from_bytes(blake2b(named, digest_size=8).digest(), "big") % count
 
     def answer(self, count: int, agreeing: int, *question: str) -> int:
-        """Draw which of `count` options a person chooses; `agreeing` is the most affirmative one."""
+        """Draw which of `count` options a person chooses. `agreeing` is the most affirmative option."""
         known = self._forced("answer", count, agreeing, *question)
         if known is not None:
             return known
@@ -35,7 +35,7 @@ class FactSampler:
         return self.draw(count, "answer", *question)
 
     def outcome(self, count: int, statement: str) -> int:
-        """Draw one of `count` outcomes for a statement; outcome 0 is the desired one."""
+        """Draw one of `count` outcomes for a statement. Outcome 0 is the desired one."""
         known = self._forced("outcome", count, statement)
         if known is not None:
             return known

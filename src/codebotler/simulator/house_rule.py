@@ -31,8 +31,8 @@ class Rule:
         name: the rule's name in messages.
         says: the rule as a sentence for people and models.
         formula: the rule as a formula.
-        when: `always` if the formula must hold after every event, `finally` if only when the mission ends.
-        refuse: whether the program continues without the forbidden action; otherwise the mission ends.
+        when: `always` if the formula must hold after each event, `finally` if only at the end of the mission.
+        refuse: whether to skip a forbidden action and let the program continue, rather than end the mission.
         any_room: whether the rule may name rooms that the house does not have.
     """
 
@@ -58,7 +58,7 @@ class Rule:
         return any(one.place is not None for one in self.elements if one.kind == event.kind)
 
     def results(self, attempt: Event) -> Sequence[Event]:
-        """Return the event with each of its possible results if the rule depends on them, else unchanged."""
+        """Return the event with each of its possible results, or unchanged if the rule ignores results."""
         compared = [one for one in self.elements if one.kind == attempt.kind]
         if any(one.found is not None for one in compared):
             return [replace(attempt, found=True), replace(attempt, found=False)]

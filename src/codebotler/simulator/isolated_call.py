@@ -54,7 +54,7 @@ class IsolatedCallError(Exception):
 
 
 class IsolatedFunction(Generic[_Arguments, _Result]):
-    """A function that runs in a closed process; the decorator `isolated` makes one."""
+    """A function that runs in a closed process, made by the decorator `isolated`."""
 
     def __init__(self, function: Callable[_Arguments, _Result], rehearsal: tuple[Any, ...]) -> None:
         self.function, self.rehearsal = function, rehearsal
@@ -62,7 +62,7 @@ class IsolatedFunction(Generic[_Arguments, _Result]):
         self.__module__, self.__name__ = function.__module__, function.__name__
 
     def __call__(self, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
-        """Call the function in a closed process; if that was used before and fails, retry in a new one.
+        """Call the function in a closed process. If a process that was used before fails, retry in a new one.
 
         Raises:
             IsolatedCallError: the function failed, or exceeded its time or memory limit.
@@ -99,7 +99,7 @@ def isolated(
     Its arguments are pickled, and its result is returned as JSON, in which tuples become lists.
 
     Args:
-        rehearsal: arguments for a first call of the function, in each new process before it is closed.
+        rehearsal: arguments for a first call of the function, made in each new process before it is closed.
     """
     return lambda function: IsolatedFunction(function, rehearsal)
 
@@ -153,7 +153,7 @@ class ClosedProcess:
         self._channel.end()
 
     def forget(self) -> None:
-        """Close the channel after a fork, in the copy that is not the process's parent."""
+        """After a fork, close the channel in the new process, which is not the closed process's parent."""
         self._process.returncode = 0
         self._channel.hang_up()
 
@@ -163,14 +163,14 @@ IDLE_PROCESSES: dict[str, list[ClosedProcess]] = {}
 
 
 def end_all() -> None:
-    """Kill all idle processes; call this only while no call is in progress."""
+    """Kill all idle processes. Call this only while no call is in progress."""
     for processes in IDLE_PROCESSES.values():
         while processes:
             processes.pop().end()
 
 
 def forget_all() -> None:
-    """Release the parent's processes after a fork, in the child."""
+    """After a fork, release the parent's processes in the child."""
     for processes in IDLE_PROCESSES.values():
         while processes:
             processes.pop().forget()

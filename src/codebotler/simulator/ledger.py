@@ -25,7 +25,7 @@ STOPPED_BY_RULE: SkillAnswer = ("stop", True)
 
 
 class SkillPerformer(Protocol):
-    """A robot that can perform the skills of a run; a skill may take any amount of time."""
+    """A robot that can perform the skills of a run. A skill may take any amount of time."""
 
     settings: SimulationSettings
     skills: SkillTable
@@ -152,10 +152,10 @@ def texts_in(given: tuple[Option, ...] | tuple[Scalar, ...]) -> list[str]:
 
 
 class RememberingLedger(Ledger):
-    """The ledger of a simulated run; it caches the answers to calls that change nothing.
+    """The ledger of a simulated run, which caches the answers to calls that change nothing.
 
-    A program that waits for something may look a thousand times. Most programs make too few calls for caching
-    to pay off.
+    Caching helps programs that look a thousand times while they wait for something. It starts late, because
+    most programs make too few calls for it to pay off.
     """
 
     def __init__(self, robot: SimulatedRobot) -> None:

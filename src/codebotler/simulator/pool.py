@@ -30,7 +30,7 @@ UNREADABLE_KEY = b""  # the name for a key that raised an error
 MIN_BATCH_KEYS, MAX_BATCH_KEYS = 16, 64  # keys per call; the first and last calls get fewer
 SIGNAL_POLL_SECONDS = 0.5  # with polars loaded, a signal does not interrupt a wait
 CALLS_PER_THREAD = 2  # submitted calls per thread, so that no thread idles
-MAX_KEYS_AHEAD = 4_000  # keys read before their results are used; one thread may be slow for seconds
+MAX_KEYS_AHEAD = 4_000  # keys read before their results are used, since one thread may be slow for seconds
 
 _Key = TypeVar("_Key")
 _Called = TypeVar("_Called")
@@ -41,8 +41,9 @@ _Arguments = ParamSpec("_Arguments")
 class WorkerPool:
     """Runs functions in threads that each own one worker.
 
-    The first worker starts in the background. As a context manager, the pool waits for it on entry; with
-    `contextlib.closing`, the first call waits. Without seccomp, it warns, or fails if isolation is required.
+    The first worker starts in the background. As a context manager, the pool waits for it on entry. With
+    `contextlib.closing`, only the first call waits. Without seccomp, the pool warns, or fails if isolation is
+    required.
     """
 
     def __init__(
@@ -143,7 +144,7 @@ class WorkerPool:
         return function() if self.is_here else self.submit(function).result()
 
     def forget(self) -> None:
-        """Close the descriptors after a fork, in the child, which has neither the workers nor the threads."""
+        """After a fork, close the descriptors in the child, which has neither the workers nor the threads."""
         for worker in self._workers:
             worker.forget()
 
@@ -155,7 +156,7 @@ class WorkerPool:
         name: Callable[[_Key], bytes],
         then: Callable[[_Called], Any] = lambda result: result,
     ) -> Iterator[Any]:
-        """Call a function on batches of keys in pool threads; see `map_batches` for the arguments."""
+        """Call a function on batches of keys in pool threads. `map_batches` explains the arguments."""
         return map_batches(
             lambda some: self._threads.submit(function, some),
             keys,
@@ -179,11 +180,11 @@ def map_batches(
     stay busy. An error from the keys or from a call is raised when its result is due.
 
     Args:
-        submit: starts a call for a few keys; the call returns one result per key.
+        submit: starts a call that takes a few keys and returns one result per key.
         keys: the keys, of which a few are read in advance.
         workers: the number of calls that run at the same time.
         name: returns a short, unique name for a key.
-        then: converts each result in the caller's thread; what it returns is pickled.
+        then: converts each result in the caller's thread, to a value that can be pickled.
     """
     distinct = DistinctKeys(keys, name)
     waiting, failed = distinct.waiting, distinct.failed
@@ -245,10 +246,11 @@ class DistinctKeys(Generic[_Key]):
         self.failed: dict[bytes, BaseException] = {}
 
     def batch(self, width: int) -> dict[bytes, _Key]:
-        """Return the next keys by name for one of `width` calls; empty at the end or if too many are waiting.
+        """Return the next keys by name, for one of `width` concurrent calls.
 
-        Batches start small so that the first results come soon, and end small so that all calls end together.
-        An error while reading the keys counts as the result of the next key.
+        There are none at the end, or while too many keys are waiting. Batches start small so that the first
+        results come soon, and end small so that all calls end together. An error while reading the keys
+        counts as the result of the next key.
         """
         size = min(MAX_BATCH_KEYS, max(MIN_BATCH_KEYS, self._sent // 2))
         self._read(size * width)
@@ -308,7 +310,7 @@ class ResultFile:
 
 
 def shared_pool() -> WorkerPool:
-    """Return this process's pool, started on first use with a worker per core; a fork gets its own pool."""
+    """Return this process's pool, started on first use with a worker per core. A fork gets its own pool."""
     with SHARED_POOL.lock:
         if SHARED_POOL.pool is None:
             SHARED_POOL.pool = WorkerPool(cores()).__enter__()  # raises EngineError if it cannot start
@@ -316,7 +318,7 @@ def shared_pool() -> WorkerPool:
 
 
 class SharedPool:
-    """Holds this process's pool once it is started; after a fork, the child starts a new one."""
+    """Holds this process's pool once it has started. After a fork, the child starts a new one."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()  # held during a fork, so that no child inherits half a pool
@@ -335,7 +337,7 @@ class SharedPool:
                 self.pool = None
 
     def begin_anew(self) -> None:
-        """Release the parent's pool after a fork, in the child."""
+        """After a fork, release the parent's pool in the child."""
         if self.pool is not None:
             self.pool.forget()
             self._inherited.append(self.pool)

@@ -150,13 +150,13 @@ class SimulatedRobot:
         return self.skills.idle - {"is_in_room"} if someone_may_come else self.skills.idle
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill if the guard allows it; a question returns the position of the chosen option."""
+        """Execute one skill if the guard allows it. A question returns the position of the chosen option."""
         if self.guard is not None:
             return self.guard.perform(self, skill, arguments)
         return self.execute(skill, arguments)
 
     def possible_rooms(self, request: str) -> Sequence[str]:
-        """Return all rooms that a request may refer to; for an exact name, only where it would lead."""
+        """Return all rooms that a request may refer to, or for an exact name only those to which it leads."""
         wanted = request.strip().lower()
         named = [room for room in self.rooms if room.lower() == wanted]
         if named:
@@ -195,7 +195,7 @@ class SimulatedRobot:
         return resolve_room(self.rooms, request, self.settings.matching)
 
     def look(self, entity: str) -> bool:
-        """Look for an object or a person; an absent person may arrive after some unsuccessful looks."""
+        """Look for an object or a person. An absent person may arrive after some unsuccessful looks."""
         settings, people = self.settings, self.people[self.room]
         seen = any(thing.is_meant_by(entity, settings.matching) for thing in self.things[self.room])
         seen = seen or any(one.is_here and is_called(one.person, entity, settings) for one in people)
@@ -240,7 +240,7 @@ class SimulatedRobot:
         self.held, self.taken = obj, thing
 
     def put(self, obj: str) -> None:
-        """Put down the held object, using the name it was picked up under or, if as-happened, any match."""
+        """Put down the object held under this name or, if events are `as-happened`, any matching name."""
         taken = self.taken if self.settings.events == "as-happened" else None
         is_meant = taken is not None and taken.is_meant_by(obj, self.settings.matching)
         if self.held is None or (self.held != obj and not is_meant):
@@ -267,7 +267,7 @@ class SimulatedRobot:
         return known
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Return the result of a skill without simulation code: given by the world, else random."""
+        """Return the result of a skill without simulation code: the world's value, or else a random one."""
         row, call = self.skills[skill], written_call(skill, plain(arguments))
         known, kinds = dict(self.world.truths).get(call), [kind for kind, _ in row.fails]
         if known in kinds:
@@ -303,7 +303,7 @@ class SimulatedRobot:
         row.wrong(sentence)
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], _errors: Sequence[str] = ()) -> int:
-        """Draw an outcome for a statement; the same world always gives the same outcome."""
+        """Draw an outcome for a statement. The same world always gives the same outcome."""
         return self._sampler.draw(len(outcomes), statement)
 
     @cached_property
@@ -353,7 +353,7 @@ class SimulatedRobot:
         to: str | None = None,
         destination: str | None = None,
     ) -> None:
-        """Record an event at the current place and time; its text is stripped."""
+        """Record an event at the current place and time, without whitespace around its text."""
         given = text.strip(), to_options(options), None, found
         event = Event(kind, *given, self.room, self.now, self.held or "", to, destination=destination)
         if self.guard is not None:

@@ -20,14 +20,14 @@ KINDS_OF_MOVES = {PICK, PLACE}
 
 
 def name_of(label: str, request: str) -> str:
-    """Return the name that rules compare for a room or thing: its label, or for a regex the request."""
+    """Return the name of a room or thing for rules: its label, or the request if the label is a regex."""
     is_name = PLAIN_LABEL.fullmatch(label) or not request or label.casefold() in request.casefold()
     return label if is_name else request
 
 
 @dataclass
 class _History:
-    """What happened so far, under the names that rules compare."""
+    """The events so far, with the names that rules compare."""
 
     monitors: Sequence[tuple[Rule, Monitor]]
     names: dict[str, str] = field(default_factory=dict)  # names of the visited rooms
@@ -63,7 +63,7 @@ class RuleGuard:
         self._prevented: RuleViolationError | None = None  # the skill may have caught it
 
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Let a robot execute one skill; raise RuleViolationError if it would break or broke a rule."""
+        """Let a robot execute one skill. Raise RuleViolationError if it would break, or broke, a rule."""
         row, start = robot.skills[skill], len(robot.events)
         holding = "" if robot.held is None else self._history.holding or robot.held
         place = self._history.names.get(robot.room, robot.room)
@@ -127,7 +127,7 @@ class RuleGuard:
             raise caught
 
     def happened(self, event: Event) -> None:
-        """Add an event to the history; raise RuleViolationError if its result broke a rule."""
+        """Add an event to the history. Raise RuleViolationError if its result broke a rule."""
         if event.destination is not None:
             self._history.names[event.destination] = event.text
         elif event.kind in KINDS_OF_MOVES:
@@ -148,12 +148,12 @@ class RuleGuard:
             raise late
 
     def moved(self, start: Point, end: Point, holding: str) -> None:
-        """Add a straight drive between two poses; raise RuleViolationError if it broke a rule."""
+        """Add a straight drive between two poses. Raise RuleViolationError if it broke a rule."""
         if self.judges_poses:
             self._enter(rooms_along(self._rooms, start, end), holding)
 
     def give_up(self, rules: Iterable[Rule], event: Event, objection: Objection, why: str) -> None:
-        """Stop judging some rules; raise RuleViolationError if one of them must always hold."""
+        """Stop judging some rules. Raise RuleViolationError if one of them must always hold."""
         for rule in rules:
             self._history.unjudged.add(rule.name)
             if rule.when == "always":
@@ -167,7 +167,7 @@ class RuleGuard:
         return None
 
     def _take(self, robot: SimulatedRobot, events: Sequence[Event], request: str | None = None) -> None:
-        """Add the current call's events to the history; `request` is the goal of a built-in drive."""
+        """Add the current call's events to the history. `request` is the goal of a built-in drive."""
         kinds = [event.kind for event in robot.events[self._start :]]
         is_one_move = sum(kind in KINDS_OF_MOVES for kind in kinds) == 1
         thing = self._held or robot.taken if is_one_move else None
@@ -196,7 +196,7 @@ class RuleGuard:
                     self.happened(Event(INSIDE, room, place=room, holding=holding))
 
     def _way(self, start: str, end: str) -> Iterable[Sequence[str]]:
-        """Return the rooms that contain each part of a simulated drive; without a map, only its two ends."""
+        """Return the rooms that contain each part of a simulated drive, or only its ends without a map."""
         one, other = self._stops.get(start), self._stops.get(end)
         return [(start,), (end,)] if one is None or other is None else rooms_along(self._rooms, one, other)
 

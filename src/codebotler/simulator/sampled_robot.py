@@ -1,4 +1,4 @@
-"""A robot in a sampled world: its rooms are known, and other facts are drawn when a program first asks."""
+"""A robot in a sampled world, whose rooms are known and whose other facts are drawn at their first use."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class RoomMap:
     rooms: tuple[str, ...]  # in the order in which the robot lists them
     start: str
     guessed: bool = False  # the rooms are a guess: any other place a program drives to exists as well
-    plain: bool = False  # names are plain text, not regexes; names of real robots and guesses always are
+    plain: bool = False  # names are plain text and not regexes, as always on real robots and guessed maps
     plan: tuple[Room, ...] = ()  # footprints, and stopping points if the robot drives straight between rooms
 
     def __post_init__(self) -> None:
@@ -57,7 +57,7 @@ class RoomMap:
 
     @classmethod
     def of_places(cls, world: World) -> RoomMap:
-        """Make the map of a robot that plans its own routes; it starts at the first place."""
+        """Make the map of a robot that plans its own routes, and starts at the first place."""
         names = tuple(room.name for room in world.rooms)
         plan = tuple(Room(room.name, (), (), room.footprint) for room in world.rooms)
         return cls(names, names[0], plain=True, plan=plan)
@@ -72,7 +72,7 @@ class RoomMap:
         return same[0] if same else next(within, (wanted or None) if self.guessed else None)
 
     def possible_rooms(self, request: str) -> list[str]:
-        """Return all known rooms that a request may refer to; for an exact name, only where it would lead."""
+        """Return all known rooms that a request may refer to. An exact name refers only to where it leads."""
         wanted, leads_to = request.strip().casefold(), self.room(request)
         named = [room for room in self.rooms if room.strip().casefold() == wanted]
         if named:
@@ -149,7 +149,7 @@ class ExploredRoom:
     people: set[str] = field(default_factory=set)
 
     def lacks(self, name: str) -> bool:
-        """Return whether a name is known to be absent; a missed longer name covers its parts."""
+        """Return whether a name, or a longer name that contains it, is known to be absent."""
         return name in self.missed or any(name in missed for missed in self.missed if name != SOMEBODY)
 
 
@@ -167,12 +167,12 @@ class RoomSearch:
 
 
 class SampledRobot(SimulatedRobot):
-    """A robot in a world whose facts are drawn while the program runs; a fact, once drawn, never changes.
+    """A robot in a world whose facts are drawn while the program runs, and never change once drawn.
 
-    Whether a person or thing that the program looks for is present is random. Without a look, the program's
-    assumptions hold: a person answers, and a thing can be picked up. Answers are random options.
+    If the program looks for a person or thing, their presence is random. Otherwise, the program's assumptions
+    hold: a person answers, and a thing can be picked up. Answers are random options.
 
-    A program that searches several rooms assumes that the thing is in one of them. If that is not so,
+    A program that searches several rooms assumes that the thing is in one of them. If the thing is in none,
     `excuses` holds the resulting errors, which are not the program's fault.
     """
 
@@ -226,7 +226,7 @@ class SampledRobot(SimulatedRobot):
 
     @contextmanager
     def excused(self, *, when: bool) -> Iterator[None]:
-        """Excuse any error raised in this context if random facts caused it and not the program."""
+        """Excuse any error raised in this context if random facts, and not the program, caused it."""
         try:
             yield
         except RobotError as error:
@@ -272,11 +272,11 @@ class SampledRobot(SimulatedRobot):
     # --- effects of skills
 
     def room_for(self, request: str) -> str | None:
-        """Return the room that a request refers to; on a guessed map, every place exists."""
+        """Return the room that a request refers to. On a guessed map, every place exists."""
         return self.room_map.room(request)
 
     def look(self, entity: str) -> bool:
-        """Look for an object or a person; the first look draws whether they are present."""
+        """Look for an object or a person. The first look draws whether they are present."""
         name, room = normalized(entity), self.here
         found = self.is_here(name)
         if found is None and (name in room.gone or (is_name(entity) and room.lacks(SOMEBODY))):
@@ -294,7 +294,7 @@ class SampledRobot(SimulatedRobot):
         return found
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
-        """Ask a person, who is present unless an earlier look failed to find them; the answer is random."""
+        """Ask a person, who is present unless an earlier look failed to find them. The answer is random."""
         person, options = as_text(person), to_options(options)
         who = normalized(person)
         if not options or not self._answers(who):

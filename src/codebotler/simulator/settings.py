@@ -23,7 +23,7 @@ Matching: TypeAlias = Literal["label-in-request", "whole-words"]
 
 @dataclass(frozen=True)
 class Limits:
-    """The resources that one run may use; beyond any limit it ends with status `timeout`."""
+    """The resources that one run may use. Beyond any limit, it ends with status `timeout`."""
 
     seconds: float = 3600.0  # simulated seconds
     calls: int = 1_000  # skill calls; sleeping does not count
@@ -34,7 +34,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class SimulationSettings:
-    """How a suite simulates its worlds; the defaults are the settings of the paper's suite."""
+    """How a suite simulates its worlds. The defaults are the settings of the paper's suite."""
 
     # `lowercase` converts a program's string literals before the run, as the authors of the paper did.
     literals: Literal["lowercase", "as-written"] = "lowercase"
@@ -47,7 +47,7 @@ class SimulationSettings:
     # who say yes choose an option that has neither, if there is only one.
     words_for_yes: tuple[str, ...] = ()
     words_for_no: tuple[str, ...] = ()
-    # Whether events record the words of the request, or the name of the actual room or thing; `as-happened`
+    # Whether events record the words of the request, or the name of the actual room or thing. `as-happened`
     # records no event for a drive to an unknown room.
     events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: Limits = field(default_factory=Limits)
@@ -95,14 +95,14 @@ def _anchored(label: str) -> str:
 
 
 def is_called(person: Person, request: str, settings: SimulationSettings) -> bool:
-    """Return whether a request refers to a person: by no name, by their own or by a word for people."""
+    """Return whether a request refers to a person by their name, by a word for people, or by no name."""
     if settings.people == "answer-to-any-name" or not request.strip():
         return True
     return any(finds(request, name, settings.matching) for name in (person.name, *settings.words_for_people))
 
 
 def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
-    """Return the first room whose name matches a request, or None; whole words prefer an exact match."""
+    """Return the first room whose name matches a request, or None. Whole words prefer an exact match."""
     return _resolve_room(tuple(rooms), request, matching)
 
 
@@ -119,7 +119,7 @@ def choose(
     """Return the position of the option that an answer refers to, or None if there is none.
 
     First, look for the answer in the options. If no option has it, look for yes or no in the settings' other
-    words; any other answer means yes if it matches the question, and no otherwise. A number selects the
+    words. Any other answer means yes if it matches the question, and no otherwise. A number selects the
     nearest option, counted from 1, or from the end if it is negative.
     """
     if isinstance(answer, int):
@@ -135,7 +135,7 @@ def choose(
 
 
 def _in_other_words(answer: str, options: tuple[Option, ...], settings: SimulationSettings) -> int | None:
-    """Return the option that means yes or no; a single option that does not mean no counts as yes."""
+    """Return the option that means yes or no. A single option that does not mean no counts as yes."""
     if answer == "no":
         return _first_saying(settings.words_for_no, options, settings.matching)
     no = ("no", *settings.words_for_no)

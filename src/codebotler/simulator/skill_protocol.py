@@ -120,7 +120,7 @@ def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, bool]:
 
 
 def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:
-    """Convert a skill's arguments for the robot; raise ProtocolError if they do not fit its parameters."""
+    """Convert a skill's arguments for the robot. Raise ProtocolError if they do not fit its parameters."""
     if len(values) != len(skill.parameters):
         raise ProtocolError("a skill call has the wrong number of arguments")
     arguments: list[Argument] = []

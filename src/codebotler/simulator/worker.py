@@ -27,15 +27,15 @@ NewRobot: TypeAlias = Callable[[], SimulatedRobot]
 Job: TypeAlias = tuple[str, Sequence[NewRobot]]
 """A program, and one function per run that creates its robot."""
 Meanwhile: TypeAlias = Callable[[], object]
-"""A function to call while a child runs programs; its result is ignored."""
+"""A function to call while a child runs programs. Its result is ignored."""
 DO_NOTHING: Meanwhile = bool
 
 
 class Worker:
     """Owns the processes that run programs, one at a time.
 
-    Nearly all programs are tame: many of them share a child, which has copies of their robots. Any other run,
-    and each one that the shared child cannot decide, gets its own child, and the engine performs its skills.
+    Nearly all programs are tame, and many of them share a child, which has copies of their robots. Any other
+    run, or one that the shared child cannot decide, gets its own child, and the engine performs its skills.
     The fork server for these runs holds the standard library, and starts when it is first needed.
     """
 
@@ -58,17 +58,17 @@ class Worker:
             raise
 
     def run(self, source: str, new_robot: NewRobot) -> Outcome:
-        """Run a program with a robot; if a process is lost, repeat the run with a new robot."""
+        """Run a program with a robot. If a process is lost, repeat the run with a new robot."""
         return self.run_all([(source, [new_robot])])[0][0]
 
     def run_all(self, jobs: Sequence[Job]) -> list[list[Outcome]]:
-        """Run programs; each outcome depends only on the program and its robot.
+        """Run programs. Each outcome depends only on the program and its robot.
 
         Args:
             jobs: the programs; all robots must have the same skills and the same `literals` setting.
 
         Returns:
-            each program's outcomes, one per robot; a repeated run gets a new robot.
+            each program's outcomes, one per robot. A repeated run gets a new robot.
         """
         known = self.run_tame(jobs)
         return [
@@ -100,7 +100,7 @@ class Worker:
             raise EngineError(f"an isolated process was lost: {error}") from None
 
     def stop(self) -> None:
-        """Kill all processes and any current run; call this from any thread."""
+        """Kill all processes and any current run. Any thread may call this."""
         self._stopped = True
         self._preparer.kill()
         for fork_server in list(self._fork_servers.values()):
@@ -112,14 +112,14 @@ class Worker:
             os.sched_setaffinity(fork_server.pid, {core})
 
     def close(self) -> None:
-        """End all processes; call this only while nothing is running."""
+        """End all processes. Call this only while nothing is running."""
         self._end_child()
         self._preparer.close()
         while self._fork_servers:
             self._fork_servers.popitem()[1].close()
 
     def forget(self) -> None:
-        """Close the descriptors after a fork, in the copy that is not the children's parent."""
+        """After a fork, close the descriptors in the new process, which is not the children's parent."""
         self._preparer.forget()
         if self._child is not None:
             self._child.hang_up()
@@ -142,7 +142,7 @@ class Worker:
     def run_tame(
         self, jobs: Sequence[Job], meanwhile: Meanwhile = DO_NOTHING
     ) -> dict[tuple[int, int], Outcome]:
-        """Return outcomes of tame programs by job and robot number; undecided runs are missing."""
+        """Return outcomes of tame programs by job and robot number, without undecided runs."""
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
             return known
@@ -200,7 +200,7 @@ class Worker:
 
     @contextmanager
     def one_child(self) -> Iterator[None]:
-        """Run all batches in this context in the same child; they must belong to one program."""
+        """Run all batches in this context in the same child. They must belong to one program."""
         self._keeps_child = True
         try:
             yield
@@ -214,7 +214,7 @@ class Worker:
         if child is None:
             return
         server = self._fork_servers.get(BATCH_SERVER)
-        if not isinstance(server, BatchServer) or server.has_ended:  # its child has ended with it
+        if not isinstance(server, BatchServer) or server.has_ended:  # its child has ended with the server
             child.hang_up()
             return
         with suppress(LostProcessError):  # the server may end at any moment
@@ -225,7 +225,7 @@ class Worker:
     # --- one child per run
 
     def run_alone(self, source: str, new_robot: NewRobot) -> Outcome:
-        """Run a program; if a process is lost through no fault of the program, repeat with a new robot."""
+        """Run a program. If a process is lost through no fault of the program, repeat with a new robot."""
         _log(source, "started")
         try:
             outcome = self._try(source, new_robot)

@@ -28,14 +28,14 @@ _LISTEN_BACKLOG = 128  # connections
 
 
 class Role(StrEnum):
-    """The role of a visitor: operators may do everything; a face may only answer questions and stop."""
+    """The role of a visitor: an operator may do everything, a face may only answer questions and stop."""
 
     OPERATOR = "operator"
     FACE = "face"
 
 
 class TooManyTriesError(Exception):
-    """Raised after too many invalid tokens from an address; for a while, even a valid token is refused."""
+    """Raised when an address has sent too many invalid tokens. For a while, even a valid one is refused."""
 
 
 def new_token() -> str:
@@ -57,7 +57,7 @@ class Access:
     def from_options(
         cls, operator: str | None, face: str | None, *, open_to_all: bool, is_private: bool
     ) -> Access:
-        """Use the given tokens, and create those that are None; raise UserError if a token is unsafe."""
+        """Use the given tokens, and create those that are None. Raise UserError if a token is unsafe."""
         if open_to_all and (operator or face or not is_private):
             raise UserError("--no-token cannot be combined with --host, --behind-proxy or your own tokens")
         if any(token is not None and len(token) < MIN_TOKEN_LENGTH for token in (operator, face)):
@@ -69,7 +69,7 @@ class Access:
         return cls(None if open_to_all else operator or new_token(), face or new_token(), unguessable)
 
     def of_token(self, token: str, address: str) -> Role | None:
-        """Return the role for a token, or None if it is invalid; this counts towards the address's limit."""
+        """Return a token's role, or None for an invalid token, which counts towards the address's limit."""
         role = self._of(token, lambda known: known)
         if role in self.unguessable:
             return role
@@ -89,7 +89,7 @@ class Access:
         return self._of(value, _cookie_value)
 
     def cookie(self, role: Role) -> str:
-        """Return the cookie for a role; the token cannot be derived from it."""
+        """Return a role's cookie, from which the token cannot be derived."""
         return _cookie_value(self.face if role is Role.FACE else self.operator or "")
 
     def _of(self, shown: str, form: Callable[[str], str]) -> Role | None:
@@ -137,7 +137,7 @@ class PageAddress:
         return self.is_loopback and not self.proxies
 
     def listen(self) -> socket.socket:
-        """Open a listening socket; raise UserError if no port is free."""
+        """Open a listening socket. Raise UserError if no port is free."""
         ports = PAGE_PORTS if self.port is None else (self.port,)
         for port in ports:
             try:

@@ -36,7 +36,7 @@ class _Form(BaseModel):
 
 
 class NewMission(_Form):
-    """A new mission: an instruction, a program, or both; without a program, the model writes one."""
+    """A new mission: an instruction, a program, or both. Without a program, the model writes one."""
 
     instruction: _LimitedText = ""
     model: Annotated[str, Field(max_length=200)] = Field("", description="By default, the first model.")
@@ -98,7 +98,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
-        """Begin a mission, and prepare its program in the background. Refused while a mission runs."""
+        """Begin a mission, unless another one runs, and prepare its program in the background."""
         with as_http_errors():
             session = console.begin(MissionOrder(new.instruction, new.model, new.program))
         await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
@@ -140,7 +140,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 def _add_changes(api: APIRouter, console: Console) -> None:
     @api.put("/missions/{mission}/program")
     def edit(mission: str, new: NewProgram) -> dict[str, Any]:
-        """Replace the program; it is checked in the background."""
+        """Replace the program, and check it in the background."""
         _current_session(console, mission)
         with as_http_errors():
             return view_data(console.edit(new.program).view)
@@ -163,7 +163,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/stop", status_code=202)
     async def stop_mission(mission: str) -> dict[str, Any]:
-        """Stop the current mission; `state` shows when it has stopped."""
+        """Stop the current mission. `state` shows when it has stopped."""
         _current_session(console, mission)
         console.stop(BY_PAGE)
         return view_data(console.view)
@@ -172,7 +172,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     async def stop(
         *, only_moving: Annotated[bool, Query(description="Stop only if a program is running.")] = False
     ) -> dict[str, Any]:
-        """Stop the current mission; return whether there is a mission to stop."""
+        """Stop the current mission, and return whether there was one to stop."""
         return {"stopping": console.stop(BY_PAGE, only_moving=only_moving)}
 
     @api.get("/missions/{mission}/events", response_class=StreamingResponse)
@@ -222,7 +222,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
 
 
 async def _stream(console: Console, session: MissionSession, known: int) -> AsyncIterator[str]:
-    """Yield server-sent events; a slow client misses no events and delays no other client."""
+    """Yield server-sent events. A slow client misses no events, and delays no other client."""
 
     def has_more() -> bool:
         return bool(session.events(known)) or session.view.is_over

@@ -35,7 +35,7 @@ MAX_WAIT_SECONDS = 15.0
 
 
 class Console:
-    """Holds the robot and the current mission for viewers on any thread; only missions connect the robot.
+    """Holds the robot and the current mission for viewers on any thread. Only missions connect the robot.
 
     `models` are the names of the available models, beginning with the default.
     """
@@ -58,7 +58,7 @@ class Console:
         self.interrupted: tuple[MissionSummary, ...] = ()
         self._open_model = open_model
         self._lock = threading.Lock()  # held briefly
-        self.session: MissionSession | None = None  # the current session, or else the last session
+        self.session: MissionSession | None = None  # the current session, or else the last one
         self._checking = threading.Lock()
         self._held = ExitStack()
         self._pool: WorkerPool | None = None
@@ -88,7 +88,7 @@ class Console:
         return self.view
 
     def begin(self, order: MissionOrder) -> MissionSession:
-        """Begin a mission, by default with the first model; raise MissionError while another mission runs."""
+        """Begin a mission, by default with the first model. Raise MissionError while another mission runs."""
         model = order.model.strip() or ("" if order.has_program else self.models[0])
         order = replace(order, instruction=order.instruction.strip(), model=model)
         for text in (order.instruction, order.program):
@@ -116,7 +116,7 @@ class Console:
         return session
 
     def edit(self, program: str) -> MissionSession:
-        """Replace the current program; after the end of a mission, begin a new mission."""
+        """Replace the current program, or begin a new mission if the current one has ended."""
         _check_length(program)
         session = self.session
         if session is None or session.view.is_over:
@@ -134,7 +134,7 @@ class Console:
         self.notifier.change()
 
     def stop(self, by: str, *, only_moving: bool = False) -> bool:
-        """Stop the mission, or only a running mission, without waiting; return whether one was found."""
+        """Stop the mission, or only a running one, without waiting. Return whether there was one to stop."""
         session, view = self.session, self.view
         if session is None or view.is_over or (only_moving and not view.is_running):
             return False
@@ -144,7 +144,7 @@ class Console:
     def check(
         self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()
     ) -> CheckResult:
-        """Check a program, one at a time; without a map, use the rooms that the program names."""
+        """Check a program once no other check runs. Without a map, use the rooms that the program names."""
         with self._checking:
             if self._pool is None:
                 self._pool = self._held.enter_context(WorkerPool(1))
@@ -153,7 +153,7 @@ class Console:
 
 
 class Notifier:
-    """Wakes viewers after each change; they read the latest view, so no queue can build up."""
+    """Wakes viewers after each change. They read the latest view, so no queue can build up."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -167,7 +167,7 @@ class Notifier:
             wake()
 
     async def changes(self) -> AsyncGenerator[None]:
-        """Yield once now and again after changes; changes in quick succession may be merged."""
+        """Yield once now, and again after changes. Changes in quick succession may be merged."""
         loop, changed = asyncio.get_running_loop(), asyncio.Event()
 
         def wake() -> None:
@@ -186,7 +186,7 @@ class Notifier:
                 self._wakes.remove(wake)
 
     async def until(self, is_met: Callable[[], bool], seconds: float | None = None) -> bool:
-        """Wait until a condition is met, for at most `seconds`; return whether it is met."""
+        """Wait until a condition is met, for at most `seconds`, and return whether it is met."""
         with suppress(TimeoutError):
             async with asyncio.timeout(seconds), aclosing(self.changes()) as changes:
                 async for _ in changes:

@@ -57,7 +57,7 @@ def router(console: Console, face: Face) -> APIRouter:
 
     @routes.get("/api/face")
     async def show(*, once_over: bool = False, once_begun: bool = False) -> dict[str, Any]:
-        """Return what the robot does, says and asks; `once_over` waits for the end of the mission."""
+        """Return what the robot does, says and asks. `once_over` waits for the end of the mission."""
         if once_begun:
             await console.view_once(over=False)
         if once_over:
@@ -66,7 +66,7 @@ def router(console: Console, face: Face) -> APIRouter:
 
     @routes.post("/api/face/answer")
     def answer(given: FaceAnswer) -> dict[str, Any]:
-        """Answer the question; the first answer counts, and late ones are refused."""
+        """Answer the question. Only the first answer counts, and late ones are refused."""
         try:
             face.answer(given.question, given.option)
         except AnswerError as error:
@@ -75,12 +75,12 @@ def router(console: Console, face: Face) -> APIRouter:
 
     @routes.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
-        """Stop a running mission; return whether there is a mission to stop."""
+        """Stop a running mission, and return whether there was one to stop."""
         return {"stopping": console.stop(BY_FACE, only_moving=True)}
 
     @routes.websocket("/api/face/live")
     async def live(socket: WebSocket) -> None:
-        """Send the face's data now and at each change; incoming messages are ignored."""
+        """Send the face's data now and at each change, and ignore incoming messages."""
         await socket.accept()
         with face.count_screen():
             sending = asyncio.create_task(_send_changes(socket, console, face))

@@ -21,7 +21,7 @@ _MAX_LABEL_CHARACTERS, _MAX_FINDS = 60, 3
 
 @dataclass(frozen=True)
 class MapState:
-    """The contents of a map besides the rooms.
+    """The contents of a map, apart from its rooms.
 
     Args:
         at: the robot's position in metres, if known.

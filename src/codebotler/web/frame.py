@@ -30,7 +30,7 @@ PAGE_BUILD_SECONDS = 60.0
 
 @dataclass(frozen=True)
 class Frame:
-    """Adds the bar to a page; its STOP button works even if the rest of the page does not.
+    """Adds the bar to a page. Its STOP button works even if the rest of the page does not.
 
     Args:
         links: the names and addresses of pages, in order.
@@ -43,7 +43,7 @@ class Frame:
     has_robot: bool = True
 
     def __call__(self, title: str, here: str, parts: Sequence[tuple[str, str]] = ()) -> None:
-        """Begin a page; the bar highlights the address `here`, and on small screens links to `parts`."""
+        """Begin a page. The bar highlights the address `here`, and on small screens links to `parts`."""
         ui.page_title(f"{title} · {self.brand}")
         ui.add_head_html(_STYLESHEET_HTML.format(prefix=outside("")))
         if self.has_robot:
@@ -76,7 +76,7 @@ def script(name: str) -> None:
 
 
 class PlainText(TextElement):
-    """An HTML element with plain text; `kind` contains its CSS classes."""
+    """An HTML element with plain text. `kind` contains its CSS classes."""
 
     def __init__(self, tag: str, text: str = "", kind: str = "") -> None:
         super().__init__(tag=tag, text=visible_lines(text))
@@ -84,7 +84,7 @@ class PlainText(TextElement):
         self.props("dir=auto")
 
     def say(self, text: str) -> None:
-        """Replace the text; an empty text hides the element."""
+        """Replace the text, or hide the element if the text is empty."""
         shown = visible_lines(text)
         if shown != self.text:
             self.text = shown
@@ -127,7 +127,7 @@ class Button(PlainText):
 
 @dataclass(frozen=True)
 class Site:
-    """The site to which other packages add pages; the guard protects these pages and keeps faces out.
+    """The site to which other packages add pages. The guard protects these pages, and keeps faces out.
 
     Args:
         app: the application; API routes belong below `/api/`, and files below `/static/`.
@@ -158,7 +158,7 @@ class Pages:
 
 
 def installed_pages() -> tuple[Pages, ...]:
-    """Load the pages of installed packages; report and leave out pages that fail to load."""
+    """Load the pages of installed packages, but report and leave out those that fail to load."""
     found: list[Pages] = []
     for point in sorted(entry_points(group=_ENTRY_POINTS), key=lambda point: point.name):
         try:

@@ -25,7 +25,7 @@ MAX_BODY_BYTES = 2_000_000
 
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _FACE_PATHS = ("/face", "/api/face", "/static", "/favicon.ico")
-"""The paths that faces may use; NiceGUI's websocket is excluded, as it accepts messages for any page."""
+"""The paths that faces may use, without NiceGUI's websocket, which accepts messages for any page."""
 
 _PAGE_POLICY = (
     "default-src 'none'; script-src 'self' 'nonce-{nonce}' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "

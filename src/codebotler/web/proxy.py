@@ -42,7 +42,7 @@ class OuterAddress:
 
     @classmethod
     def parse(cls, text: str) -> OuterAddress:
-        """Parse an address such as https://host:8443/robot; raise UserError if it is invalid."""
+        """Parse an address such as https://host:8443/robot. Raise UserError if it is invalid."""
         address = cls.found_in(text)
         if address is None:
             quoted = f'"{elide_middle(text, _MAX_QUOTED)}" is not the address of a proxy'
@@ -51,7 +51,7 @@ class OuterAddress:
 
     @classmethod
     def found_in(cls, text: str) -> OuterAddress | None:
-        """Parse an address; return None if it is invalid."""
+        """Parse an address, or return None if it is invalid."""
         found = _ADDRESS.fullmatch(text)
         if found is None:
             return None
@@ -94,7 +94,7 @@ class OuterAddress:
 
 
 def outer_addresses(texts: Iterable[str]) -> tuple[OuterAddress, ...]:
-    """Parse addresses; raise UserError if an address is invalid or two addresses have the same host."""
+    """Parse addresses. Raise UserError if an address is invalid or two addresses have the same host."""
     found = tuple(dict.fromkeys(map(OuterAddress.parse, texts)))
     hosts = [address.host for address in found]
     for address in found:
@@ -104,7 +104,7 @@ def outer_addresses(texts: Iterable[str]) -> tuple[OuterAddress, ...]:
 
 
 def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
-    """Return the addresses on the command line, or else in config.yaml; raise UserError if invalid."""
+    """Return the addresses on the command line, or else in config.yaml. Raise UserError if one is invalid."""
     file = config_file()
     if given or file is None or not file.is_file():
         return outer_addresses(given or ())

@@ -55,9 +55,9 @@ def serve(
     *,
     alone_for: float | None = None,
 ) -> None:
-    """Serve the page until Ctrl-C, which also stops a running robot; without a console, serve only `further`.
+    """Serve the page until Ctrl-C, which also stops a running robot. Without a console, serve only `further`.
 
-    A running robot is also stopped `alone_for` seconds after the last operator has left, unless it is None.
+    Unless `alone_for` is None, a running robot is also stopped that many seconds after all operators left.
     """
     with place.listen() as bound, console or nullcontext():
         port = bound.getsockname()[1]

@@ -31,7 +31,7 @@ class Action:
 
 @dataclass(frozen=True)
 class Scene:
-    """A stay in a room."""
+    """One visit to a room, with the robot's actions there."""
 
     room: str  # the requested room if the drive fails
     deeds: tuple[Action, ...] = ()
@@ -63,7 +63,10 @@ _NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which ar
 
 
 def draw_strips(check: CheckResult, reached: RouteProgress = NO_PROGRESS) -> None:
-    """Draw what a robot would do according to a check; tick off visited rooms, collapse refuted strips."""
+    """Draw what a robot would do in each kind of world, according to a check.
+
+    Visited rooms are ticked off, and strips that the actual run contradicts are collapsed.
+    """
     shown = strips(check)
     PlainText("h3", "What the robot would do" if shown else "")
     numbers = [scenes_reached(strip, reached) for strip in shown]
@@ -81,7 +84,7 @@ def draw_strips(check: CheckResult, reached: RouteProgress = NO_PROGRESS) -> Non
 
 
 def folded(numbers: Sequence[int | None]) -> list[bool]:
-    """Return for each strip whether to collapse it; if no strip matches the run, show all strips."""
+    """Return for each strip whether to collapse it. If no strip matches the run, show all strips."""
     is_among_them = any(number is not None for number in numbers)
     return [is_among_them and number is None for number in numbers]
 
@@ -116,7 +119,7 @@ def _texts(strip: Strip, kind: str) -> list[str]:
 def draw_scene(
     scene: Scene, wrong: Container[int] = frozenset(), *, is_reached: bool = False, anchor: str = ""
 ) -> None:
-    """Draw a stay in a room, and mark wrong steps; the HTML ID of a step is `anchor` plus its number."""
+    """Draw one visit to a room, and mark wrong steps. A step's HTML ID is `anchor` followed by its number."""
     kinds = ["scene"] if scene.deeds or not scene.is_found else ["scene", "passing"]
     kinds += ["wrong"] * (scene.step in wrong) + ["reached"] * is_reached
     with ui.element("li").classes(" ".join(kinds)):
@@ -165,7 +168,7 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
 def scenes(
     steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int | None] = frozenset()
 ) -> tuple[Scene, ...]:
-    """Return the scenes of a trace; a long trace is shortened in the middle, but keeps all needed steps."""
+    """Return the scenes of a trace. A long trace is shortened in the middle, but keeps all needed steps."""
     found: list[Scene] = [Scene(shortened(start, _MAX_STEP_TEXT))]
     for is_shown, some in select_steps(steps, needed):
         if not is_shown:

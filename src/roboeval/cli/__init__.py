@@ -1,4 +1,4 @@
-"""The commands of `roboeval`: they parse options and print results; other packages count and judge.
+"""The commands of `roboeval`, which parse options and print results. Other packages count and judge.
 
 Start with `app.py`, which lists the commands.
 """

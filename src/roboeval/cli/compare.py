@@ -56,7 +56,7 @@ def compare(
     elif len(runs) == _PAIR:
         compare_runs(runs, suite, ablated=ablation, as_json=json)
     else:
-        fail(f"name two runs, not {len(runs)}; only --suites takes another number")
+        fail(f"name two runs, not {len(runs)}; only --suites accepts another number")
 
 
 _PAIR = 2
@@ -128,7 +128,7 @@ def resample(
     """Compute how often programs would pass with rejection sampling.
 
     The programs of a judged run are checked, also against its house rules. The result is computed for each
-    limit of retries, without querying a model.
+    maximum number of retries, without querying a model.
     """
     from roboeval.analysis.resample import LIMITS, curve_data, trials_by_prompt
     from roboeval.cli.views.groups import resample_view

@@ -6,7 +6,7 @@ import typer
 
 
 def suite_names(incomplete: str) -> list[str]:
-    """Return the names of built-in and installed suites; the shell itself completes folders."""
+    """Return the names of built-in and installed suites. The shell itself completes folders."""
     from roboeval.suites.installed import installed_suites
     from roboeval.suites.load import shipped_suites
 

@@ -132,7 +132,7 @@ def stop_sentence(*, is_kept: bool, is_started: bool, redo: bool) -> str:
     """Return a sentence about what was saved before Ctrl-C, and how to continue."""
     if not is_kept:
         return "stopped; nothing was saved (add --out RUN to save verdicts)"
-    if redo and not is_started:  # the verdicts from before may still be there
+    if redo and not is_started:  # earlier verdicts may still be there
         return "stopped; run the same command again"
     return f"stopped; the same command {'without --redo ' * redo}continues where it stopped"
 
@@ -193,7 +193,7 @@ def import_(
 
 
 def import_batch(path: Path, out: Path, suite: str) -> None:
-    """Add the answers from a batch endpoint to their run; exit with status 1 if completions are missing."""
+    """Add the answers from a batch endpoint to their run. Exit with status 1 if completions are missing."""
     with installed():
         from roboeval.evaluation.batches import import_answers
     from roboeval.evaluation.runs.completions import how_many

@@ -44,8 +44,8 @@ def find(
 ) -> None:
     """Find completions by what they did, and group the failures.
 
-    A completion is found if its trace satisfies the formula in some world. Completions that failed are
-    grouped by the reason.
+    A completion is found if its trace satisfies the formula in some world. Failed completions are grouped by
+    the reason.
     """
     from codebotler.simulator.pool import cores
     from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures

@@ -52,7 +52,7 @@ MAX_BATCH_REQUESTS = 50_000
 
 @dataclass(frozen=True)
 class GenerationRequest:
-    """What a command requests: which completions, from which model, for which run."""
+    """A command's request: which completions to generate, from which model, and for which run."""
 
     name: str  # the name of the model
     settings: SamplingSettings
@@ -125,7 +125,7 @@ def suite_of_families(suite: str, families: str | None, num_tasks: int | None, s
 
 
 def complete_run(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
-    """Generate the missing completions of a run; exit with status 1 if any are still missing."""
+    """Generate the missing completions of a run. Exit with status 1 if any are still missing."""
     from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
     from roboeval.evaluation.generate import generate_run
 
@@ -209,7 +209,7 @@ def run(
     if repair and retries:
         fail("--repair and --retries cannot be combined; use one of them")
     if json and (repair or retries):
-        fail("--json excludes --repair and --retries; run `evaluate --json` on each round's folder")
+        fail("--json does not work with --repair or --retries; run `evaluate --json` on each round's folder")
     if with_report and find_spec("matplotlib") is None:  # check this before requests cost money
         fail(f"the report needs matplotlib; {install_command('matplotlib')}, or use --no-report")
     from roboeval.evaluation.evaluate import expect_same_judge
@@ -261,7 +261,7 @@ class GenerationMeter(ExitStack):
     progress: GenerationProgress | None = None
 
     def show(self, progress: GenerationProgress) -> None:
-        """Update the progress bar; the first call starts it and tells how many completions already exist."""
+        """Update the progress bar. The first call starts it, and says how many completions already exist."""
         if self.progress is None:
             self.progress = progress
             if progress.found:

@@ -90,9 +90,9 @@ def open_run(
     reuse_from: Results | None = None,
     on_line: Callable[[bytes], None] | None = None,
 ) -> Opened:
-    """Read a judged run; if a completion is given, read only the rows of its task.
+    """Read a judged run. If a completion is given, read only the rows of its task.
 
-    `on_line` is called with each line of verdicts; `reuse_from` is another evaluation of the same run.
+    `on_line` is called with each line of verdicts. `reuse_from` is another evaluation of the same run.
     """
     from codebotler.core.errors import UserError
     from roboeval.evaluation.runs.folder import evaluation_of
@@ -132,7 +132,7 @@ def open_current(
     reuse_from: Results | None = None,
     on_line: Callable[[bytes], None] | None = None,
 ) -> Opened:
-    """Read a judged run with `open_run`; raise UserError if verdicts are absent or outdated."""
+    """Read a judged run with `open_run`. Raise UserError if verdicts are absent or outdated."""
     from codebotler.core.errors import UserError
 
     opened = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from, on_line=on_line)

@@ -85,13 +85,13 @@ def mutate(
 
 
 def select_tasks(suite: Suite, words: Sequence[str] | None) -> list[Task]:
-    """Return the tasks with these names; a word may hold several names separated by commas."""
+    """Return the tasks with these names. A word may contain several names separated by commas."""
     names = [name for word in words or suite.tasks for name in word.split(",")]
     return [suite.task(name) for name in dict.fromkeys(names)]
 
 
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:
-    """Read the programs of the sources and group them by task; duplicates are kept."""
+    """Read the programs of the sources, and group them by task without dropping duplicates."""
     from roboeval.evaluation.runs.completions import name_of
     from roboeval.evaluation.runs.source import open_source
     from roboeval.mutation.mutants import Original
@@ -119,4 +119,4 @@ def show_scores(scores: Sequence[MutationScore], suite: str, *, brief: bool) -> 
         for original, fault in score.wrong:
             if original.claimed:
                 where = f"{fault.world}: {fault.why}"
-                note(f"not mutated because it is not right: {score.task}, {original.name} ({where})")
+                note(f"not mutated because the program is wrong: {score.task}, {original.name} ({where})")

@@ -27,7 +27,7 @@ def show_progress(items: Iterable[Watched], doing: str, total: int) -> Iterator[
 
 @contextmanager
 def progress_meter(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, str], None]]:
-    """Show progress; yield a function to call with the number of items done, from `before`, and a remark."""
+    """Show progress from `before` on. Yield a function to call with the number of items done and a remark."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     more_column = TextColumn("{task.fields[more]}", markup=False)

@@ -44,7 +44,7 @@ def report(
 ) -> None:
     """Write a report with figures, tables and a web page.
 
-    It has the paper's figures. The page also shows why programs fail and how certain the numbers are.
+    The report has the paper's figures. Its page also shows why programs fail and how certain the numbers are.
     """
     import atexit
     import gc
@@ -92,7 +92,7 @@ def judged_run(
 ) -> JudgedRun:
     """Read a run with any verdicts of its ablation, of another suite and with house rules.
 
-    The engine checks programs; without an engine, earlier results of the check are also left out.
+    The engine checks the programs. Without an engine, earlier results of the check are left out, too.
     """
     import polars as pl
 

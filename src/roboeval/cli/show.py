@@ -95,7 +95,7 @@ def show(
 
 
 def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
-    """Count broken house rules; compare with the evaluation without rules if it exists."""
+    """Count broken house rules, and compare with the evaluation without rules if it exists."""
     from roboeval.analysis.broken_rules import count_broken_rules
     from roboeval.evaluation.runs.folder import evaluation_key
     from roboeval.evaluation.runs.results import read_results
@@ -165,7 +165,7 @@ def show_completion(
     with_reply: bool,
     as_json: bool,
 ) -> None:
-    """Print a completion; if it fails, also print the command that shows the nearest passing program."""
+    """Print a completion. If it fails, also print the command that shows the nearest passing program."""
     from codebotler.core.words import counted
     from roboeval.analysis.failure_groups import nearest_fix
     from roboeval.cli.views.completions import completion_view
@@ -234,7 +234,7 @@ def serve(
 ) -> None:
     """Show runs in a browser.
 
-    You can compare runs and inspect each completion. Ctrl-C stops the server; no robot is needed.
+    You can compare runs and inspect each completion, without a robot. Ctrl-C stops the server.
     """
     from codebotler.core.errors import UserError
     from codebotler.web import server

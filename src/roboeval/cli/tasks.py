@@ -89,7 +89,7 @@ def start(task: str, suite: str) -> None:
 
 
 def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
-    """Print the findings of the linter; exit with status 1 unless all of them are accepted."""
+    """Print the findings of the linter. Exit with status 1 unless all of them are accepted."""
     from codebotler.simulator.pool import cores
     from roboeval.linting.findings import render
     from roboeval.linting.lint import lint
@@ -121,7 +121,7 @@ def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
 
 
 def other_suites(name: str) -> Iterator[str]:
-    """Yield sentences about other suites that --suite accepts, and about installed suites that fail."""
+    """Yield sentences about other suites that --suite accepts, and about suites that fail to load."""
     from codebotler.core.errors import UserError
     from roboeval.suites.installed import installed_suites
     from roboeval.suites.load import load_suite, shipped_suites

@@ -1,4 +1,4 @@
-"""Reads suites of tasks; three of them ship with RoboEval: `paper`, `plus` and `rules`.
+"""Reads suites of tasks, of which three ship with RoboEval: `paper`, `plus` and `rules`.
 
-Start with `load.py`; `schema.py` defines the content of task files.
+Start with `load.py`. The content of task files is defined in `schema.py`.
 """

@@ -54,7 +54,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 
 @cache  # many worlds use the same few expressions
 def parse_cached(text: str) -> ast.expr:
-    """Parse an expression into a syntax tree; raise ExpressionError if the syntax is invalid."""
+    """Parse an expression into a syntax tree. Raise ExpressionError if the syntax is invalid."""
     try:
         return parse_expression(text.strip())
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -62,7 +62,7 @@ def parse_cached(text: str) -> ast.expr:
 
 
 def evaluate(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - strings, numbers, lists of them
-    """Compute the value of an expression; raise ExpressionError if that is not possible."""
+    """Compute the value of an expression. Raise ExpressionError if that is not possible."""
     try:
         return _checked_value(node, names)
     except ExpressionError:
@@ -83,7 +83,7 @@ def _checked_value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - as `e
 
 
 def _size(found: object) -> int:
-    """Count the characters, digits or entries of a value; stop once the limit is exceeded."""
+    """Count the characters, digits or entries of a value, but stop once the limit is exceeded."""
     if isinstance(found, int):
         return found.bit_length() // 4
     if not isinstance(found, list | tuple):

@@ -1,4 +1,4 @@
-"""Reads house rules for evaluations; a program that breaks a rule is stopped and fails."""
+"""Reads house rules for evaluations, where a program that breaks a rule is stopped and fails."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class HouseRules:
     def read(
         cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (), *, of_suite: bool = False
     ) -> HouseRules:
-        """Read a rules file, validated against the given rooms if any; raise UserError if it is invalid."""
+        """Read a rules file, validated against any given rooms. Raise UserError if it is invalid."""
         rules = read_rules(path, skills, rooms)
         if not of_suite and not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
             raise UserError(

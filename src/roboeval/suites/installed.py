@@ -36,7 +36,7 @@ class InstalledSuite(NamedTuple):
 
 
 def installed_suites() -> list[InstalledSuite]:
-    """Return the suites of installed packages, sorted by name; several may have the same name."""
+    """Return the suites of installed packages, sorted by name. Several may have the same name."""
     suites = []
     for point in entry_points(group="roboeval.suites"):
         package = "of unknown name" if point.dist is None else f"{point.dist.name} {point.dist.version}"
@@ -45,7 +45,7 @@ def installed_suites() -> list[InstalledSuite]:
 
 
 def installed_folder(name: str) -> Path | None:
-    """Find the folder of a suite in an installed package; return None if no package has the suite.
+    """Find the folder of a suite in an installed package, or return None if no package has the suite.
 
     Raises UserError if several packages have it, or if a local folder has the same name.
     """

@@ -45,8 +45,8 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     """Read a suite.
 
     Args:
-        name: a suite that ships with RoboEval or with an installed package, or a folder; or
-            `families-SPLIT-SEED`, such as `families-test-7`, for a new task from each family; append `-N`
+        name: a suite that ships with RoboEval or with an installed package, a folder, or
+            `families-SPLIT-SEED`, such as `families-test-7`, for a new task from each family. Append `-N`
             for N tasks.
         skills: the skills that formulas may use, in addition to skills declared in the suite's files.
 
@@ -67,6 +67,6 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
 
 
 def has_suite(name: str) -> bool:
-    """Whether a suite is built in, installed, or generated from families; folders do not count."""
+    """Whether a suite is built in, installed or generated from families. Folders do not count."""
     known = {*shipped_suites(), *(suite.name for suite in installed_suites())}
     return name in known or family_tasks_named(name) is not None

@@ -13,7 +13,7 @@ _TEMPLATE = Path(__file__).parent / "template"
 
 
 def new_task(folder: Path, name: str) -> Path:
-    """Write the files of a new task, and of a new suite if needed; existing files are not changed."""
+    """Write the files of a new task, and of a new suite if needed, without changing existing files."""
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name):
         raise UserError(f'"{name}" is not a task name; join capitalised words, as in WaterPlants')
     if (folder.resolve().parent / "suite.yaml").exists():

@@ -15,7 +15,7 @@ _TRIES = 12  # number of candidates tried for each combination
 
 
 def number_values(sizes: Mapping[str, int]) -> dict[str, range]:
-    """Number the values of all factors consecutively; return the range of numbers for each factor."""
+    """Number the values of all factors consecutively, and return the range of numbers for each factor."""
     numbers: dict[str, range] = {}
     start = 0
     for factor in sorted(sizes):
@@ -32,7 +32,7 @@ def sample_combinations(sizes: Mapping[str, int], count: int, random: Random) ->
 
 
 def cover_pairs(sizes: Mapping[str, int], random: Random) -> list[Combination]:
-    """Return few combinations that cover every pair of values; the greedy choice is not always minimal."""
+    """Return few combinations that cover every pair of values. The greedy choice is not always minimal."""
     if len(sizes) == 1:
         return [{factor: value} for factor, size in sizes.items() for value in range(size)]
     numbers = number_values(sizes)

@@ -37,7 +37,7 @@ Ability = Literal[
 
 
 class StrictForm(BaseModel):
-    """Base class for file contents; unknown keys are errors."""
+    """Base class for file contents, in which unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -50,7 +50,7 @@ class CheckFile(StrictForm):
     """A check in a task file.
 
     Args:
-        means: how explanations describe the check's texts, by kind of event; a single string is for `say`.
+        means: how explanations describe the check's texts, by kind of event. A single string is for `say`.
     """
 
     category: Category  # the kind of failure if the check fails
@@ -113,7 +113,7 @@ Looks = Annotated[int, Field(strict=True, ge=0, le=1_000)]
 
 
 class SampledPersonFile(StrictForm):
-    """A person who may be in sampled worlds; each world samples one entry from each list."""
+    """A person who may be in sampled worlds. Each world samples one entry from each list."""
 
     name: NamePattern | None = None
     where: Levels = Field(alias="in")
@@ -131,7 +131,7 @@ class SampledThingFile(StrictForm):
 
 
 class CornerFile(StrictForm):
-    """A world with some values set by hand; the other values default to the first entry of their list."""
+    """A world with some values set by hand. Other values default to the first entry of their list."""
 
     about: Name
     set: dict[Name, AnswerFile | Annotated[int, Field(strict=True)]] = {}

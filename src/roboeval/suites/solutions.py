@@ -47,7 +47,7 @@ def solutions(task: Task) -> tuple[Solution, ...]:
 
 
 def locate_solution(task: Task, solution: Solution) -> tuple[Path, int | None]:
-    """Return the file and line of a solution; return the task file if the solution is in another suite."""
+    """Return the file and line of a solution, or the task file if the solution is in another suite."""
     path = task.path.parents[1] / "solutions" / task.path.name
     programs = _read(task.path.parents[1], task).programs
     if solution not in programs:

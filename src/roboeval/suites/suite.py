@@ -1,4 +1,4 @@
-"""Reads suites from folders; a suite consists of tasks and the settings for judging them."""
+"""Reads suites from folders. A suite consists of tasks and the settings used to judge programs."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ SUITE_NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 @dataclass(frozen=True)
 class Suite:
-    """Tasks with the settings for judging them.
+    """A set of tasks and the settings used to judge programs.
 
     Args:
         worlds: the minimum number of worlds per task if they are sampled; None if they are written by hand.
-        recorded: the programs of the recorded models, unless they are in files.
+        recorded: the programs of the recorded models, if they are not stored in files.
     """
 
     name: str  # the name, which evaluations record
@@ -94,7 +94,7 @@ class Suite:
         return read_suite(self.folder, self.skills)
 
     def task(self, name: str) -> Task:
-        """Return the task with this name; raise UserError if there is none."""
+        """Return the task with this name. Raise UserError if there is none."""
         if name not in self.tasks:
             known = ", ".join(self.tasks)
             raise UserError(f'the suite "{self.name}" has no task "{name}"; its tasks are {known}')
@@ -107,7 +107,7 @@ def shipped_suites() -> tuple[str, ...]:
 
 
 def suite_folder(name: str) -> Path:
-    """Return the folder of a built-in or installed suite, or a folder's path; otherwise raise UserError."""
+    """Return the folder of a built-in or installed suite, or a folder's path. Otherwise, raise UserError."""
     if name in shipped_suites():
         return SUITES / name
     if SUITE_NAME.fullmatch(name) and (installed := installed_folder(name)) is not None:

@@ -101,7 +101,7 @@ class Task:
         return f"Task({self.name!r}, {prompts}, {worlds})"
 
     def judged_in(self, *, ablated: bool = False) -> tuple[Scenario, ...]:
-        """Return the worlds and requirements for judging programs; empty if there is no ablation."""
+        """Return the worlds and requirements for judging programs, or none if there is no ablation."""
         return (self.ablation or ()) if ablated else self.scenarios
 
 
@@ -113,7 +113,7 @@ def check_label(text: str) -> str:
 
 
 def world_title(number: int, of: str, about: str) -> str:
-    """Return the title of a world; the number that starts a sampled world's description is dropped."""
+    """Return the title of a world, without the number that starts a sampled world's description."""
     return f"World {number}{of}: {about.removeprefix(f'{number}: ')}"
 
 

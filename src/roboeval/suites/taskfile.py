@@ -53,7 +53,7 @@ def read_task(
         words: words for people that `{people}` in a check matches in addition to names.
 
     Raises:
-        UserError: the file is not valid; the message names the line.
+        UserError: the file is not valid. The message names the line.
     """
     data = _with_borrowed(file, lender)
     is_sampled = isinstance(data, dict) and isinstance(data.get("worlds"), dict)

@@ -49,7 +49,7 @@ class Setting:
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """Return a key that is equal for equivalent worlds; the answers of absent people are ignored."""
+        """Return a key that is equal for equivalent worlds. It ignores the answers of absent people."""
         absent = {_owner(factor) for factor, level in self.chosen.items() if level == IN_NO_ROOM}
         chosen = self.chosen.items()
         return self.rooms, *(one for one in chosen if one[1] == IN_NO_ROOM or _owner(one[0]) not in absent)
@@ -69,7 +69,7 @@ class WorldSampler:
 
     @cached_property
     def factors(self) -> dict[str, tuple[FactorLevel, ...]]:
-        """Return the levels of each factor; factors are named like `alice.in` and `alice.answer 1`."""
+        """Return the levels of each factor, whose names are like `alice.in` and `alice.answer 1`."""
         found = {ROBOT_FACTOR: self._rooms(self.described.robot, ROBOT_FACTOR)}
         for name, person in self.described.people.items():
             found[f"{name}.in"] = self._rooms(person.where, "people", name, "in")

@@ -1,1 +1,1 @@
-"""Runs tame programs in batches: `process` in a closed child, `replay` to check its transcripts."""
+"""Runs tame programs in batches: `process` runs them in a closed child, `replay` checks its transcripts."""

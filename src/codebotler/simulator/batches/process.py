@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 __all__ = ["get_ready", "serve"]
 
-# A program alone in a process may recurse far deeper, so a run that is too deep here is repeated there.
+# A run that recurses too deep here is repeated in its own process, where it may recurse far deeper.
 BATCH_RECURSION_LIMIT = 400
 MAX_PLAIN_CALLS = 50  # in a longer transcript, equal calls are written only once
 MAX_CALL_BYTES = 50_000  # bytes of a skill's arguments, which must fit into a frame
@@ -75,8 +75,8 @@ def _receive_setup(door: socket) -> bytes:
 def execute(run: TranscribedRun, rehearsal: Batch) -> NoReturn:
     """Run the batches that the engine sends, and send back transcripts, until the engine hangs up.
 
-    A child is forked before it is needed, and rehearses first: the kernel copies each page on the first
-    write, which takes longer than most batches.
+    A child is forked before it is needed, and first runs a rehearsal, because the kernel copies each page on
+    the first write to it, which takes longer than most batches.
     """
     transcripts(run, rehearsal)
     while True:
@@ -242,7 +242,7 @@ def _robot_argument(kind: str, value: Any) -> Argument:  # noqa: ANN401 - a skil
 
 
 def _is_plain(given: Argument) -> bool:
-    """Return whether the argument's text is short and has no lone surrogates, which JSON could join."""
+    """Return whether the argument's text is short and without lone surrogates, which JSON could join."""
     if isinstance(given, tuple):
         text = "".join([str(each[0] if isinstance(each, Option) else each) for each in given])
     else:

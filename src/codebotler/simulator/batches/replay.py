@@ -43,7 +43,7 @@ class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 ReplayKey: TypeAlias = tuple[Any, ...]  # a received transcript, and the ids of the parts of its robot
 MAX_REPLAYS, MAX_REPLAY_BYTES = 2_048, 4_096  # cached transcripts, and bytes of each
-# Cached outcomes; each entry keeps the objects of its key alive so that their ids are not reused.
+# Cached outcomes. Each entry keeps the objects of its key alive so that their ids are not reused.
 REPLAYED: dict[ReplayKey | None, tuple[Outcome, SkillTable, Setup]] = {}
 LAST_MOMENT = (-1, 0.0)  # marks the end of a transcript's moments
 ONLY_TIME: SkillAnswer = ("time", None)
@@ -53,7 +53,7 @@ TRANSCRIPT_DECODER = msgspec.json.Decoder(Transcript | None)
 def message(
     programs: Programs,
 ) -> tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]:
-    """Return the message that sends programs to a child; all their robots must have the same skills."""
+    """Return the message that sends programs to a child. All their robots must have the same skills."""
     robot = programs[0][1][0]
     setups: dict[tuple[int, ...], Setup] = {}
     keyed = []
@@ -69,10 +69,10 @@ def message(
 def outcomes(
     child: IsolatedProcess, programs: Programs, meanwhile: Callable[[], object] = bool
 ) -> Iterator[Outcome | None]:
-    """Run programs in a child; yield the outcomes in order, or None for a run that must be repeated alone.
+    """Run programs in a child process, and yield their outcomes in order.
 
-    `meanwhile` is called while the child is busy. Raise LostProcessError, ProtocolError or TimeoutError if
-    the child can no longer be used.
+    An outcome is None if the run must be repeated in its own process. `meanwhile` is called while the child
+    is busy. Raise LostProcessError, ProtocolError or TimeoutError if the child can no longer be used.
     """
     child.send(message(programs), at_once=True)
     meanwhile()
@@ -92,7 +92,7 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
         if replay.ledger.broken is not None:
             if transcript.end is None:
                 raise ProtocolError("a rule ends the run, but the child is waiting")
-            return None  # repeat the run alone, to learn the line at which the rule ended it
+            return None  # repeat the run in its own process, to learn at which line the rule ended it
         if transcript.end is not None:
             outcome = judge_end(replay.ledger.outcome_at_end(transcript.end), robot)
             if outcome.status is Status.KILLED:
@@ -122,7 +122,7 @@ def key_of(frame: bytes, robot: SimulatedRobot) -> ReplayKey | None:
 
 
 def parse_transcript(frame: bytes) -> Transcript | None:
-    """Parse a transcript; return None if the run must be repeated in a process of its own."""
+    """Parse a transcript, or return None if the run must be repeated in its own process."""
     try:
         return TRANSCRIPT_DECODER.decode(frame)  # type: ignore[no-any-return]  # the decoder returns this type
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
@@ -137,10 +137,10 @@ class Replay:
         self._signatures, self._own = signatures(robot.skills), robot.own_skills
 
     def follow(self, transcript: Transcript) -> SkillAnswer:
-        """Repeat all calls, and return the last answer; raise ProtocolError if any answer differs."""
+        """Repeat all calls, and return the last answer. Raise ProtocolError if any answer differs."""
         calls = [self._expected(call) for call in transcript.calls]
         if transcript.end is None and (not calls or calls[-1][2] is not None):
-            raise ProtocolError("the child is waiting for nothing")
+            raise ProtocolError("the child is waiting, but has asked for nothing")
         order = range(len(calls)) if transcript.order is None else transcript.order
         if transcript.order and not 0 <= min(order) <= max(order) < len(calls):
             raise ProtocolError("a call does not exist")
@@ -200,7 +200,7 @@ def _fits(parameter: Parameter, given: object) -> bool:
 
 @lru_cache(maxsize=16)
 def signatures(skills: SkillTable) -> dict[str, tuple[type, ...]]:
-    """Return the argument types of each skill; `object` marks an argument that needs a further check."""
+    """Return the argument types of each skill. `object` marks an argument that needs a further check."""
     return {
         skill.name: tuple(str if p.type == TEXT_TYPE else object for p in skill.parameters)
         for skill in skills.rows

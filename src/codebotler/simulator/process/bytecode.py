@@ -69,13 +69,13 @@ def stdlib_files() -> dict[str, Path]:
 
 
 def code_of(file: str, shown: str) -> bytes:
-    """Return a module's code, whatever the interpreter's options; tracebacks show the file name `shown`."""
+    """Return a module's code, whatever the interpreter's options. Tracebacks show the file name `shown`."""
     code = None
     if not sys.flags.optimize:
         with contextlib.suppress(EOFError, ImportError, ValueError):  # the bytecode file is damaged
             code = SourceFileLoader(shown, file).get_code(shown)
     if code is None or all(column is None for _, _, column, _ in code.co_positions()):
-        # An interpreter that omits column numbers wrote it, so it is shorter.
+        # Compile again, since an interpreter that omits column numbers wrote this shorter code.
         return compiled_source(Path(file).read_text(encoding="utf-8"), shown)
     return dumped(code, shown)
 

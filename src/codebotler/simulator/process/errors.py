@@ -2,8 +2,8 @@
 
 
 class LostProcessError(Exception):
-    """A process ended through no fault of the program, such as before it was isolated."""
+    """A process ended through no fault of the program, for example before it was isolated."""
 
 
 class ProtocolError(Exception):
-    """The program wrote to the channel: our own code never sends a message like this."""
+    """The program must have written to the channel, since our own code never sends this message."""

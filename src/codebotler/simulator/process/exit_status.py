@@ -11,7 +11,7 @@ PROCESSOR_TIME = "seconds of processor time"  # ends the message about a program
 
 
 def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, RunError]:
-    """Explain why a process died without a last message; `status` is its exit status, or minus the signal."""
+    """Explain why a process died without a last message, from its exit status or negative signal number."""
     match -status:
         case signal.SIGXCPU:
             return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} {PROCESSOR_TIME}")

@@ -99,14 +99,14 @@ class ForkServer:
         self._process.kill()
 
     def close(self) -> None:
-        """Kill the fork server and close its descriptors; call this only while nothing is running."""
+        """Kill the fork server and close its descriptors. Call this only while nothing is running."""
         self._process.kill()
         self._process.wait()
         os.close(self._report)
         self._door.close()
 
     def forget(self) -> None:
-        """Close the descriptors after a fork, in the copy that is not the fork server's parent."""
+        """After a fork, close the descriptors in the new process, which is not the fork server's parent."""
         self._process.returncode = 0  # stops `Popen` from waiting for it here
         os.close(self._report)
         self._door.close()
@@ -177,7 +177,7 @@ class BatchServer(ForkServer):
         return child or super().fork()
 
     def fork_ahead(self) -> None:
-        """Fork the next child in advance; the previous child must have been killed."""
+        """Fork the next child in advance. The previous child must have been killed."""
         with contextlib.suppress(LostProcessError):  # the next fork raises the error
             self._next = super().fork()
 
@@ -188,13 +188,13 @@ class BatchServer(ForkServer):
             self._next.hang_up()
 
     def forget(self) -> None:
-        """Close the descriptors after a fork, in the copy that is not the fork server's parent."""
+        """After a fork, close the descriptors in the new process, which is not the fork server's parent."""
         super().forget()
         if self._next is not None:
             self._next.hang_up()
 
     def _set_up(self) -> None:
-        """Send our own programs to specialize its bytecode; tame programs cannot observe addresses."""
+        """Specialize the bytecode. The heap need not be stable, since tame programs cannot observe it."""
         rehearsal = message([(WARM_UP_CODE, [SimulatedRobot(WARM_UP_WORLD)])])
         setup = marshal.dumps((rehearsal, WARM_UP_RUNS), WITHOUT_REFERENCES)
         self._door.sendall(len(setup).to_bytes(HEADER, "big") + setup)

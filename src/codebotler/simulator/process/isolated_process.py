@@ -29,7 +29,7 @@ class IsolatedProcess:
         self,
         find_pid: Callable[[], int],  # returns the process id, which is unique until the next run
         channel: socket.socket,
-        wait: Callable[[], int],  # waits, and returns the exit status, or minus the signal
+        wait: Callable[[], int],  # waits, and returns the exit status or negative signal number
         *,
         has_seccomp: bool,  # whether it uses seccomp, so that /proc shows whether it is isolated
     ) -> None:
@@ -43,7 +43,7 @@ class IsolatedProcess:
 
     @cached_property
     def pid(self) -> int:
-        """The process id; raises LostProcessError if there is none."""
+        """The process id. Raises LostProcessError if there is none."""
         try:
             return self._find_pid()
         except LostProcessError:
@@ -51,7 +51,7 @@ class IsolatedProcess:
             raise
 
     def send(self, message: object, *, at_once: bool = False) -> None:
-        """Send a message; if the process has ended, `receive` notices it.
+        """Send a message. If the process has ended, only `receive` reports it.
 
         The sizes of the pieces that a process reads change its heap, which wild programs can observe. So it
         requests each piece after the first, and the sizes do not depend on its speed.
@@ -125,7 +125,7 @@ class IsolatedProcess:
             raise TimeoutError
 
     def _check_progress(self, before: int | None) -> int | None:
-        """Return a sleeping process's processor time; raise TimeoutError if it has not changed."""
+        """Return a sleeping process's processor time. Raise TimeoutError if it has not changed."""
         fields = _stat(self.pid)
         used = int(fields[11]) + int(fields[12]) if fields[:1] == ["S"] else None
         if used is not None and used == before:
@@ -138,7 +138,7 @@ class IsolatedProcess:
             os.kill(self.pid, signal.SIGKILL)
 
     def end(self) -> int:
-        """Kill the process, and return its exit status, or minus the signal."""
+        """Kill the process, and return its exit status or negative signal number."""
         self.kill()
         try:
             return self._wait()
@@ -146,7 +146,7 @@ class IsolatedProcess:
             self.hang_up()
 
     def end_gently(self) -> int:
-        """Give the process a moment to exit, then kill it; return its exit status, or minus the signal."""
+        """Kill the process unless it exits soon, and return its exit status or negative signal number."""
         for _ in range(50):
             if _stat(self.pid)[:1] in ([], ["Z"]):
                 break
@@ -162,7 +162,7 @@ class IsolatedProcess:
         self._channel.close()
 
     def was_isolated(self) -> bool:
-        """Return whether the filter was installed, or True if that is unknown; works until the next run."""
+        """Return whether the filter was installed, or True if unknown. Call this before the next run."""
         if not self._has_seccomp:
             return True
         try:

@@ -41,7 +41,7 @@ class Preparer:
         self._last: tuple[tuple[str, bool, SkillNames], Prepared | Outcome] | None = None
 
     def prepare(self, source: str, *, lowercase: bool, skills: SkillNames) -> Prepared | Outcome:
-        """Compile a program, or return the outcome of all its runs if that fails; cache the last result."""
+        """Compile a program, or return the outcome of all its runs if that fails. Cache the last result."""
         if len(source) > MAX_SOURCE:
             return refused("MemoryError", f"the program is longer than {MAX_SOURCE:,} characters")
         asked = source, lowercase, skills
@@ -73,7 +73,7 @@ class Preparer:
             self._send((source,), lowercase, skills)
 
     def start(self) -> IsolatedProcess:
-        """Return the process, started if there is none; it answers once it is ready."""
+        """Return the process, and start it if there is none. It answers once it is ready."""
         if self._process is None:
             ours, theirs = socket.socketpair()
             with theirs:
@@ -92,13 +92,13 @@ class Preparer:
             process.kill()
 
     def close(self) -> None:
-        """End the process; call this only while nothing is running."""
+        """End the process. Call this only while nothing is running."""
         process, self._process, self._served, self._asked = self._process, None, 0, None
         if process is not None:
             process.end()
 
     def forget(self) -> None:
-        """Close the channel after a fork, in the copy that is not the preparer's parent."""
+        """After a fork, close the channel in the new process, which is not the preparer's parent."""
         if self._process is not None:
             self._process.hang_up()
 

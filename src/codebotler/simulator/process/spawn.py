@@ -42,7 +42,7 @@ def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
 
 
 START_LOCK = threading.Lock()
-# A fork during a start would inherit a locked lock, and a pipe whose closing the start waits for.
+# A fork during a start would inherit a locked lock, and keep open a pipe that the start expects to close.
 os.register_at_fork(
     before=START_LOCK.acquire,
     after_in_parent=START_LOCK.release,

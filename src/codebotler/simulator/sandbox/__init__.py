@@ -26,8 +26,8 @@ MAX_CODE = 10_000_000  # bytes of a program's compiled code
 
 PROGRAM = "<program>"  # the file name of a program's code
 
-# Names of the functions that we insert into compiled programs; no source text can spell them.
+# Names of the functions that we insert into compiled programs, which no source text can spell.
 FUEL, CAUGHT, ENTRY, ENTER, BY_NAME = "<fuel>", "<caught>", "<entry>", "<enter>", "<by-name>"
 
-# The first byte of the preparer's answer; what follows is code, tame code, or the reason for a refusal.
+# The first byte of the preparer's answer. The rest is code, tame code, or the reason for a refusal.
 PLAIN, TAME, REFUSED = b"p", b"t", b"-"

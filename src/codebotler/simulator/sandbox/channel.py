@@ -60,7 +60,7 @@ def receive_at_once() -> Any:  # noqa: ANN401 - any message from the engine
 
 
 def read_piece(most: int = PIECE) -> bytes:
-    """Read a piece of the engine's message; exit the process if the engine has ended."""
+    """Read a piece of the engine's message, or exit the process if the engine has ended."""
     piece = read(CHANNEL, most)
     if not piece:
         _exit(1)

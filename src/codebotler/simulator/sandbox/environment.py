@@ -1,4 +1,4 @@
-"""Simulates the environment of programs: clock, standard streams and process ids; forbids tracing hooks."""
+"""Simulates a program's environment, such as clock, streams and process ids, and forbids tracing hooks."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ UNAWAITED = "task_program is a coroutine, which nobody awaits; write def, not as
 
 
 class ProgramRun:
-    """Runs one program; the fork server prepares as much as possible before the fork."""
+    """Runs one program. The fork server prepares as much as possible before the fork."""
 
     recursion_limit = PROGRAM_RECURSION_LIMIT
 
@@ -91,7 +91,7 @@ class ProgramRun:
         provided.update(names)
 
     def ended_by(self, error: BaseException) -> str:
-        """Describe as JSON the error that ended the program; its class may be the program's own."""
+        """Describe the error that ended the program as JSON. Its class may be the program's own."""
         kind, line = type(error), self.refused_at or _last_line(error)
         message = str.__getitem__(_message_of(error), slice(1000))  # a subclass of `str` may use fuel
         where = f'"line":{"null" if line is None else line}'
@@ -117,7 +117,7 @@ class ProgramRun:
         return {
             FUEL: use_fuel,
             CAUGHT: self.catcher(use_fuel),
-            # Goes one call deeper than a skill before it lifts the recursion limit, so hits the limit first.
+            # Goes one call deeper than a skill before lifting the recursion limit, and so hits it first.
             ENTRY: lambda: use_fuel(),  # noqa: PLW0108 - see above
             ENTER: self.enter,
             BY_NAME: self.start_task,
@@ -188,7 +188,7 @@ class ProgramRun:
     def perform(
         self, name: str, parameters: list[tuple[type | str, ParameterDescription]], values: tuple[Any, ...]
     ) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Execute a skill; texts must be of type `str` and options of type `list`, not of subclasses."""
+        """Execute a skill. Texts must be of type `str` and options of type `list`, not of subclasses."""
         for (kind, parameter), value in zip(parameters, values, strict=True):
             given: type = type(value)
             if given is not kind:
@@ -212,7 +212,7 @@ class ProgramRun:
         return self.request(f"{quoted(name)},[{','.join(given)}]")
 
     def sleep(self, seconds: object, /) -> None:
-        """Advance time; the engine learns of simulated time with the next request, or at the time limit."""
+        """Advance time. The engine learns of simulated time with the next request, or at the time limit."""
         if not isinstance(seconds, int | float):
             raise TypeError(f"{NAME_OF(type(seconds))!r} object cannot be interpreted as an integer")
         if not 0 <= seconds < float("inf"):
@@ -247,7 +247,7 @@ class ProgramRun:
 
 
 def call_task() -> object:
-    """Call the task; this code runs with the program's names, and need not be compiled in each child."""
+    """Call the task. This code runs with the program's names, and need not be compiled in each child."""
     return task_program()  # type: ignore[name-defined] # noqa: F821 - defined by the program
 
 
@@ -321,7 +321,7 @@ NAME_OF: Callable[[type], str] = type.__dict__["__name__"].__get__
 
 
 class LimitReachedError(BaseException):
-    """The run has reached a limit; any further use of fuel or a skill raises this error again."""
+    """The run has reached a limit. Any further use of fuel or a skill raises this error again."""
 
 
 class SkillError(Exception):
@@ -335,7 +335,7 @@ ROBOT_ERROR_CLASSES: dict[str, type[SkillError]] = {}
 
 
 def robot_error(number: int, kind: str, text: str) -> SkillError:
-    """Return the exception for a robot error; each kind of error has its own class."""
+    """Return the exception for a robot error. Each kind of error has its own class."""
     if kind not in ROBOT_ERROR_CLASSES:
         ROBOT_ERROR_CLASSES[kind] = type(kind, (SkillError,), {"__module__": "robot"})
     ROBOT_ERROR_CLASSES[kind].number = number

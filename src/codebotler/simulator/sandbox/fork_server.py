@@ -93,7 +93,7 @@ def _one_run(
 ) -> bool:
     """Fork the child for one run, and report its process id and later its exit status.
 
-    The dead child is reaped when the next run is requested, so that its process id is not reused before.
+    The dead child is reaped when the next run is requested, so that its process id is not reused earlier.
     """
     line = _asked_for(door)
     if line < 0:
@@ -114,7 +114,7 @@ def _one_run(
 
 
 def _asked_for(door: socket) -> int:
-    """Wait for the next request, reap the last child, and return the next one's socket, or -1 at the end."""
+    """Wait for the next request, and reap the last child. Return the new child's socket, or -1 at the end."""
     ancillary = door.recvmsg(1, CMSG_SPACE(DESCRIPTOR_BYTES))[1]
     if not ancillary:
         return -1
@@ -126,7 +126,7 @@ def _asked_for(door: socket) -> int:
 
 
 def _end_of(pid: int) -> int:
-    """Wait for a child to end, and return its exit status, or minus the signal."""
+    """Wait for a child to end, and return its exit status or negative signal number."""
     if sys.platform != "linux":  # macOS has `waitid` only since Python 3.13
         return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)

@@ -35,7 +35,7 @@ SCOPE_NODES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 def prepared(
     source: str, *, lowercase: bool, skills: frozenset[str] | None = None
 ) -> tuple[types.CodeType, bool]:
-    """Compile a program that uses fuel, and return whether it is tame; without skills, it counts as wild."""
+    """Compile a program to use fuel, and return whether it is tame. Without skills, it counts as wild."""
     if "\0" in source:
         line = source.count("\n", 0, source.index("\0")) + 1
         raise SyntaxError("source code cannot contain null characters", (PROGRAM, line, 1, None))
@@ -56,7 +56,8 @@ def prepared(
 def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
     """Return the nodes of a tree by type, without operators and contexts.
 
-    Raise MemoryError or SyntaxError if it is nested too deeply: Python's own limits depend on its version.
+    Raise MemoryError or SyntaxError if it is nested too deeply, since Python's own limits depend on the
+    version.
     """
     nodes: defaultdict[type[ast.AST], list[Any]] = defaultdict(list)
     waiting: list[tuple[ast.AST, int, int]] = [(tree, 0, 0)]
@@ -116,7 +117,7 @@ def _use_fuel(nodes: dict[type[ast.AST], list[Any]]) -> None:
 
 
 def _note_entries(statement: ast.stmt) -> None:
-    """Insert calls that record the entry of module functions: each may be the task under another name."""
+    """Insert calls that record each entry of a module function, which may be the task by another name."""
     waiting: list[ast.AST] = [statement]
     while waiting:
         node = waiting.pop()
@@ -139,5 +140,5 @@ def _call(name: str, where: ast.AST) -> ast.Expr:
 
 
 def _call_before(name: str, node: ast.expr) -> ast.expr:
-    """Return the expression `name() or node`; our functions return None."""
+    """Return the expression `name() or node`, which equals `node` because our functions return None."""
     return ast.copy_location(ast.BoolOp(ast.Or(), [_call(name, node).value, node]), node)

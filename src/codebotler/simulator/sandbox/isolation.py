@@ -28,7 +28,7 @@ def give_up_rights(memory: int = MEMORY) -> None:
 
 
 def enclose(seccomp: Filter | None, seconds: int) -> None:
-    """Leave only the channel open, and limit processor time; call `give_up_rights` first."""
+    """Leave only the channel open, and limit processor time. Call `give_up_rights` first."""
     set_limit("NPROC", 0)
     set_limit("NOFILE", CHANNEL + 1)
     limit_time(seconds)
@@ -37,7 +37,7 @@ def enclose(seccomp: Filter | None, seconds: int) -> None:
 
 
 def set_limit(name: str, value: int) -> None:
-    """Permanently set one limit; systems other than Linux lack some limits, or refuse small values."""
+    """Permanently set one limit. Systems other than Linux lack some limits, or refuse small values."""
     kind = getattr(resource, "RLIMIT_" + name, None)
     try:
         if kind is not None:
@@ -66,7 +66,7 @@ def become_nobody() -> None:
 
 
 def die_with_parent() -> None:
-    """Die when the thread that started this process ends; changing the user undoes this."""
+    """Die when the thread that started this process ends. A change of the user undoes this setting."""
     prctl(PR_SET_PDEATHSIG, SIGKILL)
 
 
@@ -76,7 +76,7 @@ def refuse_new_rights() -> None:
 
 
 def install(seccomp: Filter) -> None:
-    """Install a filter that allows only its system calls."""
+    """Install a filter, after which only the system calls that it lists are allowed."""
     prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, seccomp[0])
 
 
@@ -89,7 +89,7 @@ LIBC = _ctypes.dlopen(None, 0)  # type: ignore[arg-type]  # instead of `ctypes`,
 
 
 def prctl(option: int, value: int = 0, other: int | bytes = 0) -> None:
-    """Change an attribute of this process; does nothing on systems other than Linux."""
+    """Change an attribute of this process on Linux, and do nothing on other systems."""
     if sys.platform != "linux":
         return
     if _ctypes.call_function(_ctypes.dlsym(LIBC, "prctl"), (option, value, other, 0, 0)) != 0:
@@ -156,7 +156,7 @@ def seccomp_filter(machine: str = MACHINE) -> Filter | None:
 
 
 def usable_filter() -> Filter | None:
-    """Return the filter for this machine if the kernel accepts it, which containers may prevent, or None."""
+    """Return this machine's filter, or None if the kernel does not accept it, as in some containers."""
     seccomp = seccomp_filter()
     if seccomp is None:
         return None

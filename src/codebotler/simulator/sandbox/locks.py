@@ -8,7 +8,7 @@ from codebotler.simulator.sandbox.execution import ProgramRun
 
 
 class Lock:
-    """Replaces `_thread.lock`; there is no other thread that could release a held lock."""
+    """Replaces `_thread.lock`. There is no other thread that could release a held lock."""
 
     run: ProgramRun
 
@@ -16,7 +16,7 @@ class Lock:
         self._times = 0
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:  # noqa: FBT001, FBT002 - as in _thread
-        """Take the lock if it is free; otherwise let the timeout pass, or end the run if there is none."""
+        """Take the lock if it is free. Otherwise, let the timeout pass, or end the run if there is none."""
         if not blocking and timeout != -1:
             raise ValueError("can't specify a timeout for a non-blocking call")
         if self._is_free():
@@ -78,7 +78,7 @@ class RLock(Lock):
 
 
 def simulate_locks(run: ProgramRun) -> None:
-    """Replace all locks created from now on; call this before `threading` is imported."""
+    """Replace all locks created from now on. Call this before `threading` is imported."""
     Lock.run = run
     for each in (Lock, RLock):
         each.__module__ = "_thread"

@@ -66,7 +66,7 @@ class _CompiledModules:
 def start_again(descriptors: list[int]) -> NoReturn:
     """Restart the interpreter with fixed addresses, and with the descriptors from FIRST_DESCRIPTOR on.
 
-    A program may print an address, which must be the same after every start; even the length of an argument
+    A program may print an address, which must be the same after every start. Even the length of an argument
     or the number of a descriptor would change it.
     """
     import ctypes  # noqa: PLC0415 - large, and not needed after the restart

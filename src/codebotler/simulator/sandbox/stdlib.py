@@ -114,7 +114,7 @@ def hide_folders() -> None:
 class Select:
     """Replaces `select.select`: waiting for files is forbidden, and a wait without files is a sleep.
 
-    A class, since a function would become a method in `selectors`.
+    This is a class, since a function would become a method in `selectors`.
     """
 
     def __init__(self, run: ProgramRun) -> None:

@@ -52,7 +52,7 @@ def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
 
 
 class ProgramVerifier(ExpressionVerifier):
-    """Raises WildError for a statement that is not allowed; `STATEMENTS` has a check per allowed kind."""
+    """Raises WildError for a statement that is not allowed. `STATEMENTS` has a check per allowed kind."""
 
     def check_statements(self, body: Sequence[ast.stmt]) -> None:
         """Check a block of statements."""
@@ -103,7 +103,7 @@ class ProgramVerifier(ExpressionVerifier):
         self.check_statements([*node.body, *node.orelse])
 
     def _check_try(self, node: ast.Try) -> None:
-        """Allow `try`; a caught error may be printed or raised again, like any data."""
+        """Allow `try`. A caught error may be printed or raised again, like any data."""
         self.check_statements(node.body)
         for handler in node.handlers:
             if handler.name is not None and not self.is_data(handler.name):

@@ -1,4 +1,4 @@
-"""Checks that the names and expressions in a program are allowed in tame programs; see `tame`."""
+"""Checks that a program has only names and expressions that tame programs may have (see `tame`)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-# Consumers use up their first argument immediately; all other functions take only data.
+# Consumers use up their first argument immediately. All other functions take only data.
 CONSUMERS = _words("all any dict len list max min next sorted sum tuple")
 FUNCTIONS = CONSUMERS | _words("abs bool chr divmod float int ord pow print range repr round str")
 ITERATORS = _words("enumerate filter map reversed zip")
@@ -32,7 +32,7 @@ ERRORS = _words(
     """
 )
 GIVEN = FUNCTIONS | ITERATORS | ERRORS | {"isinstance"}  # all builtins that a tame program can use
-# Names that programs may have without binding them; every program has `__name__`, with data.
+# Names that programs may have without binding them, except `__name__`, which always holds data.
 EXISTING = frozenset({*dir(builtins), "exit", "quit", "sys", "time"}) - {"__name__"}
 
 TEXT_METHODS = _words(
@@ -70,7 +70,7 @@ def parameters_of(given: ast.arguments) -> list[str]:
 
 
 class ExpressionVerifier:
-    """Raises WildError for an expression that is not allowed; `VALUES` has a check per allowed kind."""
+    """Raises WildError for an expression that is not allowed. `VALUES` has a check per allowed kind."""
 
     def __init__(self, nodes: Nodes, skills: frozenset[str]) -> None:
         self.skills = skills
@@ -169,7 +169,7 @@ class ExpressionVerifier:
                 self._check_annotation(arg.annotation)
 
     def _check_annotation(self, node: ast.expr) -> None:
-        """Allow an annotation; programs cannot read annotations."""
+        """Allow an annotation of a usual form, since programs cannot read annotations."""
         match node:
             case ast.Constant(value) if value is None or value is ... or isinstance(value, str):
                 pass
@@ -218,7 +218,7 @@ class ExpressionVerifier:
                 wild()
 
     def _check_call_of_builtin(self, node: ast.Call, *, uses_up: bool, calls_key: bool) -> None:
-        """Allow data as arguments; the builtin may consume its first argument, and call `key`."""
+        """Allow data as arguments. The builtin may also consume its first argument, and call `key`."""
         for number, each in enumerate(node.args):
             if uses_up and number == 0:
                 self._check_iterable(each)
@@ -269,7 +269,7 @@ class ExpressionVerifier:
         self._check_value(node.value)
 
     def _check_comparison(self, node: ast.Compare) -> None:
-        """Allow a comparison of data; `in` may search an iterator."""
+        """Allow a comparison of data. `in` may also search an iterator."""
         sides = [node.left, *node.comparators]
         self._check_value(node.left)
         for operator, left, right in zip(node.ops, sides, sides[1:], strict=False):

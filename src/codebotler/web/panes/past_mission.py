@@ -22,7 +22,7 @@ from codebotler.web.live import follow
 
 MAX_LISTED_EVENTS, _MAX_CODE_CHARACTERS = 1_000, 200
 _STATE_TITLES: Mapping[str, str] = {MissionState.DRAFTING: "Program written", MissionState.RUNNING: "Started"}
-"""The titles of states in the timeline; other states keep their own names."""
+"""The titles of states in the timeline. Other states keep their own names."""
 
 _STATES_IMPLIED_BY_STOP = frozenset({MissionState.STOPPING, MissionState.STOPPED})
 """The states that the timeline hides after a stop."""
@@ -53,7 +53,7 @@ async def _update(console: Console, page: _MissionPage) -> None:
 
 
 def timeline(events: Sequence[LogLine]) -> Iterator[tuple[LogLine, str]]:
-    """Yield the visible events with their descriptions; a stop includes the activity that it interrupted."""
+    """Yield the visible events with their descriptions. A stop includes the activity that it interrupted."""
     doing, is_stopped = "", False
     for number, line in enumerate(events):
         event = line["event"]

@@ -174,7 +174,7 @@ class ProgramPane:
                 scroll_up()
 
     async def _is_seen(self, view: SessionView) -> bool:
-        """Whether this browser shows exactly the view's program; two people may type at the same time."""
+        """Whether this browser shows exactly the view's program, since two people may type at once."""
         seen = await ui.run_javascript("programEditor.settle()", timeout=5.0)
         if seen["text"] == _for_editor(view.program):
             return True

@@ -23,7 +23,7 @@ class QuestionPane:
         self._box = ui.element("div").classes("asking").props('role=group aria-label="What the robot asks"')
 
     def show(self, *, is_over: bool) -> None:
-        """Show the current question; during a mission, recommend opening the face if no screen shows it."""
+        """Show the current question. During a mission, recommend opening the face if no screen shows it."""
         screens = self._face.screens
         shown = f"The robot's face is open on {counted(screens, 'screen')}."
         nobody = "" if is_over else "Open the robot's face so people can see what it says and asks."

@@ -1,4 +1,4 @@
-"""The pane with a model's reply, shown while it arrives and if it contains no program."""
+"""The pane with a model's reply, which is shown while it arrives and if it contains no program."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from codebotler.missions.view import SessionView
 from codebotler.web.frame import PlainText
 
 _MAX_CHARACTERS = 6_000
-"""The maximum length of the shown part of a reply: the end while it arrives, then the beginning."""
+"""The maximum length of what is shown of a reply: its end while it arrives, then its beginning."""
 
 
 class ReplyPane:
@@ -44,7 +44,7 @@ class _Folded:
             self._text = PlainText("div", "", "text").props("tabindex=0")
 
     def say(self, text: str, *, is_arriving: bool = False) -> None:
-        """Show a text; an empty text hides the element."""
+        """Show a text, or hide the element if the text is empty."""
         self._box.set_visibility(bool(text.strip()))
         if len(text) > _MAX_CHARACTERS:
             text = f"… {text[-_MAX_CHARACTERS:]}" if is_arriving else f"{text[:_MAX_CHARACTERS]} …"

@@ -85,7 +85,7 @@ class RobotPane:
             self._map.set_content(floorplan(world, state))
 
     def _draw_moments(self, moments: tuple[Moment, ...]) -> None:
-        """Append new moments and scroll to them; for another mission, redraw the whole list."""
+        """Append new moments and scroll to them, or redraw the whole list for another mission."""
         if moments == self._drawn:
             return
         known = len(self._drawn)

@@ -42,7 +42,7 @@ def task_program():
     editor.setDecorations(latest.marks);
   };
 
-  /** Replace only the part that differs, so that cursors stay in place; local undo skips this change. */
+  /** Replace only the part that differs, so that cursors stay in place. Local undo skips this change. */
   const put = (program) => {
     const [view, old] = [editor.editor, text()];
     if (old === program) return;
@@ -56,7 +56,7 @@ def task_program():
     editor.emitting = true;
   };
 
-  /** Send pending text at once; return the shown text and the number of texts sent. */
+  /** Send pending text at once, and return the shown text and the number of texts sent. */
   const settle = () => {
     if (waiting !== undefined) send();
     return { text: text(), number: sent };

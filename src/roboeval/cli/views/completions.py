@@ -68,7 +68,7 @@ def completion_view(
 ) -> RenderableType:
     """Show a completion's program and what the robot did in each world, given its `completion_data`.
 
-    `in_full` also shows satisfied worlds in full; `with_reply` adds the original reasoning and reply.
+    `in_full` also shows satisfied worlds in full. `with_reply` adds the original reasoning and reply.
     """
     failure = data["failure"]
     why_none = None if failure is None else no_program_sentence(failure)

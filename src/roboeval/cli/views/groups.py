@@ -34,7 +34,7 @@ def found_view(
     groups: int,
     is_search: bool,
 ) -> RenderableType:
-    """Show groups of failures; after a search, list the completions found in each task first."""
+    """Show groups of failures. After a search, first list the completions found in each task."""
     failed = len(found) - int(counts["passed"].sum())
     parts: list[RenderableType] = []
     if is_search:

@@ -28,7 +28,7 @@ MAX_TASKS_NAMED = 3  # for more tasks, only their number is shown
 
 
 def ruled(*heads: str, first: JustifyMethod = "left") -> Table:
-    """Create a table with a line below its header; all columns but the first are right-aligned."""
+    """Create a table with a line below its header. All columns but the first are right-aligned."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for number, head in enumerate(heads):
         table.add_column(Text(head), justify="right" if number else first, overflow="fold")

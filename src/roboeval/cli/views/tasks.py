@@ -46,7 +46,7 @@ def suite_task_view(task: Task) -> RenderableType:
 
 
 def clauses_view(tasks: Iterable[Task]) -> RenderableType:
-    """Show each prompt's clauses, each with the checks that cover it or the reason why none does."""
+    """Show the clauses of each prompt, with the checks that cover them or the reason why none does."""
     parts: list[RenderableType] = []
     for task in tasks:
         table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)

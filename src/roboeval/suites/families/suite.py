@@ -20,16 +20,17 @@ from roboeval.suites.task import Task
 
 SEEDS_PER_SPLIT = 1_000_000_000
 FIRST_SEEDS = {"train": 0, "validation": SEEDS_PER_SPLIT, "test": 2 * SEEDS_PER_SPLIT}
-"""The first seed of each split; a split has SEEDS_PER_SPLIT seeds."""
+"""The first seed of each split, which has SEEDS_PER_SPLIT seeds."""
 
 MAX_FAMILY_TASKS = 100
 FAMILY_SUITE_NAME = re.compile(r"families-([a-z]+)-(\d{1,9})(?:-(\d{1,3}))?", re.ASCII)
 
 
 def first_seed(split: str, seed: int, count: int, what: str) -> int:
-    """Return the first of `count` consecutive seeds of a split; each `seed` selects entirely different ones.
+    """Return the first of `count` consecutive seeds of a split.
 
-    Raises UserError if the split does not exist or a number is out of range; `what` names the counted items.
+    Each `seed` selects entirely different ones. Raises UserError, in which `what` names the counted items, if
+    the split does not exist or a number is out of range.
     """
     if split not in FIRST_SEEDS:
         raise UserError(f'unknown split "{split}"; use {listed(list(FIRST_SEEDS))}')
@@ -43,10 +44,10 @@ def first_seed(split: str, seed: int, count: int, what: str) -> int:
 
 @dataclass(frozen=True)
 class FamilyTasks:
-    """Selects the generated tasks of a suite; the families take turns.
+    """Selects the generated tasks of a suite, one from each family in turn.
 
     Args:
-        split: `train`, `validation` or `test`, which share no task.
+        split: `train`, `validation` or `test`, which have no task in common.
         seed: each seed, from 0, gives entirely different tasks.
         count: the number of tasks, 1 to 100; one for each family by default.
 
@@ -70,7 +71,7 @@ class FamilyTasks:
         return f"families-{self.split}-{self.seed}" + ("" if usual else f"-{self.count}")
 
     def suite(self, skills: SkillTable = SKILLS) -> Suite:
-        """Build a suite from these tasks; the result is reproducible."""
+        """Build a suite from these tasks. The result is reproducible."""
         return _build_suite(self, skills)
 
     def seeds(self) -> Iterator[tuple[str, str, int]]:
@@ -119,7 +120,7 @@ def _named(name: str, made: TrainedTask) -> Task:
 
 
 def _recorded(made: TrainedTask) -> Iterator[InstructionSolutions]:
-    """Yield the programs of recorded models: right ones; hasty models first give some wrong ones."""
+    """Yield the programs of recorded models. Careful models are right, hasty ones may be wrong at first."""
     right = Solution(about="right", program=made.solution)
     wrong = [Solution(about=one.about, program=one.program, fails="unknown") for one in made.wrong]
     mixed = (right, *wrong)

@@ -60,7 +60,7 @@ class WrongProgram(StrictForm):
 
 
 class FamilyFile(StrictForm):
-    """The template file of a family; `$name` is replaced by a value chosen for each seed.
+    """The template file of a family, in which `$name` is replaced by a value chosen for each seed.
 
     Args:
         about: a one-sentence description of the tasks.
@@ -105,7 +105,7 @@ def family_names() -> tuple[str, ...]:
 
 
 def family_file(family: str) -> Path:
-    """Return the path of one of `family_names()` or of a `.yaml` file; otherwise raise UserError."""
+    """Return the path of one of `family_names()` or of a `.yaml` file. Otherwise, raise UserError."""
     if family.endswith(".yaml") and Path(family).is_file():
         return Path(family)
     if family not in family_names():
@@ -114,7 +114,7 @@ def family_file(family: str) -> Path:
 
 
 def trained_task(family: str, seed: int, *, worlds: int = TRAINING_WORLDS) -> TrainedTask:
-    """Generate the task of a family for a seed; the result is reproducible.
+    """Generate the task of a family for a seed. The result is reproducible.
 
     Args:
         family: one of `family_names()`, or the path of a `.yaml` file, which is read only once.
