@@ -26,7 +26,7 @@ class Option(NamedTuple):
 
 
 def to_options(values: Iterable[object]) -> tuple[Option, ...]:
-    """Convert the options of a question for events; keep existing `Option` values."""
+    """Convert the options of a question to `Option` values, unless they already are."""
     return tuple(
         [one if isinstance(one, Option) else Option(str(one), isinstance(one, str)) for one in values]
     )
@@ -76,7 +76,7 @@ class Event:
         more: tuple[str, ...] = (),
         destination: str | None = None,
     ) -> None:
-        values = self.__dict__  # the quickest way to fill a frozen object; traces have many events
+        values = self.__dict__  # the quickest way to fill a frozen object, since traces have many events
         values["kind"], values["text"], values["options"] = kind, text, options
         values["answer"], values["found"], values["place"], values["time"] = answer, found, place, time
         values["holding"], values["to"], values["more"] = holding, to, more

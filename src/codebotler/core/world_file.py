@@ -180,7 +180,7 @@ _CALL = re.compile(r"\w+\(.*\)")
 
 
 def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
-    """Return a statement as skills write it; raise ValueError if its value is impossible."""
+    """Return a statement in the form that skills use, or raise ValueError if its value is impossible."""
     if not _CALL.fullmatch(statement):
         if not isinstance(value, bool):
             raise ValueError(f'"{statement}" is {value!r}; write true or false')
@@ -209,7 +209,7 @@ def _expect_possible(name: str, given: list[object], value: object, skills: Skil
         raise ValueError(f"there is no skill {name}" + (f"; did you mean {alike[0]}?" if alike else ""))
     row = skills[name]
     if not row.is_random:
-        raise ValueError(f"the code of {name} computes its result; set the truths that it queries instead")
+        raise ValueError(f"the code of {name} computes its result; instead, set the facts it depends on")
     if len(given) != len(row.parameters) or not all(
         parameter.type.fits(one) for parameter, one in zip(row.parameters, given, strict=True)
     ):

@@ -14,7 +14,7 @@ from codebotler.core.words import listed
 Scalar: TypeAlias = str | int | float | bool
 Base: TypeAlias = Literal["str", "int", "float", "bool"]
 
-MAX_INTEGER = 2**53  # JSON and robots carry integers up to this exactly
+MAX_INTEGER = 2**53  # JSON and robots represent integers up to this value exactly
 BASE_TYPES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "bool"}
 
 
