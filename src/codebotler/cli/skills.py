@@ -123,7 +123,7 @@ def _example(row: Skill) -> list[Any]:
 
 
 def skills_view(skills: SkillTable) -> RenderableType:
-    """Show skills as models see them, with their outcomes: the user's own, or else all built-in skills."""
+    """Show the user's own skills, or else all built-in ones, as models see them and with their outcomes."""
     own = [row for row in skills.rows if row not in SKILLS.rows]
     return Group(*_lines(own or SKILLS.rows, skills))
 

@@ -238,7 +238,7 @@ def _introduction(lines: Sequence[str], start: int) -> int:
 def _choose(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
     """Choose the block that defines the program, or else a block that may be the program.
 
-    The first block of a base model continues the prompt; for a chat model, the last complete block that is
+    The first block of a base model continues the prompt. For a chat model, the last complete block that is
     more than an outline counts.
     """
     if continues and blocks and blocks[0].defines_task:
@@ -254,7 +254,7 @@ def _choose(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
 
 
 def _with_helpers(chosen: _Block, blocks: Sequence[_Block]) -> str:
-    """Add the blocks that define names which the chosen block needs; they may be earlier versions."""
+    """Add the blocks, even earlier versions, that define names which the chosen block needs."""
     at = blocks.index(chosen)
     kept = {at}
     tree = chosen.tree
