@@ -102,7 +102,7 @@ class CheckResult:
 
     @property
     def evidence(self) -> frozenset[int]:
-        """The number of the first sample for each problem that samples show."""
+        """The number of the first sample of each problem that any sample shows."""
         ends = {
             sample.outcome.line: sample.number for sample in reversed(self.samples) if sample.outcome.error
         }
@@ -112,7 +112,7 @@ class CheckResult:
         return frozenset(number for number in first if number is not None)
 
     def data(self, skills: SkillTable = SKILLS) -> dict[str, Any]:
-        """Convert the result to plain data for JSON, so that equal results give equal data.
+        """Convert the result to plain data for JSON. Equal results give equal data.
 
         Args:
             skills: the skills that the program could call.

@@ -50,7 +50,7 @@ class HouseRuleFile(BaseModel):
     for_each: Annotated[list[Name] | None, Field(min_length=1)] = None
 
     def rule(self, file: YamlFile, at: YamlPath, skills: SkillTable) -> Rule:
-        """Convert the entry to a rule; raise UserError if it is not valid."""
+        """Convert the entry to a rule, or raise UserError if it is not valid."""
         if self.always is None and self.finally_ is None:
             raise file.wrong(
                 f'the rule "{self.name}" has no formula; write one after "always" or "finally"', *at

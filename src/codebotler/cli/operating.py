@@ -32,7 +32,7 @@ def run(
 ) -> None:
     """Check a program, ask for approval, and run it on a robot.
 
-    Ctrl-C stops the robot; the exit status is then 130.
+    Ctrl-C stops the robot, and the exit status is then 130.
     """
     from codebotler.cli import run
     from codebotler.cli.run import Request

@@ -142,7 +142,7 @@ def robot_settings(
     rules: RulesOption = None,
     skills: SkillsOption = None,
 ) -> RobotSettings:
-    """Read the files that the options name; raise UserError if a file is invalid."""
+    """Read the files that the options name, or raise UserError if a file is invalid."""
     from codebotler.checking.rules import read_rules
     from codebotler.core.skills.files import skills_from
     from codebotler.robots.base import Options

@@ -92,7 +92,7 @@ def _event_line(line: LogLine) -> Text:
 
 
 def ending_view(ended: MissionSummary | SessionView) -> Group:
-    """Show how a mission ended, and the command that shows it again, which never wraps."""
+    """Show how a mission ended, and the command that shows it again, on a line that is never wrapped."""
     state = ended.state
     assert state is not None, "the mission has begun"
     text = Text.assemble((state, STATE_STYLES.get(state, "bold")), _why(ended))

@@ -148,7 +148,7 @@ class Appender:
             raise
 
     def append(self, line: bytes) -> None:
-        """Append a line completely or not at all; raise OSError if the disk is full."""
+        """Append a line completely or not at all. Raise OSError if the disk is full."""
         descriptor = self._file.fileno()
         start = os.fstat(descriptor).st_size
         with name_in_errors(self.path):
@@ -269,7 +269,7 @@ def _user_folder(variable: str, default: str) -> Path | None:
 
 
 def make_folder(folder: Path) -> None:
-    """Create a folder if it is missing; raise UserError if it is not writable."""
+    """Create a folder if it is missing, and raise UserError if it is not writable."""
     with suppress(PermissionError):
         folder.mkdir(parents=True, exist_ok=True)
     if not os.access(folder, os.W_OK | os.X_OK, effective_ids=True):

@@ -17,8 +17,8 @@ from codebotler.core.regex_flags import scope_flags
 
 PLAIN_LABEL = re.compile(r"[\w ',;:!%@&/-]*")  # matches texts without special characters, such as most names
 ENDLESS_REPEATS = 100  # repetitions with a higher limit count as unlimited
-MAX_WAYS = 1_000  # in which a regex may match a text
-MAX_WAYS_BESIDE_ENDLESS = 40  # if a repetition is unlimited
+MAX_WAYS = 1_000  # ways in which a regex may match a text
+MAX_WAYS_BESIDE_ENDLESS = 40  # ways if a repetition is unlimited
 ANY_LABEL = ".*"
 SINGLE = frozenset({"LITERAL", "NOT_LITERAL", "ANY", "IN"})
 REPEAT_OPCODES = frozenset({"MAX_REPEAT", "MIN_REPEAT", "POSSESSIVE_REPEAT"})
@@ -48,7 +48,7 @@ def check_label(text: str) -> str:
 
 
 def check_regex(text: str) -> str:
-    """Return a regular expression unchanged; raise ValueError if it is not valid."""
+    """Return a regular expression unchanged, or raise ValueError if it is not valid."""
     try:
         re.compile(text)
         re.compile(f"(?:{scope_flags(text)})")  # patterns for whole words wrap it like this

@@ -99,7 +99,7 @@ def parse_expression(source: str) -> ast.expr:
 def parse_program(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
     """Parse a program and return its syntax tree, or the flaw that prevents parsing.
 
-    With `compiled`, also find compile-time errors, such as a stray `return`; for untrusted text, do this only
+    With `compiled`, also find compile-time errors, such as a stray `return`. For untrusted text, do this only
     in an isolated process.
     """
     if "\0" in source or len(source) > MAX_PROGRAM_LENGTH:
@@ -297,7 +297,7 @@ def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
 
 
 def _suggest_names(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> dict[str, str]:
-    """Suggest known names for undefined ones; limits keep this fast."""
+    """Suggest known names for undefined ones, within limits that keep this fast."""
     known = sorted({*all_bound_names(tree), *skills, *GIVEN_MODULES, *dir(builtins)})
     found: dict[str, str] = {}
     if len(known) > MAX_KNOWN_NAMES:

@@ -146,15 +146,15 @@ class Outcome:
 def trace_data(trace: Trace, skills: SkillTable = SKILLS) -> list[list[Any]]:
     """Convert a trace to plain data.
 
-    An event is `[kind, text]`, `[kind, text, found]` or `[kind, text, options, answer]`; for a skill with
-    several arguments, `[kind, text, more]` or `[kind, text, more, found]`.
+    An event is `[kind, text]`, `[kind, text, found]` or `[kind, text, options, answer]`. For a skill with
+    several arguments, it is `[kind, text, more]` or `[kind, text, more, found]`.
     """
     asking = frozenset(kind for kind, recording in skills.recordings.items() if recording.options is not None)
     return [_event_data(event, asking) for event in trace]
 
 
 def trace_from(data: Iterable[object]) -> Trace:
-    """Convert the data of `trace_data` back to a trace; raise UserError for other data."""
+    """Convert the data of `trace_data` back to a trace, or raise UserError for other data."""
     return tuple(map(_event_from, data))
 
 
@@ -202,7 +202,7 @@ def option_data(option: Option) -> object:
 
 
 def option_from(data: object) -> Option:
-    """Convert the data of `option_data` back to an option; raise UserError for other data."""
+    """Convert the data of `option_data` back to an option, or raise UserError for other data."""
     match data:
         case str(text):
             return Option(text)

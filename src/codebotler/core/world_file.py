@@ -137,7 +137,7 @@ class WorldFile(_Form):
             yield asked, tuple(value) if isinstance(value, list) else value
 
     def world(self, file: YamlFile, at: YamlPath = (), skills: SkillTable | None = None) -> World:
-        """Convert the file to a World; raise UserError if a room, a regex or a truth is wrong."""
+        """Convert the file to a World, or raise UserError if a room, a regex or a truth is wrong."""
         names: dict[str, str] = {}  # by lower-case name
         for index, room in enumerate(self.rooms):
             if other := names.get(room.name.lower()):

@@ -76,7 +76,7 @@ def _quoted(value: object) -> str:
 
 
 class YamlFile:
-    """A parsed YAML file that knows the line of each part; invalid YAML raises UserError."""
+    """A parsed YAML file that knows the line of each part. Invalid YAML raises UserError."""
 
     def __init__(self, text: str, name: Path | str) -> None:
         self.name = name

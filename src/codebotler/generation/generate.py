@@ -51,7 +51,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Generation:
-    """All attempts at a program, in order; the last one is the result."""
+    """All attempts at a program, in order. The last one is the result."""
 
     attempts: tuple[Attempt, ...]  # at least one
 

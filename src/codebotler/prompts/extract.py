@@ -60,7 +60,7 @@ def program_of(reply: str, *, continues: bool = False) -> Program:
     """Return the program in a model's complete reply.
 
     If `task_program` is defined several times, the last complete definition counts. Reasoning between markers
-    such as `<think>` and `</think>` is dropped; other pairs of markers also count if a program follows. Apart
+    such as `<think>` and `</think>` is dropped. Other pairs of markers also count if a program follows. Apart
     from this, only chat template tokens, fences and lines that are certainly not code are dropped. A program
     that was cut off is not completed.
 
@@ -188,7 +188,7 @@ def _code_runs(lines: Sequence[str]) -> Iterator[list[str]]:
 
 
 def _as_body(lines: Sequence[str]) -> list[str] | None:
-    """Add a header to the lines if they are the body of `task_program`; otherwise, return None.
+    """Add a header to the lines if they are the body of `task_program`, or return None otherwise.
 
     The first line may have no indentation, since the prompt may end with it.
     """
@@ -213,7 +213,7 @@ def _as_body(lines: Sequence[str]) -> list[str] | None:
 def _split_versions(block: _Block, *, continues: bool) -> list[_Block]:
     """Split a block before each further definition of `task_program` and the comments above it.
 
-    A chat model's block that parses is not split, since its last definition counts; a base model's block may
+    A chat model's block that parses is not split, since its last definition counts. A base model's block may
     contain further examples.
     """
     lines = block.lines

@@ -103,7 +103,7 @@ def task_end(opening: str, reply: str, stop: Sequence[str] = STOP_TEXTS) -> int:
 
 
 def clean_instruction(instruction: str) -> str:
-    """Strip and normalize an instruction; raise UserError if it is empty."""
+    """Strip and normalize an instruction, or raise UserError if it is empty."""
     if not (instruction := compose(instruction.strip())):
         raise UserError("the instruction is empty; say what the robot should do")
     return instruction

@@ -92,7 +92,7 @@ def _segments(reply: str, parses: ParseTest) -> Iterator[Segment]:
 
 
 def _find_marked(reply: str, parses: ParseTest) -> Iterator[tuple[int, Segment, int]]:
-    """Yield the start, segment and end of possible fences and thoughts; only the first is reliable."""
+    """Yield the start, segment and end of possible fences and thoughts. Only the first is reliable."""
     for line in WHOLE_LINE.finditer(reply):
         start, end, text = line.start(), line.end(), line[0]
         if (fence := FENCE_LINE.match(text)) and not _is_in_code(fence, reply[:start]):

@@ -152,7 +152,7 @@ def bounding_event(scope: formulas.Scope, trace: Trace, span: range) -> int | No
 
 
 def narrow(scope: formulas.Scope, at: int | None, span: range) -> range:
-    """Restrict a span to a scope. The position of its bounding event is `at`, or None without one."""
+    """Restrict a span to a scope. Its bounding event is at position `at`, or missing if `at` is None."""
     if at is None:
         return range(span.stop, span.stop) if scope.is_only else span
     return range(span.start, at) if scope.is_before else range(at + 1, span.stop)

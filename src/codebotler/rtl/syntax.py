@@ -32,7 +32,7 @@ WRAPPERS = ("at", "holding", "to", "options", "returned")  # further conditions 
 NO_MEANINGS: Mapping[str, str] = MappingProxyType({})
 
 MAX_FORMULA_DEPTH = 50  # low enough for Python's stack during every evaluation
-MAX_OPTIONS = 100  # a formula may require this many options in a question
+MAX_OPTIONS = 100  # the most options that a formula may require
 _MAX_SHOWN_LENGTH = 40
 
 

@@ -1,4 +1,4 @@
-"""Declare a skill as one typed function; models see its signature and its docstring."""
+"""Declare a skill as one typed function, whose signature and docstring are shown to models."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def skill(
 ) -> Skill | Callable[[Callable[..., Any]], Skill]:
     """Declare a skill as a function that acts on a simulated robot, which is its first parameter.
 
-    A function with an empty body (`...`) records the skill's event and returns a random value of its type; in
+    A function with an empty body (`...`) records the skill's event and returns a random value of its type. In
     some sampled worlds, it fails with one of the skill's errors.
 
     Args:

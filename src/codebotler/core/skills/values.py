@@ -56,7 +56,7 @@ class ValueType:
         return f"a list of {many}" if self.is_list else one
 
     def fits(self, value: object) -> bool:
-        """Whether a value has exactly this type; an integer is also a float."""
+        """Whether a value has exactly this type, except that an integer is also a float."""
         if self.base is None:
             return value is None
         if self.is_list:

@@ -34,7 +34,7 @@ VerbForm: TypeAlias = Literal["base", "third", "past", "ing"]
 
 @dataclass(frozen=True)
 class Verb:
-    """The English verb of a skill; the event's text follows it or fills the braces in `object`."""
+    """The English verb of a skill. The event's text follows it or fills the braces in `object`."""
 
     base: str  # `pick up`
     third: str  # `picks up`

@@ -156,7 +156,7 @@ class Time(Matcher):
 
 
 def minutes(time: str) -> TimeOfDay:
-    """Convert a time such as `11:30` to minutes since midnight; raise ValueError for any other text."""
+    """Convert a time such as `11:30` to minutes since midnight, or raise ValueError for any other text."""
     match = re.fullmatch(r"(\d\d?):(\d\d)", time)
     if match is None or int(match[1]) > 24 or int(match[2]) > 59:  # noqa: PLR2004 - hours and minutes
         raise ValueError(f'"{time}" is not a time of day such as "11:30"')
