@@ -62,9 +62,7 @@ class Request:
         if self.what.endswith(".py") and not self.is_program:
             raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
         if self.what == "-" and not self.yes:
-            raise UserError(
-                "the program is read from standard input, so approval cannot be read from it; add --yes"
-            )
+            raise UserError("the program uses standard input, so approval cannot be read; add --yes")
 
     @property
     def is_program(self) -> bool:
