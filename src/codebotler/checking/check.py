@@ -29,7 +29,7 @@ from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
 from codebotler.simulator.worker import Meanwhile, Worker
 
-WORLDS_PER_WORKER = 16  # per batch
+WORLDS_PER_WORKER = 16  # in each batch
 MAX_WIDENINGS = 3  # rounds that add rooms which the program visits but its source does not name
 
 
@@ -54,7 +54,7 @@ def check(
         rooms: the names of the rooms, in order, as in a world file; by default those in the program.
         start: the robot's first room, one of `rooms` if given; by default `start_loc` or else the first room.
         samples: how many worlds to sample, from 1 to 10,000.
-        seed: determines the worlds, equally on all machines.
+        seed: the random seed, which gives the same worlds on all machines.
         strict: whether to randomize even facts that the program takes for granted.
         skills: the skills that the program may call.
         workers: the number of parallel runs in a new pool.
@@ -100,7 +100,7 @@ def check_on(
     room_map: RoomMap | None = None,
     settings: CheckSettings | None = None,
 ) -> CheckResult:
-    """Check one program on a worker; no other thread may use the worker."""
+    """Check one program on a worker that no other thread uses."""
     how = settings or CheckSettings()
     worker.begin_to_prepare(program, how.skills, how.simulation)
     room_map = room_map or room_map_for(program, skills=how.skills)
@@ -112,7 +112,7 @@ def check_on(
 def check_together(
     worker: Worker, programs: Sequence[tuple[str, RoomMap]], settings: CheckSettings
 ) -> list[CheckResult]:
-    """Check several programs on one worker; their first runs may share a process."""
+    """Check several programs on one worker, where their first runs may share a process."""
     samplers = first_samplers(settings)[:WORLDS_PER_WORKER]
     first = [SampledRuns(program, room_map, samplers, settings) for program, room_map in programs]
     known: list[dict[int, Outcome]] = [{} for _ in programs]
@@ -127,7 +127,7 @@ def check_together(
 
 
 RunSamples: TypeAlias = Callable[[RoomMap, Sequence[FactSampler], Meanwhile], list[Sample]]
-"""Runs a program in several worlds; while the program runs, it calls the last argument."""
+"""Runs a program in several worlds, and calls the last argument while the program runs."""
 
 
 def _runner_on_pool(pool: WorkerPool, program: str, settings: CheckSettings) -> RunSamples:

@@ -1,4 +1,4 @@
-"""Find ways to evade a rule: by another name for a room, or by an action inside a custom skill."""
+"""Find ways to evade a rule: through another name for a room, or through an action inside a custom skill."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from codebotler.simulator.settings import resolve_room
 
 
 def find_evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTable) -> Iterator[str]:
-    """Yield a sentence if programs could evade rules by custom skills that no rule names.
+    """Yield a warning if programs could evade rules through custom skills that no rule names.
 
     Args:
         rules: the rules in force.
@@ -43,13 +43,13 @@ def find_evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTabl
     ]
     if rules and unseen:
         yield (
-            f"while a robot moves, rules do not see inside the skill {listed(unseen)}; "
-            "name it in each rule that should limit it"
+            f"rules do not see inside the skill {listed(unseen)} while the robot moves; "
+            "name the skill in each rule that should limit it"
         )
 
 
 def _expect_all_names(rule: Rule, room: str, rooms: Sequence[str]) -> None:
-    """Raise UserError if a rule names a room but does not match all words that lead to it."""
+    """Raise UserError if a rule names a room but does not match every request that leads there."""
     for pattern in room_patterns(rule):
         text = Regex(pattern)
         words = [*samples(room), *samples(pattern)]

@@ -48,7 +48,7 @@ class Sample:
     number: int  # the number of the world, counted from 0
     outcome: Outcome
     facts: tuple[SampledFact, ...] = field(default=(), repr=False)  # facts that the run discovered
-    draws: tuple[Draw, ...] = field(default=(), repr=False)  # draws that decided the facts, in order
+    draws: tuple[Draw, ...] = field(default=(), repr=False)  # the draws that decided the facts, in order
     in_vain: bool = False  # whether it waited or searched without success, so that its end says little
     is_chosen: bool = False  # whether the world was chosen to try a fact that no random world had
 
@@ -102,7 +102,7 @@ class CheckResult:
 
     @property
     def evidence(self) -> frozenset[int]:
-        """The number of the first sample that shows each problem; a problem may have no sample."""
+        """The number of the first sample of each problem that any sample shows."""
         ends = {
             sample.outcome.line: sample.number for sample in reversed(self.samples) if sample.outcome.error
         }
@@ -112,7 +112,7 @@ class CheckResult:
         return frozenset(number for number in first if number is not None)
 
     def data(self, skills: SkillTable = SKILLS) -> dict[str, Any]:
-        """Convert the result to plain data for JSON; equal results give equal data.
+        """Convert the result to plain data for JSON. Equal results give equal data.
 
         Args:
             skills: the skills that the program could call.

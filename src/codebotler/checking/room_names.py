@@ -19,7 +19,7 @@ ELEMENT_METHODS = frozenset({"copy", "keys", "lower", "strip", "casefold", "titl
 COMPARISON_METHODS = frozenset({"startswith", "endswith"})
 
 TextLiteral: TypeAlias = tuple[int, int, str]
-"""A text in a program: its line from 1, its column from 0, and the text."""
+"""A text in a program: its line (from 1), its column (from 0) and the text."""
 
 A_ROOM: TextLiteral = (0, 0, "")  # the placeholder for the name of a room that a skill returns
 
@@ -78,7 +78,7 @@ def _requests(tree: ast.Module, drives: dict[str, Skill]) -> Iterator[tuple[ast.
 
 
 class _Variables:
-    """Finds the texts that the variables of a program may have; scopes are ignored."""
+    """Finds the texts that the variables of a program may contain, without regard to scopes."""
 
     def __init__(self, tree: ast.Module, skills: SkillTable) -> None:
         self.tree, self.drives = tree, _drives(skills)

@@ -23,11 +23,11 @@ from codebotler.simulator.settings import finds
 
 NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"
 ALWAYS_BROKEN = "everything that a robot can do breaks it"
-IMPOSSIBLE = "nothing can keep it"
+IMPOSSIBLE = "no program can keep it"
 UNDECIDED = 'it is too complex for examples, but still enforced; split it at "and" into several rules'
 DETECTED = (
-    "it can be broken by what a look finds or a person answers, which can only be noticed: "
-    "the mission stops right after that"
+    "the result of a look or an answer can break it; "
+    "this cannot be prevented, so the mission stops right afterwards"
 )
 OTHER_ANSWER = "something else"  # an answer that no rule names
 ANY_EVENT = Or(tuple(Exists(EventPattern(kind, Regex(".*"))) for kind in SKILLS.recordings))
@@ -72,7 +72,7 @@ def _review(rule: Rule, world: World | None) -> Review:
 
 
 def _breaking_traces(rule: Rule, shortest: Trace, world: World | None) -> Iterator[Trace]:
-    """Yield traces that break a rule: a shortest one, and ones that end with a result it mentions."""
+    """Yield a shortest trace that breaks a rule, then traces that end with a result the rule mentions."""
     yield shortest
     for element in dict.fromkeys(elements(rule.formula)):
         if element.found is not None or element.answer is not None:
@@ -82,7 +82,7 @@ def _breaking_traces(rule: Rule, shortest: Trace, world: World | None) -> Iterat
 
 
 def _is_by_result(rule: Rule, breaks: Trace) -> bool:
-    """Whether a trace breaks the rule by the result of its last step, not by the step itself."""
+    """Whether the result of the last step breaks the rule, rather than the step itself."""
     guard = RuleGuard([rule])
     try:
         for event in breaks[:-1]:
@@ -124,7 +124,7 @@ def _trace(wanted: Sequence[Formula], kept: Sequence[Rule], world: World | None)
 
 
 def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
-    """Yield the names of rooms and, for regexes, also words for the room that formulas distinguish."""
+    """Yield the name of each room and, for a regex, also words for the room that formulas tell apart."""
     names = [room.name for room in world.rooms]
     spoken_of = [*chain.from_iterable(map(elements, formulas))]
     named_texts: list[TextPattern] = [one.text for one in spoken_of if one.kind == GOTO]
@@ -139,7 +139,7 @@ def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
 
 
 def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:
-    """Yield formulas which say that the robot has picked up each thing before an event with it in hand."""
+    """Yield formulas which say that the robot must pick up each thing before it can hold the thing."""
     for element in elements(formula):
         if element.holding is not None:
             held = EventPattern(element.kind, Regex(".*"), holding=element.holding)
@@ -151,7 +151,7 @@ def _holding_needs_a_pick(formula: Formula) -> Iterator[Formula]:
 
 
 def _pair_warnings(one: Rule, other: Rule, world: World | None) -> Iterator[tuple[Rule, str]]:
-    """Yield likely mistakes in the combination of two rules, each with the rule to which it belongs."""
+    """Yield each likely mistake in a pair of rules, with the rule to which it belongs."""
     kinds = [{element.kind for element in elements(rule.formula)} for rule in (one, other)]
     if not kinds[0] & kinds[1]:
         return
@@ -177,7 +177,7 @@ def _conflict(one: Rule, other: Rule, world: World | None) -> bool:
 
 
 def _follows(rule: Rule, other: Rule, world: World | None) -> bool:
-    """Whether a rule can be broken, but only if another rule is broken, too."""
+    """Whether a rule can be broken, but only together with another rule."""
     if rule.when == "always" and other.when == "finally":
         return False
     return (

@@ -31,7 +31,7 @@ def expect_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> None:
 
 
 def unknown_rooms_in(rule: Rule, rooms: Sequence[str]) -> Iterator[str]:
-    """Yield a sentence for each room that a rule names but the house lacks; none if `rooms` is empty."""
+    """Yield a sentence for each room that a rule names but the house lacks, unless `rooms` is empty."""
     if rule.any_room or not rooms:
         return
     poses = {pattern for one in rule.inside for pattern in patterns(one.text)}
@@ -54,7 +54,7 @@ def room_patterns(rule: Rule) -> Iterator[str]:
 
 
 def may_mean(pattern: str, labels: Iterable[str]) -> bool:
-    """Whether a regex may refer to one of these labels; also true if it matches everything or nothing."""
+    """Whether a regex may refer to one of these labels, or matches everything or nothing."""
     matches, texts = Regex(pattern).matches, samples(pattern)
     return (
         not texts

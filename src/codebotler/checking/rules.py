@@ -22,8 +22,8 @@ from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.house_rule import Rule
 
-EACH_TAG = "{each}"  # in a formula, each name of `for_each` takes its place
-MAX_QUOTED_CHARACTERS = 30  # of a formula, starting at the error
+EACH_TAG = "{each}"  # replaced in a formula by each name of `for_each`
+MAX_QUOTED_CHARACTERS = 30  # a message quotes a formula from the error on
 
 
 def _as_name(text: str) -> str:
@@ -50,7 +50,7 @@ class HouseRuleFile(BaseModel):
     for_each: Annotated[list[Name] | None, Field(min_length=1)] = None
 
     def rule(self, file: YamlFile, at: YamlPath, skills: SkillTable) -> Rule:
-        """Convert the entry to a rule; raise UserError if it is not valid."""
+        """Convert the entry to a rule, or raise UserError if it is not valid."""
         if self.always is None and self.finally_ is None:
             raise file.wrong(
                 f'the rule "{self.name}" has no formula; write one after "always" or "finally"', *at
@@ -125,7 +125,7 @@ def _parse(text: str, file: YamlFile, at: YamlPath, skills: SkillTable) -> Formu
         for pattern in _regexes(element):
             if slow_text(pattern) is not None:
                 sentence = f"searching a long text for {pattern!r} takes too much time"
-                raise file.wrong(f"{sentence}; let no two repeats match the same text", *at)
+                raise file.wrong(f"{sentence}; no two repetitions may match the same text", *at)
     return formula
 
 

@@ -33,7 +33,7 @@ class CheckSettings:
     """Settings of a check."""
 
     samples: int = DEFAULT_SAMPLES
-    seed: int = 0  # determines the worlds, equally on all machines
+    seed: int = 0  # gives the same worlds on all machines
     strict: bool = False  # whether to randomize even facts that the program takes for granted
     simulation: SimulationSettings = AS_WRITTEN
     skills: SkillTable = SKILLS
@@ -45,7 +45,7 @@ class CheckSettings:
 
 
 class SampledRuns:
-    """The runs of one program in sampled worlds; a worker executes them as one job."""
+    """The runs of one program in sampled worlds, which a worker executes as one job."""
 
     def __init__(
         self, program: str, room_map: RoomMap, samplers: Sequence[FactSampler], settings: CheckSettings
@@ -56,7 +56,7 @@ class SampledRuns:
         self.job: Job = program, [partial(self._new_robot, number) for number in range(len(samplers))]
 
     def samples_on(self, worker: Worker, known: Mapping[int, Outcome]) -> list[Sample]:
-        """Return the samples; known outcomes are reused, and worlds that would repeat a run are skipped."""
+        """Return the samples, but reuse known outcomes and skip worlds that would repeat a run."""
         ran: list[Sample] = []
         for number, sampler in enumerate(self.samplers):
             if number in known:
@@ -103,13 +103,13 @@ def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
 
 
 RunInWorlds: TypeAlias = Callable[[RoomMap, Sequence[FactSampler]], Iterable[Sample]]
-"""Runs a program in several worlds; it may skip worlds that would repeat a run."""
+"""Runs a program in several worlds, but may skip worlds that would repeat a run."""
 
 
 def run_in_sampled_worlds(
     run: RunInWorlds, room_map: RoomMap, settings: CheckSettings, width: int
 ) -> list[Sample]:
-    """Run a program in the first worlds, then in further ones until both values of each fact were tried.
+    """Run a program in the first worlds, then in further ones until both values of each fact have been tried.
 
     Further worlds are also added as long as every run waits or searches without success. Worlds that would
     repeat a run share its result. `run` is called with at most `width` worlds at a time.
@@ -134,7 +134,7 @@ def run_in_sampled_worlds(
     for more in range(MAX_EXTRA_WORLDS):
         if not all(sample.in_vain and sample.draws for sample in ran) or all(map(_only_computed, ran)):
             break
-        # A program that waits in several places ends only in a lucky world; a search may need an empty world.
+        # A program that waits in several places ends only in a lucky world. A search may need an empty world.
         add([replace(first, sample=len(ran), lucky=more % 2 == 1)])
     most = len(ran) + EXPLORATION_FACTOR * settings.samples
     while len(ran) < most and not all(map(_only_computed, ran)) and (new := unexplored_samplers(ran, drew)):
@@ -143,7 +143,7 @@ def run_in_sampled_worlds(
 
 
 def unexplored_samplers(ran: Sequence[Sample], drew: Sequence[FactSampler]) -> list[FactSampler]:
-    """Return samplers of worlds that differ from an earlier world in one fact, with a value not yet seen."""
+    """Return samplers of worlds that change one fact of an earlier world to a value not seen before."""
     met = {(draw.method, draw.arguments, draw.result) for sample in ran for draw in sample.draws}
     found: list[FactSampler] = []
     for sample, sampler in zip(ran, drew, strict=True):
@@ -180,7 +180,7 @@ def group_failures(ran: Sequence[Sample], room_map: RoomMap) -> Iterator[Problem
     for sample in ran:
         outcome = sample.outcome
         if outcome.error is not None and (in_vain or not sample.in_vain):
-            line = None if outcome.status is Status.TIMEOUT else outcome.line  # any line of a loop
+            line = None if outcome.status is Status.TIMEOUT else outcome.line  # any line of its loop
             rule = outcome.error.message.split('"')[1] if outcome.error.kind == VIOLATION else ""
             groups.setdefault((line, outcome.error.kind, rule), []).append(sample)
     for (_, kind, _), same in groups.items():
@@ -200,7 +200,7 @@ def _message(same: Sequence[Sample], ran: Sequence[Sample], room_map: RoomMap) -
 
 
 def _where(same: Sequence[Sample], ran: Sequence[Sample]) -> str:
-    """Return the facts that only these runs share; if some worlds are random, the others do not count."""
+    """Return the facts that only these runs share, comparing only random worlds if there are any."""
     if not all(sample.is_chosen for sample in same):
         same, ran = ([sample for sample in those if not sample.is_chosen] for those in (same, ran))
     others = [sample for sample in ran if sample not in same]

@@ -39,7 +39,7 @@ class TextFindings:
 
 
 def read_program(program: str, room_map: RoomMap, skills: SkillTable) -> TextFindings:
-    """Find the definite errors in a program, one problem per line; slow parsing counts as a problem, too."""
+    """Find the definite errors in a program, one problem per line. Slow parsing is a problem, too."""
     try:
         compiles, problems = _findings(program, room_map, _without_functions(skills))
     except IsolatedCallError as error:

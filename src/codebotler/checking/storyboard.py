@@ -20,7 +20,7 @@ STEP_MARK = "❱"
 
 
 def steps_of(trace: Trace, *, has_places: bool = False) -> list[dict[str, Any]]:
-    """Convert the events of a trace to plain data, numbered from 1; `has_places` includes places."""
+    """Convert the events of a trace to plain data, numbered from 1, with places if `has_places` is set."""
     return [_step_data(number, event, has_places=has_places) for number, event in enumerate(trace, 1)]
 
 
@@ -48,7 +48,7 @@ def event_from_step(step: Mapping[str, Any]) -> Event:
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
-    """Draw the steps room by room; the steps in `needed` are marked and always shown."""
+    """Draw the steps room by room. The steps in `needed` are marked and always shown."""
     table = grid("right", "left")
     if not steps:
         table.add_row(Text(), Text("the robot did nothing", "dim"))
@@ -70,7 +70,7 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 def select_steps(
     steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 ) -> Iterator[tuple[bool, Sequence[Mapping[str, Any]]]]:
-    """Group steps by whether they are shown; a long trace shows both ends and the needed steps."""
+    """Group steps by whether they are shown. Of a long trace, show both ends and the needed steps."""
 
     def is_shown(step: Mapping[str, Any]) -> bool:
         number = step["step"]
@@ -100,7 +100,7 @@ def _drive(step: Mapping[str, Any]) -> Text:
 
 
 def grid(*justify: Literal["left", "right"]) -> Table:
-    """Return a table without lines; right-aligned columns are for numbers and never wrap."""
+    """Return a table without lines, whose right-aligned columns contain numbers and never wrap."""
     table = Table.grid(padding=(0, 2, 0, 0))
     for side in justify:
         table.add_column(justify=side, no_wrap=side == "right", overflow="fold")

@@ -1,4 +1,7 @@
-"""The command line of CodeBotler; `app.py` declares the commands. RoboEval shares `obey` and the options."""
+"""The command line of CodeBotler.
+
+Start with `app.py`, which declares the commands. RoboEval also uses `obey` and the options.
+"""
 
 import sys
 

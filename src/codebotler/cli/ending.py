@@ -36,9 +36,10 @@ _command = cache(get_command)
 
 
 def obey(app: typer.Typer, name: str) -> NoReturn:
-    """Run a command line and end the process; errors that a user can cause are printed as one sentence.
+    """Run a command line and end the process.
 
-    The exit status is 2 for incorrect input and 1 for failures of the machine, a model or a robot.
+    Errors that a user can cause are printed as one sentence. The exit status is 2 for incorrect input and 1
+    for failures of the machine, a model or a robot.
     """
     if sys.platform == "win32":
         note(f"{name}: {IS_WINDOWS}")
@@ -90,7 +91,7 @@ def _ending(error: Exception) -> tuple[int, str] | None:
 
 
 def _unknown_instruction(error: UnknownInstructionError) -> str:
-    """Return the message for an unknown instruction; similar ones are shown in full, ready to copy."""
+    """Return the message for an unknown instruction, with similar ones in full, ready to copy."""
     from codebotler.models.usable import suggest_model
 
     sentence = f'{error.model} has no program for "{shortened(error.instruction, 200)}"'

@@ -70,7 +70,7 @@ def write(
 
 @contextmanager
 def open_recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None]]:
-    """Yield a function that appends attempts to a file, if given; an OSError is raised only at the end."""
+    """Yield a function that appends attempts to a file, if given. An OSError is raised only at the end."""
     if path is None:
         yield ignore_attempt
         return

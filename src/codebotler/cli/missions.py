@@ -27,7 +27,7 @@ def show_missions(home: Path, *, json: bool) -> None:
 
 
 def show_mission(home: Path, name: str, *, json: bool) -> None:
-    """Print the events of a mission; the name `last` means the most recent mission."""
+    """Print the events of a mission, or of the most recent one for the name `last`."""
     recover_missions(home)
     folder = find_mission(home, name)
     summary, events = MissionSummary.read(folder), read_events(folder)

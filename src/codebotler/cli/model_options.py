@@ -75,7 +75,7 @@ def model_settings(
     seed: ModelSeedOption = None,
     timeout: TimeoutOption = SamplingSettings.timeout,
 ) -> SamplingSettings:
-    """Return the settings from the options; raise UserError if two options contradict each other."""
+    """Return the settings from the options, or raise UserError if two options contradict each other."""
     if settings not in {None, "paper"}:
         raise UserError(f'unknown settings "{settings}"; use --settings paper, or leave it out')
     if settings is not None and (
@@ -98,7 +98,7 @@ def model_settings(
 def _choose(name: str, value: float | None, *, is_left_out: bool) -> float | None:
     option = name.replace("_", "-")
     if is_left_out and value is not None:
-        raise UserError(f"--{option} and --no-{option} exclude each other; use one of them")
+        raise UserError(f"--{option} and --no-{option} cannot be used together")
     default: float = getattr(SamplingSettings, name)
     return None if is_left_out else default if value is None else value
 
@@ -114,7 +114,7 @@ def _json_object(text: str) -> dict[str, Any]:
 
 
 def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
-    """Note which of the requested settings are not sent, because the model does not support them."""
+    """Print a note about requested settings that are not sent because the model does not support them."""
     from codebotler.models.recorded import is_recorded
 
     names = ("temperature", "top_p", "seed")

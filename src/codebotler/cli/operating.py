@@ -32,7 +32,7 @@ def run(
 ) -> None:
     """Check a program, ask for approval, and run it on a robot.
 
-    Ctrl-C stops the robot; the exit status is then 130.
+    Ctrl-C stops the robot, and the exit status is then 130.
     """
     from codebotler.cli import run
     from codebotler.cli.run import Request
@@ -72,7 +72,7 @@ def missions(
     if mcap is not None and mission is None:
         raise UserError("--mcap writes one mission; give its ID, or `last`")
     if mcap is not None and json:
-        raise UserError("--mcap and --json exclude each other; use only one")
+        raise UserError("--mcap and --json cannot be used together")
     if clock not in {"wall", "robot"}:
         raise UserError(f'unknown clock "{clock}"; use wall or robot')
     skills_from(*(skills or ()))  # registers the verbs that describe the skills
@@ -206,7 +206,7 @@ def virtual_robot(
 ) -> None:
     """Offer a simulated robot's skills on ROS 1 or 2.
 
-    On ROS 1, it starts a master if none answers; Ctrl-C ends it.
+    On ROS 1, it starts a master if none responds. Ctrl-C ends the command.
     """
     from contextlib import suppress
 

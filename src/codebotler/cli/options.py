@@ -1,4 +1,4 @@
-"""Options that several commands share, and the basis of both command lines."""
+"""Options that several commands share, and the common basis of both command lines."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def robot_settings(
     rules: RulesOption = None,
     skills: SkillsOption = None,
 ) -> RobotSettings:
-    """Read the files that the options name; raise UserError if a file is invalid."""
+    """Read the files that the options name, or raise UserError if a file is invalid."""
     from codebotler.checking.rules import read_rules
     from codebotler.core.skills.files import skills_from
     from codebotler.robots.base import Options
@@ -173,7 +173,7 @@ def read_connect_option(
 def read_world(
     robot: str, file: Path | None, skills: SkillTable, connection: Connection | None = None
 ) -> World | None:
-    """Read the world file, or else return the robot's places, the office for the simulated robot, or None."""
+    """Read the world file. Without one, return the robot's places, the simulated robot's office or None."""
     from codebotler.core import world_file
     from codebotler.robots.simulated import OFFICE
 
@@ -190,7 +190,7 @@ def note_office(robot: str, file: Path | None) -> None:
 
 
 def command_line(name: str, about: str) -> typer.Typer:
-    """Create a command line that has no commands yet, and that prints its version or its help."""
+    """Create a command line that has no commands yet, but can print its version and its help."""
     app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 
     @app.callback(invoke_without_command=True, help=about)

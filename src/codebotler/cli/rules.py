@@ -23,12 +23,12 @@ from codebotler.core.words import listed
 from codebotler.core.world import World
 from codebotler.simulator.house_rule import Rule
 
-ANY_ARGUMENT = ("", "x")  # texts that mean any text when they occur in examples
+ANY_ARGUMENT = ("", "x")  # in examples, these mean any text
 WHEN_WORDS = {"always": "at any time", "finally": "at the end"}
 
 
 def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
-    """Read a rules file, if given, and print notes about likely evasions; raise UserError if invalid."""
+    """Read a rules file, if given, and warn if programs could evade the rules; raise UserError if invalid."""
     rules = () if path is None else read_rules(path, skills, rooms_of(world))
     note_evasions(rules, world, skills)
     return rules
@@ -40,7 +40,7 @@ def rooms_of(world: World | None) -> list[str]:
 
 
 def note_evasions(rules: Sequence[Rule], world: World | None, skills: SkillTable) -> None:
-    """Print notes about likely evasions of rules; raise UserError if a rule does not fit the rooms."""
+    """Warn if programs could evade rules; raise UserError if a rule covers only some names of a room."""
     for sentence in find_evasions(rules, rooms_of(world), skills):
         note(sentence)
 
@@ -85,7 +85,7 @@ def is_drive(event: Event) -> bool:
 
 
 def step_sentence(event: Event, room: str = "") -> str:
-    """Describe a step of an example; a drive from `room`, where the last step ended, omits its start."""
+    """Describe a step of an example, but omit the start of a drive if it is `room`, the current room."""
     drives = is_drive(event)
     any_text = "another room" if drives else "something"
     quote = "" if verb(event.kind).object else '"'

@@ -62,7 +62,7 @@ class Request:
         if self.what.endswith(".py") and not self.is_program:
             raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
         if self.what == "-" and not self.yes:
-            raise UserError("approval cannot be read from standard input, as the program is; add --yes")
+            raise UserError("the program uses standard input, so approval cannot be read; add --yes")
 
     @property
     def is_program(self) -> bool:
@@ -117,9 +117,9 @@ def run(
 
 
 def tell_missing(robot: Robot) -> None:
-    """Print a note about missing skills, as far as they are known before the robot is connected."""
+    """Print a note about skills that are known to be missing before the robot is connected."""
     if robot.missing:
-        note(f"{robot.name} has no {listed(list(robot.missing))}; models are offered its other skills only")
+        note(f"{robot.name} has no {listed(list(robot.missing))}; models see only its other skills")
 
 
 def checker(skills: SkillTable) -> Callable[[str, RoomMap | None, tuple[Rule, ...]], CheckResult]:
@@ -189,9 +189,9 @@ def _watched(session: MissionSession, view: SessionView, robot: Robot, request: 
 
 @contextmanager
 def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
-    """Stop the session when a signal arrives; yield the list of the signals received.
+    """Stop the session when a signal arrives, and yield the list of signals received so far.
 
-    SIGHUP stays ignored if it was already, as with `nohup`, so that the mission outlives its terminal.
+    SIGHUP stays ignored if it already was, as with `nohup`, so that the mission outlives its terminal.
     """
     got: list[int] = []
 

@@ -65,7 +65,7 @@ class SkillTrial:
 
 
 def write_new(path: Path, text: str) -> None:
-    """Write a new file; raise UserError if it already exists."""
+    """Write a new file, or raise UserError if it already exists."""
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
@@ -102,7 +102,7 @@ def try_skill(row: Skill, skills: SkillTable) -> list[SkillTrial]:
 
 
 def _example(row: Skill) -> list[Any]:
-    """Return the arguments of a skill's example in order; raise UserError if the example is invalid."""
+    """Return the arguments of a skill's example in order, or raise UserError if the example is invalid."""
     node = parse_expression(row.call)
     if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == row.name):
         row.wrong(f"the example of {row.name} is not a call of {row.name}: {row.call}")
@@ -123,7 +123,7 @@ def _example(row: Skill) -> list[Any]:
 
 
 def skills_view(skills: SkillTable) -> RenderableType:
-    """Show skills as models see them, with their outcomes: the user's own, or else all built-in skills."""
+    """Show the user's own skills, or else all built-in ones, as models see them and with their outcomes."""
     own = [row for row in skills.rows if row not in SKILLS.rows]
     return Group(*_lines(own or SKILLS.rows, skills))
 

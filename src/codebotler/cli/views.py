@@ -41,7 +41,7 @@ CLEAR_LINE = "\r\x1b[2K"
 
 
 class EventPrinter:
-    """Prints events as they happen; on a terminal, each feedback line is overwritten by the next event."""
+    """Prints events as they happen. On a terminal, each event overwrites a line of feedback before it."""
 
     def __init__(self, robot: str) -> None:
         self._console = console(highlight=False)
@@ -92,7 +92,7 @@ def _event_line(line: LogLine) -> Text:
 
 
 def ending_view(ended: MissionSummary | SessionView) -> Group:
-    """Show how a mission ended, and the command that shows it again, in one line that can be copied."""
+    """Show how a mission ended, and the command that shows it again, on a line that is never wrapped."""
     state = ended.state
     assert state is not None, "the mission has begun"
     text = Text.assemble((state, STATE_STYLES.get(state, "bold")), _why(ended))

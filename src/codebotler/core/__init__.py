@@ -1,4 +1,4 @@
-"""Foundations of all rooms: skills, worlds, traces, programs, errors, files and terminal output.
+"""Foundations of all packages: skills, worlds, traces, programs, errors, files and terminal output.
 
-Start with `skills` and `world.py`. Nothing here imports another room.
+Start with `skills` and `world.py`. Nothing here imports our other packages.
 """

@@ -11,10 +11,10 @@ if TYPE_CHECKING or sys.version_info >= (3, 12):
 else:
 
     class cached_property:  # noqa: N801 - named as in functools
-        """A property computed on first access; simultaneous threads may compute it twice.
+        """A property that is computed on first access, or twice if two threads access it at the same time.
 
-        The lock of functools is shared by all objects of a class: a process that forks while another thread
-        holds it would deadlock.
+        It has no lock, since the lock of functools is shared by all objects of a class. A process that forks
+        while another thread holds that lock would deadlock.
         """
 
         def __init__(self, compute: Callable[[Any], object]) -> None:

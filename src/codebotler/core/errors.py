@@ -1,4 +1,4 @@
-"""Errors that users can fix, such as mistakes in files and missing packages, and errors of a robot."""
+"""Errors that users can fix, such as mistakes in files and missing packages, and the errors of robots."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ MAX_SENTENCE_LENGTH = 600
 
 
 class UserError(ValueError):
-    """Raised for a mistake in a user's input; one sentence says what is wrong, where, and how to fix it.
+    """Raised for a mistake in a user's input, with a sentence that says what is wrong and how to fix it.
 
     Args:
-        sentence: the problem and the fix; joined to one line, and shortened if very long.
+        sentence: the problem and its fix, which are put on one line and shortened if very long.
         file: the file with the mistake.
         line: the line, counted from 1.
     """
@@ -82,15 +82,15 @@ def installed() -> Iterator[None]:
 
 
 VIOLATION = "RuleViolation"
-"""The kind of the error that a house rule raises to end a run or to refuse a skill."""
+"""The kind of the error with which a house rule ends a run or refuses a skill."""
 
 
 class RobotError(Exception):
     """Raised when the robot cannot execute a skill.
 
     Args:
-        kind: RuleViolation or one of the seven kinds of robot errors (paper, section V.B, and
-            AskInvalidOptions).
+        kind: RuleViolation, AskInvalidOptions, or one of the kinds of robot errors in section V.B of the
+            paper.
         message: the reason, in a sentence.
     """
 

@@ -53,7 +53,7 @@ def decode_text(data: bytes, name: Path | str, *, limit: int = MAX_FILE_BYTES) -
 
 
 def _expect_not_utf_16(data: bytes, name: Path | str) -> None:
-    """Reject UTF-16, recognized by its byte order mark; editors on Windows call it Unicode."""
+    """Reject text with the byte order mark of UTF-16, which editors on Windows call Unicode."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise UserError("is UTF-16 text; save it as UTF-8", file=name)
 
@@ -75,7 +75,7 @@ def _open(path: Path, name: Path | str) -> BinaryIO:
 def read_lines(
     path: Path, *, limit: int = MAX_ROW, name: Path | str | None = None
 ) -> Iterator[tuple[int, bytes]]:
-    """Yield the lines of a file, numbered from 1; raise UserError if a line is longer than the limit."""
+    """Yield the lines of a file, numbered from 1, or raise UserError if a line is longer than the limit."""
     with _open(path, name or path) as file:
         for number in count(1):
             line = file.readline(limit + 1)
@@ -89,7 +89,7 @@ def read_lines(
 
 
 def read_rows(path: Path, *, growing: bool = False) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the lines of a JSON Lines file with their numbers; a growing file may end in a partial line."""
+    """Yield the numbered rows of a JSON Lines file, but not a partial last line if the file is growing."""
     for number, line in read_lines(path):
         if line.strip():
             try:
@@ -104,7 +104,7 @@ def read_rows(path: Path, *, growing: bool = False) -> Iterator[tuple[int, dict[
 
 
 def parse_row(line: bytes, example: str | None = None) -> dict[str, Any] | None:
-    """Parse a line as a JSON object; return None if it is not JSON, raise UserError if it is other JSON."""
+    """Return the JSON object in a line, or None if it is not JSON; raise UserError for other JSON values."""
     try:
         row = json.loads(line)
     except (ValueError, RecursionError):
@@ -116,7 +116,7 @@ def parse_row(line: bytes, example: str | None = None) -> dict[str, Any] | None:
 
 
 def to_line(row: object) -> bytes:
-    """Encode a row as a line of JSON in UTF-8; lone surrogates become JSON escapes."""
+    """Encode a row as a line of JSON in UTF-8, with lone surrogates as JSON escapes."""
     return json.dumps(row, ensure_ascii=False).encode(errors="backslashreplace") + b"\n"
 
 
@@ -126,7 +126,7 @@ def to_text(data: dict[str, Any]) -> bytes:
 
 
 class Appender:
-    """Appends lines to a file; opening it removes a partial last line that a crash left behind.
+    """Appends lines to a file, after removing a partial last line that a crash may have left behind.
 
     With `exclusive`, opening raises BlockingIOError if another process has locked the file.
     """
@@ -148,7 +148,7 @@ class Appender:
             raise
 
     def append(self, line: bytes) -> None:
-        """Append a line completely or not at all; raise OSError if the disk is full."""
+        """Append a line completely or not at all. Raise OSError if the disk is full."""
         descriptor = self._file.fileno()
         start = os.fstat(descriptor).st_size
         with name_in_errors(self.path):
@@ -161,7 +161,7 @@ class Appender:
                 raise
 
     def sync(self) -> None:
-        """Flush the file to the disk; other threads may call this."""
+        """Flush the file to the disk. Other threads may call this method."""
         if self._is_file:
             with name_in_errors(self.path):
                 os.fsync(self._file.fileno())
@@ -202,7 +202,7 @@ def write_whole(path: Path, content: bytes | memoryview) -> None:
 
 @contextmanager
 def open_replacement(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
-    """Open a file that atomically replaces `path` on success; after an error, `path` is unchanged."""
+    """Open a file that atomically replaces `path` on success, and leaves it unchanged after an error."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = temporary or path.with_name(path.name + ".new")
     try:
@@ -233,19 +233,19 @@ def sync_folder(folder: Path) -> None:
 
 
 def expect_replaceable(path: Path, *beginnings: bytes) -> None:
-    """Raise UserError if a file does not begin like our own files, so that it is not overwritten."""
+    """Raise UserError if a file does not begin like our own files, to keep it from being overwritten."""
     if path.is_file():
         with path.open("rb") as file:
             start = file.read(max(map(len, beginnings)))
         if start and not start.startswith(beginnings):
-            raise UserError("this file has other content; name another one or remove it", file=path)
+            raise UserError("this file has unexpected content; remove it or choose another file", file=path)
 
 
 # --- the state folder
 
 
 def home() -> Path:
-    """Return the folder in which missions are stored; it may not exist yet."""
+    """Return the folder in which missions are stored, which may not exist yet."""
     folder = _user_folder("XDG_STATE_HOME", ".local/state")
     if folder is None:
         raise UserError("you have no home folder; set CODEBOTLER_HOME to a folder")
@@ -269,7 +269,7 @@ def _user_folder(variable: str, default: str) -> Path | None:
 
 
 def make_folder(folder: Path) -> None:
-    """Create a folder if it is missing; raise UserError if it is not writable."""
+    """Create a folder if it is missing, and raise UserError if it is not writable."""
     with suppress(PermissionError):
         folder.mkdir(parents=True, exist_ok=True)
     if not os.access(folder, os.W_OK | os.X_OK, effective_ids=True):

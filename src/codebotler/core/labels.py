@@ -1,7 +1,7 @@
 """Validate the labels of a world, and reject regexes that may take exponential time.
 
-Python tries every way to match a regex and cannot be interrupted. In a label, a repeat may therefore contain
-only single characters, at most one repeat may be unlimited, and the ways to match one text are limited. This
+Python tries every way to match a regex and cannot be interrupted. In a label, a repetition may therefore
+contain only single characters, at most one may be unlimited, and the ways to match a text are limited. This
 simple rule also rejects some fast regexes that labels do not need. `.*` at either end is always allowed.
 """
 
@@ -16,9 +16,9 @@ from typing import Any
 from codebotler.core.regex_flags import scope_flags
 
 PLAIN_LABEL = re.compile(r"[\w ',;:!%@&/-]*")  # matches texts without special characters, such as most names
-ENDLESS_REPEATS = 100  # repeats with a higher limit count as unlimited
-MAX_WAYS = 1_000  # to match one text
-MAX_WAYS_BESIDE_ENDLESS = 40  # to match one text if a repeat is unlimited
+ENDLESS_REPEATS = 100  # repetitions with a higher limit count as unlimited
+MAX_WAYS = 1_000  # ways in which a regex may match a text
+MAX_WAYS_BESIDE_ENDLESS = 40  # ways if a repetition is unlimited
 ANY_LABEL = ".*"
 SINGLE = frozenset({"LITERAL", "NOT_LITERAL", "ANY", "IN"})
 REPEAT_OPCODES = frozenset({"MAX_REPEAT", "MIN_REPEAT", "POSSESSIVE_REPEAT"})
@@ -28,7 +28,7 @@ UNSUPPORTED_OPCODES = frozenset({"GROUPREF", "GROUPREF_EXISTS"})
 
 
 class SlowRegexError(Exception):
-    """Raised for a regex that may be slow to search; the message says why and what to write instead."""
+    """Raised for a regex that may be slow, with a message that says why and what to write instead."""
 
 
 def check_label(text: str) -> str:
@@ -43,12 +43,12 @@ def check_label(text: str) -> str:
     try:
         expect_quick(text)
     except SlowRegexError as error:
-        raise ValueError(f"finding it may take too long: {error}") from None
+        raise ValueError(f"searching for it may take too long: {error}") from None
     return text
 
 
 def check_regex(text: str) -> str:
-    """Return a regular expression unchanged; raise ValueError if it is not valid."""
+    """Return a regular expression unchanged, or raise ValueError if it is not valid."""
     try:
         re.compile(text)
         re.compile(f"(?:{scope_flags(text)})")  # patterns for whole words wrap it like this
@@ -65,13 +65,13 @@ def expect_quick(pattern: str) -> None:
         pattern = pattern if pattern.endswith("\\.*") else pattern.removesuffix(ANY_LABEL)
     ways, endless = _cost(import_module("re._parser").parse(pattern))
     if endless > 1:
-        raise SlowRegexError("two repeats are unlimited; give them a limit, as in .{0,50}")
+        raise SlowRegexError("two repetitions are unlimited; limit them, as in .{0,50}")
     if ways > (MAX_WAYS_BESIDE_ENDLESS if endless else MAX_WAYS):
-        raise SlowRegexError("there are too many ways to match one text; use fewer repeats and choices")
+        raise SlowRegexError("it can match a text in too many ways; use fewer repetitions and alternatives")
 
 
 def _cost(tree: Any) -> tuple[int, int]:  # noqa: ANN401 - private classes of `re`
-    """Count the ways in which part of a regex can match one text, and its unlimited repeats."""
+    """Count the ways in which part of a regex can match a text, and its unlimited repetitions."""
     costs = [(str(op), *_cost_of(str(op), value)) for op, value in tree]
     # Python never backtracks into a lookaround, so its cost is added to that of the rest.
     looks = [(ways, endless) for op, ways, endless in costs if op in LOOK_OPCODES]
@@ -100,5 +100,5 @@ def _cost_of_repeat(least: int, most: int, repeated: Any) -> tuple[int, int]:  #
         ways, endless = _cost(repeated)
         return 1 + ways, endless
     if [str(op) for op, _ in repeated][1:] or str(repeated[0][0]) not in SINGLE:
-        raise SlowRegexError("a repeat contains more than one character; write out the repetitions")
+        raise SlowRegexError("a repetition contains more than one character; write it out")
     return (1, 1) if most > ENDLESS_REPEATS else (most - least + 1, 0)

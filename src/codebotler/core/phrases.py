@@ -18,7 +18,7 @@ MAX_BRACKETED_OPTIONS = 20
 def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, quote: str = '"') -> str:
     """Describe an event, such as `looked for "mug": found` or `asked "Tea?" [yes | no] → yes`.
 
-    The result, if there is one, comes last; the forms `base` and `ing` put it in parentheses.
+    The result, if any, comes last. The forms `base` and `ing` put it in parentheses.
 
     Args:
         event: the event.
@@ -61,7 +61,7 @@ def bracket_options(options: Sequence[Option], show: Callable[[str], str] = brie
 
 
 def verb(kind: str) -> Verb:
-    """Return the verb for a kind of event; kinds that no loaded skill records get a generic verb."""
+    """Return the verb for a kind of event, or a generic verb if no loaded skill records this kind."""
     if (known := verb_for(kind)) is not None:
         return known
     shown = visible(kind)

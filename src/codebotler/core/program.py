@@ -1,7 +1,7 @@
 """Parse programs, and find the skills they call and their definite errors.
 
 CPython 3.11 parses some texts in quadratic time, so the length of programs is limited. The compiler,
-`symtable` and pyflakes may still take any time: apply them to untrusted text only in isolated processes
+`symtable` and pyflakes may still take any time, so apply them to untrusted text only in isolated processes
 (`codebotler.simulator.isolated_call`).
 """
 
@@ -49,7 +49,7 @@ class Flaw:
     line: int | None  # counted from 1; None if no single line is at fault
     kind: str  # the kind of error that it causes, such as `NameError` or `AskEmptyOptions`
     message: str  # one plain sentence
-    is_misuse: bool = False  # whether it misuses a skill; a broad `except` hides this but does not fix it
+    is_misuse: bool = False  # whether it misuses a skill, which a broad `except` hides but does not fix
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Program:
 
 @lru_cache(maxsize=8)
 def parse(source: str) -> ast.Module:
-    """Return the syntax tree of a program, which callers must not change; raise what `ast.parse` raises."""
+    """Return a program's syntax tree, which callers must not change, or raise an error of `ast.parse`."""
     with _PARSING:
         return ast.parse(compose(source), SOURCE_NAME)
 
@@ -91,7 +91,7 @@ def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
 
 
 def parse_expression(source: str) -> ast.expr:
-    """Return the syntax tree of an expression; raise what `ast.parse` raises."""
+    """Return the syntax tree of an expression, or raise an error of `ast.parse`."""
     with _PARSING:
         return ast.parse(source, SOURCE_NAME, mode="eval").body
 
@@ -99,7 +99,7 @@ def parse_expression(source: str) -> ast.expr:
 def parse_program(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
     """Parse a program and return its syntax tree, or the flaw that prevents parsing.
 
-    With `compiled`, also find compile-time errors, such as a stray `return`; for untrusted text, do this only
+    With `compiled`, also find compile-time errors, such as a stray `return`. For untrusted text, do this only
     in an isolated process.
     """
     if "\0" in source or len(source) > MAX_PROGRAM_LENGTH:
@@ -128,8 +128,11 @@ def _text_flaw(source: str) -> Flaw:
     return Flaw(line, "SyntaxError", "the program contains a null character")
 
 
-def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, truth values, lists of them
-    """Evaluate a literal; raise ValueError for other nodes, dictionaries and sets (hash collisions)."""
+def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, booleans, lists of them
+    """Return the value of a literal. Raise ValueError for other nodes.
+
+    Dictionaries and sets are rejected, too, since hash collisions can make them slow to build.
+    """
     try:
         if not any(isinstance(part, ast.Dict | ast.Set) for part in ast.walk(node)):
             return ast.literal_eval(node)
@@ -172,7 +175,7 @@ def _bound_in_module(source: str) -> set[str]:
 
 
 def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
-    """Return the names that a program binds in any scope; `from x import *` binds the name `*`."""
+    """Return the names that a program binds in any scope, with `*` for `from x import *`."""
     names: set[str] = set()
     skipped = {id(node) for node in ignoring}
     for node in nodes(tree):
@@ -294,7 +297,7 @@ def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
 
 
 def _suggest_names(tree: ast.Module, undefined: Iterable[str], skills: SkillTable) -> dict[str, str]:
-    """Suggest known names for undefined ones; limits keep this fast."""
+    """Suggest known names for undefined ones, within limits that keep this fast."""
     known = sorted({*all_bound_names(tree), *skills, *GIVEN_MODULES, *dir(builtins)})
     found: dict[str, str] = {}
     if len(known) > MAX_KNOWN_NAMES:

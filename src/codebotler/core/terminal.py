@@ -98,7 +98,7 @@ def progress(*columns: ProgressColumn) -> Progress:
 
 
 def print_rich(what: RenderableType) -> None:
-    """Print to a terminal, or print plain text to a pipe, with lines of any length unless COLUMNS is set."""
+    """Print to a terminal, or as plain text to a pipe, where lines are wrapped only if COLUMNS is set."""
     from rich.measure import Measurement
 
     drawing = console()
@@ -115,7 +115,7 @@ def print_rich(what: RenderableType) -> None:
 
 @contextmanager
 def busy(doing: str) -> Iterator[None]:
-    """Show what a command is doing: with a timer on a terminal, else in a line after two seconds."""
+    """Show what a command is doing, with a timer on a terminal and otherwise in a line after two seconds."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
     line = Timer(QUIET_S, note, [f"{doing} ..."])
@@ -160,7 +160,7 @@ def confirm(question: str) -> bool:
 
 
 def system_sentence(error: OSError) -> str:
-    """Describe a system error in a sentence with the file, and the fix for a full disk."""
+    """Describe a system error in a sentence that names the file and, for a full disk, the fix."""
     where = "the output" if error.filename is None else visible(os.fsdecode(error.filename))
     mend = "; free some disk space and try again" if error.errno in DISK_FULL else ""
     return f"{where}: {error.strerror}{mend}"
@@ -174,13 +174,13 @@ def visible(text: str) -> str:
 
 
 def visible_lines(text: str) -> str:
-    """Escape unprintable characters in each line; expand tabs."""
+    """Escape unprintable characters in each line, and expand tabs."""
     if text.isprintable():
         return text
     return "\n".join(visible(line.expandtabs(4)) for line in re.split("\r\n?|\n", text))
 
 
 def shortened(text: str, most: int = 500, shown: Callable[[str], str] = visible) -> str:
-    """Escape a text, and cut it off after `most` characters with the number of the rest."""
+    """Escape a text. If it has more than `most` characters, replace the rest by its length."""
     left = len(text) - most
     return shown(text) if left <= 0 else f"{shown(text[:most])}... {left:,} more characters"

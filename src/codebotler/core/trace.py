@@ -26,7 +26,7 @@ class Option(NamedTuple):
 
 
 def to_options(values: Iterable[object]) -> tuple[Option, ...]:
-    """Convert the options of a question for events; keep existing `Option` values."""
+    """Convert the options of a question to `Option` values, unless they already are."""
     return tuple(
         [one if isinstance(one, Option) else Option(str(one), isinstance(one, str)) for one in values]
     )
@@ -76,7 +76,7 @@ class Event:
         more: tuple[str, ...] = (),
         destination: str | None = None,
     ) -> None:
-        values = self.__dict__  # the quickest way to fill a frozen object; traces have many events
+        values = self.__dict__  # the quickest way to fill a frozen object, since traces have many events
         values["kind"], values["text"], values["options"] = kind, text, options
         values["answer"], values["found"], values["place"], values["time"] = answer, found, place, time
         values["holding"], values["to"], values["more"] = holding, to, more
@@ -146,15 +146,15 @@ class Outcome:
 def trace_data(trace: Trace, skills: SkillTable = SKILLS) -> list[list[Any]]:
     """Convert a trace to plain data.
 
-    An event is `[kind, text]`, `[kind, text, found]` or `[kind, text, options, answer]`; for a skill with
-    several arguments, `[kind, text, more]` or `[kind, text, more, found]`.
+    An event is `[kind, text]`, `[kind, text, found]` or `[kind, text, options, answer]`. For a skill with
+    several arguments, it is `[kind, text, more]` or `[kind, text, more, found]`.
     """
     asking = frozenset(kind for kind, recording in skills.recordings.items() if recording.options is not None)
     return [_event_data(event, asking) for event in trace]
 
 
 def trace_from(data: Iterable[object]) -> Trace:
-    """Convert the data of `trace_data` back to a trace; raise UserError for other data."""
+    """Convert the data of `trace_data` back to a trace, or raise UserError for other data."""
     return tuple(map(_event_from, data))
 
 
@@ -202,7 +202,7 @@ def option_data(option: Option) -> object:
 
 
 def option_from(data: object) -> Option:
-    """Convert the data of `option_data` back to an option; raise UserError for other data."""
+    """Convert the data of `option_data` back to an option, or raise UserError for other data."""
     match data:
         case str(text):
             return Option(text)

@@ -65,7 +65,7 @@ class World:
         rooms: the rooms, at least one, with unique names, in the order in which the robot lists them.
         robot: the room where the robot starts.
         about: a short description.
-        may_wait_forever: whether a program may wait here for something that never happens.
+        may_wait_forever: whether a program may wait in it for something that never happens.
         truths: values of further facts and results of custom skills.
     """
 
@@ -115,8 +115,8 @@ def _squared(room: Room) -> Room:
 def laid_out(world: World) -> World:
     """Give every room a footprint and a standing point, in a grid on both sides of a hallway.
 
-    Existing footprints are kept; a room with only a standing point gets a square metre around it, and other
-    rooms are placed to the right.
+    Existing footprints are kept. A room with only a standing point gets a square metre around that point.
+    All other rooms are placed to the right.
     """
     known = [_squared(room) for room in world.rooms]
     taken = [x for room in known for x, _ in room.footprint or ()]

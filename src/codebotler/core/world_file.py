@@ -137,7 +137,7 @@ class WorldFile(_Form):
             yield asked, tuple(value) if isinstance(value, list) else value
 
     def world(self, file: YamlFile, at: YamlPath = (), skills: SkillTable | None = None) -> World:
-        """Convert the file to a World; raise UserError if a room, a regex or a truth is wrong."""
+        """Convert the file to a World, or raise UserError if a room, a regex or a truth is wrong."""
         names: dict[str, str] = {}  # by lower-case name
         for index, room in enumerate(self.rooms):
             if other := names.get(room.name.lower()):
@@ -180,7 +180,7 @@ _CALL = re.compile(r"\w+\(.*\)")
 
 
 def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
-    """Return a statement as skills write it; raise ValueError if its value is impossible."""
+    """Return a statement in the form that skills use, or raise ValueError if its value is impossible."""
     if not _CALL.fullmatch(statement):
         if not isinstance(value, bool):
             raise ValueError(f'"{statement}" is {value!r}; write true or false')
@@ -209,7 +209,7 @@ def _expect_possible(name: str, given: list[object], value: object, skills: Skil
         raise ValueError(f"there is no skill {name}" + (f"; did you mean {alike[0]}?" if alike else ""))
     row = skills[name]
     if not row.is_random:
-        raise ValueError(f"the code of {name} computes its result; set the truths that it queries instead")
+        raise ValueError(f"the code of {name} computes its result; instead, set the facts it depends on")
     if len(given) != len(row.parameters) or not all(
         parameter.type.fits(one) for parameter, one in zip(row.parameters, given, strict=True)
     ):

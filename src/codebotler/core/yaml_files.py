@@ -76,7 +76,7 @@ def _quoted(value: object) -> str:
 
 
 class YamlFile:
-    """A parsed YAML file that knows the line of each part; invalid YAML raises UserError."""
+    """A parsed YAML file that knows the line of each part. Invalid YAML raises UserError."""
 
     def __init__(self, text: str, name: Path | str) -> None:
         self.name = name
@@ -123,7 +123,7 @@ class YamlFile:
         return UserError(sentence, file=self.name, line=self.line(place))
 
     def validate(self, model: type[FileModel], data: object = None, *, at: YamlPath = ()) -> FileModel:
-        """Validate the content, or `data` at a place, against a model; raise UserError if it does not fit."""
+        """Validate the content, or `data` at a place, against a model; raise UserError if it is invalid."""
         try:
             return model.model_validate(self.data if data is None and not at else data)
         except ValidationError as error:
@@ -201,7 +201,7 @@ VALUE_KINDS = (
 
 
 def _select_error(errors: Sequence[ErrorDetails]) -> tuple[ErrorDetails, str]:
-    """Return the error to report and a hint, since a missing key may be present but misspelt."""
+    """Return the error to report, and a hint in case a missing key is only misspelt."""
     first = errors[0]
     *around, missing = first["loc"] or ("",)
     for other in errors[1:] if first["type"] == "missing" else ():

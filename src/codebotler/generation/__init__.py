@@ -1,1 +1,4 @@
-"""Generate programs from instructions; start with `generate.py`."""
+"""Generate programs from instructions.
+
+Start with `generate.py`.
+"""

@@ -51,7 +51,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Generation:
-    """All attempts at a program, in order; the last one is the result."""
+    """All attempts at a program, in order. The last one is the result."""
 
     attempts: tuple[Attempt, ...]  # at least one
 
@@ -89,10 +89,10 @@ async def write_program(
     on_text: TextListener = ignore_text,
     on_attempt: Callable[[Attempt], None] = ignore_attempt,
 ) -> Generation:
-    """Ask a model until the check accepts a program (rejection sampling; paper, section V), then close it.
+    """Ask a model until the check accepts a program (rejection sampling; paper, section V).
 
     Each further request draws another sample. With `repair`, it includes the rejected program and its
-    problems, or the reason why the reply has no program.
+    problems, or the reason why the reply has no program. The model is closed at the end.
     """
     attempts: list[Attempt] = []
     limited, request = RateLimited(model, concurrency=1), prompt
@@ -113,7 +113,7 @@ async def write_program(
 async def _attempt(
     number: int, prompt: Prompt, reply: Reply, settings: SamplingSettings, find_problems: Checker | None
 ) -> Attempt:
-    """Check the program in a reply; if there is no program, this is the only problem."""
+    """Check the program in a reply. If there is none, this is the only problem."""
     if (none := describe_programless(reply, settings)) is not None:
         return Attempt(number, prompt, reply, (none.sentence,), none)
     found = () if find_problems is None else await asyncio.to_thread(find_problems, reply.program)
@@ -138,7 +138,7 @@ def write_checked_program(
     repair: bool = False,
     on_attempt: Callable[[Attempt], None] = ignore_attempt,
 ) -> Generation:
-    """Ask a model until a program passes the check in sampled worlds; also works inside an event loop."""
+    """Ask a model until a program passes the check in sampled worlds. This works inside event loops, too."""
     with WorkerPool(1) as pool:
 
         def find_problems(program: str) -> list[str]:
@@ -174,7 +174,7 @@ def generate(
 ) -> Generation:
     """Ask a model for a program, and check the program in sampled worlds.
 
-    If all attempts have problems, the last one decides the program and the problems of the result.
+    If all attempts have problems, the result contains the program and the problems of the last one.
 
     Args:
         instruction: the robot's task, in plain words.

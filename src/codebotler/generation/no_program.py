@@ -9,7 +9,7 @@ from codebotler.models.base import Reply
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES, NoProgram
 from codebotler.models.sampling import CHAT_MAX_TOKENS, SamplingSettings
 
-LIMIT_FACTOR = 4  # how much higher than the limit that cut off a reply
+LIMIT_FACTOR = 4  # the suggested limit is this many times the one that cut off a reply
 MAX_REFUSAL_CHARACTERS = 200
 
 

@@ -21,7 +21,7 @@ class PartialReply:
 
 
 def split_partial(reply: str) -> PartialReply:
-    """Split the start of a reply into text and code; reasoning between tags counts as text."""
+    """Split the start of a reply into text and code, where reasoning between tags counts as text."""
     if CONTINUATION.match(reply) and not REASONING_TAG.match(reply):
         return PartialReply("", reply)
     text: list[str] = []

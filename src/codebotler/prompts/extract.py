@@ -60,7 +60,7 @@ def program_of(reply: str, *, continues: bool = False) -> Program:
     """Return the program in a model's complete reply.
 
     If `task_program` is defined several times, the last complete definition counts. Reasoning between markers
-    such as `<think>` and `</think>` is dropped; other pairs of markers also count if a program follows. Apart
+    such as `<think>` and `</think>` is dropped. Other pairs of markers also count if a program follows. Apart
     from this, only chat template tokens, fences and lines that are certainly not code are dropped. A program
     that was cut off is not completed.
 
@@ -188,7 +188,7 @@ def _code_runs(lines: Sequence[str]) -> Iterator[list[str]]:
 
 
 def _as_body(lines: Sequence[str]) -> list[str] | None:
-    """Add a header to the lines if they are the body of `task_program`; otherwise, return None.
+    """Add a header to the lines if they are the body of `task_program`, or return None otherwise.
 
     The first line may have no indentation, since the prompt may end with it.
     """
@@ -213,7 +213,7 @@ def _as_body(lines: Sequence[str]) -> list[str] | None:
 def _split_versions(block: _Block, *, continues: bool) -> list[_Block]:
     """Split a block before each further definition of `task_program` and the comments above it.
 
-    A chat model's block that parses is not split, since its last definition counts; a base model's block may
+    A chat model's block that parses is not split, since its last definition counts. A base model's block may
     contain further examples.
     """
     lines = block.lines
@@ -238,7 +238,7 @@ def _introduction(lines: Sequence[str], start: int) -> int:
 def _choose(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
     """Choose the block that defines the program, or else a block that may be the program.
 
-    The first block of a base model continues the prompt; for a chat model, the last complete block that is
+    The first block of a base model continues the prompt. For a chat model, the last complete block that is
     more than an outline counts.
     """
     if continues and blocks and blocks[0].defines_task:
@@ -254,7 +254,7 @@ def _choose(blocks: Sequence[_Block], *, continues: bool) -> _Block | None:
 
 
 def _with_helpers(chosen: _Block, blocks: Sequence[_Block]) -> str:
-    """Add the blocks that define names which the chosen block needs; they may be earlier versions."""
+    """Add the blocks, even earlier versions, that define names which the chosen block needs."""
     at = blocks.index(chosen)
     kept = {at}
     tree = chosen.tree

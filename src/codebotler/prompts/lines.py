@@ -39,7 +39,7 @@ INTERJECTION = re.compile(r" ?[A-Z][a-z]+\s*$")
 
 
 def is_prose(line: str) -> bool:
-    """Whether a line is certainly prose; a doubtful line counts as code, so that no code is lost."""
+    """Whether a line is certainly prose. A doubtful line counts as code, so that no code is lost."""
     line = without_residue(line)
     if INTERJECTION.match(line) or (line.strip() and is_residue(line)):
         return True

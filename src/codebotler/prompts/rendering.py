@@ -75,7 +75,7 @@ class Prompt:
         )
 
     def after_no_program(self, why: str) -> Prompt:
-        """Return the request to repeat after a reply without a program; chat models also get the reason."""
+        """Return the request to send after a reply without a program, with the reason for chat models."""
         *before, request = self.messages
         asked = f"{request.text}\n\n{_fill('no-program', why=why)}"
         return replace(self, messages=(*before, replace(request, text=asked)))
@@ -103,7 +103,7 @@ def task_end(opening: str, reply: str, stop: Sequence[str] = STOP_TEXTS) -> int:
 
 
 def clean_instruction(instruction: str) -> str:
-    """Strip and normalize an instruction; raise UserError if it is empty."""
+    """Strip and normalize an instruction, or raise UserError if it is empty."""
     if not (instruction := compose(instruction.strip())):
         raise UserError("the instruction is empty; say what the robot should do")
     return instruction
@@ -153,7 +153,7 @@ def prompt_for(
 
 
 def stub(skill: Skill) -> str:
-    """Return the stub of a skill for prompts; for a custom skill, it has an example call and the errors."""
+    """Return the stub of a skill for prompts, including an example call and errors for a custom skill."""
     lines = [skill.doc.replace('"""', "'''")]
     if skill.fails:
         lines.append(f"Fails with an exception if {listed([when for _, when in skill.fails], 'or if')}.")

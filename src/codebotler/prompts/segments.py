@@ -44,7 +44,7 @@ class Segment:
 
     Args:
         kind: `fence`, `thought` for text between markers, `end` for an unmatched closing marker, or `text`.
-        text: its text; a thought is without its markers.
+        text: its text, without the markers of a thought.
         code: its lines that may be code.
     """
 
@@ -56,8 +56,8 @@ class Segment:
 def answer_of(reply: str, parses: ParseTest) -> tuple[list[Segment], str]:
     """Split a reply into its answer, which consists of fences and texts, and its reasoning.
 
-    Everything before an unmatched closing marker is reasoning, since the opening marker may be in the prompt;
-    a closing marker at the very end, after other reasoning, is ignored.
+    Everything before an unmatched closing marker is reasoning, since the opening marker may be in the prompt.
+    A closing marker at the very end, after other reasoning, is ignored.
     """
     segments = [*_segments(_first_turn(reply), parses)]
     answer: list[Segment] = []
@@ -74,7 +74,7 @@ def answer_of(reply: str, parses: ParseTest) -> tuple[list[Segment], str]:
 
 
 def _first_turn(reply: str) -> str:
-    """Cut off a reply where a model that did not stop writes the next user's turn."""
+    """Cut off a reply where a model that did not stop starts to write the user's next turn."""
     for turn in NEXT_TURN.finditer(reply):
         if DEFINITION.search(reply[: turn.start()]):
             return reply[: turn.start()]
@@ -92,7 +92,7 @@ def _segments(reply: str, parses: ParseTest) -> Iterator[Segment]:
 
 
 def _find_marked(reply: str, parses: ParseTest) -> Iterator[tuple[int, Segment, int]]:
-    """Yield the start, segment and end of possible fences and thoughts; only the first is reliable."""
+    """Yield the start, segment and end of possible fences and thoughts. Only the first is reliable."""
     for line in WHOLE_LINE.finditer(reply):
         start, end, text = line.start(), line.end(), line[0]
         if (fence := FENCE_LINE.match(text)) and not _is_in_code(fence, reply[:start]):
@@ -193,9 +193,9 @@ def _markers_at_ends(line: str) -> Iterator[_Marker]:
 
 
 def _read_thought(marker: _Marker, rest: str) -> tuple[Segment, int] | None:
-    """Return the thought that a marker in the first line opens or closes and its end, or None.
+    """Return the thought that a marker in the first line opens or closes, and its end, or else None.
 
-    A thought without an end was cut off. A pair of other markers encloses a thought if a program follows.
+    A thought without an end was cut off. Other pairs of markers enclose a thought only if a program follows.
     """
     if marker.is_last:
         is_end = marker.is_thought and marker.is_at_edge(rest)

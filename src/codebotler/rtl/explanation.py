@@ -41,7 +41,7 @@ class Explanation:
 
 
 def explain(formula: formulas.Formula, trace: Trace) -> Explanation | None:
-    """Explain why a formula fails on a trace; return None if it holds."""
+    """Explain why a formula fails on a trace, or return None if it holds."""
     try:
         if holds(formula, trace):
             return None

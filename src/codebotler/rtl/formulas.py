@@ -1,4 +1,4 @@
-"""The formulas of RTL as immutable values; `parse` can read what `str` writes."""
+"""The formulas of RTL as immutable values, which `str` writes and `parse` reads."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ScopeName: TypeAlias = Literal[
 
 @dataclass(frozen=True)
 class Regex(Matcher):
-    """Matches texts in which a regex is found, ignoring case; `.` also matches line breaks."""
+    """Matches texts in which a regex is found. Case is ignored, and `.` also matches line breaks."""
 
     pattern: str
 
@@ -242,7 +242,7 @@ class AtLeast(_Counting):
 
 @dataclass(frozen=True)
 class And:
-    """Conjunction: holds if all of its parts hold; evaluation stops at the first part that fails."""
+    """Conjunction: holds if all of its parts hold. Evaluation stops at the first part that fails."""
 
     parts: tuple[Formula, ...]
 
@@ -252,7 +252,7 @@ class And:
 
 @dataclass(frozen=True)
 class Or:
-    """Disjunction: holds if any of its parts holds; evaluation stops at the first part that holds."""
+    """Disjunction: holds if any of its parts holds. Evaluation stops at the first part that holds."""
 
     parts: tuple[Formula, ...]
 

@@ -13,13 +13,13 @@ from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.automaton import Automaton, Letter, Undecided, machine_of
 from codebotler.rtl.semantics import is_match
 
-MAX_CACHED_STEPS = 4_000  # per formula
+MAX_CACHED_STEPS = 4_000  # for each formula
 
 
 class Monitor:
-    """Evaluates a formula on a growing trace; `holds` is the result for the events so far.
+    """Evaluates a formula on a growing trace, with the result for the events so far in `holds`.
 
-    An event takes constant time and memory. With `events`, the monitor also knows if the result is final.
+    Each event takes constant time and memory. With `events`, the monitor also knows if the result is final.
 
     Args:
         formula: the formula.
@@ -37,7 +37,7 @@ class Monitor:
 
     @property
     def state(self) -> object:
-        """The state of the automaton; monitors in equal states give equal results for the same events."""
+        """The state of the automaton, which determines the results for all later events."""
         return self._state
 
     @property
@@ -49,8 +49,8 @@ class Monitor:
         """Process the next event, and return whether the formula holds now.
 
         Raises:
-            Inconclusive: an option is not a text; the event is ignored.
-            ValueError: the event is not one of `events`; it is ignored.
+            Inconclusive: an option is not a text. The event is ignored.
+            ValueError: the event matches none of `events`, and is ignored.
         """
         mask = self._machine.mask(event, self._seen)
         if self._future is not None:
@@ -61,7 +61,7 @@ class Monitor:
         return self.holds
 
     def would_hold(self, event: Event) -> bool:
-        """Return whether the formula would hold after an event; Inconclusive if an option is not a text."""
+        """Whether the formula would hold after an event; raise Inconclusive if an option is not a text."""
         machine = self._machine
         mask = machine.mask(event, self._seen)
         return (machine.steps.get((self._state, mask)) or machine.step(self._state, mask))[1]
@@ -130,5 +130,5 @@ class _Future:
 
     def step(self, letter: Letter) -> None:
         if letter not in self._letters:
-            raise ValueError("this is not one of the possible events")
+            raise ValueError("the event is not in the monitor's list of possible events")
         self._state = self._automaton.rows[self._state][self._letters.index(letter)]

@@ -11,7 +11,7 @@ from codebotler.rtl.pattern import Tree, parse_tree
 
 MATCH_ALL_PATTERNS = frozenset({"", ".*", ".+", "^.*$"})
 UNCLEAR = "(…)"
-_MAX_TEXTS = 40  # for one regex
+_MAX_TEXTS = 40  # for each regex
 _MIN_RANGE = 3  # longer sequences of numbers are shown as a range
 _MAX_SHOWN = 5
 
@@ -38,7 +38,7 @@ def choices(pattern: str) -> tuple[str, ...] | None:
 
 
 def one_of(texts: tuple[str, ...], quote: str = '"') -> str:
-    """Join alternatives, such as `"bread" or "toast"`; after the fifth, only give the number of the rest."""
+    """Join alternatives, such as `"bread" or "toast"`. After the fifth, give only the number of the rest."""
     left = len(texts) - _MAX_SHOWN
     shown = [f"{quote}{brief(text)}{quote}" for text in texts[: _MAX_SHOWN if left > 1 else None]]
     return listed([*shown, f"{left} more"] if left > 1 else shown, "or")
@@ -101,7 +101,7 @@ def _is_category(tree: Tree, *names: str) -> bool:
 
 
 def _set_texts(members: Any) -> list[str]:  # noqa: ANN401 - private classes of `re`
-    """Return the characters of a set; only the first if it contains punctuation, which hardly matters."""
+    """Return the characters of a set, but only the first if it contains punctuation, which rarely matters."""
     characters: list[str] = []
     for op, value in members:
         if str(op) not in {"LITERAL", "RANGE"}:

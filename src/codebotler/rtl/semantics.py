@@ -133,7 +133,7 @@ def first(element: formulas.EventPattern, trace: Trace, span: range) -> int | No
 
 
 def at_least(element: formulas.EventPattern, number: int, trace: Trace, span: range) -> int:
-    """Count the matching events in a span, but not further than `number`."""
+    """Count the matching events in a span, up to `number`."""
     return sum(1 for _ in islice(occurrences(element, trace, span), min(number, len(span))))
 
 
@@ -152,7 +152,7 @@ def bounding_event(scope: formulas.Scope, trace: Trace, span: range) -> int | No
 
 
 def narrow(scope: formulas.Scope, at: int | None, span: range) -> range:
-    """Restrict a span to a scope; `at` is the position of its bounding event, or None without one."""
+    """Restrict a span to a scope. Its bounding event is at position `at`, or missing if `at` is None."""
     if at is None:
         return range(span.stop, span.stop) if scope.is_only else span
     return range(span.start, at) if scope.is_before else range(at + 1, span.stop)
@@ -171,7 +171,7 @@ def first_stay(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, spa
 def during_stays(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, span: range) -> Iterator[int]:
     """Yield the positions during all stays at a test's place.
 
-    A stay excludes the move that ends it; the move that begins it counts only as part of an earlier stay.
+    A stay excludes the move that ends it. The move that begins it counts only as part of an earlier stay.
     """
     is_there = False
     for at in span:

@@ -32,12 +32,12 @@ WRAPPERS = ("at", "holding", "to", "options", "returned")  # further conditions 
 NO_MEANINGS: Mapping[str, str] = MappingProxyType({})
 
 MAX_FORMULA_DEPTH = 50  # low enough for Python's stack during every evaluation
-MAX_OPTIONS = 100  # that a formula may require in a question
+MAX_OPTIONS = 100  # the most options that a formula may require
 _MAX_SHOWN_LENGTH = 40
 
 
 class RtlSyntaxError(ValueError):
-    """Raised for a text that is not a formula; the message says where and why.
+    """Raised for a text that is not a formula, with a message that says where and why.
 
     Args:
         column: the position, counted from 1.
@@ -62,7 +62,7 @@ def parse(
         text: the formula; a line break counts as a space.
         skills: the skills whose events the formula may name.
         means: words for explanations, by kind of event: what its texts mean, such as `that nobody is coming`
-            for `say`; answered questions have the key `answered`.
+            for `say`. Answered questions have the key `answered`.
 
     Raises:
         RtlSyntaxError: the text is not a formula.
@@ -104,7 +104,7 @@ class _Parser:
 
     def constraint(self, node: ast.expr, depth: int) -> formulas.Formula:
         if depth > MAX_FORMULA_DEPTH:
-            raise self.error(node, f"this is nested more than {MAX_FORMULA_DEPTH} deep")
+            raise self.error(node, f"this is nested more than {MAX_FORMULA_DEPTH} levels deep")
         match node:
             case ast.BoolOp(op, values):
                 parts = tuple(self.constraint(value, depth + 1) for value in values)
@@ -201,7 +201,7 @@ class _Parser:
         return formulas.EventPattern(kind, first, more=tuple(more))
 
     def value(self, node: ast.expr, wanted: ValueType) -> formulas.TextPattern:
-        """Parse a pattern for an argument; numbers and truth values may be literals."""
+        """Parse a pattern for an argument, where numbers and booleans may be literals."""
         if wanted.base == "str":
             text = self.matched(node)
             if wanted.choices and not any(text.matches(as_text(one)) for one in wanted.choices):

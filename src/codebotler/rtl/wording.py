@@ -133,7 +133,7 @@ def _describe_thing(text: TextPattern, thing: str) -> str:
 
 
 def _quote_choices(text: TextPattern) -> str:
-    """Quote the texts that a regex finds; empty if it matches anything or they cannot be determined."""
+    """Quote the texts that a regex finds, or return an empty text if they are unlimited or unknown."""
     return _words_of(text.pattern) if isinstance(text, Regex) and not is_any(text) else ""
 
 
@@ -190,7 +190,7 @@ def room_name(name: str) -> str:
 
 
 def describe_text(text: TextPattern) -> str:
-    """Describe a text pattern, such as `with "5" or "five" and without "no"`; empty if any text matches."""
+    """Describe a text pattern, such as `with "5" and without "no"`, or return "" if any text matches."""
     return listed(elide_list([*dict.fromkeys(_qualities(text))]))
 
 

@@ -334,7 +334,7 @@ def test_a_room_that_is_no_regex_is_refused(pool: WorkerPool) -> None:
 
 
 def test_a_room_that_may_take_too_long_to_find_is_refused(pool: WorkerPool) -> None:
-    with pytest.raises(UserError, match=r'"\(a\+\)\+\$", but finding it may take too long'):
+    with pytest.raises(UserError, match=r'"\(a\+\)\+\$", but searching for it may take too long'):
         check(START + f'go_to("{"a" * 40}!")', rooms=["(a+)+$"], pool=pool)
 
 

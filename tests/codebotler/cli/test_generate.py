@@ -188,7 +188,7 @@ def test_a_record_is_added_to_no_file_of_other_things(tmp_path: Path, paper: Sui
     (tmp_path / "first.py").write_text("def task_program(): ...\n")
     refusal = refused(instruction(paper), "--record", "first.py", cwd=tmp_path)
     assert refusal.at == ("first.py", None)
-    assert "other content" in refusal.sentence
+    assert "unexpected content" in refusal.sentence
     assert (tmp_path / "first.py").read_text() == "def task_program(): ...\n"
 
 

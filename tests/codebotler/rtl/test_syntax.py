@@ -189,7 +189,7 @@ def test_deep_nesting_is_an_error_and_no_crash(text: str) -> None:
 def test_50_are_deep_enough_and_51_too_deep() -> None:
     text = "not " * MAX_FORMULA_DEPTH + 'tr.Exists(say("a"))'
     assert str(parse(text)) == text
-    with pytest.raises(RtlSyntaxError, match="more than 50 deep") as caught:
+    with pytest.raises(RtlSyntaxError, match="more than 50 levels deep") as caught:
         parse("not " + text)
     assert caught.value.column == 205
 

@@ -378,7 +378,7 @@ def test_a_table_takes_the_place_of_no_other_file(tmp_path: Path) -> None:
         before = (tmp_path / file).read_bytes()
         refusal = refused("export", "run", "--out", file, cwd=tmp_path)
         assert refusal.at == (file, None)
-        assert "other content" in refusal.sentence
+        assert "unexpected content" in refusal.sentence
         assert (tmp_path / file).read_bytes() == before
     for name in ("table.csv", "table.csv", "table.parquet", "table.parquet"):
         assert roboeval("export", "run", "--out", name, cwd=tmp_path).status == 0

@@ -1,4 +1,4 @@
-"""Declare a skill as one typed function; models see its signature and its docstring."""
+"""Declare a skill as one typed function, whose signature and docstring are shown to models."""
 
 from __future__ import annotations
 
@@ -107,9 +107,9 @@ def skill(
     is_idle: bool = False,
     adds_event: bool = True,
 ) -> Skill | Callable[[Callable[..., Any]], Skill]:
-    """Declare a skill as a function that acts on a simulated robot, its first parameter.
+    """Declare a skill as a function that acts on a simulated robot, which is its first parameter.
 
-    A function with an empty body (`...`) records the skill's event and returns a random value of its type; in
+    A function with an empty body (`...`) records the skill's event and returns a random value of its type. In
     some sampled worlds, it fails with one of the skill's errors.
 
     Args:
@@ -120,7 +120,7 @@ def skill(
         fails: the kinds of its errors, each with a clause that says when it occurs.
         ros: the ROS action that executes it, such as `lab_msgs/OpenDoor:/open_door`.
         example: an example call for prompts; by default, its arguments are the names of the parameters.
-        event: the kind of event that it records; by default the name of the function; None for no event.
+        event: the kind of event that it records, or None for no event; by default the name of the function.
         text: the parameter that becomes the text of the event; by default the first one.
         names: the sort of thing that the text names, such as `room`; empty for speech.
         to: the parameter that names the addressee of a question.
@@ -130,7 +130,7 @@ def skill(
         adds_event: whether the simulation records the event afterwards; False if the function does it.
 
     Raises:
-        UserError: the function cannot be a skill; the sentence has the file and the line.
+        UserError: the function cannot be a skill; the message gives the file and the line.
     """
     said = {**locals(), "fails": fails or {}}
 
@@ -263,7 +263,7 @@ class _Declaration:
         return found
 
     def annotation(self, name: str) -> object:
-        """Return an annotation, evaluated if it is a string; the simulation's may be an undefined name."""
+        """Return an annotation, evaluated if it is a string. The simulation's may be an undefined name."""
         annotation: object = self.does.__annotations__.get(name)
         if not isinstance(annotation, str):
             return annotation

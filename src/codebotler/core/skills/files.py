@@ -50,7 +50,7 @@ def files_of(skills: SkillTable) -> dict[str, str]:
 
 
 def load_skill_module(path: Path) -> ModuleType:
-    """Run a file once and return its module; raise UserError if it fails."""
+    """Run a file once and return its module, or raise UserError if it fails."""
     try:
         return load_own_module(path)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - the file may raise anything

@@ -57,6 +57,6 @@ def location_of(module: str) -> str:
 
 
 def find_object(place: str, name: str) -> object:
-    """Return the object named `name` in a module; `place` is a result of `location_of`."""
+    """Return the object named `name` in the module at `place`, a result of `location_of`."""
     module = load_own_module(Path(place)) if place.endswith(".py") else import_module(place)
     return getattr(module, name)

@@ -7,7 +7,7 @@ from typing import Any, NoReturn, Protocol
 
 
 class Simulation(Protocol):
-    """A robot in a simulated world; an operation that fails raises a RobotError."""
+    """A robot in a simulated world, whose operations raise a RobotError if they fail."""
 
     @property
     def room(self) -> str:
@@ -37,13 +37,13 @@ class Simulation(Protocol):
 
     @property
     def state(self) -> dict[str, Any]:
-        """Data that skills keep between calls; empty at the start of a run."""
+        """The data that skills keep between the calls of a run."""
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - the skill's type
         """Return a random result for a skill with an empty body, or raise one of its errors."""
 
     def truth(self, statement: str) -> bool:
-        """Return the truth of a statement in this world: from `truths` in its file, or at random."""
+        """Return whether a statement is true in this world: as `truths` in its file says, or at random."""
 
     def fail(self, kind: str) -> NoReturn:
         """Raise an error that the skill declares under `fails`."""

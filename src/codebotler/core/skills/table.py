@@ -73,7 +73,7 @@ class RosAction:
 
     @property
     def definition(self) -> str:
-        """The text of its .action file; field names and order must match the robot's."""
+        """The text of its .action file, whose field names and order must match the robot's."""
         result = "" if self.result is None else f"{self.result} result\n"
         return "".join(f"{line}\n" for line in self.goal) + f"---\n{result}---\n"
 
@@ -159,7 +159,7 @@ def refuse(does: Callable[..., Any] | None, sentence: str) -> NoReturn:
 
 
 def _sample(parameter: Parameter) -> object:
-    """Return an example argument; for a text, this is the parameter's name."""
+    """Return an example argument, which for a text is the parameter's name."""
     value = parameter.type
     if value.choices:
         one: object = value.choices[0]
@@ -224,7 +224,7 @@ class SkillTable(Mapping[str, Skill]):
         return SkillTable((*self.rows, skill))
 
     def with_skills(self, others: Mapping[str, Skill]) -> SkillTable:
-        """Return a copy of this table with the skills added that only the other table has."""
+        """Return a copy of this table, extended by the skills that only the other table has."""
         return SkillTable((*self.rows, *(row for name, row in others.items() if name not in self)))
 
     def without(self, names: Iterable[str]) -> SkillTable:

@@ -14,7 +14,7 @@ from codebotler.core.words import listed
 Scalar: TypeAlias = str | int | float | bool
 Base: TypeAlias = Literal["str", "int", "float", "bool"]
 
-MAX_INTEGER = 2**53  # JSON and robots carry integers up to this exactly
+MAX_INTEGER = 2**53  # JSON and robots represent integers up to this value exactly
 BASE_TYPES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "bool"}
 
 
@@ -56,7 +56,7 @@ class ValueType:
         return f"a list of {many}" if self.is_list else one
 
     def fits(self, value: object) -> bool:
-        """Whether a value has exactly this type; an integer is also a float."""
+        """Whether a value has exactly this type, except that an integer is also a float."""
         if self.base is None:
             return value is None
         if self.is_list:

@@ -34,7 +34,7 @@ VerbForm: TypeAlias = Literal["base", "third", "past", "ing"]
 
 @dataclass(frozen=True)
 class Verb:
-    """The English verb of a skill; the event's text follows it or fills the braces in `object`."""
+    """The English verb of a skill. The event's text follows it or fills the braces in `object`."""
 
     base: str  # `pick up`
     third: str  # `picks up`
@@ -45,7 +45,7 @@ class Verb:
     object: str = ""  # `{} ml of {} into {}`, used for several texts
 
     def with_object(self, form: str, arguments: Sequence[str], quote: str = '"') -> str:
-        """Return a form of the verb with its objects, in quotes unless `object` puts words around them."""
+        """Return a form of the verb with its objects, quoted unless `object` puts words around them."""
         if not self.object:
             return " ".join([form, *(f"{quote}{text}{quote}" for text in arguments)])
         missing = ["something"] * (self.object.count("{") - len(arguments))
@@ -56,17 +56,17 @@ def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], 
     """Build the verb that a template such as `open {door}` declares.
 
     Raises:
-        ValueError: the template has no verb, or braces around anything but a parameter.
+        ValueError: the template has no verb, or braces around something other than a parameter.
     """
     head, _, rest = template.strip().partition(" ")
     head = head.lower()
     if not (head.isascii() and head.isalpha()):
-        raise ValueError(f'the verb "{template}" must begin with a verb such as "open"')
+        raise ValueError(f'the phrase "{template}" must begin with a verb, such as "open"')
     for name in PARAMETER.findall(template):
         if name not in parameters:
-            raise ValueError(f'the verb "{template}" names {{{name}}}, which is not a parameter')
+            raise ValueError(f'the phrase "{template}" names {{{name}}}, which is not a parameter')
     if set("{}") & set(PARAMETER.sub("", template)):
-        raise ValueError(f'the verb "{template}" may use braces only around parameters')
+        raise ValueError(f'the phrase "{template}" may use braces only around parameters')
     fixed, brace, _ = rest.partition("{")
     particle = fixed.strip() if brace and rest.endswith("}") and rest.count("{") == 1 else ""
     if rest and not brace:
@@ -103,6 +103,6 @@ def _ing(verb: str) -> str:
 
 
 def _doubled(verb: str) -> str:
-    """Return the stem for `ed` and `ing`; its consonant is doubled after a short, stressed vowel."""
+    """Return the stem for `ed` and `ing`, with its consonant doubled after a short, stressed vowel."""
     is_short = re.fullmatch(r"(?:[^aeiou]*|.*qu)[aeiou][^aeiouwxy]", verb) is not None
     return verb + verb[-1] if is_short or verb in STRESSED_AT_THE_END else verb

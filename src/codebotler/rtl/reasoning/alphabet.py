@@ -90,7 +90,7 @@ def alphabet(
 
 
 def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
-    """Split a pattern into one pattern for each aspect; it matches an event if all of them match."""
+    """Split a pattern into one pattern for each aspect, so that it matches an event if all of them do."""
     kind = element.kind
     return (
         EventPattern(
@@ -153,7 +153,7 @@ def _texts(wanted: Sequence[TextPattern | None]) -> list[str | None]:
 
 
 def _held(wanted: Sequence[TextPattern | None]) -> list[str]:
-    """Return things for all combinations of patterns; an empty text means that the robot holds nothing."""
+    """Return things for all combinations of patterns, with an empty text for a robot that holds nothing."""
     texts = _distinct(wanted)
     x_is_like_empty = all(text.matches("x") == text.matches("") for text in texts)
     strings = (string or "x" for string in _texts(texts)[1:] if string or x_is_like_empty)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias, assert_never
 from codebotler.core.cachedproperty import cached_property
 from codebotler.rtl import formulas
 
-MAX_STATES = 1_000  # in an automaton before it is minimized
+MAX_STATES = 1_000  # the limit applies before minimization
 
 AutomatonState: TypeAlias = Hashable
 Letter: TypeAlias = frozenset[formulas.EventPattern]
@@ -23,7 +23,7 @@ class Undecided(Exception):  # noqa: N818 - not a mistake of the caller
 
 @dataclass(frozen=True)
 class Automaton:
-    """The minimal deterministic automaton of a formula; it starts in state 0."""
+    """The minimal deterministic automaton of a formula, which starts in state 0."""
 
     rows: tuple[tuple[int, ...], ...]  # for each state, the next state for each letter
     accepts: tuple[bool, ...]  # for each state, whether the formula holds there
@@ -149,7 +149,7 @@ def _during_stays(test: formulas.ActAtSome) -> Machine:
 
 
 def _within(scope: formulas.Scope, inner: Machine) -> Machine:
-    """Restrict a machine to the events in a scope; a state is (whether the bound was seen, inner state)."""
+    """Restrict a machine to the events in a scope. A state is (whether the bound was seen, inner state)."""
     at, (start, step, accepts) = scope.element, inner
     which = scope.name.removeprefix("Only")
     if which == "BeforeLast":
@@ -170,7 +170,7 @@ def _within(scope: formulas.Scope, inner: Machine) -> Machine:
 
 
 def _before_last(scope: formulas.Scope, inner: Machine) -> Machine:
-    """Restrict a machine to the events before the last bound; a state includes the inner state there."""
+    """Restrict a machine to the events before the last bound. Its states include the inner state there."""
     at, (start, step, accepts) = scope.element, inner
     nothing = (start,) if scope.is_only else ()
     return Machine(

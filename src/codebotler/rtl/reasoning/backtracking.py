@@ -14,7 +14,7 @@ from codebotler.rtl.reasoning.regex_samples import failing_regex, inner_trees, s
 SHORT_SIZES = range(4, 41, 2)  # characters; small steps, since time may double with each character
 LONG_SIZES = (100, 300, 1_000, 3_000, 10_000)  # characters, up to the longest text that a program may say
 SLOW_SECONDS = 0.05  # linear searches of 10,000 characters take up to 0.01 s, quadratic ones from 0.2 s
-MAX_TRIED_TEXTS = 120  # per regex
+MAX_TRIED_TEXTS = 120  # for each regex
 UNITS = (" ", "\n", "1", "a", "a ", "1 ", "a, ", "-", ",", "'", "no ", "not ")
 SUFFIXES = ("", "\0 x y z")
 
@@ -50,7 +50,7 @@ def is_slow(
     """Whether a function takes more than `seconds` of processor time for a text of any of the sizes."""
     for size in sizes:
         duration = _measure(read, text.of(size))
-        if duration > seconds and _measure(read, text.of(size)) > seconds:  # the machine may be busy once
+        if duration > seconds and _measure(read, text.of(size)) > seconds:  # the machine may be busy
             return True
         if size == LONG_SIZES[-2] and duration < seconds / 10:  # not quadratic
             return False
@@ -59,7 +59,7 @@ def is_slow(
 
 @cache
 def texts_to_try(pattern: str) -> list[RepeatedText]:
-    """Return texts that may be slow for a regex, always the same ones; none if it has no repeat."""
+    """Return texts on which a regex may be slow, always the same ones, or none if it has no repetition."""
     tree = parse_tree(pattern)
     if "REPEAT" not in str(tree):
         return []

@@ -72,14 +72,14 @@ def _guesses(pattern: str) -> Iterator[str]:
 
 
 def _spell_in_all_ways(tree: Tree) -> list[str]:
-    """Spell out a tree in three ways: without gaps, with gaps, and with gaps and its lookaheads last."""
+    """Spell out a tree in three ways: without gaps, with gaps, and with gaps and the lookaheads last."""
     behind = sorted(tree, key=lambda node: str(node[0]) == "ASSERT")
     ways = zip_longest(spell_out(tree), spell_out(tree, " "), spell_out(behind, " "))
     return [*dict.fromkeys(text for text in chain.from_iterable(ways) if text is not None)]
 
 
 def spell_out(tree: Tree, gap: str = "") -> list[str]:
-    """Return some strings that a tree matches; `gap` takes the place of any character."""
+    """Return some strings that a tree matches, with `gap` where any character may be."""
     texts = [""]
     for op, arguments in tree:
         parts = _spell_node(op, arguments, gap)
@@ -108,7 +108,7 @@ def _spell_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN
 
 
 def _characters(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - private classes of `re`
-    """Return some characters of a set, literal ones first; only one if the set contains nearly all."""
+    """Return some characters of a set, literal ones first, or only one if the set contains nearly all."""
     parser = import_module("re._parser")
     one = import_module("re._compiler").compile(
         parser.SubPattern(parser.State(), [(op, arguments)]), PATTERN_FLAGS

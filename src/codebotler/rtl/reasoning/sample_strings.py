@@ -1,6 +1,6 @@
 """Generate strings that match some of the regexes in formulas but not the others.
 
-Combinations of samples are tried, so a set of regexes for which none is found may still have a string.
+Only combinations of samples are tried, so a matching string may exist even if none is found.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def _claims(text: TextPattern) -> Iterator[str]:
 
 
 def _distinguishable(words: Iterable[str], texts: Sequence[TextPattern]) -> list[str]:
-    """Keep two words of each group that neither the patterns nor their parts and regexes distinguish."""
+    """Keep at most two of the words that the patterns, their parts and their regexes cannot tell apart."""
     parts = chain.from_iterable(text.parts if isinstance(text, Words) else (text,) for text in texts)
     wanted = [*dict.fromkeys([*parts, *(Regex(pattern) for text in texts for pattern in patterns(text))])]
     alike: defaultdict[tuple[bool, ...], list[str]] = defaultdict(list)

@@ -141,7 +141,7 @@ States: TypeAlias = tuple[int, ...]
 def _search(
     automata: Sequence[Automaton], letters: Mapping[States, Event], *, shortest: bool
 ) -> Trace | None:
-    """Find a trace that all automata accept with a greedy search, or a shortest one with A*."""
+    """Find a trace that all automata accept: any one by greedy search, or a shortest one by A*."""
     tables = [automaton.rows for automaton in automata]
     distances = [automaton.distances for automaton in automata]
     start = (0,) * len(automata)

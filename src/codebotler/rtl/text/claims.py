@@ -25,7 +25,7 @@ class Number(Matcher):
     Args:
         number: the number.
         thing: a regex for the thing, as a whole word in the singular or the plural.
-        others: regexes for other things; their numbers are ignored.
+        others: regexes for other things, whose numbers are ignored.
         other: whether the text must give a different number instead.
     """
 
@@ -77,12 +77,12 @@ _MAX_PLACE_PREFIX = 30  # characters before a thing that are searched for these 
 
 
 def _word(pattern: str) -> re.Pattern[str]:
-    """Compile a regex for whole words, singular or plural; a sign such as `%` may be next to a word."""
+    """Compile a regex for whole words, singular or plural. A sign such as `%` may be next to a word."""
     return compile_regex(rf"(?:\b|(?=\W))(?:{scope_flags(pattern)})(?:e?s)?(?:\b|(?<=\W))")
 
 
 Mark = tuple[int | None, tuple[float, ...]]
-"""The index of a thing without numbers, or None with one or more alternative numbers."""
+"""A thing, as its index without numbers, or a number, as None with its alternative values."""
 
 
 def _marks(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[Mark]:
@@ -98,7 +98,7 @@ def _marks(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[Mark]:
 
 
 def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int, int, int]]:
-    """Yield start, end and index of each thing; overlapping names give the first, or else the longest."""
+    """Yield the start, end and index of each thing. Of overlapping names, use the first, then the longest."""
     named = [
         (match.start(), -match.end(), kind)
         for kind, regex in enumerate(kinds)
@@ -113,7 +113,7 @@ def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int
 
 
 def _numbers_of_thing(marks: list[Mark]) -> Iterator[float]:
-    """Yield the numbers of the first thing, before it or, if the marks begin with a thing, after it."""
+    """Yield the numbers of the first thing, which are before it or, if a thing comes first, after it."""
     ordered = marks if marks and marks[0][0] is None else marks[::-1]
     numbers: tuple[float, ...] = ()
     for kind, given in ordered:
@@ -156,7 +156,7 @@ class Time(Matcher):
 
 
 def minutes(time: str) -> TimeOfDay:
-    """Convert a time such as `11:30` to minutes since midnight; raise ValueError for any other text."""
+    """Convert a time such as `11:30` to minutes since midnight, or raise ValueError for any other text."""
     match = re.fullmatch(r"(\d\d?):(\d\d)", time)
     if match is None or int(match[1]) > 24 or int(match[2]) > 59:  # noqa: PLR2004 - hours and minutes
         raise ValueError(f'"{time}" is not a time of day such as "11:30"')

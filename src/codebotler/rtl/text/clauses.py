@@ -106,9 +106,10 @@ _QUOTED = re.compile(
 
 
 def sentences(text: str) -> list[str]:
-    """Split a text into sentences; questions keep their marks, and `4 p.m.` and `1.5` do not end a sentence.
+    """Split a text into sentences, where questions keep their question marks.
 
-    A question together with its answer, as in `Butter? No`, is one sentence that is not a question.
+    Neither `4 p.m.` nor `1.5` ends a sentence. A question together with its answer, as in `Butter? No`,
+    is one sentence that is not a question.
     """
     text = _QUOTED.sub(r"\1", _ANSWERED.sub(r"\1: \2", _HALF_DAY.sub(r"\1m", text)))
     return [part for part in _END.split(text) if part.strip().strip("?")]
@@ -120,7 +121,7 @@ class _Part(NamedTuple):
 
 
 def clauses(sentence: str, *, lists: bool = False) -> list[str]:
-    """Split a sentence at commas and words such as `but`; questions keep their `?`.
+    """Split a sentence at commas and words such as `but`, where questions keep their `?`.
 
     With `lists`, a few words without a verb are added to the full clause before or after them:
     `Alice and Bob are in` is one clause, and `he has bread and butter, but cheese is missing` is two.

@@ -60,9 +60,9 @@ _TOGETHER = re.compile(
 
 
 def numerals(text: str) -> Iterator[tuple[int, int, tuple[float, ...]]]:
-    """Yield the start, end and values of each number in a text; alternatives such as `2 or 3` are one number.
+    """Yield the start, end and values of each number in a text, where `2 or 3` is one number.
 
-    Words such as `no` and `nobody` are 0; `x2`, `2x` and `2kg` are 2. `2 of 4` and `a total of 2` give 2;
+    Words such as `no` and `nobody` are 0. `x2`, `2x` and `2kg` are 2. `2 of 4` and `a total of 2` give 2, but
     `the one`, `not 3` and `at least 3` give no number.
     """
     together: list[re.Match[str]] = []
