@@ -49,7 +49,7 @@ def test_limits_are_those_of_the_code() -> None:
         f"a total of {missionpictures.MAX_MISSION_PICTURE_BYTES // 10**6} MB per mission",
     ):
         assert told in TEXT, told
-    listed = re.search(r"with the encoding (.*?)\. They", TEXT)
+    listed = re.search(r"encodings? (`.*?)\. ", TEXT)
     assert listed is not None
     assert re.findall("`(.*?)`", listed[1]) == list(ENCODINGS)
 
