@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from codebotler.checking.rule_rooms import may_mean
 from codebotler.core.program import parse_expression
 from codebotler.core.skills.declaration import by_event
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room
 from codebotler.rtl import EventPattern
 from codebotler.rtl.reasoning.alphabet import elements
@@ -39,9 +40,10 @@ def _names(
     for element in elements(requirement.formula):
         row = by_event(element.kind)
         category = row.recording.names if row is not None and row.recording is not None else ""
+        is_own = row is not None and row.name not in SKILLS  # may take any description, such as "red fruit"
         if (known := known_names.get(category)) is not None:
             found = (one for pattern in patterns(element.text) for one in _alternatives(pattern))
-            yield from ((category, one, known) for one in found)
+            yield from ((category, one, known) for one in found if not (is_own and _is_asked_for(one, task)))
         elif not category:
             yield from (("person", one, [*people, *_owners(rooms)]) for one in _mentioned(element, task))
         if element.holding is not None:
@@ -54,7 +56,7 @@ def _names(
     check = next(check for check in task.checks if check.name == requirement.check)
     for parameter, argument in zip(check.parameters, _arguments(requirement), strict=True):
         if parameter == "person" or argument.lower() in _people(task):
-            yield "person", argument, people
+            yield "person", argument, [*people, *WORDS_FOR_ANYBODY]
 
 
 def _mentioned(element: EventPattern, task: Task) -> Iterator[str]:
@@ -64,6 +66,11 @@ def _mentioned(element: EventPattern, task: Task) -> Iterator[str]:
     for name in sorted(_people(task)):
         if re.search(rf"\b{re.escape(name)}\b", plain):
             yield name
+
+
+def _is_asked_for(pattern: str, task: Task) -> bool:
+    """Return whether a prompt of the task contains words that a regex matches."""
+    return any(re.search(pattern, prompt, re.IGNORECASE) for prompt in task.prompts)
 
 
 def _people(task: Task) -> set[str]:

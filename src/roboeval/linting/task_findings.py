@@ -15,7 +15,7 @@ from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.regex_words import UNCLEAR
 from codebotler.rtl.wording import is_clear
-from codebotler.simulator.settings import whole_words
+from codebotler.simulator.matching import whole_words
 from roboeval.evaluation.failures import failure_of_verdicts
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.linting.clauses import clauses_of

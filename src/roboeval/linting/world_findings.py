@@ -17,7 +17,7 @@ from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.regex_samples import samples
 from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
-from codebotler.simulator.settings import resolve_room
+from codebotler.simulator.matching import resolve_room
 from roboeval.linting.absent_names import absent_names
 from roboeval.linting.findings import Finding, FindingKind
 from roboeval.suites.load import Requirement, Scenario, Task, TaskCheck

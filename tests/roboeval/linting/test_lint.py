@@ -53,11 +53,13 @@ def linted(tmp_path: Path) -> Lint:
         unworded: bool = False,
         replaced: tuple[str, str] = ("", ""),
         edited: Sequence[tuple[str, str]] = (),
+        skills: str = "",
     ) -> list[Finding]:
         suite = tmp_path / f"suite{len([*tmp_path.iterdir()])}"
         (suite / "tasks").mkdir(parents=True)
         (suite / "solutions").mkdir()
-        (suite / "suite.yaml").write_text("name: mine\nversion: 1\n")
+        (suite / "suite.yaml").write_text("name: mine\nversion: 1\n" + "skills: [own.py]\n" * bool(skills))
+        (suite / "own.py").write_text(skills)
         (suite / "solutions" / "Hello.yaml").write_text(solutions)
         lines = ["name: Hello", "summary: Greet.", "prompts: [Say hello in the kitchen.]", "checks:"]
         lines += [f"  {name}: {head_of(rtl)}" for name, rtl in checks.items()]
@@ -380,6 +382,32 @@ def test_a_person_of_another_room_or_named_by_another_parameter(linted: Lint) ->
     kitchen, office = "rooms: [kitchen,", 'rooms: ["bob\'s office", kitchen,'
     (finding,) = linted(checks, ['not greets("Bob")', 'greets("Ann")'], replaced=(kitchen, office))
     assert finding.name == 'absent: Bob in not greets("Bob")'
+
+
+OWN_SKILLS = """
+from codebotler import Simulation, skill
+
+@skill(names="object")
+def count_here(sim: Simulation, what: str) -> int:
+    "Count things of a kind."
+    ...
+
+@skill(names="object or person")
+def lead_to(sim: Simulation, person: str, room: str) -> None:
+    "Lead a person to a room."
+"""
+
+
+def test_own_skills_may_take_descriptions_that_a_prompt_contains(linted: Lint) -> None:
+    checks = {
+        "counts": 'tr.Exists(count_here("red fruits?"))',
+        "hides": 'tr.Exists(count_here("coins?"))',
+        "leads(person)": 'tr.Exists(lead_to("{person}", "kitchen"))',
+    }
+    prompt = ("Say hello in the kitchen.", "Count the red fruit and lead the waving person to the kitchen.")
+    require = ["counts", 'leads("waving person")', 'leads("ann")', "hides"]
+    found = linted(checks, require, edited=[prompt], skills=OWN_SKILLS)
+    assert names(found) == ["absent: coins? in hides"]
 
 
 def test_one_of_several_alternatives_that_is_not_in_the_world(linted: Lint) -> None:
