@@ -5,7 +5,13 @@ from codebotler import Simulation, skill
 ON_THE_GROUND = {"NotFlying": "the drone is on the ground"}
 
 
-@skill(verb="take off", fails={"TooWindy": "it is too windy"}, seconds=5, ros="drone_msgs/TakeOff:/take_off")
+@skill(
+    verb="take off",
+    fails={"TooWindy": "it is too windy"},
+    when_tried=False,  # in too much wind, the drone does not even start
+    seconds=5,
+    ros="drone_msgs/TakeOff:/take_off",
+)
 def take_off(sim: Simulation) -> None:
     """Take off; needed before all else."""
     if sim.truth("it is too windy"):

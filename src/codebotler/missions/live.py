@@ -116,7 +116,7 @@ class LiveRobot:
         try:
             result = self._perform_logged(row, [_plain_argument(argument) for argument in arguments], event)
         except RobotError:
-            if event and row.recording and row.recording.when_tried:
+            if event and row.recording and row.recording.judged_when_tried:
                 self._report(event, room, is_drive=is_drive, failed=True)
             raise
         if event is None or row.recording is None:

@@ -337,6 +337,31 @@ def test_a_drive_that_failed_began_where_the_robot_was(tmp_path: Path) -> None:
         assert mission.state is state
 
 
+SEARCH = """
+from codebotler import Simulation, skill
+
+@skill(fails={"NotFound": "it is not there"})
+def search_for(sim: Simulation, what: str) -> None:
+    "Search for a thing."
+"""
+
+
+def test_a_failed_attempt_of_an_own_skill_counts(tmp_path: Path) -> None:
+    def answer(skill: str, _: str) -> RobotResult:
+        if skill == "search_for":
+            raise RobotError("NotFound", "it is not there")
+        return None
+
+    (tmp_path / "search.py").write_text(SEARCH)
+    robot = answering(answer)
+    robot.skills = skills_from(tmp_path / "search.py")
+    formula = 'not tr.OnlyAfterFirst(search_for("floor")).Exists(say("."))'
+    quiet = Rule("quiet", "Be silent after a search.", parse(formula, skills=robot.skills))
+    program = "def task_program():\n    try: search_for('floor')\n    except Exception: say('hello')\n"
+    mission, _ = ran(tmp_path, robot, program, [quiet])
+    assert mission.state is MissionState.STOPPED
+
+
 OWN = """
 from codebotler import Simulation, skill
 

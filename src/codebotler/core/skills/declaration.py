@@ -81,7 +81,7 @@ def skill(
     text: str = "",
     names: str = "thing",
     to: str | None = None,
-    when_tried: bool = False,
+    when_tried: bool | None = None,
     seconds: float = 1.0,
     is_idle: bool = False,
     adds_event: bool = True,
@@ -102,7 +102,7 @@ def skill(
     text: str = "",
     names: str = "thing",
     to: str | None = None,
-    when_tried: bool = False,
+    when_tried: bool | None = None,
     seconds: float = 1.0,
     is_idle: bool = False,
     adds_event: bool = True,
@@ -124,7 +124,7 @@ def skill(
         text: the parameter that becomes the text of the event; by default the first one.
         names: the sort of thing that the text names, such as `room`; empty for speech.
         to: the parameter that names the addressee of a question.
-        when_tried: whether failed attempts are recorded, too.
+        when_tried: whether failed attempts are recorded, too. By default, only house rules count them.
         seconds: its duration on the simulated clock in seconds, without driving.
         is_idle: whether it changes neither the robot nor its world.
         adds_event: whether the simulation records the event afterwards; False if the function does it.
@@ -285,8 +285,9 @@ class _Declaration:
         if to and options is None:
             self.wrong("`to` is only for questions, which have a parameter options: list[str]; leave it out")
         more = tuple(name for name in names if name not in {text, to})
+        tried = self.said["when_tried"]
         return Recording(
-            event or self.name, text, options, to, self.said["names"], self.said["when_tried"], more
+            event or self.name, text, options, to, self.said["names"], tried is True, tried is not False, more
         )
 
     def fails(self) -> Mapping[str, str]:
@@ -361,7 +362,7 @@ SKILL_OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "text": (lambda it: isinstance(it, str), "the name of a parameter"),
     "names": (lambda it: it in SORTS_OF_THINGS, "one of " + ", ".join(f'"{one}"' for one in SORTS_OF_THINGS)),
     "to": (lambda it: it is None or isinstance(it, str), "the name of a parameter"),
-    "when_tried": (lambda it: isinstance(it, bool), "True or False"),
+    "when_tried": (lambda it: it is None or isinstance(it, bool), "True, False or None"),
     "seconds": (lambda it: type(it) in {int, float} and 0 <= it < inf, "a number of at least 0"),
     "is_idle": (lambda it: isinstance(it, bool), "True or False"),
     "adds_event": (lambda it: isinstance(it, bool), "True or False"),

@@ -43,6 +43,7 @@ def get_all_rooms(sim: Simulation) -> list[str]:
         results=("not found", "found"),
     ),
     event=CHECK,
+    when_tried=False,
     adds_event=False,
     names="object or person",
     ros=RosAction("IsInRoom", "/is_in_room_server", ("string object",), "bool"),
@@ -101,6 +102,7 @@ def say(sim: Simulation, message: str) -> None:
 @skill(
     verb=Verb("pick up", "picks up", "picked up", "picking up", "picked something up"),
     names="object",
+    when_tried=False,
     adds_event=False,
     ros=RosAction("Pick", "/pick_server", ("string obj",)),
     seconds=5.0,
@@ -113,6 +115,7 @@ def pick(sim: Simulation, obj: str) -> None:
 @skill(
     verb=Verb("put down", "puts down", "put down", "putting down", "put something down"),
     names="object",
+    when_tried=False,
     adds_event=False,
     ros=RosAction("Place", "/place_server", ("string obj",), failure="PlaceNoObject"),
     seconds=3.0,

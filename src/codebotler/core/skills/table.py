@@ -43,6 +43,7 @@ class Recording:
     to: str | None = None  # the parameter that names the addressee
     names: str = ""  # the sort of thing that the text names, such as `room`; empty if the text is spoken
     when_tried: bool = False  # whether failed attempts are recorded, too
+    judged_when_tried: bool = False  # whether failed attempts count for house rules
     more: tuple[str, ...] = ()  # further parameters whose values the event contains
 
     @property
