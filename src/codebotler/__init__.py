@@ -9,10 +9,13 @@ __all__ = [
     "EngineError",
     "Generation",
     "ModelError",
+    "PersonName",
     "Problem",
     "RobotError",
+    "RoomName",
     "SamplingSettings",
     "Simulation",
+    "ThingName",
     "UserError",
     "__version__",
     "check",
@@ -31,6 +34,7 @@ if TYPE_CHECKING:
     from codebotler.core.skills.declaration import skill
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.simulation import Simulation
+    from codebotler.core.skills.values import PersonName, RoomName, ThingName
     from codebotler.generation.generate import Generation, generate
     from codebotler.models.base import ModelError
     from codebotler.models.sampling import SamplingSettings
@@ -49,6 +53,7 @@ else:  # each name is imported when it is first used
             "core.skills.declaration": ["skill"],
             "core.skills.files": ["skills_from"],
             "core.skills.simulation": ["Simulation"],
+            "core.skills.values": ["PersonName", "RoomName", "ThingName"],
             "generation.generate": ["Generation", "generate"],
             "models.base": ["ModelError"],
             "models.sampling": ["SamplingSettings"],

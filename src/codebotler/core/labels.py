@@ -8,6 +8,7 @@ simple rule also rejects some fast regexes that labels do not need. `.*` at eith
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from functools import lru_cache
 from importlib import import_module
 from math import prod
@@ -25,6 +26,11 @@ REPEAT_OPCODES = frozenset({"MAX_REPEAT", "MIN_REPEAT", "POSSESSIVE_REPEAT"})
 LOOK_OPCODES = frozenset({"ASSERT", "ASSERT_NOT"})
 GROUPS = LOOK_OPCODES | {"SUBPATTERN"}
 UNSUPPORTED_OPCODES = frozenset({"GROUPREF", "GROUPREF_EXISTS"})
+
+
+def plain_names(labels: Iterable[str]) -> tuple[str, ...]:
+    """Return the labels that are names and not regexes, each once."""
+    return tuple(dict.fromkeys(filter(PLAIN_LABEL.fullmatch, labels)))
 
 
 class SlowRegexError(Exception):

@@ -7,12 +7,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from math import isfinite
-from typing import Any, Literal, TypeAlias, get_args, get_origin
+from typing import Any, Literal, NewType, TypeAlias, get_args, get_origin
 
 from codebotler.core.words import listed
 
 Scalar: TypeAlias = str | int | float | bool
 Base: TypeAlias = Literal["str", "int", "float", "bool"]
+
+RoomName = NewType("RoomName", str)
+"""The result of a skill that returns the name of a room."""
+
+ThingName = NewType("ThingName", str)
+"""The result of a skill that returns the name of a thing."""
+
+PersonName = NewType("PersonName", str)
+"""The result of a skill that returns the name of a person."""
 
 MAX_INTEGER = 2**53  # JSON and robots represent integers up to this value exactly
 BASE_TYPES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "bool"}
@@ -27,12 +36,14 @@ class ValueType:
         is_list: whether the value is a list of `base` values.
         choices: the allowed values; empty if every value of the type is allowed.
         enum: the enumeration whose members the skill's function receives instead of plain choices.
+        names: what a text names; empty for any text.
     """
 
     base: Base | None = "str"
     is_list: bool = False
     choices: tuple[Scalar, ...] = ()
     enum: type[Enum] | None = field(default=None, compare=False)
+    names: Literal["", "room", "thing", "person"] = field(default="", compare=False)
 
     @property
     def kind(self) -> str:
@@ -88,6 +99,12 @@ TYPE_NAMES: Mapping[Base, Sequence[str]] = {
     "float": ("a number", "numbers"),
     "bool": ("True or False", "truth values"),
 }
+SINGLE_TYPES: Mapping[object, ValueType] = {
+    **{one: ValueType(base) for one, base in BASE_TYPES.items()},
+    RoomName: ValueType(names="room"),
+    ThingName: ValueType(names="thing"),
+    PersonName: ValueType(names="person"),
+}
 TEXT_TYPE, TRUTH_TYPE, NO_VALUE = ValueType(), ValueType("bool"), ValueType(None)
 
 
@@ -102,8 +119,8 @@ def value_type(annotation: object) -> ValueType | None:
     """Return the type for an annotation, or None if skills cannot use it."""
     if annotation is None or annotation is type(None):
         return NO_VALUE
-    if isinstance(annotation, type) and annotation in BASE_TYPES:
-        return ValueType(BASE_TYPES[annotation])
+    if isinstance(annotation, type | NewType) and annotation in SINGLE_TYPES:
+        return SINGLE_TYPES[annotation]
     if isinstance(annotation, type) and issubclass(annotation, Enum):
         return _one_of(tuple(member.value for member in annotation), annotation)
     if get_origin(annotation) is Literal:
@@ -122,21 +139,21 @@ def _one_of(choices: tuple[Any, ...], enum: type[Enum] | None = None) -> ValueTy
     return ValueType(BASE_TYPES[kinds.pop()], choices=choices, enum=enum)
 
 
-def sample_values(value: ValueType) -> tuple[Any, ...]:
-    """Return some values of a type, from which random results are chosen."""
+def sample_values(value: ValueType, names: Sequence[str] = ()) -> tuple[Any, ...]:
+    """Return some values of a type, from which random results are chosen; `names` are known names."""
     if value.is_list:
-        some = sample_values(ValueType(value.base, choices=value.choices))
+        some = sample_values(replace(value, is_list=False), names)
         return [some[0]], [], [some[0], some[-1]]
     if value.base is None:
         return (None,)
-    return value.choices or SCALAR_SAMPLES[value.base]
+    return value.choices or tuple(names) or SCALAR_SAMPLES[value.base]
 
 
 SCALAR_SAMPLES: Mapping[Base, tuple[Scalar, ...]] = {
     "bool": (True, False),
     "int": (1, 0, 2, 10),
     "float": (1.0, 0.0, 0.5, 100.0),
-    "str": ("something", "", "something else"),
+    "str": ("something", "another thing", "something else"),
 }
 
 
