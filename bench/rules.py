@@ -36,10 +36,10 @@ from codebotler.rtl.semantics import is_match
 from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.house_rule import Rule, RuleViolationError
+from codebotler.simulator.matching import meant_by
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
-from codebotler.simulator.settings import finds, resolve_room
 from codebotler.simulator.worker import NewRobot, Worker
 from roboeval.evaluation.judge import judge
 from roboeval.evaluation.runs.source import recorded_completions
@@ -175,11 +175,8 @@ def seen(trace: Trace, rooms: Sequence[str]) -> Trace:
 
 def driven(event: Event, rooms: Sequence[str]) -> Event:
     """Return a drive with the room that it reached as its text, and all rooms that it may mean in `to`."""
-    reached = resolve_room(rooms, event.text) or event.text
-    wanted = event.text.strip().lower()
-    named = [room for room in rooms if room.lower() == wanted]
-    may_be = named or [room for room in rooms if finds(event.text, room, "label-in-request")]
-    return replace(event, text=reached, to="\n".join(dict.fromkeys([reached, *may_be])))
+    rooms = meant_by(event.text, rooms) or [event.text]
+    return replace(event, text=rooms[0], to="\n".join(rooms))
 
 
 def meant(event: Event) -> list[Event]:
@@ -447,7 +444,7 @@ class Measuring:
 def would_fail(attempt: Event, follows: Trace, rooms: Sequence[str]) -> bool:
     """Whether a refused event would have failed, judging by what follows in the run without rules."""
     if attempt.kind == "goto":
-        return resolve_room(rooms, attempt.text) is None
+        return len(meant_by(attempt.text, rooms)) != 1
     if not follows or (follows[0].kind, follows[0].text) != (attempt.kind, attempt.text):
         return True
     return attempt.kind == "ask" and follows[0].answer is None

@@ -14,8 +14,8 @@ from codebotler.rtl import Regex
 from codebotler.rtl.reasoning import samples
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.matching import meant_by
 from codebotler.simulator.rule_guard import name_of
-from codebotler.simulator.settings import resolve_room
 
 
 def find_evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTable) -> Iterator[str]:
@@ -54,7 +54,7 @@ def _expect_all_names(rule: Rule, room: str, rooms: Sequence[str]) -> None:
         text = Regex(pattern)
         words = [*samples(room), *samples(pattern)]
         requests = [
-            one for one in (*words, *(f"x {one} x" for one in words)) if resolve_room(rooms, one) == room
+            one for one in (*words, *(f"x {one} x" for one in words)) if meant_by(one, rooms) == [room]
         ]
         missed = [one for one in requests if not text.matches(name_of(room, one))]
         if missed and (len(missed) < len(requests) or text.matches(room)):

@@ -17,9 +17,8 @@ from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
 from codebotler.simulator.house_rule import Rule, RuleViolationError
+from codebotler.simulator.matching import WORDS_FOR_PEOPLE, meant_by
 from codebotler.simulator.rule_guard import RuleGuard, name_of
-from codebotler.simulator.sampled_robot import PERSON_WORDS
-from codebotler.simulator.settings import finds
 
 NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"
 ALWAYS_BROKEN = "everything that a robot can do breaks it"
@@ -132,8 +131,7 @@ def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
     for name in names:
         yield name
         for word in distinct_strings((Regex(name), *dict.fromkeys(named_texts))):
-            found = [one for one in names if finds(word, one, "label-in-request")]
-            names_it = name_of(name, word) != name and found == [name]
+            names_it = name_of(name, word) != name and meant_by(word, names) == [name]
             if names_it and any(text.matches(word) != text.matches(name) for text in named_texts):
                 yield word
 
@@ -203,7 +201,7 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
         sorts = {
             "room": rooms,
             "object": things,
-            "object or person": [*things, *people, *PERSON_WORDS - {""}],
+            "object or person": [*things, *people, *WORDS_FOR_PEOPLE],
         }
         row = by_event(element.kind)
         sort = row.recording.names if row is not None and row.recording is not None else ""

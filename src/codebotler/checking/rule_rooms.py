@@ -12,7 +12,7 @@ from codebotler.rtl.reasoning import samples
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.settings import is_in_request
+from codebotler.simulator.matching import is_in_request
 
 
 def expect_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> None:

@@ -23,11 +23,16 @@ from codebotler.robots.base import (
     ignore_feedback,
 )
 from codebotler.robots.clock import Clock
+from codebotler.simulator.matching import WORDS_FOR_PEOPLE
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.settings import ENDLESS, WORDS_FOR_PEOPLE, SimulationSettings, resolve_room
+from codebotler.simulator.settings import ENDLESS, SimulationSettings
 
 SIMULATION = SimulationSettings(
-    literals="as-written", people="own-name-or-word", words_for_people=WORDS_FOR_PEOPLE, limits=ENDLESS
+    literals="as-written",
+    matching="longest-name",
+    people="own-name-or-word",
+    words_for_people=WORDS_FOR_PEOPLE,
+    limits=ENDLESS,
 )
 METRES_PER_SECOND = 0.5
 FEEDBACK_SECONDS = 0.25  # the real time between two position reports
@@ -84,7 +89,7 @@ class Simulated:
         """
         self._wait(0.0)
         if skill == "go_to":
-            room = resolve_room(self._robot.rooms, str(arguments[0]))
+            room = self._robot.room_for(str(arguments[0]))
             if room is not None:
                 self._drive(room, feedback)
         else:

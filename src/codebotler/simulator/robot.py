@@ -3,30 +3,32 @@
 from __future__ import annotations
 
 import json
+import re
 from _blake2 import blake2b  # `hashlib` would load OpenSSL into every child
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NoReturn, Protocol, TypeAlias
+from typing import Any, Literal, NoReturn, Protocol, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import RobotError, UserError
+from codebotler.core.labels import plain_names
 from codebotler.core.skills.calling import call_skill
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.core.skills.values import Scalar, as_text, plain, sample_values, written_call
+from codebotler.core.skills.values import Scalar, ValueType, as_text, plain, sample_values, written_call
 from codebotler.core.trace import Event, Option, Trace, attempted_event, to_options
+from codebotler.core.words import listed
 from codebotler.core.world import Answer, Person, World
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.settings import (
-    PAPER_SETTINGS,
+from codebotler.simulator.matching import (
     Matching,
-    SimulationSettings,
-    choose,
     finds,
-    is_called,
+    means_anybody,
+    meant_by,
     resolve_room,
 )
+from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings, choose
 
 Argument: TypeAlias = Scalar | tuple[Option, ...] | tuple[Scalar, ...]
 Result: TypeAlias = Scalar | list[str] | list[Scalar] | None
@@ -55,10 +57,15 @@ class Thing:
     label: str
     is_pattern: bool = True  # whether the label is a regex, and not the literal name of a thing put down
 
+    @property
+    def regex(self) -> str:
+        """The label as a regex."""
+        return self.label if self.is_pattern else re.escape(self.label)
+
     def is_meant_by(self, request: str, matching: Matching = "label-in-request") -> bool:
         """Return whether a request refers to this thing."""
-        if self.is_pattern:
-            return finds(request, self.label, matching)
+        if self.is_pattern or matching == "longest-name":
+            return finds(request, self.regex, matching)
         return self.label.lower() in request.lower()  # a regex of a long name may take minutes
 
 
@@ -75,6 +82,15 @@ class Somebody:
     def is_here(self) -> bool:
         """Whether the person is in the room now."""
         return self.looks_before == 0 and not self.is_gone
+
+    def is_meant_by(self, request: str, settings: SimulationSettings) -> bool:
+        """Return whether a request refers to this person: by no name, by theirs or by a word for people."""
+        if settings.people == "answer-to-any-name" or not request.strip():
+            return True
+        if settings.matching == "longest-name" and means_anybody(request, settings.words_for_people):
+            return True
+        words = () if settings.matching == "longest-name" else settings.words_for_people
+        return any(finds(request, name, settings.matching) for name in (self.person.name, *words))
 
     def answer(self, question: str, settings: SimulationSettings) -> Answer | None:
         """Return the person's answer to a question, or None if they have none."""
@@ -156,7 +172,9 @@ class SimulatedRobot:
         return self.execute(skill, arguments)
 
     def possible_rooms(self, request: str) -> Sequence[str]:
-        """Return all rooms that a request may refer to, or for an exact name only those to which it leads."""
+        """Return all rooms that a request may refer to; for an exact name, only where it would lead."""
+        if self.settings.matching == "longest-name":
+            return meant_by(request, self.rooms)
         wanted = request.strip().lower()
         named = [room for room in self.rooms if room.lower() == wanted]
         if named:
@@ -187,7 +205,7 @@ class SimulatedRobot:
         elif room is not None:
             self.record(GOTO, room, destination=room)
         if room is None:
-            raise unknown_room(location)
+            raise unknown_room(location, self.possible_rooms(location))
         self.room = room
 
     def room_for(self, request: str) -> str | None:
@@ -198,7 +216,7 @@ class SimulatedRobot:
         """Look for an object or a person. An absent person may arrive after some unsuccessful looks."""
         settings, people = self.settings, self.people[self.room]
         seen = any(thing.is_meant_by(entity, settings.matching) for thing in self.things[self.room])
-        seen = seen or any(one.is_here and is_called(one.person, entity, settings) for one in people)
+        seen = seen or any(one.is_here and one.is_meant_by(entity, settings) for one in people)
         self.record(CHECK, entity, found=seen)
         coming = next((one for one in people if not one.is_gone), None)
         if coming is not None and not any(one.is_here for one in people):
@@ -212,7 +230,7 @@ class SimulatedRobot:
         if not options:
             raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
         here = (one for one in self.people[self.room] if one.is_here)
-        asked = next((one for one in here if is_called(one.person, person, self.settings)), None)
+        asked = next((one for one in here if one.is_meant_by(person, self.settings)), None)
         if asked is None:
             raise RobotError("AskNoPerson", f'nobody is in "{self.room}" to be asked "{question}"')
         answer = asked.answer(question, self.settings)
@@ -232,12 +250,23 @@ class SimulatedRobot:
                 "PickWhileHolding", f'the robot holds "{self.held}" and cannot pick up "{obj}" as well'
             )
         here = self.things[self.room]
-        thing = next((thing for thing in here if thing.is_meant_by(obj, self.settings.matching)), None)
+        thing = self.thing_meant(obj)
         if thing is None:
             raise RobotError("PickInvalidObject", f'there is no "{obj}" in "{self.room}"')
         self.record(PICK, obj if self.settings.events == "as-requested" else thing.label)
         here.remove(thing)
         self.held, self.taken = obj, thing
+
+    def thing_meant(self, request: str) -> Thing | None:
+        """Return the object in this room that a request refers to; raise RobotError if it may be several."""
+        matching, here = self.settings.matching, self.things[self.room]
+        if matching != "longest-name":
+            return next((thing for thing in here if thing.is_meant_by(request, matching)), None)
+        labels = {thing.regex: thing for thing in reversed(here)}  # of equal things, the first
+        best = [labels[label] for label in meant_by(request, labels)]
+        if len(best) > 1:
+            raise RobotError("PickInvalidObject", ambiguous(request, [thing.label for thing in best]))
+        return best[0] if best else None
 
     def put(self, obj: str) -> None:
         """Put down the object held under this name or, if events are `as-happened`, any matching name."""
@@ -257,9 +286,13 @@ class SimulatedRobot:
         """The values that skills store between calls."""
         return {}
 
+    @cached_property
+    def _truths(self) -> Mapping[str, Scalar | tuple[Scalar, ...]]:
+        return {statement.casefold(): value for statement, value in self.world.truths}
+
     def truth(self, statement: str) -> bool:
         """Return whether a statement is true in this world."""
-        known = dict(self.world.truths).get(statement)
+        known = self._truths.get(statement.casefold())
         if known is None:
             return self.draw_outcome(f'"{statement}"', ("is true", "is not true")) == 0
         if not isinstance(known, bool):
@@ -269,7 +302,7 @@ class SimulatedRobot:
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
         """Return the result of a skill without simulation code: the world's value, or else a random one."""
         row, call = self.skills[skill], written_call(skill, plain(arguments))
-        known, kinds = dict(self.world.truths).get(call), [kind for kind, _ in row.fails]
+        known, kinds = self._truths.get(call.casefold()), [kind for kind, _ in row.fails]
         if known in kinds:
             self.fail(str(known))
         if known is not None:
@@ -278,7 +311,7 @@ class SimulatedRobot:
                 raise UserError(f"the world sets {call} to {known!r}, but {must}")
             return plain(known)
         asks = [one for one, parameter in zip(arguments, row.parameters, strict=True) if parameter.is_options]
-        results = tuple(asks[0]) if asks and asks[0] else sample_values(row.returns)
+        results = tuple(asks[0]) if asks and asks[0] else self._possible_results(row.returns)
         if len(results) == 1 and not row.fails:
             return results[0]
         words = [f"gives {result!r}" if result is not None else "works" for result in results]
@@ -286,6 +319,19 @@ class SimulatedRobot:
         if number >= len(results):
             self.fail(kinds[number - len(results)])
         return results[number]
+
+    def _possible_results(self, value: ValueType) -> tuple[Any, ...]:
+        return sample_values(value, self.known_names(value.names) if value.names else ())
+
+    def known_names(self, sort: Literal["room", "thing", "person"]) -> Sequence[str]:
+        """Return the names of all rooms, things or people in this world, without those that are regexes."""
+        if sort == "room":
+            return self.rooms
+        if sort == "thing":
+            labels = [thing.label for here in self.things.values() for thing in here]
+        else:
+            labels = [one.person.name for here in self.people.values() for one in here]
+        return plain_names(labels)
 
     def fail(self, kind: str) -> NoReturn:
         """End the current skill with an error that it declares in `fails`."""
@@ -320,7 +366,7 @@ class SimulatedRobot:
         if event is not None and is_tried:
             self.events.append(event)
         if event is not None and row.is_drive and self.room_for(event.text) is None:
-            raise unknown_room(event.text)
+            raise unknown_room(event.text, self.possible_rooms(event.text))
         self._own_skill = row
         result: Result = call_skill(row, self, arguments)
         if event is not None:
@@ -372,6 +418,13 @@ class SimulatedRobot:
 _USUAL = {name: row.does for name, row in SKILLS.items()}
 
 
-def unknown_room(location: str) -> RobotError:
-    """Return the error for a drive to an unknown room."""
-    return RobotError("GoToInvalidLocation", f'there is no room "{location}"')
+def unknown_room(location: str, possible: Sequence[str] = ()) -> RobotError:
+    """Return the error for a drive to an unknown room, or to one of several possible rooms."""
+    sentence = ambiguous(location, possible) if len(possible) > 1 else f'there is no room "{location}"'
+    return RobotError("GoToInvalidLocation", sentence)
+
+
+def ambiguous(request: str, names: Sequence[str]) -> str:
+    """Return a sentence about a request that several names match equally well."""
+    quoted = [f'"{name}"' for name in names]
+    return f'"{request}" could mean {listed(quoted, "or")}; use the name of one of them'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, field, replace
 
@@ -76,9 +77,11 @@ class RuleGuard:
         try:
             result = self._execute(robot, skill, arguments)
         except RobotError:
-            is_tried = row.recording is not None and row.recording.when_tried
-            tried = [attempt] if attempt is not None and is_tried else []
-            self._take(robot, robot.events[start:] or tried, request)
+            is_tried = attempt is not None and row.recording is not None and row.recording.judged_when_tried
+            events = robot.events[start:]
+            if is_tried and all(event.kind != attempt.kind for event in events):
+                events.append(attempt)
+            self._take(robot, events, request)
             if self._prevented is not None:
                 raise self._prevented from None
             raise
@@ -244,7 +247,7 @@ def _names_of_thing(robot: SimulatedRobot, kind: str, request: str) -> Sequence[
     """Return the recorded name of the thing that would be picked up or put down, or nothing."""
     things = [robot.taken] if kind == PLACE and robot.taken is not None else []
     if kind == PICK:
-        here = robot.things[robot.room]
-        things = [thing for thing in here if thing.is_meant_by(request, robot.settings.matching)][:1]
+        with suppress(RobotError):  # several things match; the skill will fail
+            things = [thing for thing in [robot.thing_meant(request)] if thing is not None]
     as_happened = robot.settings.events == "as-happened"
     return [thing.label if as_happened else name_of(thing.label, request) for thing in things]

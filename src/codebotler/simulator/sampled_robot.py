@@ -7,9 +7,10 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 from codebotler.core.errors import RobotError
+from codebotler.core.labels import plain_names
 from codebotler.core.skills.kinds import ASK, CHECK
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
@@ -19,19 +20,12 @@ from codebotler.core.unicode import compose_fields
 from codebotler.core.words import brief
 from codebotler.core.world import Room, World, laid_out
 from codebotler.simulator.fact_sampler import Draw, FactSampler
+from codebotler.simulator.matching import content_words, means_anybody, meant_by
 from codebotler.simulator.robot import SimulatedRobot, SkillGuard, Thing
-from codebotler.simulator.settings import SimulationSettings, finds
+from codebotler.simulator.settings import SimulationSettings
 
-AS_WRITTEN = SimulationSettings(literals="as-written")  # leaves literals unchanged, as on a real robot
-
+AS_WRITTEN = SimulationSettings(literals="as-written", matching="longest-name")  # as on a robot
 SOMEBODY = "somebody"
-PERSON_WORDS = frozenset(  # words that mean any person
-    {
-        *("", SOMEBODY, "someone", "anybody", "anyone", "everybody", "everyone", "all"),
-        *("person", "persons", "people", "human", "humans", "human being"),
-        *("another person", "other person", "other people"),
-    }
-)
 AGREEING_TEXT = re.compile(r"\s*(?:yes|yeah|sure|ok)\b", re.IGNORECASE)
 _ARTICLE = re.compile(r"^(?:the|an?|any|some)\s+")
 
@@ -45,6 +39,8 @@ class RoomMap:
     guessed: bool = False  # the rooms are a guess: any other place a program drives to exists as well
     plain: bool = False  # names are plain text and not regexes, as always on real robots and guessed maps
     plan: tuple[Room, ...] = ()  # footprints, and stopping points if the robot drives straight between rooms
+    things: tuple[str, ...] = ()  # the names of known things, which may be anywhere
+    people: tuple[str, ...] = ()  # the names of known people, who may be anywhere
 
     def __post_init__(self) -> None:
         compose_fields(self)
@@ -53,7 +49,13 @@ class RoomMap:
     def of(cls, world: World) -> RoomMap:
         """Make the map of a world from a suite or file."""
         plan = [Room(room.name, (), (), room.footprint, room.stand_at) for room in laid_out(world).rooms]
-        return cls(tuple(room.name for room in world.rooms), world.robot, plan=tuple(plan))
+        return cls(
+            tuple(room.name for room in world.rooms),
+            world.robot,
+            plan=tuple(plan),
+            things=plain_names(label for room in world.rooms for label in room.objects),
+            people=plain_names(person.name for room in world.rooms for person in room.people),
+        )
 
     @classmethod
     def of_places(cls, world: World) -> RoomMap:
@@ -63,23 +65,21 @@ class RoomMap:
         return cls(names, names[0], plain=True, plan=plan)
 
     def room(self, request: str) -> str | None:
-        """Return the room that a request refers to, or None if there is no such room."""
-        if not (self.guessed or self.plain):
-            return next((r for r in self.rooms if finds(request, r, "label-in-request")), None)
-        wanted = request.strip()
-        same = [room for room in self.rooms if room.strip().casefold() == wanted.casefold()]
-        within = (room for room in self.rooms if room.casefold() in wanted.casefold())
-        return same[0] if same else next(within, (wanted or None) if self.guessed else None)
+        """Return the room that a request refers to, or None if there is none or there may be several."""
+        meant = self._meant(request)
+        if not meant and self.guessed:
+            return request.strip() or None
+        return meant[0] if len(meant) == 1 else None
 
     def possible_rooms(self, request: str) -> list[str]:
-        """Return all known rooms that a request may refer to. An exact name refers only to where it leads."""
-        wanted, leads_to = request.strip().casefold(), self.room(request)
-        named = [room for room in self.rooms if room.strip().casefold() == wanted]
-        if named:
-            return [*named, *([] if leads_to is None or leads_to in named else [leads_to])]
-        if self.guessed or self.plain:
-            return [room for room in self.rooms if room.strip().casefold() in wanted]
-        return [room for room in self.rooms if finds(request, room, "label-in-request")]
+        """Return all known rooms that a request may refer to, however a real robot understands it."""
+        meant, wanted = self._meant(request), request.strip().casefold()
+        if not self.plain or any(room.strip().casefold() == wanted for room in meant):
+            return meant
+        return [room for room in self.rooms if room.strip().casefold() in wanted]
+
+    def _meant(self, request: str) -> list[str]:
+        return meant_by(request, self.rooms, plain=self.guessed or self.plain)
 
 
 # --- facts
@@ -150,7 +150,8 @@ class ExploredRoom:
 
     def lacks(self, name: str) -> bool:
         """Return whether a name, or a longer name that contains it, is known to be absent."""
-        return name in self.missed or any(name in missed for missed in self.missed if name != SOMEBODY)
+        missed = self.missed
+        return name in missed or (name != SOMEBODY and any(contains(longer, name) for longer in missed))
 
 
 @dataclass
@@ -219,7 +220,8 @@ class SampledRobot(SimulatedRobot):
         """Return the rooms where the program looked for a name, including longer and shorter forms of it."""
         combined = RoomSearch()
         for sought, search in self.searches.items():
-            if sought == name or (SOMEBODY not in {sought, name} and (sought in name or name in sought)):
+            is_part = contains(name, sought) or contains(sought, name)
+            if sought == name or (is_part and SOMEBODY not in {sought, name}):
                 combined.vain |= search.vain
                 combined.found |= search.found
         return combined
@@ -237,7 +239,7 @@ class SampledRobot(SimulatedRobot):
     def is_here(self, name: str) -> bool | None:
         """Return whether a person or thing is in this room, or None if that is undecided."""
         things = self.things[self.room] if name != SOMEBODY else []
-        if name in self.here.people or any(thing.is_meant_by(name) for thing in things):
+        if name in self.here.people or any(thing.is_meant_by(name, "longest-name") for thing in things):
             return True
         return False if self.here.lacks(name) else None
 
@@ -271,6 +273,12 @@ class SampledRobot(SimulatedRobot):
 
     # --- effects of skills
 
+    def known_names(self, sort: Literal["room", "thing", "person"]) -> Sequence[str]:
+        """Return the names of all rooms, or of the things or people that are known to this house."""
+        if sort == "room":
+            return self.rooms
+        return self.room_map.things if sort == "thing" else self.room_map.people
+
     def room_for(self, request: str) -> str | None:
         """Return the room that a request refers to. On a guessed map, every place exists."""
         return self.room_map.room(request)
@@ -279,12 +287,12 @@ class SampledRobot(SimulatedRobot):
         """Look for an object or a person. The first look draws whether they are present."""
         name, room = normalized(entity), self.here
         found = self.is_here(name)
-        if found is None and (name in room.gone or (is_name(entity) and room.lacks(SOMEBODY))):
+        if found is None and (name in room.gone or (means_person(entity) and room.lacks(SOMEBODY))):
             found = False
             room.missed.add(name)
         if found is None:
             found = self.settle(name, is_random=True)
-            if found and (name == SOMEBODY or is_name(entity)):
+            if found and (name == SOMEBODY or means_person(entity)):
                 room.people |= {name, SOMEBODY}
             if found and name != SOMEBODY:
                 self.things[self.room].append(Thing(name, is_pattern=False))
@@ -348,9 +356,14 @@ def normalized(request: str) -> str:
     """Return the canonical form of a requested name: drop articles, and map all words for people to one."""
     name = " ".join(request.casefold().split())
     name = _ARTICLE.sub("", name, count=1)
-    return SOMEBODY if name in PERSON_WORDS else name
+    return SOMEBODY if means_anybody(name) else name
 
 
-def is_name(request: str) -> bool:
-    """Return whether a request looks like the name of a person because it is capitalized."""
-    return request.strip()[:1].isupper()
+def means_person(request: str) -> bool:
+    """Return whether a request refers to a person: it is capitalized, or has a word for people."""
+    return request.strip()[:1].isupper() or any(map(means_anybody, content_words(request)))
+
+
+def contains(request: str, name: str) -> bool:
+    """Return whether a request has a plain name in it, as whole words."""
+    return bool(meant_by(request, [name], plain=True))

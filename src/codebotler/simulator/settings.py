@@ -1,24 +1,15 @@
-"""The settings by which a suite simulates programs, and the rules for matching requests with labels."""
+"""The settings by which a suite simulates programs, and how people choose an option."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import lru_cache
-from typing import Literal, TypeAlias
+from typing import Literal
 
-from codebotler.core.regex_flags import scope_flags
 from codebotler.core.trace import Option
-from codebotler.core.world import Answer, Person
-
-WORDS_FOR_PEOPLE = (
-    *("person", "people", "human", "someone", "somebody", "anyone", "anybody", "everyone", "everybody"),
-    *("visitor", "guest", "employee", "colleague", "coworker", "occupant"),
-)
-
-Matching: TypeAlias = Literal["label-in-request", "whole-words"]
+from codebotler.core.world import Answer
+from codebotler.simulator.matching import Matching, finds
 
 
 @dataclass(frozen=True)
@@ -38,7 +29,7 @@ class SimulationSettings:
 
     # `lowercase` converts a program's string literals before the run, as the authors of the paper did.
     literals: Literal["lowercase", "as-written"] = "lowercase"
-    # Whether a world's label may match anywhere in a request, or only whole words, in the singular or plural.
+    # How requests refer to the labels of a world; see the module `matching`.
     matching: Matching = "label-in-request"
     # Whether people answer to any name, or only to their own, to a word for people and to no name at all.
     people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
@@ -56,61 +47,6 @@ class SimulationSettings:
 
 PAPER_SETTINGS = SimulationSettings()
 ENDLESS = Limits(calls=10**12, trace=10**12)  # for live robots, where each skill refuels the program
-
-
-# --- matching requests with labels
-
-
-def is_in_request(label: str, request: str) -> bool:
-    """Return whether a world's label, which is a regex, matches in a program's request."""
-    return _pattern(label).search(request) is not None
-
-
-def finds(request: str, label: str, matching: Matching) -> bool:
-    """Return whether a world's label, which is a regex, matches in a program's request or equals it."""
-    pattern = label if matching == "label-in-request" else whole_words(label)
-    return is_in_request(pattern, request) or request.lower() == label.lower()
-
-
-@lru_cache(maxsize=4096)
-def whole_words(label: str) -> str:
-    """Return a regex that matches a label as whole words only, in the singular or the plural."""
-    return rf"(?<!\w)(?:{_anchored(scope_flags(label))})(?:e?s)?(?!\w)"
-
-
-@lru_cache(maxsize=4096)
-def _pattern(label: str) -> re.Pattern[str]:
-    return re.compile(_anchored(label), re.IGNORECASE | re.DOTALL)
-
-
-_ANYTHING_FIRST = re.compile(r"(?:^|(?<=(?<!\\)\|))\.\*")
-
-
-def _anchored(label: str) -> str:
-    """Anchor alternatives with a leading `.*` to the start, so that a label matches in linear time.
-
-    The label matches the same requests, since `.*` can match everything before the rest of the alternative.
-    """
-    return label if set("([") & set(label) else _ANYTHING_FIRST.sub(r"^.*", label)
-
-
-def is_called(person: Person, request: str, settings: SimulationSettings) -> bool:
-    """Return whether a request refers to a person by their name, by a word for people, or by no name."""
-    if settings.people == "answer-to-any-name" or not request.strip():
-        return True
-    return any(finds(request, name, settings.matching) for name in (person.name, *settings.words_for_people))
-
-
-def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
-    """Return the first room whose name matches a request, or None. Whole words prefer an exact match."""
-    return _resolve_room(tuple(rooms), request, matching)
-
-
-@lru_cache(maxsize=65_536)
-def _resolve_room(rooms: tuple[str, ...], request: str, matching: Matching) -> str | None:
-    if matching == "whole-words" and request in rooms:
-        return request
-    return next((room for room in rooms if finds(request, room, matching)), None)
 
 
 def choose(

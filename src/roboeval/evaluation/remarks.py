@@ -12,7 +12,8 @@ from codebotler.core.words import counted, listed
 from codebotler.core.world import Answer, Person, World
 from codebotler.rtl.regex_words import choices, one_of
 from codebotler.rtl.wording import elide_list, quoted, room_name
-from codebotler.simulator.settings import SimulationSettings, choose, finds
+from codebotler.simulator.matching import finds
+from codebotler.simulator.settings import SimulationSettings, choose
 
 MIN_REPETITIONS = 3  # fewer repetitions are not called a cycle
 MAX_CYCLE_STEPS = 100

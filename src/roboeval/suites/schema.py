@@ -9,7 +9,8 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from codebotler.core.labels import check_regex
 from codebotler.core.world_file import AnswerFile, Name, NamePattern, PersonFile, WorldFile, YamlText
-from codebotler.simulator.settings import WORDS_FOR_PEOPLE, Limits, SimulationSettings
+from codebotler.simulator.matching import WORDS_FOR_PEOPLE, Matching
+from codebotler.simulator.settings import Limits, SimulationSettings
 
 MAX_WORLDS = 10_000  # per task; this many worlds already need a gigabyte of memory and minutes to sample
 
@@ -194,7 +195,7 @@ class SimulationFile(StrictForm):
     """The simulation settings in a suite file."""
 
     literals: Literal["lowercase", "as-written"] = "lowercase"
-    matching: Literal["label-in-request", "whole-words"] = "label-in-request"
+    matching: Matching = "label-in-request"
     people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
     words_for_people: tuple[NamePattern, ...] = ()
     words_for_yes: tuple[NamePattern, ...] = ()

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
+from codebotler.simulator.matching import Matching, _pattern, resolve_room
 from codebotler.simulator.robot import Result, SimulatedRobot, Thing
-from codebotler.simulator.settings import Matching, SimulationSettings, _pattern, choose, resolve_room
+from codebotler.simulator.settings import SimulationSettings, choose
 
 Texts: TypeAlias = tuple[str, ...]
 

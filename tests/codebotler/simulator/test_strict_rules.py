@@ -9,14 +9,9 @@ from codebotler.core.trace import Option, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import read_world
 from codebotler.simulator.engine import run
+from codebotler.simulator.matching import WORDS_FOR_PEOPLE, resolve_room
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.settings import (
-    PAPER_SETTINGS,
-    WORDS_FOR_PEOPLE,
-    SimulationSettings,
-    choose,
-    resolve_room,
-)
+from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings, choose
 from roboeval.suites.schema import SimulationFile
 
 STRICT = SimulationSettings(

@@ -63,7 +63,7 @@ class Pyrobosim(Simulated):
             self._drivable.place(room, request, feedback)
             return None
         objects = self._drivable.objects_in(room)
-        body = next(body for body in objects if self._things[body].is_meant_by(request))
+        body = next(body for body in objects if self._things[body] is self._robot.taken)
         self._drivable.pick(body, request, feedback)
         self._things[body] = Thing(request, is_pattern=False)
         return None

@@ -26,14 +26,26 @@ SIMULATION_MODULES = (
     f"{BATCHES}.process",
     *(
         f"{CORE}.{name}"
-        for name in ("cachedproperty", "errors", "regex_flags", "trace", "unicode", "words", "world")
+        for name in (
+            "cachedproperty",
+            "errors",
+            "labels",
+            "regex_flags",
+            "trace",
+            "unicode",
+            "words",
+            "world",
+        )
     ),
     *(
         f"{CORE}.skills.{path.stem}"
         for path in sorted(SKILLS_FOLDER.glob("[a-z]*.py"))
         if path.stem != "files"
     ),
-    *(f"{SIMULATOR}.{name}" for name in ("fact_sampler", "ledger", "robot", "settings", "sampled_robot")),
+    *(
+        f"{SIMULATOR}.{name}"
+        for name in ("fact_sampler", "ledger", "matching", "robot", "settings", "sampled_robot")
+    ),
 )
 
 
