@@ -245,6 +245,20 @@ def test_a_rule_that_is_not_kept_at_the_end_is_a_problem_without_a_line(tmp_path
     assert problem.startswith('RuleViolation: the rule "report" is not kept at the end: At the end, tell')
 
 
+def test_leaving_rule_is_a_problem_at_the_drive_or_at_the_end(tmp_path: Path) -> None:
+    locked = 'not tr.AfterLast(say("^closed")).Exists(say("^opened"))'
+    text = f"rules: [{{name: locked, says: Lock up., leaving: '{locked}'}}]"
+    house_rules = read_rules(rules_in(tmp_path, text))
+    program = "def task_program():\n    say('opened')\n    {}\n    go_to('kitchen')\n    {}\n"
+    for first, last, line in (
+        ("say('hello')", "say('closed')", 4),
+        ("say('closed')", "say('opened again')", None),
+        ("say('closed')", "say('bye')", 0),
+    ):
+        found = check(program.format(first, last), rooms=ROOMS, house_rules=house_rules)
+        assert [problem.line for problem in found.problems] == ([] if line == 0 else [line])
+
+
 def test_worlds_are_looked_for_that_lead_into_every_branch(tmp_path: Path) -> None:
     """Nested questions, each of which goes on with the last of four options only."""
     options = "['a', 'b', 'c', 'd']"

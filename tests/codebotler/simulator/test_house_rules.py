@@ -374,6 +374,15 @@ def test_leaving_rule_stops_each_drive_out_of_a_room(
         one.perform(skill, arguments)
 
 
+def test_leaving_rule_that_cannot_be_judged_is_not_kept() -> None:
+    kept = Rule("tea", "No tea.", parse('not tr.Exists(ask("tea", "^no$"))'), "leaving")
+    guard = RuleGuard([kept])
+    one = SimulatedRobot(WORLD, AS_WRITTEN, guard=guard)
+    one.perform("ask", ["ann", "tea?", (Option("1", is_text=False), Option("yes"))])
+    refused(one, "go_to", "office")
+    assert guard.at_end() is not None
+
+
 @pytest.mark.parametrize("calls", [[ON], [ON, OFF]])
 def test_leaving_rule_must_hold_at_the_end(switches: SkillTable, calls: list[tuple[str, str]]) -> None:
     guard = RuleGuard([leaves_off(switches)])
