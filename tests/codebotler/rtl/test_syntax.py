@@ -240,6 +240,8 @@ OTHER_LOOK = Event("check", "mug", found=True)
         ((NO_LOOK, OTHER_LOOK), False, True),
         ((NO_LOOK, LOOK, OTHER_LOOK), True, False),
         ((LOOK, NO_LOOK), False, True),
+        ((NO_LOOK, LOOK, NO_LOOK), False, True),
+        ((LOOK, NO_LOOK, LOOK), True, False),
     ],
 )
 def test_last_look_decides(trace: tuple[Event, ...], found: bool, missed: bool) -> None:  # noqa: FBT001 - of a table

@@ -398,6 +398,7 @@ def test_program_may_catch_the_refusal_of_a_leaving_rule(worker: Worker, switche
         "    except Exception: turn_off('stove')\n    go_to('office')\n"
     )
     guard = RuleGuard([leaves_off(switches, refuse=True)])
+    assert guard.may_refuse
     new_robot = partial(SimulatedRobot, WORLD, AS_WRITTEN, switches, guard=guard)
     outcome = worker.run_alone(program, new_robot)
     assert [event.kind for event in outcome.trace] == ["turn_on", "turn_off", "goto"]
