@@ -41,11 +41,7 @@ DETECTED = (
     "this cannot be prevented, so the mission stops right afterwards"
 )
 OTHER_ANSWER = "something else"  # an answer that no rule names
-ORDER: Sequence[WhenJudged] = (
-    "always",
-    "leaving",
-    "finally",
-)  # by how often each is judged
+ORDER: Sequence[WhenJudged] = ("always", "leaving", "finally")  # by how often each is judged
 ANY_EVENT = Or(tuple(Exists(EventPattern(kind, Regex(".*"))) for kind in SKILLS.recordings))
 
 
@@ -72,8 +68,7 @@ def review_rules(rules: Sequence[Rule], world: World | None = None) -> list[Revi
 def _review(rule: Rule, world: World | None) -> Review:
     warnings = [*_unknown_names(rule, world)]
     try:
-        at_a_step = _trace([Not(_judged_each_step(rule, world))], [], world)
-        breaks = at_a_step or _trace([Not(rule.formula)], [], world)
+        breaks = _breaking_trace(rule, world)
         keeps = _keeping_trace(rule, world)
     except Undecided:
         return Review(rule, None, None, (*warnings, UNDECIDED))
@@ -86,6 +81,16 @@ def _review(rule: Rule, world: World | None) -> Review:
     if keeps is None:
         warnings.append(ALWAYS_BROKEN if rule.when == "always" else IMPOSSIBLE)
     return Review(rule, keeps, breaks, tuple(warnings))
+
+
+def _breaking_trace(rule: Rule, world: World | None) -> Trace | None:
+    """Return a shortest trace that breaks a rule, if possible at a step rather than at the end."""
+    for parts in (_judged_each_step(rule, world), [*_conjuncts(rule.formula)]):
+        traces = [_trace([Not(part)], [], world) for part in parts]
+        found = [trace for trace in traces if trace is not None]
+        if found:
+            return min(found, key=len)
+    return None
 
 
 def _breaking_traces(rule: Rule, shortest: Trace, world: World | None) -> Iterator[Trace]:
@@ -133,8 +138,9 @@ def _keeping_trace(rule: Rule, world: World | None) -> Trace | None:
 
 def _trace(wanted: Sequence[Formula], kept: Sequence[Rule], world: World | None) -> Trace | None:
     """Return a shortest trace on which formulas hold and rules are kept, or None if there is none."""
-    always = [_judged_each_step(rule, world) for rule in kept if rule.when != "finally"]
-    finally_ = [rule.formula for rule in kept if rule.when != "always"]
+    at_end = [rule.formula for rule in kept if rule.when != "always"]
+    always = [part for rule in kept if rule.when != "finally" for part in _judged_each_step(rule, world)]
+    finally_ = [*chain.from_iterable(map(_conjuncts, at_end))]
     spoken_of = [*wanted, *always, *finally_]
     moves = None if world is None else {room: room for room in _rooms(spoken_of, world)}
     start = "" if world is None else world.robot
@@ -148,12 +154,24 @@ def _drive_away(world: World | None) -> EventPattern:
     return EventPattern(GOTO, Regex(".*") if world is None else Without(world.robot))
 
 
-def _judged_each_step(rule: Rule, world: World | None) -> Formula:
-    """Return the formula, or for a `leaving` rule, one that fails right after each drive it forbids."""
+def _judged_each_step(rule: Rule, world: World | None) -> list[Formula]:
+    """Return the parts of the formula, for a `leaving` rule such that they fail right after a drive."""
+    parts = [*_conjuncts(rule.formula)]
     if rule.when != "leaving":
-        return rule.formula
+        return parts
     drives = _drive_away(world)
-    return Or((Not(Last(drives)), _before(drives, rule.formula)))
+    return [Or((Not(Last(drives)), _before(drives, part))) for part in parts]
+
+
+def _conjuncts(formula: Formula) -> Iterator[Formula]:
+    """Split a formula into parts that must all hold, since small formulas are easier to reason about."""
+    match formula:
+        case And(parts):
+            yield from chain.from_iterable(map(_conjuncts, parts))
+        case Not(Or(parts)):
+            yield from chain.from_iterable(_conjuncts(Not(part)) for part in parts)
+        case _:
+            yield formula
 
 
 def _before(event: EventPattern, formula: Formula) -> Formula:

@@ -215,6 +215,19 @@ def test_examples_of_a_leaving_rule_end_with_a_drive_to_another_room(world: Worl
     assert review.warnings == ()
 
 
+def test_leaving_rule_about_many_things_has_examples() -> None:
+    parts = (
+        f'tr.AfterLast(place("{thing}")).Exists(pick("{thing}"))' for thing in ("mug", "pan", "fork", "cup")
+    )
+    (review,) = review_rules([leaving("all", f"not ({' or '.join(parts)})")])
+    assert review.keeps is not None
+    assert review.breaks is not None
+    assert [event.kind for event in (*review.keeps, *review.breaks)] == [
+        *("pick", "place", "goto"),
+        *("pick", "goto"),
+    ]
+
+
 def test_leaving_rule_in_a_house_of_one_room_is_broken_at_the_end() -> None:
     (review,) = review_rules([leaving("locked", LOCKED)], World((Room("hall", ("glass",)),), "hall"))
     assert review.breaks is not None
