@@ -20,7 +20,7 @@ from codebotler.rtl import And, EventPattern, Formula, RtlSyntaxError, holds, pa
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.reasoning.sample_strings import patterns
-from codebotler.rtl.syntax import SET_TAG
+from codebotler.rtl.syntax import SET_TAG, no_set
 from codebotler.simulator.house_rule import Rule, WhenJudged
 
 EACH_TAG = "{each}"  # replaced in a formula by each name of `for_each`
@@ -95,8 +95,7 @@ class HouseRuleFile(BaseModel):
             raise file.wrong(f'{EACH_TAG} in a formula needs "for_each" with a list of names', *at)
         if isinstance(self.for_each, str):
             if self.for_each not in sets:
-                known = ", ".join(sets) or "lists"
-                sentence = f'"for_each" needs a list or a set; there is no set {self.for_each}, only {known}'
+                sentence = f'"for_each" needs a list of names or a set; {no_set(self.for_each, sets)}'
                 raise file.wrong(sentence, *at[:-1], "for_each")
             each = [{**sets, "each": [name]} for name in sets[self.for_each]]
             parts = [_parse(text, file, at, skills, one) for one in each]

@@ -379,8 +379,7 @@ class _Parser:
     def names_in(self, name: str, node: ast.expr) -> Sequence[str]:
         sets = self.sets or {}
         if name not in sets:
-            known = f"the sets are {', '.join(sets)}" if sets else 'the file has no "sets"'
-            raise self.error(node, f"there is no set {name}; {known}")
+            raise self.error(node, no_set(name, sets))
         return sets[name]
 
     def check_regex(self, at: ast.expr, pattern: str, compiled: Callable[[str], object], wrong: str) -> None:
@@ -427,6 +426,12 @@ class _Parser:
             at = (at.end_col_offset or 0) - len(at.attr.encode())
         offset = at if isinstance(at, int) else at.col_offset
         return RtlSyntaxError(self.indent + len(self.bytes[:offset].decode(errors="replace")) + 1, problem)
+
+
+def no_set(name: str, sets: Iterable[str]) -> str:
+    """Return a sentence about a set that does not exist, with the names of those that do."""
+    known = ", ".join(sets)
+    return f"there is no set {name}; " + (f"the sets are {known}" if known else 'list its names under "sets"')
 
 
 def _escaped(name: str) -> str:

@@ -112,6 +112,7 @@ def test_a_rule_for_each_name_of_a_set(tmp_path: Path) -> None:
     )
 
 
+OF_NO_SET = SETS.replace("{}", 'pick("{each}")').replace("says:", "for_each: meta\n    says:")
 LEAVING = "rules:\n  - name: a\n    says: b\n    leaving: last_found('door')\n    refuse: true\n"
 
 
@@ -130,6 +131,7 @@ def test_leaving_rule_may_be_false_at_first_and_refuse(tmp_path: Path) -> None:
         (SETS.replace('[fork, "pan (old)"]', "[]"), 3, ['"metal"']),
         (SETS.replace('[fork, "pan (old)"]', "fork"), 3, ['"metal"']),
         (SETS.replace("fork", "1"), 3, []),
+        (OF_NO_SET, 7, ["no set meta;", "metal, wet rooms"]),
         (EACH_ROOM.replace("{each}", "{metal}"), 6, ['"for_each"']),
         (EACH_ROOM.replace("{each}", "{each}{metal}"), 6, ["no set metal", '"sets"']),
         (LEAVING.replace("refuse: true", "always: 'x'"), 4, ["has both"]),
