@@ -147,7 +147,7 @@ class CheckResult:
 def no_room(request: str, room_map: RoomMap) -> str:
     """Return the message for an unknown room, with the most similar name."""
     name = brief(request)
-    return f'there is no room "{name}"{closest_room(name, room_map.rooms)}'
+    return f'there is no room "{name}"{closest_room(name, room_map.goals)}'
 
 
 def closest_room(name: str, rooms: Sequence[str]) -> str:
