@@ -147,18 +147,18 @@ def laid_out(world: World) -> World:
     return replace(world, rooms=tuple(chain.from_iterable(_with_places(room, world) for room in rooms)))
 
 
-PLACE_SIZE = 0.25  # of a share of the room's width and of its depth
+PLACE_WIDTH, PLACE_DEPTH = 0.88, 0.36  # of a place's share of the wall, and of the room's depth
 
 
 def _with_places(room: Room, world: World) -> Iterator[Room]:
-    """Yield a room and the places in it; those without a position get one along the far wall."""
+    """Yield a room and the places in it. Places without a position get one along the lower wall."""
     yield room
     places = [one for one in world.rooms if one.within == room.name]
     xs, ys = zip(*(room.footprint or SQUARE), strict=True)
     share, depth = (max(xs) - min(xs)) / (len(places) or 1), max(ys) - min(ys)
-    dx, dy = PLACE_SIZE * share, PLACE_SIZE * depth / 2
+    dx, dy = PLACE_WIDTH * share / 2, PLACE_DEPTH * depth / 2
     for number, place in enumerate(places):
-        x, y = place.stand_at or (min(xs) + (number + 0.5) * share, max(ys) - 1.5 * dy)
+        x, y = place.stand_at or (min(xs) + (number + 0.5) * share, min(ys) + 1.15 * dy)
         corners = ((x - dx, y - dy), (x + dx, y - dy), (x + dx, y + dy), (x - dx, y + dy))
         yield replace(place, footprint=place.footprint or corners, stand_at=(x, y))
 
