@@ -157,7 +157,8 @@ class SimulatedRobot(SimulatedWorld):
         if thing is None:
             raise RobotError("PickInvalidObject", f'there is no "{obj}" in "{self.room}"')
         self.record(PICK, obj if self.settings.events == "as-requested" else thing.label)
-        next(there for there in self.contents.values() if any(one is thing for one in there)).remove(thing)
+        here = next(things for things in self.contents.values() if any(one is thing for one in things))
+        here.remove(thing)
         self.held, self.taken = obj, thing
 
     def put(self, obj: str) -> None:
