@@ -59,7 +59,9 @@ def replay(
                 effects[file] = find_log_effect(log, rules, world, skills)
         except UserError as error:
             effects[file] = RuleEffect("unreadable", line=error.line, error=error.sentence)
-    effects.update(zip(programs, find_program_effects(programs.values(), rules, world, skills), strict=True))
+    if programs:  # logs need no processes
+        found = find_program_effects(programs.values(), rules, world, skills)
+        effects.update(zip(programs, found, strict=True))
     return effects
 
 

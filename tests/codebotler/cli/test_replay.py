@@ -92,6 +92,13 @@ def test_each_program_is_a_row_with_its_end_and_the_rule(folder: Path) -> None:
 
 
 @pytest.mark.slow
+def test_an_endless_program_ends_after_a_thousand_calls(folder: Path) -> None:
+    ended = replay(folder, "plans/endless.py", "--world", "world.yaml", "--rules", "rules.yaml", "--json")
+    (row,) = json.loads(ended.out)["files"]
+    assert "1,000" in row["error"]
+
+
+@pytest.mark.slow
 def test_the_table_ends_with_numbers_for_each_rule(folder: Path) -> None:
     chosen = [f"plans/{name}.py" for name in ("before", "late", "at-end", "kept", "failed", "wild")]
     ended = replay(folder, *chosen, "--world", "world.yaml", "--rules", "rules.yaml")
@@ -123,7 +130,7 @@ def test_equal_programs_have_a_row_each(folder: Path) -> None:
 # --- logs
 
 
-def event(kind: str, **data: object) -> dict[str, object]:
+def event(kind: str, /, **data: object) -> dict[str, object]:
     return {"time": 1.0, "clock": 0.0, "event": kind, **data}
 
 
@@ -170,6 +177,19 @@ def test_a_rule_about_a_room_sees_where_the_log_says_the_robot_was(folder: Path)
         "here": "",
         "map": "quiet",
     }
+
+
+def test_own_skills_in_a_log_are_judged_by_their_own_names(folder: Path) -> None:
+    (folder / "own.py").write_text(
+        "from codebotler import Simulation, skill\n\n\n@skill\n"
+        'def pour(sim: Simulation, what: str) -> None:\n    """Pour."""\n'
+    )
+    rule = 'not tr.AtLeast(pour("tea"), 2)'
+    (folder / "rules.yaml").write_text(f"rules: [{{name: one, says: Once., always: '{rule}'}}]")
+    failed = [event("error", number=1, skill="pour", kind="Spilled", message="spilled")]
+    lines = [called("pour", what="tea")[0], *failed, *called("pour", what="tea")]
+    (folder / "pour.jsonl").write_bytes(b"".join(map(to_line, lines)))
+    assert effects(folder, "pour.jsonl", "--skills", "own.py")["pour"][:3] == ("stopped", "one", "before")
 
 
 @pytest.mark.slow
