@@ -38,6 +38,7 @@ def generate(
     from codebotler.core.world_file import read_world
     from codebotler.models.chosen import choose_model
     from codebotler.prompts import prompt_for
+    from codebotler.simulator.sampled_robot import RoomMap
 
     chosen = choose_model(model, base_url)
     settings = chosen.add_server(model_settings(**sampling))
@@ -47,7 +48,7 @@ def generate(
     prompt = prompt_for(
         instruction,
         skills=table,
-        rooms=() if known is None else [room.name for room in known.rooms],
+        rooms=() if known is None else RoomMap.of(known).described,
         rules=[rule.says for rule in house_rules],
     )
     if show_prompt:
