@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,7 +15,7 @@ from codebotler.core.phrases import phrase
 from codebotler.core.skills.kinds import PICK, PLACE
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, attempted_event, to_options, trace_from
-from codebotler.core.world import World, laid_out
+from codebotler.core.world import World
 from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState, read_log
 from codebotler.missions.map_event import map_from
 from codebotler.robots.simulated import SIMULATION
@@ -25,7 +24,7 @@ from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.pool import WorkerPool, cores
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import SampledRobot
+from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.settings import Limits
 
 LIMITED_SIMULATION = replace(SIMULATION, limits=Limits())  # nobody waits to stop an endless program
@@ -55,7 +54,7 @@ class NotingGuard(RuleGuard):
     """A guard that keeps the violations that it raises."""
 
     def __init__(self, rules: Sequence[Rule], world: World | None) -> None:
-        super().__init__(rules, () if world is None else laid_out(world).rooms)
+        super().__init__(rules, () if world is None else RoomMap.of(world).plan)
         self.violations: list[RuleViolationError] = []
 
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
@@ -115,8 +114,10 @@ class LoggedRobot(SimulatedRobot):
 
     def __init__(self, world: World | None, skills: SkillTable) -> None:
         super().__init__(world or World((), ""), SIMULATION, skills)
-        self.things = defaultdict(list)  # a log does not list them, and may name unknown rooms
         self.end: LogLine = {}  # the event that ends the current skill
+
+    def thing_meant(self, request: str) -> None:
+        """Return None, since a log does not list the things in a room."""
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Repeat the end of a skill, and record its event."""

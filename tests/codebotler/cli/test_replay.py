@@ -143,11 +143,12 @@ TO_OFFICE = called("go_to", location="office")
 TO_VAULT = called("go_to", location="vault")
 FAILED = called("go_to", "cancelled", location="office")
 ASKED = called("ask", result="no", person="", question="Tea?", options=["yes", "no"])
+PICKED = called("pick", obj="mug")
 SAID = called("say", message="done")
 SUNG = [event("rule", rule="x", says="X.", formula="x", what=["say", "la la"], prevented=True, line=3)]
 ENDED = [event("state", state="done")]
 LOGS = {
-    "kept": (SAID + TO_OFFICE + ENDED, ("finished", "", "", None, "")),
+    "kept": (SAID + TO_OFFICE + PICKED + ENDED, ("finished", "", "", None, "")),
     "before": (SAID + TO_VAULT + ENDED, ("stopped", "vault", "before", 7, 'going to "vault"')),
     "late": (ASKED + SAID + ENDED, ("stopped", "no-means-no", "late", 7, 'the answer "no" to "Tea?"')),
     "at-end": (TO_OFFICE + ENDED, ("finished", "report", "at the end", None, "")),
