@@ -27,7 +27,7 @@ from roboeval.suites.load import SUITES, load_suite
 @skill(ros=RosAction("Wave", "/wave_server", ("string person",)), when_tried=True)
 def wave(robot: SimulatedRobot, person: str) -> None:
     """Wave at a person in the room."""
-    if not robot.people[robot.room]:
+    if not robot.occupants[robot.room]:
         raise RobotError("WaveNoPerson", f'nobody is here to be waved at as "{person}"')
 
 

@@ -2,16 +2,12 @@
 
 from codebotler import Simulation, skill
 
+TOO_WINDY = {"TooWindy": "it is too windy"}
 ON_THE_GROUND = {"NotFlying": "the drone is on the ground"}
 
 
-@skill(
-    verb="take off",
-    fails={"TooWindy": "it is too windy"},
-    when_tried=False,  # in too much wind, the drone does not even start
-    seconds=5,
-    ros="drone_msgs/TakeOff:/take_off",
-)
+# In too much wind, the drone does not even start, so a failed attempt does not count.
+@skill(verb="take off", fails=TOO_WINDY, when_tried=False, seconds=5, ros="drone_msgs/TakeOff:/take_off")
 def take_off(sim: Simulation) -> None:
     """Take off; needed before all else."""
     if sim.truth("it is too windy"):

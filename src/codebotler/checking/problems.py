@@ -13,6 +13,7 @@ from codebotler.core.trace import Outcome, outcome_data
 from codebotler.core.words import brief, counted, listed
 from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.sampled_robot import RoomMap, SampledFact
+from codebotler.simulator.simulated_world import ambiguous
 
 
 @dataclass(frozen=True)
@@ -145,9 +146,11 @@ class CheckResult:
 
 
 def no_room(request: str, room_map: RoomMap) -> str:
-    """Return the message for an unknown room, with the most similar name."""
+    """Return the message for a request that means no room, with the most similar name, or several rooms."""
+    if len(possible := room_map.possible_rooms(request)) > 1:
+        return ambiguous(brief(request), possible)
     name = brief(request)
-    return f'there is no room "{name}"{closest_room(name, room_map.rooms)}'
+    return f'there is no room "{name}"{closest_room(name, room_map.goals)}'
 
 
 def closest_room(name: str, rooms: Sequence[str]) -> str:

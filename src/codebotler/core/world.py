@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import TypeAlias
 
 from codebotler.core.skills.values import Scalar
@@ -16,6 +16,9 @@ from codebotler.core.words import counted
 warnings.filterwarnings("ignore", "Possible (nested )?set", FutureWarning)  # such regexes still work
 
 Point: TypeAlias = tuple[float, float]
+
+Trait: TypeAlias = tuple[str, Scalar | tuple[str, ...]]
+"""A property of a thing or person, such as `("wears", "red coat")` or `("is", ("fruit", "red"))`."""
 
 Answer: TypeAlias = str | int
 """A regex for the chosen option, or its position: 1 is the first, -1 the last."""
@@ -45,6 +48,7 @@ class Room:
         people: the people in it, in order.
         footprint: the positions of its corners in metres; None if unknown.
         stand_at: the point where the robot stops, in metres.
+        within: the room that contains it if it is a place inside a room, such as a table, else empty.
     """
 
     name: str
@@ -52,6 +56,7 @@ class Room:
     people: tuple[Person, ...] = ()
     footprint: tuple[Point, ...] | None = None
     stand_at: Point | None = None
+    within: str = ""
 
     def __post_init__(self) -> None:
         compose_fields(self)
@@ -67,6 +72,7 @@ class World:
         about: a short description.
         may_wait_forever: whether a program may wait in it for something that never happens.
         truths: values of further facts and results of custom skills.
+        traits: the properties of things and people, by their labels and names.
     """
 
     rooms: tuple[Room, ...]
@@ -74,6 +80,7 @@ class World:
     about: str = ""
     may_wait_forever: bool = False
     truths: tuple[tuple[str, Scalar | tuple[Scalar, ...]], ...] = ()
+    traits: tuple[tuple[str, tuple[Trait, ...]], ...] = ()
 
     def __post_init__(self) -> None:
         compose_fields(self)
@@ -89,12 +96,14 @@ class World:
 
     def to_data(self) -> dict[str, object]:
         """Return the content of a world file."""
+        traits, rooms = {name: _traits_data(of) for name, of in self.traits}, self.rooms
+        places = {room.name: [_room_data(one) for one in rooms if one.within == room.name] for room in rooms}
         data = {
             "about": self.about,
             "robot": self.robot,
-            "rooms": [_room_data(room) for room in self.rooms],
-            "objects": {room.name: list(room.objects) for room in self.rooms if room.objects},
-            "people": {room.name: [*map(_person_data, room.people)] for room in self.rooms if room.people},
+            "rooms": [_room_data(room, places[room.name]) for room in rooms if not room.within],
+            "objects": {r.name: [_thing_data(one, traits) for one in r.objects] for r in rooms if r.objects},
+            "people": {r.name: [_person_data(one, traits) for one in r.people] for r in rooms if r.people},
             "may_wait_forever": self.may_wait_forever,
             "truths": {key: list(v) if isinstance(v, tuple) else v for key, v in self.truths},
         }
@@ -118,7 +127,7 @@ def laid_out(world: World) -> World:
     Existing footprints are kept. A room with only a standing point gets a square metre around that point.
     All other rooms are placed to the right.
     """
-    known = [_squared(room) for room in world.rooms]
+    known = [_squared(room) for room in world.rooms if not room.within]
     taken = [x for room in known for x, _ in room.footprint or ()]
     start = max(taken, default=0.0) + (HALLWAY if taken else 0.0)
     rooms, placed = [], 0
@@ -135,7 +144,23 @@ def laid_out(world: World) -> World:
             sum(y for _, y in footprint) / len(footprint),
         )
         rooms.append(replace(room, footprint=footprint, stand_at=room.stand_at or centre))
-    return replace(world, rooms=tuple(rooms))
+    return replace(world, rooms=tuple(chain.from_iterable(_with_places(room, world) for room in rooms)))
+
+
+PLACE_WIDTH, PLACE_DEPTH = 0.88, 0.36  # of a place's share of the wall, and of the room's depth
+
+
+def _with_places(room: Room, world: World) -> Iterator[Room]:
+    """Yield a room and the places in it. Places without a position get one along the lower wall."""
+    yield room
+    places = [one for one in world.rooms if one.within == room.name]
+    xs, ys = zip(*(room.footprint or SQUARE), strict=True)
+    share, depth = (max(xs) - min(xs)) / (len(places) or 1), max(ys) - min(ys)
+    dx, dy = PLACE_WIDTH * share / 2, PLACE_DEPTH * depth / 2
+    for number, place in enumerate(places):
+        x, y = place.stand_at or (min(xs) + (number + 0.5) * share, min(ys) + 1.15 * dy)
+        corners = ((x - dx, y - dy), (x + dx, y - dy), (x + dx, y + dy), (x - dx, y + dy))
+        yield replace(place, footprint=place.footprint or corners, stand_at=(x, y))
 
 
 _EDGE_TOLERANCE = 1e-9  # relative to the size of a footprint; decimal fractions are rarely exact
@@ -184,23 +209,34 @@ def crossings(y: float, corners: Sequence[Point]) -> list[float]:
     )
 
 
-def _person_data(person: Person) -> dict[str, object]:
+def _traits_data(traits: Iterable[Trait]) -> dict[str, object]:
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in traits}
+
+
+def _thing_data(label: str, traits: Mapping[str, dict[str, object]]) -> object:
+    return {"name": label, **traits[label]} if label in traits else label
+
+
+def _person_data(person: Person, traits: Mapping[str, dict[str, object]]) -> dict[str, object]:
     data: dict[str, object] = {
         **vars(person),
+        **traits.get(person.name, {}),
         "answers": [*map(_answer_data, person.answers)],
         "topics": {topic: _answer_data(answer) for topic, answer in person.topics},
     }
-    return {key: value for key, value in data.items() if value or key == "answers"}
+    return {key: value for key, value in data.items() if value or key == "answers" or key not in vars(person)}
 
 
 def _answer_data(answer: Answer) -> object:
     return {"option": answer} if isinstance(answer, int) else answer
 
 
-def _room_data(room: Room) -> object:
+def _room_data(room: Room, places: Sequence[object] = ()) -> object:
     data: dict[str, object] = {"name": room.name}
     if room.footprint is not None:
         data["footprint"] = [list(corner) for corner in room.footprint]
     if room.stand_at is not None:
         data["stand_at"] = list(room.stand_at)
+    if places:
+        data["places"] = list(places)
     return data if len(data) > 1 else room.name

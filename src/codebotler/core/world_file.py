@@ -31,7 +31,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import Scalar, plain, written_call
 from codebotler.core.words import listed
-from codebotler.core.world import Answer, Person, Room, World, is_within
+from codebotler.core.world import Answer, Person, Room, Trait, World, is_within
 from codebotler.core.yaml_files import YamlFile, YamlPath
 
 
@@ -82,10 +82,42 @@ AnswerFile = Annotated[
 ]
 
 
-class PersonFile(_Form):
-    """A person in a world file."""
+class _Described(BaseModel):
+    """A thing or person, with any further properties."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
 
     name: NamePattern
+
+    @property
+    def traits(self) -> tuple[Trait, ...]:
+        """The further properties."""
+        extra = (self.model_extra or {}).items()
+        return tuple((key, tuple(value) if isinstance(value, list) else value) for key, value in extra)
+
+    def wrong_traits(self) -> Iterator[tuple[str, str]]:
+        """Yield the name of each property that is not valid, and what is wrong with it."""
+        for key, value in (self.model_extra or {}).items():
+            alike = get_close_matches(key, type(self).model_fields, 1, cutoff=0.75)
+            if alike:
+                yield key, f'"{key}" is unknown here; did you mean {alike[0]}?'
+            texts = value if isinstance(value, list) else []
+            if not isinstance(value, str | int | float | list) or not all(isinstance(t, str) for t in texts):
+                yield key, f'"{key}" must be a text, a number, true, false or a list of texts'
+
+
+class ThingFile(_Described):
+    """A thing in a world file: a label, alone or with properties."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _label_alone(cls, data: object) -> object:
+        return data if isinstance(data, dict | ThingFile) else {"name": data}
+
+
+class PersonFile(_Described):
+    """A person in a world file."""
+
     answers: list[AnswerFile] = []
     topics: dict[NamePattern, AnswerFile] = {}
     after_looks: Annotated[int, Field(strict=True, ge=0, le=1_000)] = 0
@@ -102,8 +134,8 @@ def _answer(form: AnswerFile) -> Answer:
     return form.option if isinstance(form, OptionFile) else form
 
 
-class RoomFile(_Form):
-    """A room in a world file: a name, alone or with geometry."""
+class PlaceFile(_Form):
+    """A place in a world file, such as a table: a name, alone or with geometry."""
 
     name: NamePattern
     footprint: Annotated[list[Corner], Field(min_length=3)] | None = None
@@ -112,7 +144,13 @@ class RoomFile(_Form):
     @model_validator(mode="before")
     @classmethod
     def _name_alone(cls, data: object) -> object:
-        return data if isinstance(data, dict | RoomFile) else {"name": data}
+        return data if isinstance(data, dict | PlaceFile) else {"name": data}
+
+
+class RoomFile(PlaceFile):
+    """A room in a world file, with the places in it."""
+
+    places: list[PlaceFile] = []
 
 
 class WorldFile(_Form):
@@ -121,7 +159,7 @@ class WorldFile(_Form):
     about: YamlText = ""
     robot: Name
     rooms: Annotated[list[RoomFile], Field(min_length=1, max_length=5_000)]
-    objects: dict[YamlText, list[NamePattern]] = {}
+    objects: dict[YamlText, list[ThingFile]] = {}
     people: dict[YamlText, list[PersonFile]] = {}
     may_wait_forever: Annotated[bool, Field(strict=True)] = False
     truths: dict[Name, YamlValue | list[YamlValue]] = {}
@@ -139,17 +177,17 @@ class WorldFile(_Form):
     def world(self, file: YamlFile, at: YamlPath = (), skills: SkillTable | None = None) -> World:
         """Convert the file to a World, or raise UserError if a room, a regex or a truth is wrong."""
         names: dict[str, str] = {}  # by lower-case name
-        for index, room in enumerate(self.rooms):
+        for where, room, _ in self._goals():
             if other := names.get(room.name.lower()):
                 sentence = f'the room "{other}" is listed twice; remove one'
                 if room.name != other:
                     sentence = f'the rooms "{other}" and "{room.name}" differ only in case; rename one'
-                raise file.wrong(sentence, *at, "rooms", index)
+                raise file.wrong(sentence, *at, *where)
             names[room.name.lower()] = room.name
             if room.stand_at and room.footprint and not is_within(room.stand_at, room.footprint):
                 point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
                 sentence = f'the robot would stand at {point}, outside the footprint of "{room.name}"'
-                raise file.wrong(f"{sentence}; move the point", *at, "rooms", index, "stand_at")
+                raise file.wrong(f"{sentence}; move the point", *at, *where, "stand_at")
         rooms = dict.fromkeys(names.values())
         known = ", ".join(rooms)
         if self.robot not in rooms:
@@ -162,18 +200,41 @@ class WorldFile(_Form):
             rooms=tuple(
                 Room(
                     name=room.name,
-                    objects=tuple(self.objects.get(room.name, ())),
+                    objects=tuple(thing.name for thing in self.objects.get(room.name, ())),
                     people=tuple(person.person() for person in self.people.get(room.name, ())),
                     footprint=None if room.footprint is None else tuple(room.footprint),
                     stand_at=room.stand_at,
+                    within=within,
                 )
-                for room in self.rooms
+                for _, room, within in self._goals()
             ),
             robot=self.robot,
             about=self.about,
             may_wait_forever=self.may_wait_forever,
             truths=tuple(self._truths(file, (*at, "truths"), skills)),
+            traits=tuple(self._traits(file, at).items()),
         )
+
+    def _goals(self) -> Iterator[tuple[YamlPath, PlaceFile, str]]:
+        """Yield each room and the places in it, with its path in the file and the room that contains it."""
+        for index, room in enumerate(self.rooms):
+            yield ("rooms", index), room, ""
+            for number, place in enumerate(room.places):
+                yield ("rooms", index, "places", number), place, room.name
+
+    def _traits(self, file: YamlFile, at: YamlPath) -> dict[str, tuple[Trait, ...]]:
+        found: dict[str, tuple[Trait, ...]] = {}
+        for key, named in (("objects", self.objects), ("people", self.people)):
+            for room, entries in named.items():
+                for number, entry in enumerate(entries):
+                    for trait, sentence in entry.wrong_traits():
+                        raise file.wrong(sentence, *at, key, room, number, trait)
+                    if found.get(entry.name, entry.traits) != entry.traits:
+                        sentence = f'"{entry.name}" is described twice, and differently; rename one'
+                        raise file.wrong(sentence, *at, key, room, number)
+                    if entry.traits:
+                        found[entry.name] = entry.traits
+        return found
 
 
 _CALL = re.compile(r"\w+\(.*\)")
@@ -182,8 +243,8 @@ _CALL = re.compile(r"\w+\(.*\)")
 def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
     """Return a statement in the form that skills use, or raise ValueError if its value is impossible."""
     if not _CALL.fullmatch(statement):
-        if not isinstance(value, bool):
-            raise ValueError(f'"{statement}" is {value!r}; write true or false')
+        if isinstance(value, list):
+            raise ValueError(f'"{statement}" is a list; write a single value')
         return statement
     node: ast.expr = ast.Constant(None)
     given: list[object] = []

@@ -56,7 +56,7 @@ def prompt_of(view: SessionView, robot: Robot, *, repair: bool) -> Prompt:
     """Return the prompt for a mission's instruction. A repair prompt also says what was wrong."""
     prompt = prompt_for(
         view.instruction,
-        rooms=() if view.room_map is None else view.room_map.rooms,
+        rooms=() if view.room_map is None else view.room_map.described,
         rules=[rule.says for rule in view.rules_in_force],
         skills=robot.skills.without(robot.missing),
     )

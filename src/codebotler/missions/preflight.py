@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from codebotler.checking.problems import no_room
 from codebotler.checking.room_names import named_rooms
@@ -54,12 +55,13 @@ def ask_rooms(
     place = here if isinstance(here, str) else ""
     if not isinstance(rooms, list) or not rooms:
         return None, place
-    if place and place not in rooms:
+    known = RoomMap((), "") if world is None or not robot.rooms_are_regexes else RoomMap.of(world)
+    if place and place not in (*rooms, *known.goals):
         remark(shortened(f'the robot says it is in "{place}", which is not in its list of rooms'))
     listed = list(map(str, rooms))
-    names = dict.fromkeys([*listed, place] if place else listed)
-    plan = () if world is None else _plan(robot, world)
-    return RoomMap(tuple(names), place or listed[0], plain=not robot.rooms_are_regexes, plan=plan), place
+    names = dict.fromkeys([*listed, place] if place and place not in known.goals else listed)
+    plan, plain = () if world is None else _plan(robot, world), not robot.rooms_are_regexes
+    return replace(known, rooms=tuple(names), start=place or listed[0], plain=plain, plan=plan), place
 
 
 def _plan(robot: Robot, world: World) -> tuple[Room, ...]:

@@ -223,7 +223,7 @@ class MissionSession:
         """Ask the robot for its rooms and its current room. Refuse rules that cannot be enforced."""
         room_map, place = ask_rooms(self._robot, self._add_remark, self._world)
         self._show(room_map=limit_rooms(room_map, self._add_remark))
-        rules, rooms = self._view.rules, () if room_map is None else room_map.rooms
+        rules, rooms = self._view.rules, () if room_map is None else room_map.goals
         regexes = () if room_map is None or room_map.plain else rooms
         expect_rooms(rules, rooms)
         expect_poses(rules, self._robot, room_map)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 from codebotler.core.regex_flags import scope_flags
+from codebotler.core.world import Trait
 
 Matching: TypeAlias = Literal["label-in-request", "whole-words", "longest-name"]
 """How requests refer to labels.
@@ -95,8 +96,71 @@ def _meant_by(request: str, labels: tuple[str, ...], regexes: tuple[str, ...]) -
 
 def _matched_words(request: str, regex: str) -> int:
     """Return how many words of a request a regex matches at most."""
-    found = _pattern(whole_words(regex)).finditer(request)
-    return max((len(_WORD.findall(match[0])) or 1 for match in found if match[0].strip()), default=0)
+    return _longest_match(request, regex)[0]
+
+
+def _longest_match(request: str, regex: str) -> tuple[int, str]:
+    """Return the number of words that a regex matches at most, and the words of the request beside them."""
+    found = [match for match in _pattern(whole_words(regex)).finditer(request) if match[0].strip()]
+    counts = [
+        (len(_WORD.findall(one[0])) or 1, f"{request[: one.start()]} {request[one.end() :]}") for one in found
+    ]
+    return max(counts, default=(0, request), key=lambda each: each[0])
+
+
+class Entity(NamedTuple):
+    """A thing or person that a request may mean.
+
+    Args:
+        label: the regex that matches its names.
+        traits: the words that describe it; if there are any, a request must not contain others.
+    """
+
+    label: str
+    traits: frozenset[str] = frozenset()
+
+
+def best_fits(request: str, entities: Sequence[Entity], anybody: Sequence[str] = ()) -> list[int]:
+    """Return the positions of the entities that a request fits best.
+
+    There are several only if the request contains the names of several entities. Of those that merely have
+    the traits in a request, or that have equal names, the first is meant.
+
+    Args:
+        request: the words of a program.
+        entities: the candidates.
+        anybody: regexes for words that mean any of the candidates.
+    """
+    counts = [_fit(request, *entity, tuple(anybody)) for entity in entities]
+    best = [number for number, count in enumerate(counts) if count == max(counts) > 0]
+    named = {entities[n].label: n for n in reversed(best) if _matched_words(request, entities[n].label)}
+    return sorted(named.values()) or best[:1]
+
+
+@lru_cache(maxsize=65_536)
+def _fit(request: str, label: str, traits: frozenset[str], anybody: tuple[str, ...]) -> int:
+    """Return how many words of a request fit an entity, or 0 if it is not meant."""
+    request = " ".join(request.split())
+    if request.casefold() == " ".join(label.casefold().split()) != "":
+        return len(request)
+    named, rest = _longest_match(request, label)
+    if named and not traits:
+        return named
+    others = [word for word in content_words(rest) if not means_anybody(word, anybody)]
+    if not all(_singulars(word) & traits for word in others):
+        return 0
+    return named + len(others) or bool(anybody and rest.strip())
+
+
+def _singulars(word: str) -> set[str]:
+    return {word, word.removesuffix("s"), word.removesuffix("es")}
+
+
+def trait_words(traits: Iterable[Trait]) -> frozenset[str]:
+    """Return the words that describe a thing or person: its values, and the names of those that are true."""
+    words = [key if value is True else value for key, value in traits if value is not False]
+    texts = [text for one in words for text in (one if isinstance(one, tuple) else (str(one),))]
+    return frozenset(word for text in texts for word in content_words(text))
 
 
 def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:

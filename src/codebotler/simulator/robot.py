@@ -2,33 +2,22 @@
 
 from __future__ import annotations
 
-import json
-import re
-from _blake2 import blake2b  # `hashlib` would load OpenSSL into every child
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal, NoReturn, Protocol, TypeAlias
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NoReturn, Protocol, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.labels import plain_names
 from codebotler.core.skills.calling import call_skill
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.skills.values import Scalar, ValueType, as_text, plain, sample_values, written_call
 from codebotler.core.trace import Event, Option, Trace, attempted_event, to_options
-from codebotler.core.words import listed
-from codebotler.core.world import Answer, Person, World
-from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.matching import (
-    Matching,
-    finds,
-    means_anybody,
-    meant_by,
-    resolve_room,
-)
+from codebotler.core.world import World
+from codebotler.simulator.entities import Thing
 from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings, choose
+from codebotler.simulator.simulated_world import SimulatedWorld, unknown_room
 
 Argument: TypeAlias = Scalar | tuple[Option, ...] | tuple[Scalar, ...]
 Result: TypeAlias = Scalar | list[str] | list[Scalar] | None
@@ -50,64 +39,7 @@ class SkillGuard(Protocol):
         """Return the error that arises if the run ends now, or None if there is none."""
 
 
-@dataclass
-class Thing:
-    """An object in a room."""
-
-    label: str
-    is_pattern: bool = True  # whether the label is a regex, and not the literal name of a thing put down
-
-    @property
-    def regex(self) -> str:
-        """The label as a regex."""
-        return self.label if self.is_pattern else re.escape(self.label)
-
-    def is_meant_by(self, request: str, matching: Matching = "label-in-request") -> bool:
-        """Return whether a request refers to this thing."""
-        if self.is_pattern or matching == "longest-name":
-            return finds(request, self.regex, matching)
-        return self.label.lower() in request.lower()  # a regex of a long name may take minutes
-
-
-class Somebody:
-    """A person in a room, and the answers they have left."""
-
-    def __init__(self, person: Person) -> None:
-        self.person = person
-        self.answers = [*person.answers]
-        self.looks_before = person.after_looks
-        self.is_gone = False
-
-    @property
-    def is_here(self) -> bool:
-        """Whether the person is in the room now."""
-        return self.looks_before == 0 and not self.is_gone
-
-    def is_meant_by(self, request: str, settings: SimulationSettings) -> bool:
-        """Return whether a request refers to this person: by no name, by theirs or by a word for people."""
-        if settings.people == "answer-to-any-name" or not request.strip():
-            return True
-        if settings.matching == "longest-name" and means_anybody(request, settings.words_for_people):
-            return True
-        words = () if settings.matching == "longest-name" else settings.words_for_people
-        return any(finds(request, name, settings.matching) for name in (self.person.name, *words))
-
-    def answer(self, question: str, settings: SimulationSettings) -> Answer | None:
-        """Return the person's answer to a question, or None if they have none."""
-        for topic, answer in self.person.topics:
-            if finds(question, topic, settings.matching):
-                return answer
-        if not self.answers:
-            return None
-        answer = self.answers[0]
-        if len(self.answers) > 1:  # the last answer is repeated
-            del self.answers[0]
-        else:
-            self.is_gone = self.person.leaves
-        return answer
-
-
-class SimulatedRobot:
+class SimulatedRobot(SimulatedWorld):
     """A robot that acts in its own copy of a world and records a trace."""
 
     is_copied = True  # whether a batch's child can copy it; each subclass must set this itself
@@ -120,30 +52,18 @@ class SimulatedRobot:
         *,
         guard: SkillGuard | None = None,
     ) -> None:
-        self.guard = guard
-        self.world, self.settings, self.skills = world, settings, skills
+        super().__init__(world, settings)
+        self.guard, self.skills = guard, skills
         self.setup: Setup = ("simulated", (world, settings))
         missing = () if skills is SKILLS else [name for name, row in skills.items() if row.does is None]
         if missing:
             raise UserError(f'the skill "{missing[0]}" cannot be simulated because it has no code')
-        self.rooms = tuple(room.name for room in world.rooms)
-        self.room = world.robot
         self.held: str | None = None
         self.taken: Thing | None = None
         self.now, self.is_live = 0.0, False
         self.line: int | None = None
         self._own_skill: Skill | None = None  # the user's own skill that is being executed
         self.events: list[Event] = []
-
-    @cached_property
-    def things(self) -> dict[str, list[Thing]]:
-        """The objects in each room."""
-        return {room.name: [Thing(label) for label in room.objects] for room in self.world.rooms}
-
-    @cached_property
-    def people(self) -> dict[str, list[Somebody]]:
-        """The people in each room, including people who arrive later."""
-        return {room.name: [Somebody(person) for person in room.people] for room in self.world.rooms}
 
     @property
     def trace(self) -> Trace:
@@ -162,7 +82,7 @@ class SimulatedRobot:
     @property
     def idle_skills(self) -> frozenset[str]:
         """The skills that change neither the robot nor its world."""
-        someone_may_come = any(one.looks_before for here in self.people.values() for one in here)
+        someone_may_come = any(one.looks_before for here in self.occupants.values() for one in here)
         return self.skills.idle - {"is_in_room"} if someone_may_come else self.skills.idle
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
@@ -170,17 +90,6 @@ class SimulatedRobot:
         if self.guard is not None:
             return self.guard.perform(self, skill, arguments)
         return self.execute(skill, arguments)
-
-    def possible_rooms(self, request: str) -> Sequence[str]:
-        """Return all rooms that a request may refer to; for an exact name, only where it would lead."""
-        if self.settings.matching == "longest-name":
-            return meant_by(request, self.rooms)
-        wanted = request.strip().lower()
-        named = [room for room in self.rooms if room.lower() == wanted]
-        if named:
-            leads_to = resolve_room(self.rooms, request, self.settings.matching)
-            return [*named, *([] if leads_to is None else [leads_to])]
-        return [room for room in self.rooms if finds(request, room, self.settings.matching)]
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill without asking the guard."""
@@ -208,14 +117,10 @@ class SimulatedRobot:
             raise unknown_room(location, self.possible_rooms(location))
         self.room = room
 
-    def room_for(self, request: str) -> str | None:
-        """Return the first room whose name occurs in a request, or None if there is none."""
-        return resolve_room(self.rooms, request, self.settings.matching)
-
     def look(self, entity: str) -> bool:
         """Look for an object or a person. An absent person may arrive after some unsuccessful looks."""
-        settings, people = self.settings, self.people[self.room]
-        seen = any(thing.is_meant_by(entity, settings.matching) for thing in self.things[self.room])
+        settings, people = self.settings, self.people_here
+        seen = any(thing.is_meant_by(entity, settings.matching) for thing in self.things_here)
         seen = seen or any(one.is_here and one.is_meant_by(entity, settings) for one in people)
         self.record(CHECK, entity, found=seen)
         coming = next((one for one in people if not one.is_gone), None)
@@ -229,8 +134,7 @@ class SimulatedRobot:
         self.record(ASK, question, options, to=person)
         if not options:
             raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
-        here = (one for one in self.people[self.room] if one.is_here)
-        asked = next((one for one in here if one.is_meant_by(person, self.settings)), None)
+        asked = self.person_meant(person)
         if asked is None:
             raise RobotError("AskNoPerson", f'nobody is in "{self.room}" to be asked "{question}"')
         answer = asked.answer(question, self.settings)
@@ -249,24 +153,13 @@ class SimulatedRobot:
             raise RobotError(
                 "PickWhileHolding", f'the robot holds "{self.held}" and cannot pick up "{obj}" as well'
             )
-        here = self.things[self.room]
         thing = self.thing_meant(obj)
         if thing is None:
             raise RobotError("PickInvalidObject", f'there is no "{obj}" in "{self.room}"')
         self.record(PICK, obj if self.settings.events == "as-requested" else thing.label)
+        here = next(things for things in self.contents.values() if any(one is thing for one in things))
         here.remove(thing)
         self.held, self.taken = obj, thing
-
-    def thing_meant(self, request: str) -> Thing | None:
-        """Return the object in this room that a request refers to; raise RobotError if it may be several."""
-        matching, here = self.settings.matching, self.things[self.room]
-        if matching != "longest-name":
-            return next((thing for thing in here if thing.is_meant_by(request, matching)), None)
-        labels = {thing.regex: thing for thing in reversed(here)}  # of equal things, the first
-        best = [labels[label] for label in meant_by(request, labels)]
-        if len(best) > 1:
-            raise RobotError("PickInvalidObject", ambiguous(request, [thing.label for thing in best]))
-        return best[0] if best else None
 
     def put(self, obj: str) -> None:
         """Put down the object held under this name or, if events are `as-happened`, any matching name."""
@@ -276,7 +169,7 @@ class SimulatedRobot:
             holds = "nothing" if self.held is None else f'"{self.held}"'
             raise RobotError("PlaceNoObject", f'the robot cannot place "{obj}": it holds {holds}')
         self.record(PLACE, taken.label if taken else obj)
-        self.things[self.room].append(taken or Thing(obj, is_pattern=False))
+        self.contents[self.room].append(taken or Thing(obj, is_pattern=False))
         self.held = self.taken = None
 
     # --- the user's own skills
@@ -285,19 +178,6 @@ class SimulatedRobot:
     def state(self) -> dict[str, Any]:
         """The values that skills store between calls."""
         return {}
-
-    @cached_property
-    def _truths(self) -> Mapping[str, Scalar | tuple[Scalar, ...]]:
-        return {statement.casefold(): value for statement, value in self.world.truths}
-
-    def truth(self, statement: str) -> bool:
-        """Return whether a statement is true in this world."""
-        known = self._truths.get(statement.casefold())
-        if known is None:
-            return self.draw_outcome(f'"{statement}"', ("is true", "is not true")) == 0
-        if not isinstance(known, bool):
-            raise UserError(f'the world sets "{statement}" to {known!r}; use true or false')
-        return known
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
         """Return the result of a skill without simulation code: the world's value, or else a random one."""
@@ -323,16 +203,6 @@ class SimulatedRobot:
     def _possible_results(self, value: ValueType) -> tuple[Any, ...]:
         return sample_values(value, self.known_names(value.names) if value.names else ())
 
-    def known_names(self, sort: Literal["room", "thing", "person"]) -> Sequence[str]:
-        """Return the names of all rooms, things or people in this world, without those that are regexes."""
-        if sort == "room":
-            return self.rooms
-        if sort == "thing":
-            labels = [thing.label for here in self.things.values() for thing in here]
-        else:
-            labels = [one.person.name for here in self.people.values() for one in here]
-        return plain_names(labels)
-
     def fail(self, kind: str) -> NoReturn:
         """End the current skill with an error that it declares in `fails`."""
         row = self._own_skill
@@ -347,15 +217,6 @@ class SimulatedRobot:
         if row is None:
             raise UserError(sentence)
         row.wrong(sentence)
-
-    def draw_outcome(self, statement: str, outcomes: Sequence[str], _errors: Sequence[str] = ()) -> int:
-        """Draw an outcome for a statement. The same world always gives the same outcome."""
-        return self._sampler.draw(len(outcomes), statement)
-
-    @cached_property
-    def _sampler(self) -> FactSampler:
-        world = json.dumps(self.world.to_data(), sort_keys=True)
-        return FactSampler(int.from_bytes(blake2b(world.encode(), digest_size=8).digest(), "big"))
 
     def _own(self, row: Skill, arguments: Sequence[Argument]) -> Result:
         """Execute one of the user's own skills, and record its event."""
@@ -416,15 +277,3 @@ class SimulatedRobot:
 
 
 _USUAL = {name: row.does for name, row in SKILLS.items()}
-
-
-def unknown_room(location: str, possible: Sequence[str] = ()) -> RobotError:
-    """Return the error for a drive to an unknown room, or to one of several possible rooms."""
-    sentence = ambiguous(location, possible) if len(possible) > 1 else f'there is no room "{location}"'
-    return RobotError("GoToInvalidLocation", sentence)
-
-
-def ambiguous(request: str, names: Sequence[str]) -> str:
-    """Return a sentence about a request that several names match equally well."""
-    quoted = [f'"{name}"' for name in names]
-    return f'"{request}" could mean {listed(quoted, "or")}; use the name of one of them'

@@ -14,8 +14,9 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, attempted_event
 from codebotler.core.world import Point, Room, rooms_along
 from codebotler.rtl import Inconclusive, Monitor
+from codebotler.simulator.entities import Thing
 from codebotler.simulator.house_rule import NON_TEXT_OPTION, Objection, Rule, RuleViolationError
-from codebotler.simulator.robot import Argument, Result, SimulatedRobot, Thing
+from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 
 KINDS_OF_MOVES = {PICK, PLACE}
 
@@ -78,9 +79,9 @@ class RuleGuard:
         try:
             result = self._execute(robot, skill, arguments)
         except RobotError:
-            is_tried = attempt is not None and row.recording is not None and row.recording.judged_when_tried
             events = robot.events[start:]
-            if is_tried and all(event.kind != attempt.kind for event in events):
+            is_tried = row.recording is not None and row.recording.judged_when_tried
+            if attempt is not None and is_tried and all(event.kind != attempt.kind for event in events):
                 events.append(attempt)
             self._take(robot, events, request)
             if self._prevented is not None:

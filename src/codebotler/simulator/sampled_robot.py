@@ -17,11 +17,20 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import as_text
 from codebotler.core.trace import to_options
 from codebotler.core.unicode import compose_fields
-from codebotler.core.words import brief
-from codebotler.core.world import Room, World, laid_out
+from codebotler.core.words import brief, listed
+from codebotler.core.world import Room, Trait, World, laid_out
+from codebotler.simulator.entities import Thing
 from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.matching import content_words, means_anybody, meant_by
-from codebotler.simulator.robot import SimulatedRobot, SkillGuard, Thing
+from codebotler.simulator.matching import (
+    WORDS_FOR_PEOPLE,
+    Entity,
+    best_fits,
+    content_words,
+    means_anybody,
+    meant_by,
+    trait_words,
+)
+from codebotler.simulator.robot import SimulatedRobot, SkillGuard
 from codebotler.simulator.settings import SimulationSettings
 
 AS_WRITTEN = SimulationSettings(literals="as-written", matching="longest-name")  # as on a robot
@@ -41,6 +50,8 @@ class RoomMap:
     plan: tuple[Room, ...] = ()  # footprints, and stopping points if the robot drives straight between rooms
     things: tuple[str, ...] = ()  # the names of known things, which may be anywhere
     people: tuple[str, ...] = ()  # the names of known people, who may be anywhere
+    traits: tuple[tuple[str, tuple[Trait, ...]], ...] = ()  # their properties
+    places: tuple[tuple[str, str], ...] = ()  # the places, each with the room that contains it
 
     def __post_init__(self) -> None:
         compose_fields(self)
@@ -50,9 +61,11 @@ class RoomMap:
         """Make the map of a world from a suite or file."""
         plan = [Room(room.name, (), (), room.footprint, room.stand_at) for room in laid_out(world).rooms]
         return cls(
-            tuple(room.name for room in world.rooms),
+            tuple(room.name for room in world.rooms if not room.within),
             world.robot,
             plan=tuple(plan),
+            places=tuple((room.name, room.within) for room in world.rooms if room.within),
+            traits=world.traits,
             things=plain_names(label for room in world.rooms for label in room.objects),
             people=plain_names(person.name for room in world.rooms for person in room.people),
         )
@@ -79,7 +92,18 @@ class RoomMap:
         return [room for room in self.rooms if room.strip().casefold() in wanted]
 
     def _meant(self, request: str) -> list[str]:
-        return meant_by(request, self.rooms, plain=self.guessed or self.plain)
+        return meant_by(request, self.goals, plain=self.guessed or self.plain)
+
+    @property
+    def goals(self) -> tuple[str, ...]:
+        """The rooms and the places in them, to all of which the robot can drive."""
+        return (*self.rooms, *(place for place, _ in self.places))
+
+    @property
+    def described(self) -> list[str]:
+        """The rooms for a model, each with its places."""
+        places = {room: [place for place, within in self.places if within == room] for room in self.rooms}
+        return [f"{room} (with {listed(within)})" if within else room for room, within in places.items()]
 
 
 # --- facts
@@ -188,12 +212,13 @@ class SampledRobot(SimulatedRobot):
         *,
         guard: SkillGuard | None = None,
     ) -> None:
-        world = World(tuple(map(Room, room_map.rooms)), room_map.start)
+        rooms = [*map(Room, room_map.rooms), *(Room(place, within=room) for place, room in room_map.places)]
+        world = World(tuple(rooms), room_map.start, traits=room_map.traits)
         super().__init__(world, settings, skills, guard=guard)
         self.setup = "sampled", (room_map, sampler, settings)
         self.room_map, self.sampler = room_map, sampler
-        self.things = defaultdict(list)
-        self.people = defaultdict(list)  # always empty, since no world file names people
+        self.contents = defaultdict(list)
+        self.occupants = defaultdict(list)  # always empty, since no world file names people
         self.explored: defaultdict[str, ExploredRoom] = defaultdict(ExploredRoom)
         self.answers: dict[tuple[str, ...], str] = {}  # answers by room, person and question
         self.outcomes: dict[str, int] = {}  # outcomes by statement
@@ -238,7 +263,7 @@ class SampledRobot(SimulatedRobot):
 
     def is_here(self, name: str) -> bool | None:
         """Return whether a person or thing is in this room, or None if that is undecided."""
-        things = self.things[self.room] if name != SOMEBODY else []
+        things = self.contents[self.room] if name != SOMEBODY else []
         if name in self.here.people or any(thing.is_meant_by(name, "longest-name") for thing in things):
             return True
         return False if self.here.lacks(name) else None
@@ -285,21 +310,55 @@ class SampledRobot(SimulatedRobot):
 
     def look(self, entity: str) -> bool:
         """Look for an object or a person. The first look draws whether they are present."""
-        name, room = normalized(entity), self.here
-        found = self.is_here(name)
-        if found is None and (name in room.gone or (means_person(entity) and room.lacks(SOMEBODY))):
-            found = False
-            room.missed.add(name)
-        if found is None:
-            found = self.settle(name, is_random=True)
-            if found and (name == SOMEBODY or means_person(entity)):
-                room.people |= {name, SOMEBODY}
-            if found and name != SOMEBODY:
-                self.things[self.room].append(Thing(name, is_pattern=False))
+        name = normalized(entity)
+        found = self._find(name, is_person=means_person(entity))
         search = self.searches[name]
         (search.found if found else search.vain).add(self.room)
         self.record(CHECK, entity, found=found)
         return found
+
+    def _find(self, name: str, *, is_person: bool) -> bool:
+        """Return whether a thing or person is in this room. The first time, this is decided at random."""
+        room, found = self.here, self.is_here(name)
+        if found is None and (name in room.gone or (is_person and room.lacks(SOMEBODY))):
+            found = False
+            room.missed.add(name)
+        if found is None:
+            found = self.settle(name, is_random=True)
+            if found and (name == SOMEBODY or is_person):
+                room.people |= {name, SOMEBODY}
+            if found and name != SOMEBODY:
+                self.contents[self.room].append(Thing(name, is_pattern=False))
+        return found
+
+    def things(self, where: str = "", is_: str = "") -> list[str]:
+        """Return the names of things that fit a description. Whether each is there is random."""
+        return self._all_of(self.room_map.things, where, is_ or "thing", is_person=False)
+
+    def people(self, where: str = "", is_: str = "", **traits: str) -> list[str]:
+        """Return the names of people who fit a description. Whether each is there is random."""
+        wanted = " ".join(text for text in (is_, *traits.values()) if text) or SOMEBODY
+        return self._all_of(self.room_map.people, where, wanted, is_person=True)
+
+    def _all_of(self, known: Sequence[str], where: str, wanted: str, *, is_person: bool) -> list[str]:
+        words = WORDS_FOR_PEOPLE if is_person else ("thing", "object")
+        entities = [Entity(name, trait_words(self.traits(name).items())) for name in known]
+        fitting = [one.label for one in entities if best_fits(wanted, [one], words)]
+        names = [normalized(name) for name in fitting or (wanted, f"another {wanted}")]
+        before, goals = self.room, self._goals_in(where)
+        found = []
+        for self.room in goals:
+            found += [name for name in names if self._find(name, is_person=is_person)]
+        self.room = before
+        return found
+
+    def move_person(self, name: str, room: str) -> None:
+        """Move a person to a room or place."""
+        goal, who = self.goal_of(room), normalized(name)
+        for explored in self.explored.values():
+            explored.people.discard(who)
+        self.explored[goal].missed -= {who, SOMEBODY}
+        self.explored[goal].people |= {who, SOMEBODY}
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
         """Ask a person, who is present unless an earlier look failed to find them. The answer is random."""
@@ -333,7 +392,7 @@ class SampledRobot(SimulatedRobot):
         """Pick up an object, which is present unless an earlier look failed to find it."""
         name = normalized(obj)
         if self.held is None and self.is_here(name) is None and self._lies_there(name):
-            self.things[self.room].append(Thing(name, is_pattern=False))
+            self.contents[self.room].append(Thing(name, is_pattern=False))
         search = self.search(name)
         again = self.held is not None and normalized(self.held) == name and len(search.found) > 1
         with self.excused(when=again or search.is_lost):

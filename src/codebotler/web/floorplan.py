@@ -14,7 +14,7 @@ MAX_DRAWN_ROOMS = 100
 _LETTER_WIDTH = 0.62
 """The width of a letter, relative to its height."""
 
-_MIN_LETTER, _MAX_LETTER, _FIND_LETTER = 0.2, 0.62, 0.44
+_MIN_LETTER, _MAX_LETTER, _MAX_PLACE_LETTER, _FIND_LETTER = 0.2, 0.62, 0.34, 0.44
 _HALO_RADIUS = 0.62  # metres
 _MAX_LABEL_CHARACTERS, _MAX_FINDS = 60, 3
 
@@ -69,7 +69,9 @@ def floorplan(world: World, state: MapState) -> str:
         look = ("goal" if state.is_driving else "here") if one.name == state.room else ""
         corners = [on_map(corner) for corner in one.footprint]
         parts.append(f'<polygon class="room {look}" points="{_svg_points(corners)}"/>')
-        names += _labels(one, corners, on_map, state.finds.get(one.name, ()))
+        within = [on_map(y)[1] for other in rooms if other.within == one.name for y in other.footprint or ()]
+        floor = min(within) if within and one.stand_at else None
+        names += _labels(one, corners, on_map, state.finds.get(one.name, ()), floor)
     if len(state.trail) > 1:
         parts.append(f'<polyline class="trail" points="{_svg_points(map(on_map, state.trail))}"/>')
     if state.at is not None:
@@ -101,20 +103,28 @@ def _robot(x: float, y: float) -> str:
 
 
 def _labels(
-    room: Room, corners: Sequence[Point], on_map: Callable[[Point], Point], finds: Sequence[str]
+    room: Room,
+    corners: Sequence[Point],
+    on_map: Callable[[Point], Point],
+    finds: Sequence[str],
+    floor: float | None = None,
 ) -> Iterator[str]:
-    """Yield a room's name at the wall farther from the robot, and its finds beside the name if they fit."""
+    """Yield a room's name at the wall farther from the robot, and its finds beside the name if they fit.
+
+    If the room has places, `floor` is where they begin, so that no label covers them.
+    """
     top, bottom = min(y for _, y in corners), max(y for _, y in corners)
+    bottom = bottom if floor is None or floor <= top + _HALO_RADIUS else floor
     left, right = min(x for x, _ in corners), max(x for x, _ in corners)
     middle, stop = (left + right) / 2, on_map(room.stand_at)[1] if room.stand_at else bottom
     lines = _wrap(shortened(room.name, _MAX_LABEL_CHARACTERS))
-    size = _size(lines, right - left, _MAX_LETTER)
+    size = _size(lines, right - left, _MAX_PLACE_LETTER if room.within else _MAX_LETTER)
     is_above = stop >= (top + bottom) / 2
     start = top + 1.2 * size if is_above else bottom - size * (1.15 * (len(lines) - 1) + 0.5)
     for number, line in enumerate(lines):
         yield _text(middle, start + 1.15 * size * number, size, line, "name")
     labels = [shortened(one, _MAX_LABEL_CHARACTERS) for one in finds[-_MAX_FINDS:]]
-    small = _size(labels or [""], right - left, _FIND_LETTER)
+    small = _size(labels or [""], right - left, min(size, _FIND_LETTER))
     named, found = size * (1.15 * len(lines) + 0.35), small * 1.15 * len(labels)
     fits = max(stop - top, bottom - stop) - _HALO_RADIUS >= named + found
     if is_above:

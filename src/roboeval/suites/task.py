@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import re
 from ast import literal_eval
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from codebotler.core.words import counted
-from codebotler.core.world import Answer, Person, World
+from codebotler.core.world import Answer, Person, Room, Trait, World
 from codebotler.rtl import Formula
 from codebotler.rtl.regex_words import first_choice
 from roboeval.suites.schema import Ability, AcceptedFinding, Category, TaskFact
@@ -117,9 +117,19 @@ def world_title(number: int, of: str, about: str) -> str:
     return f"World {number}{of}: {about.removeprefix(f'{number}: ')}"
 
 
-def describe_person(person: Person) -> str:
-    """Describe a person: their name, their answers, and when they arrive and leave."""
-    parts = [f"answers {', then '.join(map(_answer, person.answers)) or 'nothing'}"]
+def describe_contents(world: World, room: Room) -> list[str]:
+    """Describe each thing and person in a room or at a place, with their properties."""
+    traits = {name: _describe_traits(of) for name, of in world.traits}
+    things = [f"{one} ({', '.join(traits[one])})" if one in traits else one for one in room.objects]
+    return [*things, *(_describe_person(one, traits.get(one.name, [])) for one in room.people)]
+
+
+def _describe_traits(traits: Sequence[Trait]) -> list[str]:
+    return [f"{key} {', '.join(value) if isinstance(value, tuple) else value}" for key, value in traits]
+
+
+def _describe_person(person: Person, traits: Sequence[str]) -> str:
+    parts = [*traits, f"answers {', then '.join(map(_answer, person.answers)) or 'nothing'}"]
     parts += [f"{topic}: {_answer(answer)}" for topic, answer in person.topics]
     if person.after_looks:
         parts.append(f"arrives after {person.after_looks} unsuccessful looks")

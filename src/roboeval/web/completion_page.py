@@ -28,7 +28,7 @@ from roboeval.evaluation.explanation import (
 from roboeval.evaluation.failures import label_of, no_program_sentence
 from roboeval.evaluation.runs.completions import CompletionKey, name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_facts
-from roboeval.suites.task import check_label, describe_person, world_title
+from roboeval.suites.task import check_label, describe_contents, world_title
 from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import completion_details
@@ -244,6 +244,6 @@ def _draw_rooms(world: World) -> None:
     ui.html(floorplan(world, MapState(room=world.robot)), sanitize=False).classes("map")
     with ui.element("dl").classes("rooms"):
         for room in world.rooms:
-            inside = ", ".join([*map(describe_person, room.people), *room.objects])
+            inside = ", ".join(describe_contents(world, room))
             PlainText("dt", shortened(room.name, 200))
             PlainText("dd", shortened(inside, 500) if inside else "empty")

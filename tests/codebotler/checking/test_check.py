@@ -403,3 +403,12 @@ def test_data_is_what_json_can_hold(checks: Checks) -> None:
     ]
     assert not data["accepted"]
     assert list(data["samples"][0]) == ["sample", "world", "in_vain", "status", "error", "line", "trace"]
+
+
+def test_a_drive_that_could_mean_several_rooms_lists_them() -> None:
+    result = check(
+        'def task_program():\n    go_to("the shelf in the kitchen")\n', rooms=["hall", "kitchen", "shelf"]
+    )
+    (problem,) = result.problems
+    assert (problem.kind, problem.line) == ("GoToInvalidLocation", 2)
+    assert '"kitchen" or "shelf"' in problem.message

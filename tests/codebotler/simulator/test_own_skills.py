@@ -31,22 +31,22 @@ def pour(sim: Simulation, what: str) -> None:
 
 
 @skill
-def describe(sim: Simulation) -> str:
+def describe(sim: Simulation) -> str:  # type: ignore[empty-body]  # its result is drawn
     """Describe the room."""
 
 
 @skill
-def choose_room(sim: Simulation) -> RoomName:
+def choose_room(sim: Simulation) -> RoomName:  # type: ignore[empty-body]  # its result is drawn
     """Choose a room."""
 
 
 @skill
-def choose_things(sim: Simulation) -> list[ThingName]:
+def choose_things(sim: Simulation) -> list[ThingName]:  # type: ignore[empty-body]  # its result is drawn
     """Choose some things."""
 
 
 @skill
-def choose_person(sim: Simulation) -> PersonName:
+def choose_person(sim: Simulation) -> PersonName:  # type: ignore[empty-body]  # its result is drawn
     """Choose a person."""
 
 

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
+from codebotler.simulator.entities import Thing
 from codebotler.simulator.matching import Matching, _pattern, resolve_room
-from codebotler.simulator.robot import Result, SimulatedRobot, Thing
+from codebotler.simulator.robot import Result, SimulatedRobot
 from codebotler.simulator.settings import SimulationSettings, choose
 
 Texts: TypeAlias = tuple[str, ...]
@@ -133,7 +134,7 @@ def test_only_the_room_where_the_robot_is_counts() -> None:
 def test_first_matching_object_of_the_room_is_taken() -> None:
     robot = robot_in(objects=("water", "cold water", "tea"))
     robot.perform("pick", ["a bottle of cold water"])
-    assert [thing.label for thing in robot.things["lab"]] == ["cold water", "tea"]
+    assert [thing.label for thing in robot.contents["lab"]] == ["cold water", "tea"]
 
 
 def test_placed_object_is_found_by_its_request_as_literal_text() -> None:

@@ -358,3 +358,12 @@ def test_what_fails_is_shown_first_also_in_the_last_of_many_worlds() -> None:
     shown = strips(found)
     assert len(shown) == MAX_STRIPS
     assert [strip.ends_well for strip in shown] == [False, *[True] * (MAX_STRIPS - 1)]
+
+
+def test_labels_of_a_room_do_not_cover_its_places() -> None:
+    rooms = (Room("kitchen"), Room("sink", within="kitchen"), Room("fridge", within="kitchen"))
+    drawn = floorplan(
+        World(rooms, "kitchen"), MapState(finds={"kitchen": ["apple", "pear"], "sink": ["cup"]})
+    )
+    heights = {text: float(y) for y, text in re.findall(r'<text[^>]* y="([\d.]+)"[^>]*>([^<]*)<', drawn)}
+    assert max(heights[name] for name in ("kitchen", "apple", "pear")) < min(heights["sink"], heights["cup"])

@@ -505,7 +505,7 @@ def test_an_interruption_counts_what_waits_for_the_disk(
     monkeypatch.setattr(Appender, "sync", interrupted)
     plan = GenerationPlan(paper, SMALL, 100)  # so many that it cannot be over by then
     with pytest.raises(KeyboardInterrupt):
-        generate_run(run, plan, Scripted(seconds=0.01), Pace(), on_progress=seen.append)
+        generate_run(run, plan, Scripted(seconds=0.1), Pace(), on_progress=seen.append)
     progress = seen[0]
     assert progress.done == len(rows(run)) > 10
     assert progress.under_way > 0

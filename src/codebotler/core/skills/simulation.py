@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn, Protocol
 
 
@@ -41,6 +41,21 @@ class Simulation(Protocol):
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - the skill's type
         """Return a random result for a skill with an empty body, or raise one of its errors."""
+
+    def things(self, where: str = "", is_: str = "") -> list[str]:
+        """Return the names of the things in a room or at a place, or anywhere, that fit a description."""
+
+    def people(self, where: str = "", is_: str = "", **traits: str) -> list[str]:
+        """Return the names of the people in a room, or anywhere, who fit a description."""
+
+    def traits(self, name: str) -> Mapping[str, Any]:
+        """Return the properties that the world gives to a thing or person."""
+
+    def move_person(self, name: str, room: str) -> None:
+        """Move a person to a room or place."""
+
+    def value(self, statement: str, *values: Any) -> Any:  # noqa: ANN401 - any type
+        """Return the value of a statement in this world: from `truths` in its file, or one at random."""
 
     def truth(self, statement: str) -> bool:
         """Return whether a statement is true in this world: as `truths` in its file says, or at random."""

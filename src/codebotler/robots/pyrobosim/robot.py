@@ -19,7 +19,7 @@ from codebotler.robots.base import (
     ignore_feedback,
 )
 from codebotler.robots.simulated import Simulated, perform_at_once
-from codebotler.simulator.robot import Thing
+from codebotler.simulator.entities import Thing
 
 if TYPE_CHECKING:
     from codebotler.robots.pyrobosim.world import DrivableWorld
@@ -46,7 +46,7 @@ class Pyrobosim(Simulated):
         self._things = {
             body: thing
             for room, bodies in self._drivable.objects.items()
-            for body, thing in zip(bodies, self._robot.things[room], strict=True)
+            for body, thing in zip(bodies, self._robot.contents[room], strict=True)
         }
 
     def perform(
@@ -72,7 +72,9 @@ class Pyrobosim(Simulated):
         """Copy the robot's room, the held object and all other objects from pyrobosim to the simulator."""
         world, robot = self._drivable, self._robot
         robot.room = world.room or robot.room
-        robot.things = {room: [self._things[body] for body in world.objects_in(room)] for room in robot.rooms}
+        robot.contents = {
+            room: [self._things[body] for body in world.objects_in(room)] for room in robot.rooms
+        }
         robot.held = None if world.held is None else self._things[world.held].label
 
     def _drive(self, room: str, feedback: Feedback) -> None:

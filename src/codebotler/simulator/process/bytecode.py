@@ -44,7 +44,16 @@ SIMULATION_MODULES = (
     ),
     *(
         f"{SIMULATOR}.{name}"
-        for name in ("fact_sampler", "ledger", "matching", "robot", "settings", "sampled_robot")
+        for name in (
+            "entities",
+            "fact_sampler",
+            "simulated_world",
+            "ledger",
+            "matching",
+            "robot",
+            "settings",
+            "sampled_robot",
+        )
     ),
 )
 

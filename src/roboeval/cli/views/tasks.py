@@ -12,7 +12,7 @@ from rich.text import Text
 from codebotler.core.words import listed
 from roboeval.linting.clauses import clauses_of
 from roboeval.suites.load import Scenario, Suite, Task, TaskCheck
-from roboeval.suites.task import describe_person, world_title
+from roboeval.suites.task import describe_contents, world_title
 
 
 def suite_view(suite: Suite) -> RenderableType:
@@ -80,7 +80,7 @@ def _check_view(check: TaskCheck) -> RenderableType:
 def _world_lines(scenario: Scenario) -> Iterator[RenderableType]:
     world = scenario.world
     for room in world.rooms:
-        there = [*room.objects, *map(describe_person, room.people)]
+        there = describe_contents(world, room)
         there += ["the robot"] if room.name == world.robot else []
         yield Text(f"{room.name}: {', '.join(there) or 'empty'}")
     if world.may_wait_forever:

@@ -1,0 +1,176 @@
+"""Worlds whose things and people have properties, with places in rooms; and skills that read them."""
+
+from pathlib import Path
+
+import pytest
+
+from codebotler.core.errors import RobotError, UserError
+from codebotler.core.world import World, is_within, laid_out
+from codebotler.core.world_file import read_world
+from codebotler.robots.simulated import SIMULATION
+from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
+
+FLAT = """
+robot: hall
+rooms:
+  - hall
+  - {name: kitchen, places: [kitchen table, sink]}
+  - bathroom
+objects:
+  kitchen table: [{name: apple, is: [fruit, red], size: 2}, {name: pear, is: [fruit, green]}, mug]
+  sink: [sponge]
+people:
+  kitchen:
+    - {name: Angel, pose: waving, wears: red coat, answers: ["yes"]}
+    - {name: Bo, pose: sitting, tall: true}
+  hall: [{name: Cy, answers: ["no"]}]
+truths: {Number of cups: 3}
+"""
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> World:
+    path = tmp_path_factory.mktemp("world") / "flat.yaml"
+    path.write_text(FLAT)
+    return read_world(path)
+
+
+@pytest.fixture
+def robot(world: World) -> SimulatedRobot:
+    return SimulatedRobot(world, SIMULATION)
+
+
+def sampled(world: World, sample: int = 0) -> SampledRobot:
+    return SampledRobot(RoomMap.of(world), FactSampler(sample=sample))
+
+
+def test_a_world_file_keeps_places_and_properties(world: World, tmp_path: Path) -> None:
+    path = tmp_path / "again.yaml"
+    path.write_text(world.to_yaml())
+    assert read_world(path) == world
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("pose: waving", "anwers: [x]", 12),
+        ("size: 2", "size: {x: 1}", 8),
+        ("mug]", "{name: apple, is: [fruit, green]}]", 8),
+        ("[kitchen table, sink]", "[kitchen table, hall]", 5),
+        ("Number of cups: 3", "Number of cups: [3]", 15),
+    ],
+)
+def test_mistakes_name_the_line(tmp_path: Path, old: str, new: str, line: int) -> None:
+    path = tmp_path / "wrong.yaml"
+    path.write_text(FLAT.replace(old, new))
+    with pytest.raises(UserError) as raised:
+        read_world(path)
+    assert raised.value.line == line
+
+
+def test_a_place_is_a_goal_inside_its_room_but_no_room(world: World, robot: SimulatedRobot) -> None:
+    assert robot.perform("get_all_rooms", []) == ["hall", "kitchen", "bathroom"]
+    robot.perform("go_to", ["the kitchen table"])
+    assert (robot.room, robot.trace[-1].text) == ("kitchen table", "the kitchen table")
+    rooms = {room.name: room for room in laid_out(world).rooms}
+    for place in ("kitchen table", "sink"):
+        assert all(
+            is_within(corner, rooms["kitchen"].footprint or ()) for corner in rooms[place].footprint or ()
+        )
+
+
+def test_things_at_places_are_found_in_the_room_and_only_there(robot: SimulatedRobot) -> None:
+    def finds(where: str, what: str) -> object:
+        robot.perform("go_to", [where])
+        return robot.perform("is_in_room", [what])
+
+    assert finds("kitchen", "apple")
+    assert finds("kitchen table", "apple")
+    assert not finds("sink", "apple")
+    assert finds("sink", "Angel")  # people are in the room
+    assert not finds("bathroom", "apple")
+
+
+def test_what_is_put_down_at_a_place_lies_there(robot: SimulatedRobot) -> None:
+    robot.perform("go_to", ["kitchen"])
+    robot.perform("pick", ["apple"])
+    robot.perform("go_to", ["sink"])
+    robot.perform("place", ["apple"])
+    assert robot.things("sink") == ["sponge", "apple"]
+    assert "apple" not in robot.things("kitchen table")
+
+
+@pytest.mark.parametrize(
+    ("request_", "is_there"),
+    [
+        ("fruit", True),
+        ("red fruit", True),
+        ("the red apple", True),
+        ("green apple", False),
+        ("mug", True),
+        ("waving person", True),
+        ("person in a red coat", True),
+        ("tall person", True),
+        ("sitting person in a red coat", False),
+        ("Angel", True),
+        ("waving Angel", True),
+        ("sitting Angel", False),
+    ],
+)
+def test_requests_may_describe(robot: SimulatedRobot, request_: str, is_there: bool) -> None:  # noqa: FBT001 - a case
+    robot.perform("go_to", ["kitchen"])
+    assert robot.perform("is_in_room", [request_]) is is_there
+
+
+def test_a_description_means_the_first_that_fits(robot: SimulatedRobot) -> None:
+    robot.perform("go_to", ["kitchen"])
+    robot.perform("pick", ["green fruit"])
+    assert robot.taken is not None
+    assert robot.taken.label == "pear"
+
+
+def test_skills_read_the_world(robot: SimulatedRobot) -> None:
+    assert robot.things("kitchen", is_="fruit") == ["apple", "pear"]
+    assert robot.things("hall") == []
+    assert robot.people("kitchen", wears="red coat") == ["Angel"]
+    assert robot.people(is_="person") == ["Cy", "Angel", "Bo"]
+    assert robot.traits("apple")["size"] == 2
+    assert robot.value("number of cups", 0, 1) == 3
+    assert robot.value("the colour", "red") == "red"
+    with pytest.raises(RobotError):
+        robot.things("cellar")
+
+
+def test_people_can_be_moved(robot: SimulatedRobot) -> None:
+    robot.move_person("Angel", "bathroom")
+    assert robot.people("bathroom") == ["Angel"]
+    assert robot.people("kitchen") == ["Bo"]
+    with pytest.raises(UserError):
+        robot.move_person("Dora", "bathroom")
+
+
+def test_sampled_worlds_draw_known_things_and_people(world: World) -> None:
+    counts = {len(sampled(world, number).things("kitchen", is_="fruit")) for number in range(30)}
+    assert {0, 1, 2} <= counts
+    names = {name for number in range(30) for name in sampled(world, number).people("hall", pose="waving")}
+    assert names == {"angel"}
+    unknown = {name for number in range(30) for name in sampled(world, number).things("hall", is_="toy")}
+    assert unknown == {"toy", "another toy"}
+
+
+def test_a_sampled_world_keeps_what_it_has_drawn(world: World) -> None:
+    for number in range(20):
+        robot = sampled(world, number)
+        there = robot.things("hall", is_="fruit")
+        assert robot.things("hall", is_="fruit") == there
+        assert robot.perform("is_in_room", ["apple"]) is ("apple" in there)
+
+
+def test_a_person_who_was_moved_is_there(world: World) -> None:
+    for number in range(10):
+        robot = sampled(world, number)
+        robot.move_person("Angel", "bathroom")
+        robot.perform("go_to", ["bathroom"])
+        assert robot.perform("is_in_room", ["Angel"])
