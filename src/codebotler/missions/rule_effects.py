@@ -162,7 +162,9 @@ def _log_effect(events: Sequence[LogLine], guard: RuleGuard, robot: LoggedRobot)
                 guard.perform(robot, line["skill"], _arguments(line, robot.skills))
             elif line["event"] == "rule" and line.get("prevented"):  # the log has no skill for this step
                 step = trace_from([line["what"]])[0]
-                guard.judge(replace(step, place=robot.room, holding=robot.held or ""))
+                attempt = replace(step, place=robot.room, holding=robot.held or "")
+                recording = robot.skills.recordings.get(step.kind)
+                guard.judge(attempt, is_drive=recording is not None and recording.is_drive)
             elif line["event"] == "state":
                 state = line
         except RuleViolationError as broken:

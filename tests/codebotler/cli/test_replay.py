@@ -180,6 +180,23 @@ def test_a_rule_about_a_room_sees_where_the_log_says_the_robot_was(folder: Path)
     }
 
 
+def test_leaving_rules_are_judged_before_drives_in_a_log(folder: Path) -> None:
+    rule = 'tr.Exists(say("done"))'
+    (folder / "rules.yaml").write_text(f"rules: [{{name: bye, says: Say it., leaving: '{rule}'}}]")
+    kept_back = event(
+        "rule", rule="x", says="X.", formula="x", what=["goto", "office"], prevented=True, line=3
+    )
+    for name, lines in {"did": TO_OFFICE, "tried": [kept_back], "kept": SAID + TO_OFFICE, "end": []}.items():
+        (folder / f"{name}.jsonl").write_bytes(b"".join(map(to_line, [*lines, *ENDED])))
+    found = effects(folder, "did.jsonl", "tried.jsonl", "kept.jsonl", "end.jsonl")
+    assert {name: effect[1:3] for name, effect in found.items()} == {
+        "did": ("bye", "before"),
+        "tried": ("bye", "before"),
+        "kept": ("", ""),
+        "end": ("bye", "at the end"),
+    }
+
+
 def test_own_skills_in_a_log_are_judged_by_their_own_names(folder: Path) -> None:
     (folder / "own.py").write_text(
         "from codebotler import Simulation, skill\n\n\n@skill\n"
