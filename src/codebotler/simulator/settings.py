@@ -61,6 +61,8 @@ def choose(
     if isinstance(answer, int):
         return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1
     direct = _first_saying((answer,), options, settings.matching)
+    if direct is None and settings.matching == "longest-name":  # "warm" also means the option "Warmer"
+        direct = _first_saying((answer,), options, "label-in-request")
     if direct is not None:
         return direct
     if answer in {"yes", "no"} and settings.words_for_no:

@@ -327,7 +327,7 @@ TRUTHS = {
     "'read({1: 2})': 1": "is not a call; write it as in",
     "'read([{1}])': 1": "is not a call; write it as in",
     "read(what='a'): 1": "is not a call; write it as in",
-    "the sun shines: maybe": "is 'maybe'; write true or false",
+    "the sun shines: [maybe]": "is a list; write a single value",
 }
 
 

@@ -20,10 +20,17 @@ def test_rules_of_the_paper_are_those_that_the_published_verdicts_rest_on() -> N
     assert SimulationSettings() == PAPER_SETTINGS
 
 
-@pytest.mark.parametrize("matching", ["label-in-request", "whole-words"])
+@pytest.mark.parametrize("matching", ["label-in-request", "whole-words", "longest-name"])
 @pytest.mark.parametrize("label", ["(?i)yes", "(?x) yes # or no", "(?s).*yes", ".*yes|(?i:no)"])
 def test_a_label_may_have_flags(label: str, matching: Matching) -> None:
     options = (Option("later"), Option("Yes"))
     assert choose(label, "Tea?", options, SimulationSettings(matching=matching)) == 1
     assert finds("oh yes", label, matching)
     assert not finds("later", label, matching)
+
+
+def test_an_answer_means_the_option_with_the_whole_word_or_else_a_part() -> None:
+    settings = SimulationSettings(matching="longest-name")
+    options = tuple(map(Option, ("Warmer", "Colder", "no")))
+    assert choose("warm", "Warmer or colder?", options, settings) == 0
+    assert choose("no", "Now?", tuple(map(Option, ("I know", "no"))), settings) == 1
