@@ -27,9 +27,9 @@ STARTER = [ThreadPoolExecutor(1, "starter")]  # processes of an engine end with 
 class SharedWorker(Worker):
     """A worker that waits for its next user when it is closed, unless it was stopped during a run."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, is_live: bool = False) -> None:
         self.is_running = self.is_leaving = self.was_stopped = False
-        super().__init__()
+        super().__init__(is_live=is_live)
         start = self._preparer.start
         self._preparer.start = lambda: lasting(start)  # type: ignore[method-assign]  # so does its process
 
@@ -50,7 +50,13 @@ class SharedWorker(Worker):
     def _running(self, run: Callable[[], Ran]) -> Ran:
         self._expect_a_user()
         self.is_running = True
-        ran = run()
+        try:
+            ran = run()
+        except (EngineError, OSError):
+            raise
+        except Exception:  # the robot's own, after which the program has ended
+            self.is_running = False
+            raise
         self.is_running = False
         return ran
 
@@ -82,12 +88,12 @@ class SharedWorker(Worker):
             raise EngineError("the engine was stopped")
 
 
-def worker(*, one_process_per_run: bool = False) -> Worker:
+def worker(*, one_process_per_run: bool = False, is_live: bool = False) -> Worker:
     """One that waits, or else a new one."""
     if one_process_per_run:
         return Worker(one_process_per_run=True)
     if not IDLE:
-        return lasting(SharedWorker)
+        return lasting(partial(SharedWorker, is_live=is_live))
     found = IDLE.pop()
     found.is_leaving = False
     return found

@@ -517,9 +517,9 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
     begun: list[str] = []
 
     class Slow(Worker):
-        def __init__(self) -> None:
+        def __init__(self, **options: bool) -> None:
             mission.stop("the test")
-            super().__init__()
+            super().__init__(**options)
 
         def run_live(self, source: str, robot: ledger.SkillPerformer) -> Outcome:
             begun.append(source)
