@@ -19,6 +19,8 @@ from codebotler.simulator.settings import (
 )
 from roboeval.suites.schema import SimulationFile
 
+pytestmark = pytest.mark.shared_engine
+
 STRICT = SimulationSettings(
     literals="as-written",
     matching="whole-words",
