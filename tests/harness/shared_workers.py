@@ -14,6 +14,7 @@ from typing import TypeVar
 import pytest
 
 from codebotler.core.trace import Outcome
+from codebotler.simulator.isolated_call import ClosedProcess
 from codebotler.simulator.ledger import SkillPerformer
 from codebotler.simulator.process.fork_server_client import ForkServer
 from codebotler.simulator.worker import DO_NOTHING, EngineError, Job, Meanwhile, NewRobot, Worker
@@ -107,10 +108,14 @@ def lasting(start: Callable[[], Started]) -> Started:
 
 @contextmanager
 def shared() -> Iterator[None]:
-    """Let whoever starts a worker be given one of these."""
+    """Let whoever starts a worker be given one of these, and keep closed processes for all threads."""
     with pytest.MonkeyPatch.context() as patch:
         for user in ("codebotler.simulator.pool", "codebotler.missions.mission"):
             patch.setattr(f"{user}.Worker", worker)
+        patch.setattr(
+            "codebotler.simulator.isolated_call.ClosedProcess",
+            lambda module: lasting(partial(ClosedProcess, module)),
+        )
         yield
 
 

@@ -28,7 +28,7 @@ from codebotler.web.access import (
 from codebotler.web.guard import MAX_BODY_BYTES, Guard, _is_same
 from codebotler.web.proxy import OuterAddress, proxies_in_front
 from command_line import ENVIRONMENT
-from forked import Forked
+from forked import PAGE, Forked
 from pageserver import PageServer
 
 SOCKET = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
@@ -212,7 +212,7 @@ def test_a_token_is_made_for_each_start() -> None:
 def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told: str) -> None:
     (tmp_path / "world.yaml").write_text("robot: a\nrooms: [a]\n")
     words = ("serve", "--world", "world.yaml", *arguments)
-    with Forked("codebotler", *words, cwd=tmp_path, environment=ENVIRONMENT) as process:
+    with Forked("codebotler", *words, cwd=tmp_path, environment=ENVIRONMENT, preload=PAGE) as process:
         _, err = process.communicate(timeout=30)
     assert process.returncode == 2
     assert told in err
