@@ -195,15 +195,19 @@ def test_a_token_is_made_for_each_start() -> None:
     [
         (["--no-token", "--host", "0.0.0.0"], "--no-token cannot be combined"),
         *(
-            pytest.param(
-                ["--no-token", "--host", host], "--no-token cannot be combined", marks=pytest.mark.slow
+            pytest.param(["--no-token", *more], "--no-token cannot be combined", marks=pytest.mark.slow)
+            for more in (
+                *(["--host", host] for host in ("::", "0", "127.example", "")),
+                ["--token", "x" * 20],
+                ["--behind-proxy", "https://robot.example"],
             )
-            for host in ("::", "0", "127.example", "")
         ),
-        (["--no-token", "--token", "x" * 20], "--no-token cannot be combined"),
-        (["--no-token", "--behind-proxy", "https://robot.example"], "--no-token cannot be combined"),
         (["--behind-proxy", "https://robot.example/missions"], ": /missions is already used by the page"),
-        (["--behind-proxy", "https://robot.example/_nicegui/x"], ": /_nicegui is already used by the page"),
+        pytest.param(
+            ["--behind-proxy", "https://robot.example/_nicegui/x"],
+            ": /_nicegui is already used by the page",
+            marks=pytest.mark.slow,
+        ),
         (["--behind-proxy", "robot.example"], "https://HOST"),
         (["--token", "short"], "too short"),
         (["--host", "999.1.1.1"], "cannot listen"),
