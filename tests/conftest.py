@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, settings
 import messages
 import processor_time
 import shared_workers
+from codebotler.simulator.isolated_call import ClosedProcess
 from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite, load_suite
 
@@ -133,10 +134,11 @@ def engine() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def engine_of_its_own(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let tests of the engine itself start its processes as users do."""
-    if request.path.parent.name == "simulator":
+    """Let tests of the engine itself start its processes as users do, unless they are marked otherwise."""
+    if request.path.parent.name == "simulator" and not request.node.get_closest_marker("shared_engine"):
         shared_workers.end_all()
         monkeypatch.setattr("codebotler.simulator.pool.Worker", Worker)
+        monkeypatch.setattr("codebotler.simulator.isolated_call.ClosedProcess", ClosedProcess)
 
 
 @pytest.fixture(scope="session")

@@ -1,30 +1,43 @@
 """Two installs: without an extra the rest works, and what needs the extra says so in one sentence."""
 
+import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from codebotler.core.errors import EXTRAS
+from forked import Forked, Server
 
 ROOT = Path(__file__).parent.parent
-WITHOUT = f"""
-import sys
-for package in {sorted(EXTRAS)}:
-    sys.modules[package] = None
-from {{package}}.cli.app import main
-sys.argv = [{{package!r}}, *sys.argv[1:]]
-main()
-"""
+PRELOADED = (
+    *("codebotler.cli.check", "codebotler.cli.run", "codebotler.generation.generate"),
+    *("codebotler.missions.session", "codebotler.robots.open", "codebotler.robots.simulated"),
+    *("roboeval.cli.views.results", "roboeval.cli.views.tasks", "roboeval.evaluation.evaluate"),
+    *("polars", "rich.table", "rich.live", "rich.syntax", "asyncio"),
+)
+"""What several of the commands import, beside what all do."""
 
 
-def without_extras(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    package, *words = command.split()
-    code = WITHOUT.format(package=package)
-    return subprocess.run(
-        [sys.executable, "-c", code, *words], cwd=folder, capture_output=True, text=True, check=False
-    )
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    """A process that has no package of any extra, from which commands are forked."""
+    made = Server(missing=sorted(EXTRAS))
+    yield made
+    made.end()
+
+
+def without_extras(command: str, folder: Path, server: Server) -> tuple[int, str, str]:
+    """How a command ends, and what it prints and says."""
+    name, *words = command.split()
+    environment = {**os.environ, "CODEBOTLER_HOME": str(folder / "home")}
+    with Forked(
+        name, *words, cwd=folder, environment=environment, preload=PRELOADED, server=server
+    ) as running:
+        out, err = running.communicate()
+        return running.wait(), out, err
 
 
 @pytest.mark.parametrize(
@@ -45,13 +58,13 @@ def without_extras(command: str, folder: Path) -> subprocess.CompletedProcess[st
         ("roboeval report recorded:careful --out report", "report"),
     ],
 )
-def test_a_missing_extra_is_one_sentence(command: str, extra: str, tmp_path: Path) -> None:
+def test_a_missing_extra_is_one_sentence(command: str, extra: str, tmp_path: Path, server: Server) -> None:
     (tmp_path / "office.yaml").write_text((ROOT / "examples" / "office.yaml").read_text())
     (tmp_path / "say.py").write_text("def task_program():\n    say('hello')\n")
-    ended = without_extras(command, tmp_path)
-    assert (ended.returncode, ended.stdout) == (2, ""), ended.stderr
-    assert f"pip install 'codebotler[{extra}]'" in ended.stderr
-    assert len(ended.stderr.splitlines()) == 1
+    status, out, err = without_extras(command, tmp_path, server)
+    assert (status, out) == (2, ""), err
+    assert f"pip install 'codebotler[{extra}]'" in err
+    assert len(err.splitlines()) == 1
 
 
 PAGES = f"""
@@ -62,6 +75,7 @@ import codebotler.web.server, codebotler.web.page, roboeval.web.pages
 """
 
 
+@pytest.mark.slow
 def test_pages_need_no_other_extra() -> None:
     pytest.importorskip("nicegui", reason="the extra `page` itself is not installed")
     assert len(PAGES.split(",")) > 2
@@ -76,12 +90,12 @@ def test_pages_need_no_other_extra() -> None:
         "codebotler missions",
         "codebotler robots",
         "roboeval tasks",
-        "roboeval evaluate recorded:careful --tasks SayGoodDay",
+        pytest.param("roboeval evaluate recorded:careful --tasks SayGoodDay", marks=pytest.mark.slow),
         "roboeval run --model recorded:careful --tasks SayGoodDay --num-completions 1 --no-report",
     ],
 )
-def test_the_core_works_without_any_extra(command: str, tmp_path: Path) -> None:
+def test_the_core_works_without_any_extra(command: str, tmp_path: Path, server: Server) -> None:
     (tmp_path / "office.yaml").write_text((ROOT / "examples" / "office.yaml").read_text())
     (tmp_path / "say.py").write_text("def task_program():\n    say('hello')\n")
-    ended = without_extras(command, tmp_path)
-    assert ended.returncode == 0, ended.stderr
+    status, _, err = without_extras(command, tmp_path, server)
+    assert status == 0, err

@@ -9,6 +9,7 @@ import runpy
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -53,29 +54,38 @@ def test_importing_a_package_imports_next_to_nothing(package: str) -> None:
     assert new <= {package, "codebotler", "codebotler.core", "codebotler.core.facade", "__future__"}
 
 
-@pytest.mark.parametrize(
-    "code",
-    [  # load_results gives a table of polars
+def test_using_the_names_imports_no_library_for_pages_figures_or_models() -> None:
+    code = "\n".join(  # load_results gives a table of polars
         f"from {package} import {', '.join(name for name in names if name != 'load_results')}"
         for package, names in PACKAGES.items()
-    ],
-)
-def test_using_the_names_imports_no_library_for_pages_figures_or_models(code: str) -> None:
+    )
     assert not imported_by(code) & (WEB | MODELS | FIGURES | DRAWING)
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"], [], ["run", "--help"], ["serve", "--help"]])
-@pytest.mark.parametrize("package", PACKAGES)
-def test_help_imports_nothing_that_a_command_works_with(package: str, arguments: list[str]) -> None:
-    code = (
-        f"import sys\nsys.argv = {['x', *arguments]}\nfrom {package}.__main__ import main\n"
-        "try:\n    main()\nexcept SystemExit:\n    pass"
-    )
-    imported = imported_by(code)
-    assert "typer" in imported
-    assert not imported & (WEB | MODELS | FIGURES | DRAWING | WORK)
-    if arguments == ["--help"]:  # otherwise typer needs it
-        assert "pydantic" not in imported
+CALLED = """
+import importlib, json, sys
+imported = []
+for package, arguments in {calls}:
+    sys.argv = ["x", *arguments]
+    try:
+        importlib.import_module(f"{{package}}.__main__").main()
+    except SystemExit:
+        pass
+    imported.append(sorted(sys.modules))
+print("\\n" + json.dumps(imported))
+"""
+
+
+def test_help_imports_nothing_that_a_command_works_with() -> None:
+    words: list[list[str]] = [["--help"], ["--version"], [], ["run", "--help"], ["serve", "--help"]]
+    calls = [(package, arguments) for arguments in words for package in PACKAGES]
+    command = [sys.executable, "-c", CALLED.format(calls=calls)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True)
+    for call, names in zip(calls, json.loads(ended.stdout.splitlines()[-1]), strict=True):
+        assert "typer" in names
+        assert not {*names} & (WEB | MODELS | FIGURES | DRAWING | WORK), call
+        if call[1] == ["--help"]:  # otherwise typer needs it
+            assert "pydantic" not in names
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -103,12 +113,13 @@ def test_a_public_name_is_documented_and_is_no_module(package: str, name: str) -
 
 
 def test_names_stay_what_they_are_whatever_else_is_imported() -> None:
-    code = (
-        "import roboeval.evaluation.judge, codebotler.checking.check, codebotler.generation.generate\n"
-        "import roboeval.cli.app, codebotler.cli.app\n"
-    )
-    uses = "from roboeval import evaluate\nfrom codebotler import check, generate\n"
-    imported_by(code + uses + "assert callable(evaluate) and callable(check) and callable(generate)")
+    for module in ("evaluation.judge", "cli.app"):
+        import_module(f"roboeval.{module}")
+    for module in ("checking.check", "generation.generate", "cli.app"):
+        import_module(f"codebotler.{module}")
+    assert callable(roboeval.evaluate)
+    assert callable(codebotler.check)
+    assert callable(codebotler.generate)
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -169,19 +180,34 @@ def test_the_page_lists_the_documented_modules(documented: set[str]) -> None:
     assert all(import_module(module).__doc__ for module in documented)
 
 
-@pytest.mark.parametrize("suite", ["paper", "plus", "plus` with `worlds=5"])
+@cache
+def suite_named(name: str) -> Suite:
+    return load_suite(name)
+
+
+@pytest.mark.parametrize(
+    "suite", ["paper", "plus", pytest.param("plus` with `worlds=5", marks=pytest.mark.slow)]
+)
 def test_in_how_many_worlds_a_program_is_rewarded(suite: str) -> None:
     name, _, count = suite.partition("` with `worlds=")
-    loaded = load_suite(name).with_worlds(int(count)) if count else load_suite(name)
+    loaded = suite_named(name).with_worlds(int(count)) if count else suite_named(name)
     numbers = [len(task.scenarios) for task in loaded.tasks.values()]
     assert f"\n| `{suite}` | {min(numbers)} to {max(numbers)} | " in PAGE
 
 
-@pytest.mark.parametrize(("code", "printed"), EXAMPLES)
-def test_an_example_prints_what_the_page_shows(code: str, printed: str) -> None:
+@pytest.mark.parametrize(
+    ("code", "printed"),
+    [
+        pytest.param(*example, marks=[pytest.mark.slow] * ("recorded_completions" in example[0]))
+        for example in EXAMPLES
+    ],
+)
+def test_an_example_prints_what_the_page_shows(
+    code: str, printed: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert len(ast.parse(code).body) == 3
-    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ended.stdout == printed
+    exec(code, {})
+    assert capsys.readouterr().out == printed
 
 
 def test_all_four_examples_are_there() -> None:
@@ -200,17 +226,17 @@ LONG = "def task_program():\n" + "    say('hello', 1)\n    say(x)\n" * 500
 
 def returned() -> Iterator[object]:
     """What public functions return, where it is large, and what that is made of."""
-    for suite in (load_suite("paper"), load_suite("plus")):
+    for suite in (suite_named("paper"), suite_named("plus")):
         yield suite
         for task in suite.tasks.values():
             yield task
             for scenario in task.scenarios:
                 yield from (scenario, scenario.world, *scenario.require)
-    yield from roboeval.recorded_completions("recorded:careful", load_suite())
+    yield from roboeval.recorded_completions("recorded:careful", suite_named("paper"))
     yield codebotler.program_of(LONG)
     for check in (codebotler.check(LONG), codebotler.check(LONG.replace(", 1)", ")").replace("say(x)", ""))):
         yield from (check, check.room_map, *check.samples, *(sample.outcome for sample in check.samples))
-    generation = codebotler.generate(load_suite().tasks["SayGoodDay"].prompts[0])
+    generation = codebotler.generate(suite_named("paper").tasks["SayGoodDay"].prompts[0])
     (attempt,) = generation.attempts
     yield from (generation, attempt, attempt.prompt, attempt.reply)
 
@@ -348,9 +374,10 @@ def test_a_suite_is_named_by_its_folder(tmp_path: Path) -> None:
         roboeval.load_suite(tmp_path)
 
 
-def test_generate_works_in_a_notebook_and_refuses_what_makes_no_sense(paper: Suite) -> None:
-    code = NOTEBOOK.replace("INSTRUCTION", repr(paper.tasks["LunchTime"].prompts[0]))
-    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    retries, model = ended.stdout.splitlines()
+def test_generate_works_in_a_notebook_and_refuses_what_makes_no_sense(
+    paper: Suite, capsys: pytest.CaptureFixture[str]
+) -> None:
+    exec(NOTEBOOK, {"INSTRUCTION": paper.tasks["LunchTime"].prompts[0]})
+    retries, model = capsys.readouterr().out.splitlines()
     assert re.search("retries is -1; .* 0$", retries)
     assert '"nobody"' in model

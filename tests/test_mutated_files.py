@@ -100,7 +100,7 @@ def damaged(text: str, chance: random.Random, kind: int) -> str:
 def test_a_damaged_file_is_read_or_refused_in_a_sentence_with_a_line(files: list[tuple[str, Read]]) -> None:
     chance = random.Random(20)
     refused: Counter[int] = Counter()
-    for number in range(150):
+    for number in range(75):
         text, read = chance.choice(files)
         text = damaged(text, chance, kind=number % 5)
         error = refusal(text, read)

@@ -145,6 +145,8 @@ def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others() ->
 def test_a_suite_whose_formulas_know_it_draws_other_worlds(tmp_path: Path) -> None:
     shutil.copytree(SUITES / "plus", tmp_path / "plus")
     task = tmp_path / "plus" / "tasks" / "SayGoodDay.yaml"
+    for other in {*task.parent.iterdir()} - {task}:
+        other.unlink()
     task.write_text(
         task.read_text().replace(
             "rtl: not tr.Exists(goto", 'rtl: not tr.Exists(wave("bob")) and not tr.Exists(goto', 1
@@ -153,7 +155,7 @@ def test_a_suite_whose_formulas_know_it_draws_other_worlds(tmp_path: Path) -> No
     with pytest.raises(UserError, match="wave"):
         load_suite(tmp_path / "plus")
     loaded = load_suite(tmp_path / "plus", skills=TABLE)
-    assert loaded.with_worlds(40).with_own_worlds() == loaded
+    assert loaded.with_worlds(10).with_own_worlds() == loaded
 
 
 def test_models_are_told_of_it() -> None:

@@ -44,6 +44,21 @@ RULES = {
 }
 
 
+DEAR = {
+    *("test_tasks_have_no_findings", "test_an_instruction_becomes_a_program_and_a_mission"),
+    *("test_the_rule_is_shown_with_examples", "test_a_suite_is_evaluated_and_mutated_from_the_command_line"),
+}
+"""What is quick with the first set only."""
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    if "own" in metafunc.fixturenames:
+        first, *others = BREAKS
+        marks = [pytest.mark.slow] * (metafunc.definition.name in DEAR)
+        sets = [first, *(pytest.param(name, marks=marks) for name in others)]
+        metafunc.parametrize("own", sets, indirect=True)
+
+
 @dataclass(frozen=True)
 class Own:
     """A set of own skills."""
@@ -69,7 +84,7 @@ class Own:
         return [problem.kind for problem in found.problems]
 
 
-@pytest.fixture(params=sorted(path.name for path in SETS.iterdir() if path.is_dir()), name="own")
+@pytest.fixture(name="own")
 def own_(request: pytest.FixtureRequest) -> Own:
     return Own(SETS / request.param)
 
@@ -180,7 +195,7 @@ def test_a_suite_is_evaluated_and_mutated_from_the_command_line(own: Own, tmp_pa
     checked = json.loads(CliRunner().invoke(roboeval, again).stdout)["prompts"]
     assert [prompt["accepted"] for prompt in checked] == [prompt["completions"] for prompt in checked]
     mutated = CliRunner().invoke(
-        roboeval, ["mutate", "--suite", str(own.folder), "--mutants", "10", "--brief"]
+        roboeval, ["mutate", "--suite", str(own.folder), "--mutants", "4", "--brief"]
     )
     assert mutated.exit_code == 0, mutated.output
     assert all(task in mutated.output for task in own.suite.tasks)

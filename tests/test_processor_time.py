@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
 import time
 from typing import Literal
 
@@ -31,6 +32,27 @@ def test_time_of_a_child_is_used_while_it_lives_and_when_it_has_ended() -> None:
         assert used() - before >= 0.02
         child.communicate(b"\n")
     assert used() - before >= 0.02
+
+
+def test_a_child_is_seen_while_threads_end() -> None:
+    script = BURN.format(0.05) + "print(flush=True)\ninput()\n"
+    has_ended = threading.Event()
+
+    def start_threads() -> None:
+        while not has_ended.is_set():
+            threading.Thread(target=int).start()
+
+    before = used()
+    with subprocess.Popen([sys.executable, "-S", "-c", script], stdin=-1, stdout=-1) as child:
+        assert child.stdout is not None
+        child.stdout.readline()
+        starter = threading.Thread(target=start_threads)
+        starter.start()
+        least = min(used() for _ in range(250))
+        has_ended.set()
+        starter.join()
+        child.communicate(b"\n")
+    assert least - before >= 0.04
 
 
 def report(name: str, seconds: float, *markers: str) -> pytest.TestReport:

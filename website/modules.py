@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -38,7 +38,8 @@ def _rows(room: Path) -> Iterator[str]:
 
 def first_line(path: Path) -> str:
     """The first line of a module's docstring."""
-    return (ast.get_docstring(ast.parse(path.read_text())) or "").split("\n")[0].replace("|", "\\|")
+    found = re.match(r'"""(.*?)(?:"""|$)', path.read_text(), re.MULTILINE)
+    return found[1].replace("|", "\\|") if found else ""
 
 
 def page() -> str:

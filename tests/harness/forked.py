@@ -34,6 +34,7 @@ class Forked:
         environment: all its variables.
         stderr: a file for what it says beside them; a pipe by default.
         preload: modules that are imported before it is forked, once for all.
+        server: the process from which it is forked; one for all by default.
     """
 
     def __init__(
@@ -44,7 +45,9 @@ class Forked:
         environment: Mapping[str, str],
         stderr: IO[str] | None = None,
         preload: Sequence[str] = (),
+        server: Server | None = None,
     ) -> None:
+        self._server = server or SERVER
         theirs, given = os.pipe()
         told, to_out = os.pipe()
         said, to_err = os.pipe() if stderr is None else (None, os.dup(stderr.fileno()))
@@ -53,7 +56,7 @@ class Forked:
         self.stderr = None if said is None else os.fdopen(said, encoding="utf-8")
         job = {"words": [name, *map(str, arguments)], "cwd": str(cwd), "env": dict(environment)}
         handed = (theirs, to_out, to_err)
-        self.pid: int = SERVER.ask({**job, "preload": list(preload)}, handed)
+        self.pid: int = self._server.ask({**job, "preload": list(preload)}, handed)
         self.returncode: int | None = None
         for end in handed:
             os.close(end)
@@ -69,7 +72,7 @@ class Forked:
     def poll(self) -> int | None:
         """Its status, once it has ended; minus the number of the signal that has ended it."""
         if self.returncode is None:
-            self.returncode = SERVER.ask({"ended": self.pid})
+            self.returncode = self._server.ask({"ended": self.pid})
         return self.returncode
 
     def wait(self, timeout: float = 600) -> int:
@@ -114,9 +117,14 @@ class Forked:
 
 
 class Server:
-    """The process from which commands are forked; started when the first is."""
+    """The process from which commands are forked; started when the first is.
 
-    def __init__(self) -> None:
+    Args:
+        missing: packages that cannot be imported there, as if they were not installed.
+    """
+
+    def __init__(self, missing: Sequence[str] = ()) -> None:
+        self._missing = list(missing)
         self._lock = threading.Lock()
         self._line: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
@@ -139,7 +147,7 @@ class Server:
         with theirs:
             for end in (self._line, theirs):
                 end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, LONGEST)
-            command = [sys.executable, __file__, str(theirs.fileno())]
+            command = [sys.executable, __file__, str(theirs.fileno()), *self._missing]
             self._process = subprocess.Popen(command, pass_fds=[theirs.fileno()])
         atexit.register(self.end)
         return self._line
@@ -205,6 +213,7 @@ def become(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.modules.update(dict.fromkeys(sys.argv[2:]))  # type: ignore[arg-type]  # None: cannot be imported
     mains = {name: importlib.import_module(f"{name}.__main__").main for name in ("codebotler", "roboeval")}
     with socket.socket(fileno=int(sys.argv[1])) as door:
         words = serve(door)

@@ -22,18 +22,25 @@ ATTRIBUTE = "processor_time"
 
 def used() -> float:
     """Return the processor seconds of this process and of all its descendants so far."""
-    times = os.times()
-    own = time.process_time() + times.children_user + times.children_system
-    return own + sum(_used_by(child) for child in _children(os.getpid()))
+    while True:
+        ended = os.times()[2:4]
+        running = sum(_used_by(child) for child in _children(os.getpid()))
+        if os.times()[2:4] == ended:  # otherwise a child has ended and may be missing from both
+            return time.process_time() + sum(ended) + running
 
 
 def _children(pid: int) -> list[int]:
     """Return the children of all threads of a process, none if it has just ended."""
-    try:
-        files = list(Path(f"/proc/{pid}/task").glob("*/children"))
-        return [int(child) for file in files for child in file.read_text().split()]
-    except OSError:
-        return []
+    while True:
+        try:
+            threads = list(Path(f"/proc/{pid}/task").iterdir())
+        except OSError:
+            return []
+        try:
+            files = [(thread / "children").read_text() for thread in threads]
+        except OSError:
+            continue  # a thread has ended, and its children now belong to another one
+        return [int(child) for file in files for child in file.split()]
 
 
 def _used_by(pid: int) -> float:

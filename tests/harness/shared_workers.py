@@ -14,6 +14,7 @@ from typing import TypeVar
 import pytest
 
 from codebotler.core.trace import Outcome
+from codebotler.simulator.isolated_call import ClosedProcess
 from codebotler.simulator.ledger import SkillPerformer
 from codebotler.simulator.process.fork_server_client import ForkServer
 from codebotler.simulator.worker import DO_NOTHING, EngineError, Job, Meanwhile, NewRobot, Worker
@@ -27,9 +28,9 @@ STARTER = [ThreadPoolExecutor(1, "starter")]  # processes of an engine end with 
 class SharedWorker(Worker):
     """A worker that waits for its next user when it is closed, unless it was stopped during a run."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, is_live: bool = False) -> None:
         self.is_running = self.is_leaving = self.was_stopped = False
-        super().__init__()
+        super().__init__(is_live=is_live)
         start = self._preparer.start
         self._preparer.start = lambda: lasting(start)  # type: ignore[method-assign]  # so does its process
 
@@ -50,7 +51,13 @@ class SharedWorker(Worker):
     def _running(self, run: Callable[[], Ran]) -> Ran:
         self._expect_a_user()
         self.is_running = True
-        ran = run()
+        try:
+            ran = run()
+        except (EngineError, OSError):
+            raise
+        except Exception:  # the robot's own, after which the program has ended
+            self.is_running = False
+            raise
         self.is_running = False
         return ran
 
@@ -82,12 +89,12 @@ class SharedWorker(Worker):
             raise EngineError("the engine was stopped")
 
 
-def worker(*, one_process_per_run: bool = False) -> Worker:
+def worker(*, one_process_per_run: bool = False, is_live: bool = False) -> Worker:
     """One that waits, or else a new one."""
     if one_process_per_run:
         return Worker(one_process_per_run=True)
     if not IDLE:
-        return lasting(SharedWorker)
+        return lasting(partial(SharedWorker, is_live=is_live))
     found = IDLE.pop()
     found.is_leaving = False
     return found
@@ -101,10 +108,14 @@ def lasting(start: Callable[[], Started]) -> Started:
 
 @contextmanager
 def shared() -> Iterator[None]:
-    """Let whoever starts a worker be given one of these."""
+    """Let whoever starts a worker be given one of these, and keep closed processes for all threads."""
     with pytest.MonkeyPatch.context() as patch:
         for user in ("codebotler.simulator.pool", "codebotler.missions.mission"):
             patch.setattr(f"{user}.Worker", worker)
+        patch.setattr(
+            "codebotler.simulator.isolated_call.ClosedProcess",
+            lambda module: lasting(partial(ClosedProcess, module)),
+        )
         yield
 
 

@@ -223,7 +223,7 @@ class Mission:
     def _execute(self, live: LiveRobot) -> None:
         """Run the program. This needs its own thread, because a skill may never return."""
         try:
-            with closing(Worker()) as worker:
+            with closing(Worker(is_live=True)) as worker:
                 self.stop_button.on_press(worker.stop)
                 if self.stop_button.ended.is_set():
                     raise StoppedError  # noqa: TRY301 - handled like any other error

@@ -37,9 +37,13 @@ class Worker:
     Nearly all programs are tame, and many of them share a child, which has copies of their robots. Any other
     run, or one that the shared child cannot decide, gets its own child, and the engine performs its skills.
     The fork server for these runs holds the standard library, and starts when it is first needed.
+
+    Args:
+        one_process_per_run: no two runs share a child.
+        is_live: the worker is for a live robot, so the fork server for live programs starts first.
     """
 
-    def __init__(self, *, one_process_per_run: bool = False) -> None:
+    def __init__(self, *, one_process_per_run: bool = False, is_live: bool = False) -> None:
         self._stopped = False
         self._child: IsolatedProcess | None = None  # the child that runs batches
         self._keeps_child = False
@@ -48,8 +52,8 @@ class Worker:
         self._fork_servers: dict[str, ForkServer] = {}
         try:
             self._preparer.start()  # gets ready while the fork server starts
-            first = self._fork_server(FORK_SERVER if one_process_per_run else BATCH_SERVER)
-            self.has_seccomp = first.has_seccomp
+            simulating = FORK_SERVER if one_process_per_run else BATCH_SERVER
+            self.has_seccomp = self._fork_server(LIVE_SERVER if is_live else simulating).has_seccomp
         except LostProcessError as error:
             self._preparer.close()
             raise EngineError(f"the engine cannot start: {error}") from None

@@ -364,7 +364,7 @@ def test_the_number_of_workers_changes_nothing() -> None:
         worker.close()
 
 
-@pytest.mark.parametrize("samples", [3, 20])
+@pytest.mark.parametrize("samples", [3, pytest.param(20, marks=pytest.mark.slow)])
 def test_programs_that_are_checked_together_are_checked_as_each_alone(samples: int) -> None:
     looks, rooms = START + "\n    ".join(LOOKS) + "\n", RoomMap(ROOMS, ROOMS[0])
     waits = START + "while not is_in_room('mug'):\n        time.sleep(1)\n"

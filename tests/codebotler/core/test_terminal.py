@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import io
 import logging
+import re
 import sys
 import threading
 import warnings
@@ -38,6 +39,10 @@ PRINTS = {"print", "echo", "secho", "confirm", "prompt", "StreamHandler", "basic
     "track",
 }
 STREAMS = {"stdout", "stderr", "__stdout__", "__stderr__"}
+MAY_WRITE = re.compile(
+    rf"\b(?:print|input)\(|^\s*(?:from|import) (?:{'|'.join(LIBRARIES)})\b|std(?:out|err)", re.MULTILINE
+)
+"""What stands in the text of each module that writes; the others are not parsed."""
 SOURCE = [Path(package.__file__ or "").parent for package in (codebotler, roboeval)]
 WRITER = Path(terminal.__file__ or "")
 CHILDREN = {"environment.py", "channel.py"}
@@ -128,7 +133,10 @@ def test_a_room_of_a_world_is_named_as_text(
 
 def passed_by(path: Path) -> list[str]:
     """Where a module prints, draws, or takes the standard output or error for itself."""
-    tree = ast.parse(path.read_text())
+    text = path.read_text()
+    if not MAY_WRITE.search(text):
+        return []
+    tree = ast.parse(text)
     imported = {
         alias.asname or alias.name
         for node in ast.walk(tree)

@@ -191,7 +191,10 @@ def test_skill_that_drives_around_a_room_has_not_been_inside(tmp_path: Path) -> 
 # --- while the robot moves
 
 
-@pytest.mark.parametrize(("speed", "wrapped"), [(None, ""), (100.0, ""), (None, "face"), (None, "spelling")])
+@pytest.mark.parametrize(
+    ("speed", "wrapped"),
+    [(None, ""), (100.0, ""), (None, "face"), pytest.param(None, "spelling", marks=pytest.mark.slow)],
+)
 def test_a_robot_is_stopped_where_its_pose_enters_a_forbidden_room(
     tmp_path: Path, speed: float | None, wrapped: str
 ) -> None:

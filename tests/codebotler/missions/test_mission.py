@@ -264,9 +264,15 @@ def running(mission: Mission, reserved: Reservation, until: str) -> Iterator[Non
     ("program", "until"),
     [
         ("def task_program():\n    go_to('kitchen')\n    say('there')\n", "feedback"),
-        ("def task_program():\n    say('hello')\n    time.sleep(3600)\n    say('there')\n", "sleep"),
+        pytest.param(
+            "def task_program():\n    say('hello')\n    time.sleep(3600)\n    say('there')\n",
+            "sleep",
+            marks=pytest.mark.slow,
+        ),
         (STUBBORN, "feedback"),
-        ("def task_program():\n    say('a')\n    sum(range(10**11))\n", "result"),
+        pytest.param(
+            "def task_program():\n    say('a')\n    sum(range(10**11))\n", "result", marks=pytest.mark.slow
+        ),
     ],
 )
 def test_stop_ends_whatever_goes_on(home: Path, program: str, until: str) -> None:
@@ -407,6 +413,7 @@ def test_robot_that_does_not_confirm_a_stop_is_told_of(home: Path, monkeypatch: 
     assert robot.done == ["hello"]
 
 
+@pytest.mark.slow
 def test_robot_that_cannot_even_be_told_to_stop_is_told_of(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -433,6 +440,7 @@ def test_robot_that_cannot_even_be_told_to_stop_is_told_of(
         assert isinstance(stopping.exception(30), MissionError)
 
 
+@pytest.mark.slow
 def test_skill_without_an_end_goes_on_until_the_stop(home: Path) -> None:
     program = "def task_program(): go_to('kitchen')"
     with (
@@ -467,6 +475,7 @@ def test_stop_may_come_again(home: Path) -> None:
     assert robot.cancels >= 2
 
 
+@pytest.mark.slow
 def test_stop_is_written_even_where_its_end_comes_first(home: Path) -> None:
     class Quick(Simulated):
         def cancel(self) -> None:
@@ -517,9 +526,9 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
     begun: list[str] = []
 
     class Slow(Worker):
-        def __init__(self) -> None:
+        def __init__(self, **options: bool) -> None:
             mission.stop("the test")
-            super().__init__()
+            super().__init__(**options)
 
         def run_live(self, source: str, robot: ledger.SkillPerformer) -> Outcome:
             begun.append(source)

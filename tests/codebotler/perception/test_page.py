@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from dataclasses import fields
 from pathlib import Path
 
+import pytest
 from PIL import Image
 
 from codebotler.missions import pictures as missionpictures
@@ -25,15 +24,15 @@ def test_what_comes_out_is_told() -> None:
     assert re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE) == [field.name for field in fields(Sighting)]
 
 
-def test_code_looks_into_a_picture(tmp_path: Path) -> None:
+def test_code_looks_into_a_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
     Image.new("RGB", (64, 40)).save(tmp_path / "kitchen.jpg")
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     with Server(answer=lambda _: '{"found": true, "score": 0.9, "box": [0, 0, 0.5, 1]}') as server:
-        code = code.replace("http://localhost:8000/v1", server.url)
-        done = subprocess.run(
-            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-        )
-    assert done.stdout == "Sighting(found=True, box=(0.0, 0.0, 0.5, 1.0), score=0.9)\n"
+        exec(code.replace("http://localhost:8000/v1", server.url), {})
+    assert capsys.readouterr().out == "Sighting(found=True, box=(0.0, 0.0, 0.5, 1.0), score=0.9)\n"
     assert read_image(tmp_path / "seen.jpg").size == (64, 40)
 
 

@@ -37,8 +37,9 @@ def fenced(code: str, info: str = "python", marks: str = "```") -> str:
     return f"{marks}{info}\n{code}{marks}\n"
 
 
-def test_recorded_programs_stay_as_they_are_alone_and_in_chat() -> None:
-    for reply in RECORDED:
+@pytest.mark.parametrize("step", [10, pytest.param(1, marks=pytest.mark.slow)])
+def test_recorded_programs_stay_as_they_are_alone_and_in_chat(step: int) -> None:
+    for reply in RECORDED[::step]:
         program, once = reply.program, source(reply.program)
         assert source(once) == once
         if reply.fails not in UNPARSABLE:

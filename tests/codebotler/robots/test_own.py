@@ -173,15 +173,25 @@ STOPS_BADLY = {
 }
 
 
-@pytest.mark.parametrize("stop", STOPS_BADLY.values(), ids=STOPS_BADLY)
-@pytest.mark.parametrize("program", ["say('hello')", "import time\n    say('a')\n    time.sleep(60)"])
+ASKS, SLEEPS = "say('hello')", "import time\n    say('a')\n    time.sleep(60)"
+QUICK = {("raises", SLEEPS), ("async", ASKS)}
+
+
+@pytest.mark.parametrize(
+    ("stop", "program"),
+    [
+        pytest.param(stop, program, marks=[pytest.mark.slow] * ((stop, program) not in QUICK))
+        for stop in STOPS_BADLY
+        for program in (ASKS, SLEEPS)
+    ],
+)
 def test_a_mission_of_a_robot_that_could_not_be_stopped_has_failed(
     write: Write, tmp_path: Path, stop: str, program: str
 ) -> None:
     robot = write(
         f"""
     def __init__(self): self.event, self.begun = threading.Event(), threading.Event()
-    {stop}
+    {STOPS_BADLY[stop]}
     def rooms(self): return ["hall"]
     def say(self, message):
         self.begun.set()
@@ -376,6 +386,7 @@ server.run("streamable-http", host="127.0.0.1", port=int(sys.argv[1]))
 """
 
 
+@pytest.mark.slow
 def test_a_robot_whose_skills_are_tools_of_an_mcp_server(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

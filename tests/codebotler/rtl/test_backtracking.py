@@ -102,7 +102,7 @@ WORDS = (
 )
 
 
-DEAR = {"claim", "gathered clauses", "number", "numerals", "polarity", "times_in"}
+DEAR = {"claim", "clauses", "gathered clauses", "number", "numerals", "polarity", "time", "times_in"}
 
 
 @pytest.mark.parametrize(
@@ -130,10 +130,10 @@ def test_the_regexes_of_a_suite_take_linear_time(suite: str) -> None:
 @pytest.mark.parametrize(
     "pattern",
     [
-        *("(a+)+b", "(a|a)*b"),
+        *("(a|a)*b", "x.*y"),
         *(
             pytest.param(pattern, marks=pytest.mark.slow)
-            for pattern in (r"a\s*\s*b", "x.*y", r"\w+n't", r"1[^.]*\bnot\b[^.]*y", "no (?!.*not)")
+            for pattern in ("(a+)+b", r"a\s*\s*b", r"\w+n't", r"1[^.]*\bnot\b[^.]*y", "no (?!.*not)")
         ),
     ],
 )
@@ -144,8 +144,14 @@ def test_a_slow_regex_is_found(pattern: str) -> None:
 @pytest.mark.parametrize(
     "pattern",
     [
-        *("(?:a|aa){40}b", r"(?:\w{1,20} ?){1,12}!", "(?:a?){30}a{30}", "(?:(?=a)a|(?!b)a){25}b"),
-        *(r"\w{0,20}" * 8 + "!", "(?:(?:(?:x{0,99}){0,99}){0,99}){0,99}y", "a?" * 30 + "a{30}"),
+        *("(?:a?){30}a{30}", r"\w{0,20}" * 8 + "!"),
+        *(
+            pytest.param(pattern, marks=pytest.mark.slow)
+            for pattern in (
+                *("(?:a|aa){40}b", r"(?:\w{1,20} ?){1,12}!", "(?:(?=a)a|(?!b)a){25}b", "a?" * 30 + "a{30}"),
+                "(?:(?:(?:x{0,99}){0,99}){0,99}){0,99}y",
+            )
+        ),
     ],
 )
 def test_a_regex_that_is_slow_although_bounded_is_found_at_once(pattern: str) -> None:

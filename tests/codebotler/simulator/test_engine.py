@@ -91,6 +91,7 @@ def test_outcomes_come_in_the_order_of_the_pairs() -> None:
     assert [said(outcome) for outcome in outcomes] == [[text] for text in texts]
 
 
+@pytest.mark.shared_engine
 def test_equal_pairs_are_run_once_and_have_equal_outcomes() -> None:
     ran: list[str] = []
 
@@ -111,6 +112,7 @@ def test_pairs_are_told_apart_wherever_one_text_ends_and_the_next_begins() -> No
     )
 
 
+@pytest.mark.shared_engine
 def test_no_pairs_give_no_outcomes() -> None:
     assert list(run([], workers=1)) == []
 
@@ -152,6 +154,7 @@ def test_a_pool_that_nobody_enters_ends_with_the_process() -> None:
     assert fork_servers() <= began
 
 
+@pytest.mark.shared_engine
 def test_pairs_are_read_only_a_little_ahead() -> None:
     read = count()
     outcomes = run(((saying(str(next(read))), WORLD) for _ in count()), workers=1)
@@ -160,6 +163,7 @@ def test_pairs_are_read_only_a_little_ahead() -> None:
     assert next(read) < 100
 
 
+@pytest.mark.shared_engine
 def test_work_goes_on_while_the_first_result_is_long_in_coming() -> None:
     others_done = threading.Semaphore(0)
 
@@ -199,6 +203,7 @@ def test_a_signal_is_heard_while_a_result_is_waited_for() -> None:
     assert told.stdout == "True\n"
 
 
+@pytest.mark.shared_engine
 def test_what_was_read_before_the_keys_failed_has_results() -> None:
     def keys() -> Iterator[int]:
         yield from range(20)
@@ -231,13 +236,13 @@ def test_identities_do_not_depend_on_what_the_engine_holds() -> None:
     assert outcomes[0] == outcomes[1]
 
 
+@pytest.mark.shared_engine
 def test_a_room_that_is_no_regex_harms_no_program_that_drives_nowhere() -> None:
     world = World((Room("hall"), Room("[")), "hall")
-    worker = Worker()
-    assert said(worker.run(saying("a"), lambda: SimulatedRobot(world))) == ["a"]
-    worker.close()
+    assert said(next(run([(saying("a"), world)], workers=1))) == ["a"]
 
 
+@pytest.mark.shared_engine
 def test_a_smaller_table_of_skills_leaves_no_other_skill() -> None:
     table = SkillTable(tuple(skill for skill in SKILLS.values() if skill.name != "pick"))
     (outcome,) = run([("def task_program(): pick('x')", WORLD)], workers=1, skills=table)
@@ -455,6 +460,7 @@ def test_fork_server_that_is_killed_again_and_again_is_an_error_of_the_engine_an
         list(run([(saying("a"), WORLD)], workers=1, skills=doing(killing(99))))
 
 
+@pytest.mark.shared_engine
 def test_a_skill_may_take_longer_than_a_child_may_be_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("codebotler.simulator.process.isolated_process.PROCESS_WAIT_SECONDS", 1.0)
 
@@ -511,6 +517,7 @@ def test_program_that_waits_a_little_at_a_time_ends_the_same_way_in_each_of_many
     assert ends == {(Status.FINISHED, "2.00", "-1")}
 
 
+@pytest.mark.shared_engine
 def test_requests_beyond_a_limit_are_not_read_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     answered: list[list[object]] = []
     answer = SkillProtocol._answer
@@ -548,6 +555,7 @@ def test_child_that_is_killed_from_outside_is_told_so() -> None:
 # --- the rest
 
 
+@pytest.mark.shared_engine
 def test_suite_sets_the_limits() -> None:
     limits = Limits(seconds=10, calls=3, ticks=50, text=5, trace=12)
     bodies = {
@@ -562,6 +570,7 @@ def test_suite_sets_the_limits() -> None:
     assert [outcome.error.message for outcome in outcomes if outcome.error] == list(bodies.values())
 
 
+@pytest.mark.shared_engine
 def test_program_of_enormous_length_is_refused_without_being_read() -> None:
     (outcome,) = run([("#" * 6_000_000, WORLD)], workers=1)
     assert (outcome.status, outcome.trace) == (Status.PYTHON_ERROR, ())
@@ -569,6 +578,7 @@ def test_program_of_enormous_length_is_refused_without_being_read() -> None:
     assert "longer than 5,000,000 characters" in outcome.error.message
 
 
+@pytest.mark.shared_engine
 def test_isolation_can_be_required() -> None:
     assert len(list(run([(saying("a"), WORLD)], workers=1, require_isolation=True))) == 1
 

@@ -406,8 +406,8 @@ def test_every_program_says_in_one_sentence_what_it_tries() -> None:
 def test_program_that_is_silent_for_too_long_is_ended_though_it_computes(
     reach: Reach, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("codebotler.simulator.process.isolated_process.PROCESS_WAIT_SECONDS", 0.5)
-    outcome = reach.run("def task_program():\n    sum(range(10**12))\n")
+    monkeypatch.setattr("codebotler.simulator.process.isolated_process.PROCESS_WAIT_SECONDS", 0.1)
+    outcome = reach.run("import math\n\ndef task_program():\n    sum(range(10**12))\n")
     assert outcome.status is Status.TIMEOUT
     assert outcome.error is not None
     assert not outcome.error.message.endswith(PROCESSOR_TIME)

@@ -95,12 +95,12 @@ def test_threads_call_at_the_same_time() -> None:
     def call(number: int) -> None:
         found[number] = closed.echo(str(number))
 
-    threads = [threading.Thread(target=call, args=(number,)) for number in range(4)]
+    threads = [threading.Thread(target=call, args=(number,)) for number in range(2)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert found == {number: [str(number)] for number in range(4)}
+    assert found == {number: [str(number)] for number in range(2)}
 
 
 def test_forked_process_has_processes_of_its_own() -> None:

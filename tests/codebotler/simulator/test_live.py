@@ -57,9 +57,17 @@ def others() -> set[int]:
     return engine_processes()
 
 
+@pytest.fixture(scope="module")
+def worker() -> Iterator[Worker]:
+    worker = Worker(is_live=True)
+    yield worker
+    worker.close()
+
+
 @pytest.fixture
-def worker(others: set[int]) -> Iterator[Worker]:  # noqa: ARG001 - told before it starts
-    worker = Worker()
+def own_worker(others: set[int]) -> Iterator[Worker]:  # noqa: ARG001 - told before it starts
+    """A worker whose processes a test ends."""
+    worker = Worker(is_live=True)
     yield worker
     worker.close()
 
@@ -197,7 +205,7 @@ def test_what_the_robot_throws_besides_ends_the_child_and_comes_through(worker: 
 
 
 @pytest.mark.slow
-def test_run_whose_process_is_lost_is_not_run_again(worker: Worker) -> None:
+def test_run_whose_process_is_lost_is_not_run_again(own_worker: Worker) -> None:
     def does(_: str) -> Result:
         family = engine_processes()
         for pid in fork_servers():
@@ -207,12 +215,12 @@ def test_run_whose_process_is_lost_is_not_run_again(worker: Worker) -> None:
 
     machine = Machine(does)
     with pytest.raises(EngineError, match="lost"):
-        worker.run_live("def task_program():\n    say('a')\n    say('b')\n", machine)
+        own_worker.run_live("def task_program():\n    say('a')\n    say('b')\n", machine)
     assert machine.done == ["a"]
-    assert done(worker, "def task_program(): say('next')")[0] == ["next"]
+    assert done(own_worker, "def task_program(): say('next')")[0] == ["next"]
 
 
-def test_stop_ends_a_run_that_sleeps(worker: Worker, others: set[int]) -> None:
+def test_stop_ends_a_run_that_sleeps(own_worker: Worker, others: set[int]) -> None:
     sleeps, may_go_on = threading.Event(), threading.Event()
 
     class Sleeper(Machine):
@@ -224,11 +232,11 @@ def test_stop_ends_a_run_that_sleeps(worker: Worker, others: set[int]) -> None:
     machine = Sleeper()
     with ThreadPoolExecutor(1) as thread:
         program = "def task_program():\n    time.sleep(3600)\n    say('a')\n"
-        running = thread.submit(worker.run_live, program, machine)
+        running = thread.submit(own_worker.run_live, program, machine)
         assert sleeps.wait(30)
         family = engine_processes() - others
         assert family
-        worker.stop()
+        own_worker.stop()
         assert are_gone(family)
         may_go_on.set()
         assert isinstance(running.exception(30), EngineError)

@@ -10,6 +10,8 @@ from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
 from codebotler.simulator.settings import SimulationSettings
 
+pytestmark = pytest.mark.shared_engine
+
 Outcomes: TypeAlias = dict[str, Outcome]
 
 HOUSE = World(
@@ -44,7 +46,7 @@ def all_of(*tables: dict[str, tuple[str, object]]) -> dict[str, str]:
 
 def run_all(programs: dict[str, str], settings: SimulationSettings) -> Outcomes:
     pairs = ((program, HOUSE) for program in programs.values())
-    return dict(zip(programs, run(pairs, workers=2, settings=settings), strict=True))
+    return dict(zip(programs, run(pairs, workers=1, settings=settings), strict=True))
 
 
 # --- what works: each program says these things

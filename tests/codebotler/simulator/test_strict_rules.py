@@ -14,6 +14,8 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings, choose
 from roboeval.suites.schema import SimulationFile
 
+pytestmark = pytest.mark.shared_engine
+
 STRICT = SimulationSettings(
     literals="as-written",
     matching="whole-words",

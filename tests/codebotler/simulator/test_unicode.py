@@ -15,6 +15,8 @@ from codebotler.robots.open import open_robot
 from codebotler.rtl import holds, parse
 from codebotler.simulator import run
 
+pytestmark = pytest.mark.shared_engine
+
 NFC, NFD = "caf\u00e9", "cafe\u0301"
 FORMS = ["NFC", "NFD"]
 PROGRAM = """def task_program():

@@ -237,18 +237,24 @@ def test_another_method_is_told_which_are_taken(
     assert answer.data["detail"] == f"this address accepts only {allowed.replace(', ', ' and ')}"
 
 
-def test_before_there_is_a_mission_that_is_said(tmp_path: Path) -> None:
-    with PageServer(tmp_path) as server:
-        for method, path in (
-            ("GET", "/events"),
-            ("GET", "/events.jsonl"),
-            ("GET", "/events.mcap"),
-            ("POST", "/stop"),
-            ("POST", "/again"),
-        ):
-            answer = server.call(method, f"/api/missions/current{path}", {} if path == "/again" else None)
-            assert answer.status == 404, path
-            assert "POST /api/missions" in answer.data["detail"]
+@pytest.fixture(scope="module")
+def fresh(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+    """A page without any mission."""
+    with PageServer(tmp_path_factory.mktemp("fresh")) as server:
+        yield server
+
+
+def test_before_there_is_a_mission_that_is_said(fresh: PageServer) -> None:
+    for method, path in (
+        ("GET", "/events"),
+        ("GET", "/events.jsonl"),
+        ("GET", "/events.mcap"),
+        ("POST", "/stop"),
+        ("POST", "/again"),
+    ):
+        answer = fresh.call(method, f"/api/missions/current{path}", {} if path == "/again" else None)
+        assert answer.status == 404, path
+        assert "POST /api/missions" in answer.data["detail"]
 
 
 @pytest.mark.slow
@@ -268,12 +274,14 @@ def test_missions_that_cannot_be_kept_are_said_before_the_page_is_there(tmp_path
     assert "CODEBOTLER_HOME" in ended.stderr
 
 
-def test_missions_that_can_no_longer_be_kept_are_said_in_a_sentence(tmp_path: Path) -> None:
-    with PageServer(tmp_path) as server:
-        (server.home / "missions").rmdir()
-        (server.home / "missions").touch()
-        answer = server.call("POST", "/api/missions", {"program": HELLO})
-    assert (answer.status, answer.data["detail"]) == (409, f"{server.home / 'missions'}: File exists")
+def test_missions_that_can_no_longer_be_kept_are_said_in_a_sentence(fresh: PageServer) -> None:
+    missions = fresh.home / "missions"
+    missions.rmdir()
+    missions.touch()
+    answer = fresh.call("POST", "/api/missions", {"program": HELLO})
+    missions.unlink()
+    missions.mkdir()
+    assert (answer.status, answer.data["detail"]) == (409, f"{missions}: File exists")
 
 
 def test_a_mission_of_before_can_be_read_and_no_longer_followed(server: PageServer) -> None:

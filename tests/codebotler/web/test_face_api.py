@@ -27,7 +27,7 @@ from codebotler.web.console import Console
 from codebotler.web.face import MAX_FACE_OPTIONS, MAX_FACE_TEXT, face_data, question_data, screen_text
 from codebotler.web.guard import MAX_BODY_BYTES
 from command_line import ENVIRONMENT
-from forked import Forked
+from forked import PAGE, Forked
 from pageserver import PageServer
 
 TEA = """def task_program():
@@ -286,7 +286,7 @@ def test_there_is_no_face_unless_one_is_asked_for(tmp_path: Path) -> None:
 def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], named: str) -> None:
     (tmp_path / "world.yaml").write_text("robot: a\nrooms: [a]\n")
     words = ("serve", "--world", "world.yaml", "--face", *arguments)
-    with Forked("codebotler", *words, cwd=tmp_path, environment=ENVIRONMENT) as process:
+    with Forked("codebotler", *words, cwd=tmp_path, environment=ENVIRONMENT, preload=PAGE) as process:
         _, err = process.communicate(timeout=30)
     assert process.returncode == 2
     assert named in err

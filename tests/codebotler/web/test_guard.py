@@ -28,7 +28,7 @@ from codebotler.web.access import (
 from codebotler.web.guard import MAX_BODY_BYTES, Guard, _is_same
 from codebotler.web.proxy import OuterAddress, proxies_in_front
 from command_line import ENVIRONMENT
-from forked import Forked
+from forked import PAGE, Forked
 from pageserver import PageServer
 
 SOCKET = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
@@ -195,15 +195,19 @@ def test_a_token_is_made_for_each_start() -> None:
     [
         (["--no-token", "--host", "0.0.0.0"], "--no-token cannot be combined"),
         *(
-            pytest.param(
-                ["--no-token", "--host", host], "--no-token cannot be combined", marks=pytest.mark.slow
+            pytest.param(["--no-token", *more], "--no-token cannot be combined", marks=pytest.mark.slow)
+            for more in (
+                *(["--host", host] for host in ("::", "0", "127.example", "")),
+                ["--token", "x" * 20],
+                ["--behind-proxy", "https://robot.example"],
             )
-            for host in ("::", "0", "127.example", "")
         ),
-        (["--no-token", "--token", "x" * 20], "--no-token cannot be combined"),
-        (["--no-token", "--behind-proxy", "https://robot.example"], "--no-token cannot be combined"),
         (["--behind-proxy", "https://robot.example/missions"], ": /missions is already used by the page"),
-        (["--behind-proxy", "https://robot.example/_nicegui/x"], ": /_nicegui is already used by the page"),
+        pytest.param(
+            ["--behind-proxy", "https://robot.example/_nicegui/x"],
+            ": /_nicegui is already used by the page",
+            marks=pytest.mark.slow,
+        ),
         (["--behind-proxy", "robot.example"], "https://HOST"),
         (["--token", "short"], "too short"),
         (["--host", "999.1.1.1"], "cannot listen"),
@@ -212,7 +216,7 @@ def test_a_token_is_made_for_each_start() -> None:
 def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told: str) -> None:
     (tmp_path / "world.yaml").write_text("robot: a\nrooms: [a]\n")
     words = ("serve", "--world", "world.yaml", *arguments)
-    with Forked("codebotler", *words, cwd=tmp_path, environment=ENVIRONMENT) as process:
+    with Forked("codebotler", *words, cwd=tmp_path, environment=ENVIRONMENT, preload=PAGE) as process:
         _, err = process.communicate(timeout=30)
     assert process.returncode == 2
     assert told in err
