@@ -23,6 +23,8 @@ SOCKET, FILES = "/_nicegui_ws/", "/events."
 STATUSES = "(asked) => Promise.all(asked.map(async (each) => (await fetch(each)).status))"
 WAYS = {"root": ("", False), "kept": ("/robot", False), "stripped": ("/lab/robot", True)}
 """The path of the page, and whether the proxy removes it."""
+BELOW_A_PATH = pytest.mark.parametrize("site", ["kept", "stripped"], indirect=True)
+"""At the root, what a page leads to is as without a proxy."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,7 @@ def test_the_cookie_counts_below_the_path_alone_and_only_by_https(site: Site, op
     assert (cookie["path"], cookie["secure"], cookie["httpOnly"]) == (prefix or "/", True, True)
 
 
+@BELOW_A_PATH
 def test_a_past_mission_is_found_and_downloaded(site: Site, opened: OpenPage) -> None:
     site.server.rest()
     site.server.run(ASK)
@@ -130,6 +133,7 @@ def test_a_past_mission_is_found_and_downloaded(site: Site, opened: OpenPage) ->
     assert Path(download.value.path()).read_bytes().startswith(b'{"time"')
 
 
+@BELOW_A_PATH
 def test_the_face_speaks_and_its_stop_works(site: Site, opened: OpenPage) -> None:
     site.server.rest()
     face = opened(site.server, link=f"{site.proxy.address}/face?token={site.server.face_token}")
@@ -142,6 +146,7 @@ def test_the_face_speaks_and_its_stop_works(site: Site, opened: OpenPage) -> Non
     expect(face.locator("#stop-told")).to_have_text("The robot has stopped.")
 
 
+@BELOW_A_PATH
 def test_the_run_of_a_benchmark_is_shown_to_its_last_page(site: Site, opened: OpenPage) -> None:
     page = opened(site.server, link=site.link("runs"))
     page.locator("table a").first.click()

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.skills.table import Skill
+from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.robots.base import ROS_PYTHON, Options
 from codebotler.robots.ros import ros1
 from codebotler.robots.ros.robot import RosRobot, Timeouts
@@ -26,6 +26,8 @@ MASTER = HERE / "ros_master.py"
 SERVER = HERE / "action_servers.py"
 LONG = 60.0  # seconds after which what is waited for has failed
 GO_TO, SAY = SKILLS["go_to"], SKILLS["say"]
+FEW = SkillTable((GO_TO, SAY))
+"""Enough for most tests: to make the messages of all skills takes a worker longer than all else."""
 
 
 def free_port() -> int:
@@ -107,9 +109,15 @@ class Graph:
         server.expect("ready")
         return server
 
-    def robot(self, waits: Timeouts | None = None, **options: Any) -> RosRobot:  # noqa: ANN401 - fields of Options
+    def robot(
+        self,
+        waits: Timeouts | None = None,
+        *,
+        skills: SkillTable = FEW,
+        **options: Any,  # noqa: ANN401 - fields of Options
+    ) -> RosRobot:
         short = Timeouts(patience=1.5, silence=1.5, longest=20.0)
-        robot = ros1.robot(Options(address=self.uri, **options), waits or short)
+        robot = ros1.robot(Options(address=self.uri, skills=skills, **options), waits or short)
         self.robots.append(robot)
         return robot
 

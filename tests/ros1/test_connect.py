@@ -198,20 +198,13 @@ def test_pose_comes_from_transforms(robots: Robots, kind: str) -> None:
 
 
 @BOTH
-@pytest.mark.parametrize(
-    ("before", "after", "sentence"),
-    [
-        ("/amcl_pose", "/odom", '"odom".*"map"'),
-        ("/amcl_pose", "/nothing", "/nothing"),
-    ],
-)
-def test_poses_that_cannot_be_used_are_refused(
-    robots: Robots, kind: str, before: str, after: str, sentence: str
-) -> None:
+def test_poses_that_cannot_be_used_are_refused(robots: Robots, kind: str) -> None:
     robots.move_base()
-    robot = robots.robot(kind, CONNECTION.replace(before, after))
-    with pytest.raises(NotReadyError, match=sentence):
-        robot.connect()
+    for topic, sentence in (("/odom", '"odom".*"map"'), ("/nothing", "/nothing")):
+        robot = robots.robot(kind, CONNECTION.replace("/amcl_pose", topic))
+        with pytest.raises(NotReadyError, match=sentence):
+            robot.connect()
+        robot.disconnect()
 
 
 def test_what_is_missing_is_said(robots: Robots) -> None:
@@ -257,23 +250,19 @@ def test_message_without_a_field_is_said(robots: Robots) -> None:
 
 
 @BOTH
-@pytest.mark.parametrize(
-    ("action", "service", "topic"),
-    [
+def test_types_are_written_as_on_ros_1_or_2(robots: Robots, kind: str) -> None:
+    move_base = robots.move_base("--speed", "5", "--acceleration", "9")
+    for action, service, topic in (
         ("move_base_msgs/MoveBaseAction", "std_srvs/Trigger", "std_msgs/String"),
         ("move_base_msgs/msg/MoveBaseAction", "std_srvs/srv/Trigger", "std_msgs/msg/String"),
         ("move_base_msgs/action/MoveBase", "std_srvs/srv/Trigger", "std_msgs/msg/String"),
-    ],
-)
-def test_types_are_written_as_on_ros_1_or_2(
-    robots: Robots, kind: str, action: str, service: str, topic: str
-) -> None:
-    move_base = robots.move_base("--speed", "5", "--acceleration", "9")
-    text = CONNECTION.replace("move_base_msgs/MoveBase", action)
-    text = text.replace("std_srvs/Trigger", service).replace("std_msgs/String", topic)
-    robot = robots.robot(kind, text)
-    robot.connect()
-    robot.perform("go_to", ["lab"])
-    robot.perform("say", ["hello"])
-    robot.perform("open_door", [])
-    told(move_base, "door")
+    ):
+        text = CONNECTION.replace("move_base_msgs/MoveBase", action)
+        text = text.replace("std_srvs/Trigger", service).replace("std_msgs/String", topic)
+        robot = robots.robot(kind, text)
+        robot.connect()
+        robot.perform("go_to", ["lab"])
+        robot.perform("say", ["hello"])
+        robot.perform("open_door", [])
+        told(move_base, "door")
+        robot.disconnect()

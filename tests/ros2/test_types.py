@@ -79,22 +79,21 @@ def test_messages_go_there_and_back() -> None:
     assert (grid["info"]["width"], grid["data"]) == (2, [0, -1])
 
 
-@pytest.mark.parametrize(
-    ("name", "values", "path"),
-    [
+def test_value_that_does_not_fit_is_named_by_its_path() -> None:
+    poses, number, text = "geometry_msgs/msg/PoseArray", "std_msgs/msg/UInt8", "std_msgs/msg/String"
+    wrong: list[tuple[str, dict[str, Any], str]] = [
         (POSE, {"pose": {"pose": {"position": {"q": 1}}}}, "pose.pose.position.q"),
         (POSE, {"pose": {"pose": {"position": {"x": "1"}}}}, "pose.pose.position.x"),
         (POSE, {"pose": {"covariance": [1, 2]}}, "pose.covariance"),
         (POSE, {"pose": 3}, "pose"),
-        ("geometry_msgs/msg/PoseArray", {"poses": [{}, {"position": {"y": []}}]}, "poses[1].position.y"),
-        ("geometry_msgs/msg/PoseArray", {"poses": {}}, "poses"),
-        ("std_msgs/msg/UInt8", {"data": 300}, "data"),
-        ("std_msgs/msg/String", {"data": 3}, "data"),
-    ],
-)
-def test_value_that_does_not_fit_is_named_by_its_path(name: str, values: dict[str, Any], path: str) -> None:
-    (said,) = filled([name], (name, "", values), folders=[])
-    assert f" {path} " in re.sub("[,;]", " ", said)
+        (poses, {"poses": [{}, {"position": {"y": []}}]}, "poses[1].position.y"),
+        (poses, {"poses": {}}, "poses"),
+        (number, {"data": 300}, "data"),
+        (text, {"data": 3}, "data"),
+    ]
+    told = filled([POSE, poses, number, text], *((name, "", values) for name, values, _ in wrong), folders=[])
+    for said, (_, _, path) in zip(told, wrong, strict=True):
+        assert f" {path} " in re.sub("[,;]", " ", said)
 
 
 def test_messages_of_the_package_itself_are_built_with_it(tmp_path: Path) -> None:

@@ -186,6 +186,8 @@ def go_to(room):
 """
 
 
+WORLDS = 3
+"""Each third world shows it."""
 AROUND = [
     "say('I am on my way.'); _task(); say('All done!')",
     "_task(); say('That was no problem at all.')",
@@ -200,7 +202,11 @@ AROUND = [
 @each_task
 def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: str) -> None:
     task = plus().tasks[name]
-    several = [*zip(solutions(task), verdicts_on_solutions(name), strict=True)][::4]
+    several = [
+        (one, judged[::WORLDS])
+        for one, judged in [*zip(solutions(task), verdicts_on_solutions(name), strict=True)][::4]
+    ]
+    task = replace(task, scenarios=task.scenarios[::WORLDS])
     changed = [
         f"{HARMLESS}{solution.program}\n_task = task_program\ndef task_program():\n    {around}\n"
         for around, (solution, _) in zip(cycle(AROUND), several, strict=False)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import re
 import shlex
 import signal
@@ -210,7 +211,7 @@ def test_a_zip_that_is_none(tmp_path: Path) -> None:
 
 def test_a_file_that_swells_in_a_zip(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("SayGoodDay_0_0.py", " " * 50_000_000)
+        archive.writestr("SayGoodDay_0_0.py", " " * 5_000_001)
     refusal = refused("evaluate", "a.zip", cwd=tmp_path)
     assert refusal.at == ("a.zip/SayGoodDay_0_0.py", None)
     assert "5,000,000 bytes" in refusal.sentence
@@ -533,9 +534,13 @@ def test_a_pipe_is_a_file_of_completions(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + row(1, "go_to('nowhere')"))
     ended = roboeval("evaluate", "--json", cwd=tmp_path, after="<(cat a.jsonl)")
     assert json.loads(ended.out)["completions"] == 2
-    wrong = roboeval("evaluate", cwd=tmp_path, after="<(cat a.jsonl; echo oops)")
-    assert (wrong.status, wrong.out) == (2, "")
-    assert re.fullmatch(r"roboeval: /dev/fd/\d+, line 3: .*\bJSON; .*\n", wrong.err)
+    end, given = os.pipe()
+    os.write(given, (tmp_path / "a.jsonl").read_bytes() + b"oops\n")
+    os.close(given)
+    wrong = refused("evaluate", f"/dev/fd/{end}", cwd=tmp_path)
+    os.close(end)
+    assert wrong.at == (f"/dev/fd/{end}", 3)
+    assert "JSON; " in wrong.sentence
 
 
 def test_the_version() -> None:
@@ -750,15 +755,12 @@ def test_help_costs_little() -> None:
         "used = resource.getrusage(resource.RUSAGE_CHILDREN)\n"
         "print(used.ru_utime + used.ru_stime)\n"
     )
-    best = min(
-        float(
-            subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
-        )
-        for _ in range(3)
-    )
+    used = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
     heavy = "{'pydantic', 'yaml', 'rich', 'polars'}"
     bare = f"import sys, roboeval.cli.app; print(bool({heavy} & sys.modules.keys()))"
-    assert best < 3.0  # a figure for machines far slower than ours; what it costs here stands in the benches
+    assert (
+        float(used) < 3.0
+    )  # a figure for machines far slower than ours; what it costs here stands in the benches
     assert subprocess.run(
         [sys.executable, "-c", bare], capture_output=True, text=True, check=True
     ).stdout == ("False\n")

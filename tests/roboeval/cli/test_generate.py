@@ -58,7 +58,8 @@ def test_from_nothing_to_tables_and_a_report(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_report_that_is_interrupted_costs_nothing(tmp_path: Path) -> None:
-    words = ["run", "--model", "recorded:hasty", "--num-completions", "3", "--out", "run", "--workers", "1"]
+    words = ["run", "--model", "recorded:hasty", "--num-completions", "4", "--out", "run", "--workers", "1"]
+    words += ["--tasks", "LunchBreak,LunchTime,SayGoodDay,StaplerSupply"]
     process = Forked("roboeval", *words, cwd=tmp_path, environment=ENVIRONMENT)
     checks = tmp_path / "run" / "checks" / "paper.jsonl"
     while process.poll() is None and not (checks.exists() and checks.stat().st_size):

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -37,10 +38,11 @@ def explanations(task: Task, suite: Suite) -> Iterator[str]:
 
 
 @pytest.mark.slow  # some thousand explanations of each suite
-@pytest.mark.parametrize("name", SUITES)
-def test_explanations_of_all_wrong_solutions(name: str) -> None:
+@pytest.mark.parametrize(("name", "every"), [("paper", 1), ("plus", 5)])  # plus has 30 worlds of each task
+def test_explanations_of_all_wrong_solutions(name: str, every: int) -> None:
     suite = load_suite(name)
-    found = {sentence for task in suite.tasks.values() for sentence in explanations(task, suite)}
+    tasks = [replace(task, scenarios=task.scenarios[::every]) for task in suite.tasks.values()]
+    found = {sentence for task in tasks for sentence in explanations(task, suite)}
     assert len(found) > 100
     assert [sentence for sentence in found if REGEX.search(sentence)] == []
     assert [sentence for sentence in found if "fits the requirement" in sentence] == []

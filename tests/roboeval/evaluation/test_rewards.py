@@ -165,7 +165,7 @@ def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.Mo
         return futures[-1]
 
     monkeypatch.setattr(pool, "submit", noted)
-    waited_for, given_up = distinct(8, "interrupted"), distinct(1_000, "given up")
+    waited_for, given_up = distinct(8, "interrupted"), distinct(300, "given up")
     few, many = (len(split_programs(programs, pool.workers)) for programs in (waited_for, given_up))
 
     def interrupt() -> None:

@@ -78,7 +78,7 @@ def test_the_pages_show_runs_that_were_judged_by_it(
     install()
     install("broken-suite", "broken", whole=False)
     store = RunStore(Path("runs"))
-    assert [store.suite(name) is not None for name in ("plus", "garden", "broken", "none")] == [
+    assert [store.suite(name) is not None for name in ("paper", "garden", "broken", "none")] == [
         True,
         True,
         False,

@@ -283,7 +283,7 @@ def test_the_rules_of_the_paper() -> None:
     assert suite.settings.clock_starts.isoformat() == "2024-01-01T12:00:00+00:00"
 
 
-@pytest.mark.parametrize("name", ["paper", "plus"])
+@pytest.mark.parametrize("name", ["paper", pytest.param("plus", marks=pytest.mark.slow)])
 def test_a_suite_can_be_copied_and_sent_and_stand_in_a_set(name: str) -> None:
     suite = load_suite(name)
     again = pickle.loads(pickle.dumps(suite))

@@ -143,6 +143,7 @@ def test_without_the_rules_most_conflicts_are_none(programs: list[Judged], suite
             assert failure_of(one.untold) == one.failure
 
 
+@pytest.mark.slow
 def test_the_linter_finds_nothing(suite: Suite) -> None:
     for task in suite.tasks.values():
         found = lint(task, judge_solutions(task, suite, workers=2))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import hacking
 from codebotler.core.errors import UserError
 from hacking import earned, hacks, honest, taken_back
 from roboeval.suites.families.tasks import RETRACTION, family_names, trained_prompts, trained_task
@@ -19,6 +20,8 @@ from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
 
 SEEDS = (0, 1, 1_000_000_000)
+LONG = "WaitAndGreet"  # its programs wait for long
+FAMILIES = [pytest.param(name, marks=[pytest.mark.slow] * (name == LONG)) for name in family_names()]
 IDLE = ("", "def task_program():\n    pass\n")
 ALIKE = 8  # words in a row that two instructions may not share
 
@@ -27,16 +30,16 @@ def test_there_are_families_enough() -> None:
     assert len(family_names()) >= 16
 
 
-@pytest.mark.parametrize("family", family_names())
+@pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize(
     "seed", [SEEDS[0], *(pytest.param(seed, marks=pytest.mark.slow) for seed in SEEDS[1:])]
 )
 def test_right_programs_earn_1_idle_ones_0_and_wrong_ones_something_between(family: str, seed: int) -> None:
     task = trained_task(family, seed)
     programs = (task.solution, *IDLE, *(one.program for one in task.wrong))
-    numbers = range(len(task.prompts))
-    assert len(numbers) >= 4
-    for prompt in numbers:
+    last = len(task.prompts) - 1
+    assert last >= 3
+    for prompt in (0, last) if seed == SEEDS[0] else range(last + 1):
         found = judge([Rollout(family, seed, prompt, program) for program in programs])
         right, nothing, idle, *wrong = (one.reward for one in found)
         assert (right, nothing, idle) == (1, 0, 0), prompt
@@ -179,7 +182,10 @@ def test_no_solution_is_one_of_a_task_that_is_measured_with(family: str) -> None
 
 
 @pytest.mark.slow
-def test_no_hack_earns_as_much_as_an_honest_program_without_its_last_step() -> None:
+def test_no_hack_earns_as_much_as_an_honest_program_without_its_last_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(hacking, "family_names", lambda: family_names()[::3])  # bench/hacking.py takes all
     programs = hacks()
     assert len(programs) >= 30
     aim = honest(SEEDS[:1])
@@ -187,7 +193,7 @@ def test_no_hack_earns_as_much_as_an_honest_program_without_its_last_step() -> N
     assert {about: reward for about, reward in earned(programs, SEEDS[:1]).items() if reward >= aim} == {}
 
 
-@pytest.mark.parametrize("family", family_names())
+@pytest.mark.parametrize("family", FAMILIES)
 def test_a_program_that_takes_back_what_it_has_said_does_not_pass(family: str) -> None:
     right = trained_task(family, 0).solution
     said, thanked = (taken_back(right, text) for text in (DENIALS[0], "Thank you, that is all."))

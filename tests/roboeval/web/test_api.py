@@ -21,8 +21,12 @@ from codebotler.core.files import to_line
 from codebotler.web.access import Access, GuardRules
 from codebotler.web.guard import Guard
 from command_line import refused, roboeval
+from made_up_runs import made_up
 from pageserver import PageServer
 from roboeval.evaluation.runs.folder import RunFolder
+from roboeval.report.scores import results
+from roboeval.report.sheets import Section, Sheet
+from roboeval.report.writing import write_report
 from runs_server import serving
 
 HOSTILE = "<script>window.owned=1</script>[x](javascript:owned)\u202e\ud800\x00'\"&"
@@ -82,12 +86,14 @@ def test_one_run_has_the_numbers_of_show(server: PageServer, folder: Path) -> No
 
 
 def test_the_report_of_a_run_opens(server: PageServer, folder: Path) -> None:
+    report = folder / "hasty" / "report"
+    tables = [part for part in results([made_up("hasty", {"Visit": (3,)})]).parts if isinstance(part, Sheet)]
+    list(write_report("a report", [], [Section("results", tables)], report))  # figures take long
     assert server.call("GET", "/api/runs/hasty/report").status == 200
     table = server.call("GET", "/api/runs/hasty/tables/overall.csv")
     assert (table.status, table.text.startswith("model,")) == (200, True)
     assert server.call("GET", "/api/runs/hasty/tables/no.csv").status == 404
     assert server.call("GET", "/api/runs/hasty/tables/..%2F..%2Frun.csv").status == 404
-    report = folder / "hasty" / "report"
     shutil.rmtree(report)
     assert server.call("GET", "/api/runs/hasty/report").status == 404
     report.mkdir()

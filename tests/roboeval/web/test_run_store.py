@@ -60,6 +60,8 @@ def test_no_name_leads_out(runs: Path, name: str) -> None:
     "path", ["", "completions.jsonl", "run.json", "evaluations", "evaluations/paper.jsonl", "checks"]
 )
 def test_no_link_leads_out(runs: Path, path: str) -> None:
+    (runs / "hasty" / "checks").mkdir()
+    (runs / "hasty" / "checks" / "paper.jsonl").touch()
     secret = runs.parent / "secret"
     shutil.copytree(runs / "hasty", secret)
     link = runs / "hasty" / path
