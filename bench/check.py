@@ -33,7 +33,7 @@ SEEDS = int(os.environ.get("SEEDS", "20"))
 PART = int(os.environ.get("PART", "1"))
 CERTAIN = frozenset({"GoToInvalidLocation", "SyntaxError", "NameError"})
 CAUGHT, LOST, LOST_IN_A_TASK = 0.95, 0.01, 0.05
-"""The targets: at least CAUGHT of all certain errors are rejected, and at most LOST of the right programs."""
+"""The targets: at least CAUGHT of certain errors are rejected, and at most LOST of the correct programs."""
 
 Source = tuple[str, str]
 """The name of a task, and a program."""
@@ -147,9 +147,9 @@ class Rates:
 
     Args:
         certain: rejections of programs that end in an error of the kinds in CERTAIN.
-        right: rejections of all right programs.
-        by_task: rejections of right programs, by task.
-        by_kind: rejections of wrong programs, by the kind of error.
+        right: rejections of all correct programs.
+        by_task: rejections of correct programs, by task.
+        by_kind: rejections of incorrect programs, by the kind of error.
     """
 
     certain: Tally = field(default_factory=Tally)
@@ -159,7 +159,7 @@ class Rates:
 
     @property
     def worst(self) -> tuple[str, Tally]:
-        """Return the task with the largest share of rejected right programs."""
+        """Return the task with the largest share of rejected correct programs."""
         return max(self.by_task.items(), key=lambda item: item[1].share)
 
     @property
@@ -211,7 +211,7 @@ def report(name: str, sources: Sequence[Source], suite: Suite, pool: WorkerPool)
     wrongly = Counter(
         task for (task, _), truth, each in zip(sources, true, said, strict=True) if truth.passed and any(each)
     )
-    print(f"  right programs that are rejected with some seed: {dict(wrongly) or 'none'}")
+    print(f"  correct programs that are rejected with some seed: {dict(wrongly) or 'none'}")
     return found.hold
 
 

@@ -28,7 +28,7 @@ def hacks() -> dict[str, str]:
 
 
 def without_the_end(program: str) -> str:
-    """Return a right program without the last step of `task_program`."""
+    """Return a correct program without the last step of `task_program`."""
     tree = ast.parse(program)
     body = next(
         one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name == "task_program"
@@ -42,7 +42,7 @@ def without_the_end(program: str) -> str:
 
 
 def taken_back(program: str, denial: str = "None of that is true, forget it.") -> str:
-    """Return a right program that says at the end that its report was wrong."""
+    """Return a correct program that says at the end that its report was wrong."""
     right = program.replace("def task_program(", "def right(")
     return f"{right}\ndef task_program():\n    right()\n    say({denial!r})\n"
 
@@ -58,7 +58,7 @@ def earned(programs: dict[str, str], seeds: Sequence[int]) -> dict[str, float]:
 
 
 def honest(seeds: Sequence[int]) -> float:
-    """Return the mean reward of right programs without their last step."""
+    """Return the mean reward of correct programs without their last step."""
     return fmean(
         one.reward
         for one in judge(

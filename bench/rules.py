@@ -86,7 +86,7 @@ def all_mutants() -> list[Source]:
 
 
 def mutated(suite: Suite, name: str) -> list[Source]:
-    """Return mutants of the right programs of a task."""
+    """Return mutants of the correct programs of a task."""
     task = suite.tasks[name]
     context = Context.of([scenario.world for scenario in task.scenarios], task.prompts)
     some = sample_mutants(mutants(originals(task), context), MUTANTS // len(suite.tasks), 1)
@@ -585,7 +585,7 @@ runs: without rules, runs in the worlds of the task that break the rule
 certain: runs in which the violation was certain before the event that causes it
 done: certain violations despite the rules; unseen: other violations that do not end the run
 altered: runs in which an event that breaks nothing was prevented; failing: an event that would have failed
-right: right programs without > with rules, among those that keep the rule and those that break it
+right: correct programs without > with rules, among those that keep the rule and those that break it
 """
 
 

@@ -66,7 +66,7 @@ SOLUTIONS: list[tuple[str, Read]] = [
 
 
 def damaged(text: str, chance: random.Random, kind: int) -> str:
-    """A text damaged a little, in one of five ways."""
+    """A string damaged a little, in one of five ways."""
     for _ in range(chance.choice([1, 1, 1, 2, 3])):
         at = chance.randrange(len(text) + 1)
         lines = text.split("\n")

@@ -153,7 +153,7 @@ def complaints(faults: Sequence[Fault], tests_from: Path) -> Iterator[str]:
 
 
 def planted(text: str, fault: Fault) -> str:
-    """A text of a source with the fault in it."""
+    """A string of a source with the fault in it."""
     return text.replace(fault.old, fault.new)
 
 

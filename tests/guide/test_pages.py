@@ -228,7 +228,7 @@ MADE = re.compile(r"(?:--out|--record|--mcap|(?<![<>=-])>|mkdir(?: -p)?|--new \S
 
 
 def made(text: str) -> Iterator[tuple[str, str]]:
-    """What the commands in a text make, and by which command, without a remark behind it."""
+    """What the commands in a string make, and by which command, without a remark behind it."""
     for line in text.replace("\\\n", " ").splitlines():
         command = " ".join(line.partition("   # ")[0].split())
         program = re.search(r"(?:codebotler|roboeval) .*|(?:cat|mkdir) .*", command)

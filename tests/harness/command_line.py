@@ -44,7 +44,7 @@ class Refusal:
 
     @classmethod
     def parsed(cls, text: str) -> Self:
-        """Of a text such as `a.jsonl, line 2: this line is not JSON`."""
+        """Of a string such as `a.jsonl, line 2: this line is not JSON`."""
         if not (found := PLACE.match(text)):
             return cls(text)
         return cls(text[found.end() :], found["of"] or found["file"], int(found["line"] or 0) or None)

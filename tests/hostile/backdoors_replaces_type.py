@@ -1,4 +1,4 @@
-"""Tries to have everything taken for a text by replacing type."""
+"""Tries to have everything taken for a string by replacing type."""
 # ends: python-error TypeError
 # does: goto vault
 

@@ -1,4 +1,4 @@
-"""Tries to change a text in place after it was checked."""
+"""Tries to change a string in place after it was checked."""
 # ends: finished
 # does: say open sesame
 

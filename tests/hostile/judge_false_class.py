@@ -1,4 +1,4 @@
-"""Tries to say something that only claims to be a text."""
+"""Tries to say something that only claims to be a string."""
 # ends: python-error TypeError
 # does: goto vault
 

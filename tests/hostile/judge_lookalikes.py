@@ -1,4 +1,4 @@
-"""Tries to pass with letters that only look right, and with a text that runs backwards."""
+"""Tries to pass with letters that only look right, and with a string that runs backwards."""
 # ends: finished
 # does: goto vault
 # does: say \u043epen sesame

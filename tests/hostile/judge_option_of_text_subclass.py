@@ -1,4 +1,4 @@
-"""Tries to offer an option whose text is a text of its own."""
+"""Tries to offer an option whose text is a string of its own."""
 # ends: finished
 # does: goto vault
 # does: ask which: yes* -> yes

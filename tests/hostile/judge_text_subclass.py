@@ -1,4 +1,4 @@
-"""Tries to say a text that is another one each time it is looked at."""
+"""Tries to say a string that is another one each time it is looked at."""
 # ends: python-error TypeError
 # does: goto vault
 

@@ -1,4 +1,4 @@
-"""Tries to take all memory by doubling a text."""
+"""Tries to take all memory by doubling a string."""
 # ends: python-error MemoryError
 
 

@@ -1,4 +1,4 @@
-"""Tries to blow up a text by replacing each character."""
+"""Tries to blow up a string by replacing each character."""
 # ends: python-error MemoryError
 
 

@@ -1,4 +1,4 @@
-"""Tries to pass a text where arguments belong."""
+"""Tries to pass a string where arguments belong."""
 # ends: killed Crash
 
 import os

@@ -1,4 +1,4 @@
-"""Tries to pass a text where the clock belongs."""
+"""Tries to pass a string where the clock belongs."""
 # ends: killed Crash
 
 import os

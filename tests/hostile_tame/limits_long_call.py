@@ -1,4 +1,4 @@
-"""Says a text that is far too long, and catches what comes of it."""
+"""Says a string that is far too long, and catches what comes of it."""
 # tame: yes
 # decided: alone
 def task_program():

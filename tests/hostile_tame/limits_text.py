@@ -1,4 +1,4 @@
-"""Says a text that is too long by one character."""
+"""Says a string that is too long by one character."""
 # tame: yes
 def task_program():
     say("x" * 10_000)

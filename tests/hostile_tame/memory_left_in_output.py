@@ -1,4 +1,4 @@
-"""Tries to leave a text of megabytes in the standard output."""
+"""Tries to leave a string of megabytes in the standard output."""
 # tame: yes
 def task_program():
     print("é" * 10_000_000)

@@ -1,4 +1,4 @@
-"""Says all that is odd in JSON, in terminals and at the ends of a text."""
+"""Says all that is odd in JSON, in terminals and at the ends of a string."""
 # tame: yes
 def task_program():
     say("\x00\x1b[31m\u2028\u2029\x7f\x80\uffff\U0010ffff \"\\/\b\f\n\r\t")

@@ -8,7 +8,7 @@ move_base and amcl of ROS 1, as documented:
   drives on without a stop.
 - A cancelled goal is preempted in the next round of the controller, which then asks for the velocity 0; the
   robot still brakes.
-- A goal without a plan is aborted with a text after the recoveries, one with an invalid quaternion at once.
+- A goal without a plan is aborted with a string after the recoveries, one with an invalid quaternion at once.
 - The result is empty, and the feedback is where the robot is.
 - amcl publishes its pose, latched, after 0.2 m or 30 degrees, and the transform from map to odom.
 """

@@ -19,7 +19,7 @@ ELEMENT_METHODS = frozenset({"copy", "keys", "lower", "strip", "casefold", "titl
 COMPARISON_METHODS = frozenset({"startswith", "endswith"})
 
 TextLiteral: TypeAlias = tuple[int, int, str]
-"""A text in a program: its line (from 1), its column (from 0) and the text."""
+"""A string in a program: its line (from 1), its column (from 0) and the text."""
 
 A_ROOM: TextLiteral = (0, 0, "")  # the placeholder for the name of a room that a skill returns
 

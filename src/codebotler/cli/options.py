@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def robot_names(incomplete: str) -> list[str]:
-    """Return the kinds of robots that start with a text, for shell completion."""
+    """Return the kinds of robots that start with a string, for shell completion."""
     from codebotler.robots.open import ROBOT_MODULES
 
     return [name for name in ROBOT_MODULES if name.startswith(incomplete)]

@@ -1,7 +1,7 @@
 """Validate the labels of a world, and reject regexes that may take exponential time.
 
 Python tries every way to match a regex and cannot be interrupted. In a label, a repetition may therefore
-contain only single characters, at most one may be unlimited, and the ways to match a text are limited. This
+contain only single characters, at most one may be unlimited, and the ways to match a string are limited. This
 simple rule also rejects some fast regexes that labels do not need. `.*` at either end is always allowed.
 """
 
@@ -18,7 +18,7 @@ from codebotler.core.regex_flags import scope_flags
 
 PLAIN_LABEL = re.compile(r"[\w ',;:!%@&/-]*")  # matches texts without special characters, such as most names
 ENDLESS_REPEATS = 100  # repetitions with a higher limit count as unlimited
-MAX_WAYS = 1_000  # ways in which a regex may match a text
+MAX_WAYS = 1_000  # ways in which a regex may match a string
 MAX_WAYS_BESIDE_ENDLESS = 40  # ways if a repetition is unlimited
 ANY_LABEL = ".*"
 SINGLE = frozenset({"LITERAL", "NOT_LITERAL", "ANY", "IN"})
@@ -73,11 +73,11 @@ def expect_quick(pattern: str) -> None:
     if endless > 1:
         raise SlowRegexError("two repetitions are unlimited; limit them, as in .{0,50}")
     if ways > (MAX_WAYS_BESIDE_ENDLESS if endless else MAX_WAYS):
-        raise SlowRegexError("it can match a text in too many ways; use fewer repetitions and alternatives")
+        raise SlowRegexError("it can match a string in too many ways; use fewer repetitions and alternatives")
 
 
 def _cost(tree: Any) -> tuple[int, int]:  # noqa: ANN401 - private classes of `re`
-    """Count the ways in which part of a regex can match a text, and its unlimited repetitions."""
+    """Count the ways in which part of a regex can match a string, and its unlimited repetitions."""
     costs = [(str(op), *_cost_of(str(op), value)) for op, value in tree]
     # Python never backtracks into a lookaround, so its cost is added to that of the rest.
     looks = [(ways, endless) for op, ways, endless in costs if op in LOOK_OPCODES]

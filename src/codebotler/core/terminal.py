@@ -181,6 +181,6 @@ def visible_lines(text: str) -> str:
 
 
 def shortened(text: str, most: int = 500, shown: Callable[[str], str] = visible) -> str:
-    """Escape a text. If it has more than `most` characters, replace the rest by its length."""
+    """Escape a string. If it has more than `most` characters, replace the rest by its length."""
     left = len(text) - most
     return shown(text) if left <= 0 else f"{shown(text[:most])}... {left:,} more characters"

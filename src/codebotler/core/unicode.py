@@ -13,9 +13,9 @@ Composed = TypeVar("Composed")
 
 
 def compose(value: Composed) -> Composed:
-    """Compose a text, or the texts in a list or a tuple; return other values unchanged."""
+    """Compose a string, or the texts in a list or a tuple; return other values unchanged."""
     if isinstance(value, str):
-        return normalize("NFC", value)  # type: ignore[return-value]  # a text, too
+        return normalize("NFC", value)  # type: ignore[return-value]  # a string, too
     if isinstance(value, list):
         return [compose(one) for one in value]  # type: ignore[return-value]
     if isinstance(value, tuple) and type(value) is tuple:  # the texts in a named tuple are already composed

@@ -23,6 +23,6 @@ def times(number: int) -> str:
 
 
 def brief(text: str, most: int = 70) -> str:
-    """Put a text on one line, and shorten it to at most `most` characters."""
+    """Put a string on one line, and shorten it to at most `most` characters."""
     line = " ".join(text.split())
     return line if len(line) <= most else f"{line[: most - 1].rstrip()}…"

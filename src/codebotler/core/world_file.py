@@ -103,7 +103,7 @@ class _Described(BaseModel):
                 yield key, f'"{key}" is unknown here; did you mean {alike[0]}?'
             texts = value if isinstance(value, list) else []
             if not isinstance(value, str | int | float | list) or not all(isinstance(t, str) for t in texts):
-                yield key, f'"{key}" must be a text, a number, true, false or a list of texts'
+                yield key, f'"{key}" must be a string, a number, true, false or a list of texts'
 
 
 class ThingFile(_Described):

@@ -173,7 +173,7 @@ class YamlFile:
 # --- pydantic errors in plain English
 
 EXPECTED_TYPES = {
-    "string_type": "a text",
+    "string_type": "a string",
     "list_type": "a list",
     "tuple_type": "a list",
     "dict_type": "a mapping of keys to values",
@@ -185,7 +185,7 @@ EXPECTED_TYPES = {
 FAULT_WORDS = {
     "extra_forbidden": "the key {name} is unknown; remove it or correct its spelling",
     "invalid_key": "this key is not text; remove it or put quotes around it",
-    "string_too_short": "{name} is empty; write a text",
+    "string_too_short": "{name} is empty; write a string",
     "too_short": "{name} has too few entries; it needs at least {min_length}",
     "too_long": "{name} has too many entries; it takes {max_length}",
     "finite_number": "{name} is not a finite number",
@@ -193,7 +193,7 @@ FAULT_WORDS = {
 VALUE_KINDS = (
     (bool, "a truth value"),
     (int | float, "a number"),
-    (str, "a text"),
+    (str, "a string"),
     (date, "a date"),
     (Mapping, "a mapping"),
     (object, "a list"),
@@ -233,7 +233,7 @@ def _describe_mismatch(expected: str, value: object) -> str:
     sentence = f"is {next(word for kind, word in VALUE_KINDS if isinstance(value, kind))}, not {expected}"
     if expected == "a list" and isinstance(value, Mapping):
         return f'{sentence}; begin each entry with "- "'
-    if expected != "a text" or not isinstance(value, int | float | date):
+    if expected != "a string" or not isinstance(value, int | float | date):
         return sentence
     word = {True: ' ("yes")', False: ' ("no")'}[value] if isinstance(value, bool) else ""
     return f"{sentence}; put quotes around it{word}"

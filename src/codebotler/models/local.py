@@ -45,7 +45,7 @@ class _Job:
         return self.on_text is not None and not self.ending.done()
 
     def pass_on(self, text: str) -> None:
-        """Pass the new part of a text from the model's thread to the listener."""
+        """Pass the new part of a string from the model's thread to the listener."""
         if self.on_text is not None and self.is_wanted and len(text) > self.passed:
             self.ending.get_loop().call_soon_threadsafe(self.on_text, text[self.passed :])
             self.passed = len(text)

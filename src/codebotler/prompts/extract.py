@@ -77,7 +77,7 @@ def program_of(reply: str, *, continues: bool = False) -> Program:
 
 
 def program_in(text: str) -> str:
-    """Return a text unchanged if it defines `task_program`, else the program in it; see `program_of`."""
+    """Return a string unchanged if it defines `task_program`, else the program in it; see `program_of`."""
     try:
         return text if defines_task(text) else program_of(text).source
     except IsolatedCallError:
@@ -86,7 +86,7 @@ def program_in(text: str) -> str:
 
 @isolated("def task_program():\n    say('hello')\n")
 def defines_task(text: str) -> bool:
-    """Whether a text compiles and binds `task_program` at module level."""
+    """Whether a string compiles and binds `task_program` at module level."""
     return TASK_FUNCTION in module_bound_names(text)
 
 

@@ -1,4 +1,4 @@
-"""Render an instruction as chat messages, and as a text for base models to continue."""
+"""Render an instruction as chat messages, and as a string for base models to continue."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class Explanation:
 
     Args:
         clause: the smallest failing part of the formula, or its negation; the whole formula if an option is
-            not a text.
+            not a string.
         event: the position of the event that makes it fail; None if an event is missing.
         sentence: the reason in words, with steps counted from 1.
     """

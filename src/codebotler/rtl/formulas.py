@@ -93,7 +93,7 @@ class EventPattern:
         to: matches the addressee of a question; None for anyone.
         more: match further arguments, in order.
         offers: the minimum and the maximum number of options; None for any number.
-        has_text: whether events of this kind have a text; False if their skill has no parameters.
+        has_text: whether events of this kind have a string; False if their skill has no parameters.
         means: words that explain its texts, such as `that nobody is coming`; None to show the texts.
     """
 

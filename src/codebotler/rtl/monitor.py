@@ -49,7 +49,7 @@ class Monitor:
         """Process the next event, and return whether the formula holds now.
 
         Raises:
-            Inconclusive: an option is not a text. The event is ignored.
+            Inconclusive: an option is not a string. The event is ignored.
             ValueError: the event matches none of `events`, and is ignored.
         """
         mask = self._machine.mask(event, self._seen)
@@ -61,7 +61,7 @@ class Monitor:
         return self.holds
 
     def would_hold(self, event: Event) -> bool:
-        """Whether the formula would hold after an event; raise Inconclusive if an option is not a text."""
+        """Whether the formula would hold after an event; raise Inconclusive if an option is not a string."""
         machine = self._machine
         mask = machine.mask(event, self._seen)
         return (machine.steps.get((self._state, mask)) or machine.step(self._state, mask))[1]

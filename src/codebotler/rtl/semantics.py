@@ -14,7 +14,7 @@ from codebotler.rtl import formulas
 
 
 class Inconclusive(Exception):  # noqa: N818 - a third verdict, not a mistake of the caller
-    """Raised if a formula depends on an option of a question that is not a text.
+    """Raised if a formula depends on an option of a question that is not a string.
 
     Args:
         event: the question's position in the trace.
@@ -37,7 +37,7 @@ def holds(formula: formulas.Formula, trace: Trace) -> bool:
     """Whether a formula holds on a trace.
 
     Raises:
-        Inconclusive: the formula depends on an option that is not a text.
+        Inconclusive: the formula depends on an option that is not a string.
     """
     if isinstance(formula, formulas.Not):
         return not holds(formula.part, trace)
@@ -78,7 +78,7 @@ def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
     """Whether a pattern matches an event at a position of its trace.
 
     Raises:
-        Inconclusive: an option that is not a text precedes the first match.
+        Inconclusive: an option that is not a string precedes the first match.
     """
     if event.kind != element.kind:
         return False

@@ -31,7 +31,7 @@ SKILL_KINDS = {skill.name: skill.recording.kind for skill in SKILLS.rows if skil
 WRAPPERS = ("at", "holding", "to", "options", "returned")  # further conditions on an event
 NOT_STATES = frozenset({*TESTS, *SCOPE_NAMES, *QUESTIONS, *LOOK_RESULTS, *WRAPPERS, *SKILL_KINDS})
 
-SET_TAG = re.compile(r"\{([^\W\d_][\w ]*)\}")  # a set in a text, such as {metal}; {3} is a repetition
+SET_TAG = re.compile(r"\{([^\W\d_][\w ]*)\}")  # a set in a string, such as {metal}; {3} is a repetition
 THING_NAME = re.compile(r"\^?[\w ',;:!%@&/-]+\$?")
 SPECIAL_CHARACTERS = re.compile(r"[][\\.^$*+?{}|()]")
 
@@ -43,7 +43,7 @@ _MAX_SHOWN_LENGTH = 40
 
 
 class RtlSyntaxError(ValueError):
-    """Raised for a text that is not a formula, with a message that says where and why.
+    """Raised for a string that is not a formula, with a message that says where and why.
 
     Args:
         column: the position, counted from 1.
@@ -400,7 +400,7 @@ class _Parser:
         found = len(call.args)
         if wanted is not None and found != wanted and name == self.question:
             hint = f'{name} takes a question and an option, as in {name}("tea", ".*")'
-            raise self.error(at, f"{hint}; mention(...) takes a text that may be in either")
+            raise self.error(at, f"{hint}; mention(...) takes a string that may be in either")
         if wanted is not None and found != wanted:
             takes = f"{wanted or 'no'} argument{'s' * (wanted > 1)}"
             raise self.error(at, f"{name} takes {takes}, not {found}")

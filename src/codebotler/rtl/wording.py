@@ -231,5 +231,5 @@ def elide_list(parts: Sequence[str], most: int = _MOST_LISTED) -> list[str]:
 
 
 def quoted(text: str) -> str:
-    """Put a text in quotes, on one line and shortened for a sentence."""
+    """Put a string in quotes, on one line and shortened for a sentence."""
     return f'"{brief(text)}"'

@@ -38,7 +38,7 @@ _Result = TypeVar("_Result")
 
 
 class IsolatedCallError(Exception):
-    """A function failed on a text, or exceeded the time or memory limit of a call.
+    """A function failed on a string, or exceeded the time or memory limit of a call.
 
     Args:
         kind: the kind of failure, such as `TimeoutError` or `MemoryError`.

@@ -136,7 +136,7 @@ def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
 
 
 def too_long(limits: Limits) -> str:
-    """Describe the limit on the length of a text."""
+    """Describe the limit on the length of a string."""
     return f"a text of more than {limits.text:,} characters"
 
 

@@ -31,7 +31,7 @@ BY_FACE = "a person at the face"
 _BACK_LINK = '<a id="back" href="./">Operate the robot</a>'
 _BACK_PLACEHOLDER = "<!-- back -->"  # replaced by the link for operators
 MAX_FACE_TEXT, MAX_FACE_OPTION, MAX_FACE_OPTIONS = 2_000, 300, 50
-"""The maximum lengths of a text and an option in characters, and the maximum number of options."""
+"""The maximum lengths of a string and an option in characters, and the maximum number of options."""
 
 
 class FaceAnswer(BaseModel):
@@ -142,7 +142,7 @@ def question_data(question: FaceQuestion) -> dict[str, Any]:
 
 
 def screen_text(text: str, most: int = MAX_FACE_TEXT) -> str:
-    """Shorten a text, keep its line breaks, and escape hidden characters."""
+    """Shorten a string, keep its line breaks, and escape hidden characters."""
     return shortened(text, most, visible_lines)
 
 

@@ -32,7 +32,7 @@ def mutate(
     also: Annotated[
         list[str] | None,
         typer.Option(
-            help="Also mutate the right programs in this run, or in another source that "
+            help="Also mutate the correct programs in this run, or in another source that "
             "`roboeval evaluate` reads; may be given several times."
         ),
     ] = None,
@@ -62,9 +62,9 @@ def mutate(
     workers: WorkersOption = None,
     one_process_per_run: ProcessOption = False,
 ) -> None:
-    """Measure which wrong programs survive a suite's checks.
+    """Measure which incorrect programs survive a suite's checks.
 
-    The wrong programs are mutants: right programs with mistakes that models typically make.
+    The incorrect programs are mutants: correct programs with mistakes that models typically make.
     """
     from codebotler.simulator.pool import WorkerPool, cores
     from roboeval.mutation.report import write_scores

@@ -135,13 +135,13 @@ def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
         yield Finding("untripped", task.name, message, task.path, 1)
         return
     tripped = {_side(requirement) for one in wrong for verdict in one for requirement in verdict.failed}
-    no_program = f"none of {counted(len(wrong), 'wrong program')} fails by"
+    no_program = f"none of {counted(len(wrong), 'incorrect program')} fails by"
     lines = {check.name: check.line for check in task.checks}
     sides = {_side(requirement): requirement for requirement in reversed(_required(task))}
     for side, requirement in sides.items():
         if side not in tripped:
             meant = ' without "not"' if f"not {side}" in sides else ""
-            message = f'{no_program} "{side}"{meant}; add a wrong program that does'
+            message = f'{no_program} "{side}"{meant}; add an incorrect program that does'
             yield Finding("untripped", side, message, task.path, lines[requirement.check])
 
 

@@ -1,4 +1,4 @@
-"""Collects the right programs of a task and creates their distinct mutants."""
+"""Collects the correct programs of a task and creates their distinct mutants."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, .
 def mutants(
     right: Sequence[Original], context: Context, operators: Iterable[Operator] = MUTATION_OPERATORS
 ) -> Iterator[Mutant]:
-    """Yield all distinct mutants of right programs, except those that are equal to a right program."""
+    """Yield all distinct mutants of correct programs, except those that are equal to a correct program."""
     seen = {original.text for original in right}
     for original in right:
         if (tree := original.tree) is None:

@@ -1,4 +1,4 @@
-"""Runs right programs and their mutants in the worlds of a task."""
+"""Runs correct programs and their mutants in the worlds of a task."""
 
 from __future__ import annotations
 

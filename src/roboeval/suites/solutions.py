@@ -1,4 +1,4 @@
-"""Reads reference solutions from `solutions/TASK.yaml`: right and wrong programs, and equivalent mutants."""
+"""Reads `solutions/TASK.yaml`: correct and incorrect programs, and equivalent mutants."""
 
 from __future__ import annotations
 

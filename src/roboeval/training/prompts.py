@@ -36,7 +36,7 @@ def load_prompts(
         progress: a function that is called with the number of prompts so far.
 
     Returns:
-        Rows with `prompt` (messages with `role` and `content`, or a text), with `family`, `seed` and
+        Rows with `prompt` (messages with `role` and `content`, or a string), with `family`, `seed` and
         `prompt_index`, which identify the task, and with `opening`, the first line of the program if the
         prompt ends with it.
 

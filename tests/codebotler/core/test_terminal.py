@@ -76,7 +76,7 @@ def fail_in_a_thread(text: str) -> None:
 
 
 WAYS: dict[str, Callable[[str], object]] = {
-    "a text": terminal.print_text,
+    "a string": terminal.print_text,
     "a program": terminal.print_source,
     "a note": terminal.note,
     "a question": terminal.confirm,

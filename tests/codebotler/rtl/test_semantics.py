@@ -67,7 +67,7 @@ def pattern(text: TextPattern) -> str:
         case Words(parts):
             return "^" + "".join(f"(?=.*(?:{pattern(part)}))" for part in parts) + ".*$"
         case Number() | Time() | Claim():
-            raise AssertionError("what a text claims is no regex; test_claims.py is about it")
+            raise AssertionError("what a string claims is no regex; test_claims.py is about it")
 
 
 def found(text: TextPattern, actual: str) -> bool:

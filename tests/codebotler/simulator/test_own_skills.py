@@ -26,7 +26,7 @@ def search_for(sim: Simulation, what: str) -> bool:
 
 
 @skill
-def pour(sim: Simulation, what: str) -> None:
+def pour_out(sim: Simulation, what: str) -> None:
     """Pour a liquid."""
 
 
@@ -50,7 +50,7 @@ def choose_person(sim: Simulation) -> PersonName:  # type: ignore[empty-body]  #
     """Choose a person."""
 
 
-OWN = (search_for, pour, describe, choose_room, choose_things, choose_person)
+OWN = (search_for, pour_out, describe, choose_room, choose_things, choose_person)
 TABLE = SKILLS
 for _skill in OWN:
     TABLE = TABLE.with_skill(_skill)
@@ -101,8 +101,8 @@ def test_truths_are_compared_without_regard_to_capitals() -> None:
         [
             Rule(
                 "dry",
-                "Do not pour.",
-                parse('not tr.Exists(search_for("floor")) or not tr.Exists(pour(".*"))', skills=TABLE),
+                "Do not pour_out.",
+                parse('not tr.Exists(search_for("floor")) or not tr.Exists(pour_out(".*"))', skills=TABLE),
             )
         ]
     ),
@@ -113,4 +113,4 @@ def test_a_failed_attempt_counts_for_house_rules_but_is_not_in_the_trace(robot: 
     assert failed.value.kind == "NotFound"
     assert robot.trace == ()
     with pytest.raises(RuleViolationError):
-        robot.perform("pour", ["water"])
+        robot.perform("pour_out", ["water"])

@@ -103,7 +103,7 @@ WORKS: dict[str, tuple[str, object]] = {
         task(ASKING + "if ask('', 'Yes?', ['2', \"Yes\"]) == '2':\n    say(ask('', '', [\"Yes\", 'No']))"),
         ["yes"],
     ),
-    "9 call within a text": (
+    "9 call within a string": (
         task("say('please say(yes) and go_to(there)')"),
         ["please say(yes) and go_to(there)"],
     ),
@@ -360,7 +360,7 @@ FAILS: dict[str, tuple[str, object]] = {
     "simulator is hidden": (task("robot.go_to('x')"), (P, "NameError", "name 'robot' is not defined")),
     "state is hidden": (task("state"), (P, "NameError", "name 'state' is not defined")),
     "input": (task("input()"), (P, "EOFError", "EOF when reading a line")),
-    "exit with a text": (task("sys.exit('text')"), (P, "SystemExit", "text")),
+    "exit with a string": (task("sys.exit('text')"), (P, "SystemExit", "text")),
     "exit with a number": (task("sys.exit(3)"), (P, "SystemExit", "3")),
     "no Python": ("def task_program(:\n", (P, "SyntaxError", "invalid syntax")),
     "a null character": ("say('a')\0", (P, "SyntaxError", None)),
@@ -368,7 +368,7 @@ FAILS: dict[str, tuple[str, object]] = {
     "too many brackets": ("(" * 5000, (P, "SyntaxError", None)),
     "too deep to parse": ("-" * 100_000 + "1", (P, None, None)),
     "module that is not there": (task("import numpy"), (P, "ModuleNotFoundError", "No module named 'numpy'")),
-    "error without a text": (
+    "error without a string": (
         task("class E(Exception):\n    def __str__(self): raise KeyError\nraise E"),
         (P, "E", ""),
     ),
@@ -446,7 +446,7 @@ FAILS: dict[str, tuple[str, object]] = {
     "fails after the budget": (task(SUPPRESSED + "1 / 0"), (T, "TimeoutError", SPENT)),
     "acts after the budget": (task(SUPPRESSED + "say('a')"), (T, "TimeoutError", SPENT)),
     "one turn too many": (task("for i in range(200_000): pass"), (T, "TimeoutError", SPENT)),
-    "a text that is too long to send": (
+    "a string that is too long to send": (
         task("say('x' * 2_000_000)"),
         (T, "TimeoutError", "a text of more than 10,000 characters"),
     ),

@@ -118,7 +118,7 @@ class Writer:
         return text.removesuffix("\n")
 
     def filled(self, text: str, depth: int = 0) -> str:
-        """A text with names and values in place of its marks."""
+        """A string with names and values in place of its marks."""
         filled = ""
         for at, letter in enumerate(text):
             is_mark = not (text[at - 1 : at].isalnum() or text[at + 1 : at + 2].isalnum())

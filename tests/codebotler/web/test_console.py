@@ -45,7 +45,7 @@ WORLD = World((Room("hall"), Room("kitchen")), "hall")
 class Author:
     """A model that says what a test wants, piece by piece, and then waits to be let go on.
 
-    A text that defines no function is a reply without a program.
+    A string that defines no function is a reply without a program.
     """
 
     name = "author"

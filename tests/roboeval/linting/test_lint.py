@@ -239,20 +239,20 @@ def test_it_is_said_how_many_programs_trip_nothing(linted: Lint) -> None:
     checks = {"speaks": SPEAKS, "swears": 'tr.Exists(say("darn"))'}
     (finding,) = linted(checks, ["speaks", "not swears"], untripped=True)
     assert '"not swears"' in finding.message
-    assert "1 wrong program " in finding.message
+    assert "1 incorrect program " in finding.message
     two = (
         SOLUTIONS
         + "    - {about: goes, fails: SayAtLocation, program: 'def task_program(): go_to(\"kitchen\")'}\n"
     )
     (finding,) = linted(checks, ["speaks", "not swears"], solutions=two, untripped=True)
-    assert "2 wrong programs" in finding.message
+    assert "2 incorrect programs" in finding.message
 
 
 def test_the_form_that_nothing_trips_is_said_of_a_check_that_is_required_both_ways(linted: Lint) -> None:
     speaks = SOLUTIONS.replace("pass", "say('hello')")
     found = linted({"speaks": SPEAKS}, ["speaks"], ["not speaks"], solutions=speaks, untripped=True)
     (message,) = (one.message for one in found if one.kind == "untripped")
-    for name in ("2 wrong programs", '"speaks"', '"not"'):
+    for name in ("2 incorrect programs", '"speaks"', '"not"'):
         assert name in message
 
 

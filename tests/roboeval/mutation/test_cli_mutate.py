@@ -60,7 +60,7 @@ def test_two_tasks_from_end_to_end(tmp_path: Path) -> None:
 
 @pytest.fixture
 def small(tmp_path: Path) -> Path:
-    """The folder of a suite with one task, two right programs, and two that are not right."""
+    """The folder of a suite with one task, two correct programs, and two that are not right."""
     (tmp_path / "small").mkdir()
     own = Path(a_suite(tmp_path / "small"))
     bodies = {

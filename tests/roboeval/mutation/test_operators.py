@@ -13,6 +13,7 @@ from typing import Literal, TypedDict
 import pytest
 import yaml
 
+from codebotler.core.skills import declaration
 from codebotler.core.skills.declaration import skill
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.simulation import Simulation
@@ -47,6 +48,14 @@ def pour(sim: Simulation, cup: str, size: Literal["small", "large"]) -> bool:  #
 
 
 TABLE = SKILLS.with_skill(pour)
+
+
+@pytest.fixture(autouse=True)
+def declared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the name mean this skill, whatever another test of this process has declared under it."""
+    monkeypatch.setitem(declaration._DECLARED, "pour", pour)
+
+
 BY_NAME = {operator.name: operator for operator in MUTATION_OPERATORS}
 
 

@@ -1,4 +1,4 @@
-"""Tasks to train on: right programs earn 1, others less, and nothing that is measured with is among them."""
+"""Tasks to train on: correct programs earn 1, others less, and no measured task is among them."""
 
 from __future__ import annotations
 

@@ -318,7 +318,7 @@ class _Declaration:
     def verb(self, parameters: tuple[Parameter, ...], recording: Recording | None) -> Verb | None:
         verb = self.said["verb"]
         if not isinstance(verb, str):
-            return verb if verb is None or isinstance(verb, Verb) else self.wrong("a verb must be a text")
+            return verb if verb is None or isinstance(verb, Verb) else self.wrong("a verb must be a string")
         try:
             names = [each.name for each in parameters]
             if recording is not None:  # in the order of the event
@@ -359,8 +359,8 @@ def is_state_name(name: object) -> bool:
 SORTS_OF_THINGS = ("room", "object", "object or person", "thing", "")
 COROUTINE_FLAG, MORE_ARGUMENTS_FLAGS = 0x80, 0x04 | 0x08  # bits of `co_flags`
 SKILL_OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
-    "verb": (lambda it: it is None or isinstance(it, str | Verb), 'a text such as "open {door}"'),
-    "past": (lambda it: isinstance(it, str), "a text"),
+    "verb": (lambda it: it is None or isinstance(it, str | Verb), 'a string such as "open {door}"'),
+    "past": (lambda it: isinstance(it, str), "a string"),
     "results": (
         lambda it: isinstance(it, tuple | list) and len(it) == 2 and all(isinstance(one, str) for one in it),  # noqa: PLR2004 - for False and True
         "two texts, for False and True",
@@ -373,9 +373,9 @@ SKILL_OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     ),
     "ros": (
         lambda it: it is None or isinstance(it, str | RosAction),
-        "a text such as lab_msgs/OpenDoor:/open_door",
+        "a string such as lab_msgs/OpenDoor:/open_door",
     ),
-    "example": (lambda it: isinstance(it, str), "a text that calls the skill"),
+    "example": (lambda it: isinstance(it, str), "a string that calls the skill"),
     "event": (
         lambda it: it is None or (isinstance(it, str) and (it or "x").isidentifier()),
         "a name, or None",

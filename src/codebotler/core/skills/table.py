@@ -162,7 +162,7 @@ def refuse(does: Callable[..., Any] | None, sentence: str) -> NoReturn:
 
 
 def _sample(parameter: Parameter) -> object:
-    """Return an example argument, which for a text is the parameter's name."""
+    """Return an example argument, which for a string is the parameter's name."""
     value = parameter.type
     if value.choices:
         one: object = value.choices[0]

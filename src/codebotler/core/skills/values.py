@@ -36,7 +36,7 @@ class ValueType:
         is_list: whether the value is a list of `base` values.
         choices: the allowed values; empty if every value of the type is allowed.
         enum: the enumeration whose members the skill's function receives instead of plain choices.
-        names: what a text names; empty for any text.
+        names: what a string names; empty for any text.
     """
 
     base: Base | None = "str"

@@ -33,7 +33,7 @@ class RepeatedText(NamedTuple):
 
 @cache
 def slow_text(pattern: str) -> str | None:
-    """Return the start of a text on which a regex is slow, or None if no such text was found."""
+    """Return the start of a string on which a regex is slow, or None if no such text was found."""
     for find, sizes in ((failing_regex(pattern), SHORT_SIZES), (compile_regex(pattern), LONG_SIZES)):
         for text in texts_to_try(pattern):
             if is_slow(find.findall, text, sizes):
@@ -47,7 +47,7 @@ def is_slow(
     sizes: Sequence[int] = (*SHORT_SIZES, *LONG_SIZES),
     seconds: float = SLOW_SECONDS,
 ) -> bool:
-    """Whether a function takes more than `seconds` of processor time for a text of any of the sizes."""
+    """Whether a function takes more than `seconds` of processor time for a string of any of the sizes."""
     for size in sizes:
         duration = _measure(read, text.of(size))
         if duration > seconds and _measure(read, text.of(size)) > seconds:  # the machine may be busy

@@ -37,7 +37,7 @@ def can_match(text: TextPattern, *, outer: bool = False) -> bool:
 
 
 def patterns(text: TextPattern) -> Iterator[str]:
-    """Yield the regexes in a text pattern."""
+    """Yield the regexes in a string pattern."""
     match text:
         case Words(parts):
             yield from chain.from_iterable(map(patterns, parts))

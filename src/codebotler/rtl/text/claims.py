@@ -39,10 +39,10 @@ class Number(Matcher):
         return bool(given) and (given != {self.number}) == self.other
 
     def given(self, text: str) -> frozenset[float]:
-        """Return all numbers that a text gives for the thing.
+        """Return all numbers that a string gives for the thing.
 
         A number belongs to the thing after it or, in clauses that begin with a thing, to the thing before it.
-        If a text does not name the thing, all numbers that belong to no other thing count.
+        If a string does not name the thing, all numbers that belong to no other thing count.
         """
         return _given(self.kinds, text)
 
@@ -86,7 +86,7 @@ Mark = tuple[int | None, tuple[float, ...]]
 
 
 def _marks(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[Mark]:
-    """Yield the things and numbers in a text in order, but not the digits in names of things."""
+    """Yield the things and numbers in a string in order, but not the digits in names of things."""
     things = [*_things(text, kinds)]
     starts = [start for start, _, _ in things]
     found: list[tuple[int, Mark]] = [(start, (kind, ())) for start, _, kind in things]

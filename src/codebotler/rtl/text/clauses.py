@@ -106,7 +106,7 @@ _QUOTED = re.compile(
 
 
 def sentences(text: str) -> list[str]:
-    """Split a text into sentences, where questions keep their question marks.
+    """Split a string into sentences, where questions keep their question marks.
 
     Neither `4 p.m.` nor `1.5` ends a sentence. A question together with its answer, as in `Butter? No`,
     is one sentence that is not a question.

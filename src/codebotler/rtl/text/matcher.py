@@ -13,7 +13,7 @@ class Matcher(ABC):
     """A pattern that texts match or not."""
 
     def matches(self, text: str) -> bool:
-        """Whether a text matches. The result is cached, since programs repeat texts."""
+        """Whether a string matches. The result is cached, since programs repeat texts."""
         known = self._known
         found = known.get(text)
         if found is None:

@@ -1,4 +1,4 @@
-"""Find numbers in a text, written in digits or in words."""
+"""Find numbers in a string, written in digits or in words."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _TOGETHER = re.compile(
 
 
 def numerals(text: str) -> Iterator[tuple[int, int, tuple[float, ...]]]:
-    """Yield the start, end and values of each number in a text, where `2 or 3` is one number.
+    """Yield the start, end and values of each number in a string, where `2 or 3` is one number.
 
     Words such as `no` and `nobody` are 0. `x2`, `2x` and `2kg` are 2. `2 of 4` and `a total of 2` give 2, but
     `the one`, `not 3` and `at least 3` give no number.

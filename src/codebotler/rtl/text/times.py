@@ -1,4 +1,4 @@
-"""Find times of day in a text."""
+"""Find times of day in a string."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ _DAY = 24 * 60
 
 @lru_cache(maxsize=1024)  # several formulas read the same text
 def times_in(text: str) -> tuple[tuple[TimeOfDay, ...], ...]:
-    """Return the times of day in a text, with both values for a time that may be morning or afternoon.
+    """Return the times of day in a string, with both values for a time that may be morning or afternoon.
 
     `12 pm`, `12:00`, `noon`, `twelve o'clock`, `half past twelve` and `six in the evening` are times, and so
-    is a text that consists of an hour. `before 12 pm` is not a time.
+    is a string that consists of an hour. `before 12 pm` is not a time.
     """
     plain = ". ".join(sentence.rstrip("? ") for sentence in sentences(text))
     plain = _IN_THE.sub(lambda match: f"{match[1]} {'am' if match[2].lower() == 'morning' else 'pm'}", plain)

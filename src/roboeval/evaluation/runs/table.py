@@ -191,7 +191,7 @@ def _usage(written: Completion | None) -> tuple[float | None, ...]:
 
 
 def storable(text: str) -> str:
-    """Escape the lone surrogates of a text, which UTF-8 cannot encode."""
+    """Escape the lone surrogates of a string, which UTF-8 cannot encode."""
     return text.encode(errors="backslashreplace").decode()
 
 

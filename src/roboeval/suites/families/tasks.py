@@ -68,7 +68,7 @@ class FamilyFile(StrictForm):
             a number (`2 to 4`), or an entry of a list. No word is chosen twice.
         task: the content of a task file, without a name. In prompts, `{look|see}` is replaced by either word.
         solution: a program that is right in all worlds.
-        wrong: wrong programs, each with a reward below 1.
+        wrong: incorrect programs, each with a reward below 1.
     """
 
     about: Name
@@ -80,11 +80,11 @@ class FamilyFile(StrictForm):
 
 @dataclass(frozen=True)
 class TrainedTask:
-    """A task generated from a family, with a right program and wrong ones."""
+    """A task generated from a family, with one correct program and several incorrect ones."""
 
     suite: Suite  # a suite that contains only this task
     name: str  # the family and the seed, such as `BringThing-17`
-    solution: str  # a right program's source
+    solution: str  # a correct program's source
     wrong: tuple[WrongProgram, ...]  # programs that miss part of the instruction
 
     @property
@@ -192,7 +192,7 @@ def _generate(family: str, seed: int, worlds: int) -> TrainedTask:
 def _forbid_retraction(task: Task) -> Task:
     """Change all requirements so that none of them holds once a program has retracted its report.
 
-    A separate requirement would already hold at the start and so reward wrong programs.
+    A separate requirement would already hold at the start and so reward incorrect programs.
     """
     no_retraction = parse(f'not tr.Exists(say(r"{RETRACTION}"))', skills=SKILLS)
 

@@ -6,7 +6,7 @@ from codebotler.rtl.text.matcher import MAX_CACHED_LENGTH, MAX_CACHED_TEXTS, Mat
 
 
 class Longer(Matcher):
-    """A text of more than three characters; keeps what it had to look at."""
+    """A string of more than three characters; keeps what it had to look at."""
 
     def __init__(self) -> None:
         self.seen: list[str] = []

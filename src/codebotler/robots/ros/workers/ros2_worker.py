@@ -298,7 +298,7 @@ def _check_sendable(message: Any, fields: Fields) -> None:
     from rclpy.serialization import serialize_message
 
     if r"\x00" in repr(fields).replace(r"\\", ""):  # ROS 2 truncates strings at NUL
-        raise ValueError("a text contains NUL")
+        raise ValueError("a string contains NUL")
     serialize_message(message)
 
 
