@@ -254,10 +254,10 @@ class WatchedGuard(RuleGuard):
 
     refused: Event | None = None
 
-    def judge(self, *attempts: Event) -> None:
+    def judge(self, *attempts: Event, is_drive: bool = False) -> None:
         """Judge an attempt, and record it if it is refused."""
         try:
-            super().judge(*attempts)
+            super().judge(*attempts, is_drive=is_drive)
         except RuleViolationError:
             self.refused = attempts[0]
             raise

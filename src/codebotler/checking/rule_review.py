@@ -12,11 +12,23 @@ from codebotler.core.skills.kinds import GOTO, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Option, Trace
 from codebotler.core.world import World
-from codebotler.rtl import EventPattern, Exists, Formula, Last, Not, Or, Regex, Scope, TextPattern
+from codebotler.rtl import (
+    And,
+    EventPattern,
+    Exists,
+    Formula,
+    Last,
+    Not,
+    Or,
+    Regex,
+    Scope,
+    TextPattern,
+    Without,
+)
 from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
-from codebotler.simulator.house_rule import Rule, RuleViolationError
+from codebotler.simulator.house_rule import Rule, RuleViolationError, WhenJudged
 from codebotler.simulator.matching import WORDS_FOR_PEOPLE, meant_by
 from codebotler.simulator.rule_guard import RuleGuard, name_of
 
@@ -29,6 +41,7 @@ DETECTED = (
     "this cannot be prevented, so the mission stops right afterwards"
 )
 OTHER_ANSWER = "something else"  # an answer that no rule names
+ORDER: Sequence[WhenJudged] = ("always", "leaving", "finally")  # by how often each is judged
 ANY_EVENT = Or(tuple(Exists(EventPattern(kind, Regex(".*"))) for kind in SKILLS.recordings))
 
 
@@ -55,7 +68,7 @@ def review_rules(rules: Sequence[Rule], world: World | None = None) -> list[Revi
 def _review(rule: Rule, world: World | None) -> Review:
     warnings = [*_unknown_names(rule, world)]
     try:
-        breaks = _trace([Not(rule.formula)], [], world)
+        breaks = _breaking_trace(rule, world)
         keeps = _keeping_trace(rule, world)
     except Undecided:
         return Review(rule, None, None, (*warnings, UNDECIDED))
@@ -68,6 +81,16 @@ def _review(rule: Rule, world: World | None) -> Review:
     if keeps is None:
         warnings.append(ALWAYS_BROKEN if rule.when == "always" else IMPOSSIBLE)
     return Review(rule, keeps, breaks, tuple(warnings))
+
+
+def _breaking_trace(rule: Rule, world: World | None) -> Trace | None:
+    """Return a shortest trace that breaks a rule, if possible at a step rather than at the end."""
+    for parts in (_judged_each_step(rule, world), [*_conjuncts(rule.formula)]):
+        traces = [_trace([Not(part)], [], world) for part in parts]
+        found = [trace for trace in traces if trace is not None]
+        if found:
+            return min(found, key=len)
+    return None
 
 
 def _breaking_traces(rule: Rule, shortest: Trace, world: World | None) -> Iterator[Trace]:
@@ -103,23 +126,62 @@ def _keeping_trace(rule: Rule, world: World | None) -> Trace | None:
     less = [replace(one, place=None) for one in spoken_of] + [replace(one, holding=None) for one in spoken_of]
     kinds = [EventPattern(kind, Regex(".*")) for kind in dict.fromkeys(one.kind for one in spoken_of)]
     happenings: list[Formula] = [*map(Exists, dict.fromkeys([*spoken_of, *less, *kinds])), ANY_EVENT]
+    if rule.when == "leaving":
+        drives = Last(_drive_away(world))
+        happenings = [*(And((Exists(one), drives)) for one in reversed(spoken_of)), *happenings]
     for happens in happenings:
         trace = _trace([happens], [rule], world)
         if trace is not None:
             return trace
-    return _trace([rule.formula], [], world) if rule.when == "finally" else None
+    return _trace([rule.formula], [], world) if rule.when != "always" else None
 
 
 def _trace(wanted: Sequence[Formula], kept: Sequence[Rule], world: World | None) -> Trace | None:
     """Return a shortest trace on which formulas hold and rules are kept, or None if there is none."""
-    always = [rule.formula for rule in kept if rule.when == "always"]
-    finally_ = [rule.formula for rule in kept if rule.when == "finally"]
+    at_end = [rule.formula for rule in kept if rule.when != "always"]
+    always = [part for rule in kept if rule.when != "finally" for part in _judged_each_step(rule, world)]
+    finally_ = [*chain.from_iterable(map(_conjuncts, at_end))]
     spoken_of = [*wanted, *always, *finally_]
     moves = None if world is None else {room: room for room in _rooms(spoken_of, world)}
     start = "" if world is None else world.robot
     possible = [*dict.fromkeys(chain.from_iterable(map(_holding_needs_a_pick, spoken_of)))]
     reasoner = Reasoner([*spoken_of, *possible], moves, start)
     return reasoner.trace([*wanted, *finally_], always=[*always, *possible], shortest=True)
+
+
+def _drive_away(world: World | None) -> EventPattern:
+    """Match drives, except those to the room where the robot starts."""
+    return EventPattern(GOTO, Regex(".*") if world is None else Without(world.robot))
+
+
+def _judged_each_step(rule: Rule, world: World | None) -> list[Formula]:
+    """Return the parts of the formula, for a `leaving` rule such that they fail right after a drive."""
+    parts = [*_conjuncts(rule.formula)]
+    if rule.when != "leaving":
+        return parts
+    drives = _drive_away(world)
+    return [Or((Not(Last(drives)), _before(drives, part))) for part in parts]
+
+
+def _conjuncts(formula: Formula) -> Iterator[Formula]:
+    """Split a formula into parts that must all hold, since small formulas are easier to reason about."""
+    match formula:
+        case And(parts):
+            yield from chain.from_iterable(map(_conjuncts, parts))
+        case Not(Or(parts)):
+            yield from chain.from_iterable(_conjuncts(Not(part)) for part in parts)
+        case _:
+            yield formula
+
+
+def _before(event: EventPattern, formula: Formula) -> Formula:
+    """Return a formula that holds if another one held before the last occurrence of an event."""
+    match formula:
+        case And(parts) | Or(parts):
+            return replace(formula, parts=tuple(_before(event, part) for part in parts))
+        case Not(part):
+            return Not(_before(event, part))
+    return replace(formula, scopes=(Scope("BeforeLast", event), *formula.scopes))
 
 
 def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
@@ -176,7 +238,7 @@ def _conflict(one: Rule, other: Rule, world: World | None) -> bool:
 
 def _follows(rule: Rule, other: Rule, world: World | None) -> bool:
     """Whether a rule can be broken, but only together with another rule."""
-    if rule.when == "always" and other.when == "finally":
+    if ORDER.index(rule.when) < ORDER.index(other.when):
         return False
     return (
         _trace([Not(rule.formula)], [], world) is not None

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeAlias
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
@@ -20,7 +20,8 @@ from codebotler.rtl import And, EventPattern, Formula, RtlSyntaxError, holds, pa
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.reasoning.sample_strings import patterns
-from codebotler.simulator.house_rule import Rule
+from codebotler.rtl.syntax import SET_TAG
+from codebotler.simulator.house_rule import Rule, WhenJudged
 
 EACH_TAG = "{each}"  # replaced in a formula by each name of `for_each`
 MAX_QUOTED_CHARACTERS = 30  # a message quotes a formula from the error on
@@ -32,8 +33,19 @@ def _as_name(text: str) -> str:
     return text
 
 
+def _as_set_name(text: str) -> str:
+    if text == "each" or not SET_TAG.fullmatch(f"{{{text}}}"):
+        raise ValueError("needs a letter, then letters, digits, spaces or underscores, and may not be each")
+    return text
+
+
 def _on_one_line(text: str) -> str:
     return " ".join(text.split())
+
+
+SetName = Annotated[YamlText, AfterValidator(_as_set_name)]
+Sets: TypeAlias = Mapping[str, Sequence[str]]
+"""The names in each set."""
 
 
 class HouseRuleFile(BaseModel):
@@ -44,41 +56,53 @@ class HouseRuleFile(BaseModel):
     name: Annotated[str, Field(strict=True), AfterValidator(_as_name)]
     says: Annotated[YamlText, Field(min_length=1), AfterValidator(_on_one_line)]
     always: YamlText | None = None
+    leaving: YamlText | None = None
     finally_: Annotated[YamlText | None, Field(alias="finally")] = None
     refuse: Annotated[bool, Field(strict=True)] = False
     any_: Annotated[bool, Field(alias="any", strict=True)] = False
-    for_each: Annotated[list[Name] | None, Field(min_length=1)] = None
+    for_each: Annotated[list[Name] | Name | None, Field(min_length=1)] = None
 
-    def rule(self, file: YamlFile, at: YamlPath, skills: SkillTable) -> Rule:
+    def rule(self, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Sets) -> Rule:
         """Convert the entry to a rule, or raise UserError if it is not valid."""
-        if self.always is None and self.finally_ is None:
-            raise file.wrong(
-                f'the rule "{self.name}" has no formula; write one after "always" or "finally"', *at
-            )
-        if self.always is not None and self.finally_ is not None:
-            sentence = f'the rule "{self.name}" has both "always" and "finally"; split it into two rules'
-            raise file.wrong(sentence, *at, "finally")
-        if self.always is None:
-            if self.refuse:
-                sentence = 'a "finally" rule cannot have "refuse"; remove "refuse" or write "always"'
-                raise file.wrong(sentence, *at, "refuse")
-            formula = self._formula(self.finally_ or "", file, (*at, "finally"), skills)
-            return Rule(self.name, self.says, formula, "finally", any_room=self.any_)
-        formula = self._formula(self.always, file, (*at, "always"), skills)
-        if not holds(formula, ()):
+        texts: dict[WhenJudged, str | None] = {
+            "always": self.always,
+            "leaving": self.leaving,
+            "finally": self.finally_,
+        }
+        given = [when for when, text in texts.items() if text is not None]
+        if not given:
+            mend = 'write one after "always", "leaving" or "finally"'
+            raise file.wrong(f'the rule "{self.name}" has no formula; {mend}', *at)
+        when = given[0]
+        if len(given) > 1:
+            sentence = f'the rule "{self.name}" has both "{when}" and "{given[-1]}"; split it into two rules'
+            raise file.wrong(sentence, *at, given[-1])
+        if when == "finally" and self.refuse:
+            sentence = 'a "finally" rule cannot have "refuse"; remove "refuse" or write "always"'
+            raise file.wrong(sentence, *at, "refuse")
+        formula = self._formula(texts[when] or "", file, (*at, when), skills, sets)
+        if when == "always" and not holds(formula, ()):
             whenever = f'not tr.Last(goto(".*")) or {_bracketed(formula)}'
             sentence = f'the rule "{self.name}" is broken before anything has happened'
             mend = f'say when it counts, such as on each drive: {whenever}, or write "finally" for the end'
             raise file.wrong(f"{sentence}; {mend}", *at, "always")
-        return Rule(self.name, self.says, formula, "always", self.refuse, self.any_)
+        return Rule(self.name, self.says, formula, when, self.refuse, self.any_)
 
-    def _formula(self, text: str, file: YamlFile, at: YamlPath, skills: SkillTable) -> Formula:
+    def _formula(self, text: str, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Sets) -> Formula:
         if self.for_each is not None and EACH_TAG not in text:
             raise file.wrong(f'"for_each" needs {EACH_TAG} in the formula', *at)
         if self.for_each is None and EACH_TAG in text:
             raise file.wrong(f'{EACH_TAG} in a formula needs "for_each" with a list of names', *at)
-        names = self.for_each or [EACH_TAG]
-        parts = [_parse(text.replace(EACH_TAG, name), file, at, skills) for name in names]
+        if isinstance(self.for_each, str):
+            if self.for_each not in sets:
+                known = ", ".join(sets) or "lists"
+                sentence = f'"for_each" needs a list or a set; there is no set {self.for_each}, only {known}'
+                raise file.wrong(sentence, *at[:-1], "for_each")
+            each = [{**sets, "each": [name]} for name in sets[self.for_each]]
+            parts = [_parse(text, file, at, skills, one) for one in each]
+        else:
+            names = self.for_each or [EACH_TAG]
+            parts = [_parse(text.replace(EACH_TAG, name), file, at, skills, sets) for name in names]
         return parts[0] if len(parts) == 1 else And(tuple(parts))
 
 
@@ -87,6 +111,7 @@ class HouseRulesFile(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    sets: Mapping[SetName, Annotated[list[Name], Field(min_length=1)]] = {}
     rules: Annotated[list[HouseRuleFile], Field(min_length=1)]
 
 
@@ -102,21 +127,23 @@ def read_rules(path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (
         UserError: the file is not valid; the message gives the line and the fix.
     """
     file = YamlFile.read(path)
-    forms = file.validate(HouseRulesFile).rules
+    content = file.validate(HouseRulesFile)
+    forms = content.rules
     names = [form.name for form in forms]
     for number, name in enumerate(names):
         if name in names[:number]:
             raise file.wrong(f'the rule "{name}" is listed twice; rename one', "rules", number, "name")
-    rules = tuple(form.rule(file, ("rules", number), skills) for number, form in enumerate(forms))
+    sets = content.sets
+    rules = tuple(form.rule(file, ("rules", number), skills, sets) for number, form in enumerate(forms))
     for number, rule in enumerate(rules):
         for sentence in unknown_rooms_in(rule, rooms):
             raise file.wrong(sentence, "rules", number, rule.when)
     return rules
 
 
-def _parse(text: str, file: YamlFile, at: YamlPath, skills: SkillTable) -> Formula:
+def _parse(text: str, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Sets) -> Formula:
     try:
-        formula = parse(text, skills=skills.with_skill(POSE_IN_ROOM))
+        formula = parse(text, skills=skills.with_skill(POSE_IN_ROOM), sets=sets)
     except RtlSyntaxError as error:
         there = brief(text[error.column - 1 :], MAX_QUOTED_CHARACTERS)
         where = f"column {error.column} of it" + (f", at {there}" if there else "")

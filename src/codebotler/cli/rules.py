@@ -24,7 +24,11 @@ from codebotler.core.world import World
 from codebotler.simulator.house_rule import Rule
 
 ANY_ARGUMENT = ("", "x")  # in examples, these mean any text
-WHEN_WORDS = {"always": "at any time", "finally": "at the end"}
+WHEN_WORDS = {
+    "always": "at any time",
+    "leaving": "when the robot leaves a room, and at the end",
+    "finally": "at the end",
+}
 
 
 def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:

@@ -143,8 +143,10 @@ class LiveRobot:
         guard = self._guard
         if guard is None:
             return event.place
-        rules = [rule for rule in guard.rules if self._room is None and rule.depends_on_room(event)]
-        if rules:
+        is_lost = self._room is None
+        rules = [rule for rule in guard.rules if is_lost and rule.depends_on_room(event)]
+        may_leave = is_lost and is_drive and any(rule.when == "leaving" for rule in guard.rules)
+        if rules or may_leave:
             self._room = self._ask_room()
         if rules and self._room is None:
             with self._enforcing():
@@ -152,7 +154,7 @@ class LiveRobot:
         room = self._room or ""
         texts = dict.fromkeys([event.text, *(self._rooms_meant(event.text) if is_drive else ())])
         with self._enforcing():
-            guard.judge(*(replace(event, text=text, place=room) for text in texts))
+            guard.judge(*(replace(event, text=text, place=room) for text in texts), is_drive=is_drive)
         return room
 
     def _report(self, event: Event, room: str, *, is_drive: bool, failed: bool = False) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from types import MappingProxyType
@@ -26,8 +26,14 @@ TEXT_WORDS = ("words", "without", "number", "othernumber", "time", "othertime", 
 ANSWERED = "answered"
 QUESTIONS = ("mention", ANSWERED)
 LOOK_RESULTS = {"found": True, "missed": False}
+LAST_LOOKS = {"last_found": True, "last_missed": False}
 SKILL_KINDS = {skill.name: skill.recording.kind for skill in SKILLS.rows if skill.recording}
 WRAPPERS = ("at", "holding", "to", "options", "returned")  # further conditions on an event
+NOT_STATES = frozenset({*TESTS, *SCOPE_NAMES, *QUESTIONS, *LOOK_RESULTS, *WRAPPERS, *SKILL_KINDS})
+
+SET_TAG = re.compile(r"\{([^\W\d_][\w ]*)\}")  # a set in a text, such as {metal}; {3} is a repetition
+THING_NAME = re.compile(r"\^?[\w ',;:!%@&/-]+\$?")
+SPECIAL_CHARACTERS = re.compile(r"[][\\.^$*+?{}|()]")
 
 NO_MEANINGS: Mapping[str, str] = MappingProxyType({})
 
@@ -54,7 +60,11 @@ class RtlSyntaxError(ValueError):
 
 
 def parse(
-    text: str, *, skills: SkillTable = SKILLS, means: Mapping[str, str] = NO_MEANINGS
+    text: str,
+    *,
+    skills: SkillTable = SKILLS,
+    means: Mapping[str, str] = NO_MEANINGS,
+    sets: Mapping[str, Sequence[str]] | None = None,
 ) -> formulas.Formula:
     """Parse a formula.
 
@@ -63,16 +73,23 @@ def parse(
         skills: the skills whose events the formula may name.
         means: words for explanations, by kind of event: what its texts mean, such as `that nobody is coming`
             for `say`. Answered questions have the key `answered`.
+        sets: the names in each set that texts may contain in braces; None if braces have no such meaning.
 
     Raises:
         RtlSyntaxError: the text is not a formula.
     """
-    return _Parser(compose(text), skills, means).formula()
+    return _Parser(compose(text), skills, means, sets).formula()
 
 
 class _Parser:
-    def __init__(self, text: str, skills: SkillTable, means: Mapping[str, str]) -> None:
-        self.means = means
+    def __init__(
+        self,
+        text: str,
+        skills: SkillTable,
+        means: Mapping[str, str],
+        sets: Mapping[str, Sequence[str]] | None,
+    ) -> None:
+        self.means, self.sets = means, sets
         self.indent = len(text) - len(text.lstrip())
         self.text = re.sub(r"[\r\n\f]", " ", text).strip()
         self.bytes = self.text.encode(errors="replace")  # `ast` counts columns in bytes
@@ -84,6 +101,7 @@ class _Parser:
         self.question = next((kind for kind, row in self.recordings.items() if row.options is not None), None)
         looks = (kind for kind, row in self.recordings.items() if row.names == "object or person")
         self.look = next(looks, None)
+        self.states = {row.sets for row in self.recordings.values() if row.sets}
 
     def formula(self) -> formulas.Formula:
         if not self.text:
@@ -113,7 +131,49 @@ class _Parser:
                 return formulas.Not(self.constraint(operand, depth + 1))
             case ast.Call(ast.Attribute() as function):
                 return self.test(node, function)
+            case ast.Call(ast.Name(name)) if name in LAST_LOOKS and self.look is not None:
+                return self.last_look(name, node)
+            case ast.Call(ast.Name(name)) if name in self.states:
+                return self.state(name, node)
+            case ast.Call(ast.Name(name)) if name not in {*self.recordings, *NOT_STATES}:
+                raise self.unknown(node, "state", name, [*LAST_LOOKS, *sorted(self.states)])
         raise self.expected('a test such as tr.Exists(goto("lobby"))', node)
+
+    def last_look(self, name: str, node: ast.Call) -> formulas.Formula:
+        """Parse a test of the most recent look: since the opposite result, this one has occurred."""
+        (thing,) = self.arguments(node, node, name, 1)
+        text, found = self.matched(thing), LAST_LOOKS[name]
+        wanted, opposite = (formulas.EventPattern(self.look or "", text, found=f) for f in (found, not found))
+        return formulas.Exists(wanted, (formulas.Scope("AfterLast", opposite),))
+
+    def state(self, name: str, node: ast.Call) -> formulas.Formula:
+        """Parse a test such as `on("stove")`, which holds for a set if it holds for any of its names."""
+        (thing,) = self.arguments(node, node, name, 1)
+        things = [thing]
+        match thing:
+            case ast.Constant(str(text)) if self.sets is not None and (tag := SET_TAG.fullmatch(text)):
+                names = map(_escaped, self.names_in(tag[1], thing))
+                things = [ast.copy_location(ast.Constant(each), thing) for each in names]
+            case ast.Constant(str(text)) if not THING_NAME.fullmatch(text):
+                raise self.expected("a string with the name of one thing", thing)
+            case ast.Call():
+                raise self.expected("a string with the name of one thing", thing)
+        return _joined(formulas.Or, [self.is_in_state(name, each) for each in things])
+
+    def is_in_state(self, name: str, thing: ast.expr) -> formulas.Formula:
+        """Say that an event has set a state since the last event of each kind that clears it."""
+        rows = self.recordings.items()
+        setting = [self.event_of(kind, thing) for kind, row in rows if row.sets == name]
+        clearing = [self.event_of(kind, thing) for kind, row in rows if row.clears == name]
+        scopes: list[tuple[formulas.Scope, ...]] = [(formulas.Scope("AfterLast", one),) for one in clearing]
+        parts = [
+            _joined(formulas.Or, [formulas.Exists(one, scope) for one in setting]) for scope in scopes or [()]
+        ]
+        return _joined(formulas.And, parts)
+
+    def event_of(self, kind: str, thing: ast.expr) -> formulas.EventPattern:
+        text = self.value(thing, self.types[kind][self.recordings[kind].text])
+        return formulas.EventPattern(kind, text, means=self.means.get(kind))
 
     def test(self, node: ast.Call, function: ast.Attribute) -> formulas.Test:
         name = function.attr
@@ -306,9 +366,22 @@ class _Parser:
                     raise self.error(
                         node, 'this string contains a backspace; write r"..." so that \\b is a word boundary'
                     )
+                if self.sets is not None:
+                    pattern = SET_TAG.sub(lambda tag: self.alternation(tag, node), pattern)
                 self.check_regex(node, pattern, compile_regex, "this is not a valid regex")
                 return pattern
         raise self.expected("a string", node)
+
+    def alternation(self, tag: re.Match[str], node: ast.expr) -> str:
+        names = "|".join(map(_escaped, self.names_in(tag[1], node)))
+        return names if tag[0] == tag.string else f"(?:{names})"
+
+    def names_in(self, name: str, node: ast.expr) -> Sequence[str]:
+        sets = self.sets or {}
+        if name not in sets:
+            known = f"the sets are {', '.join(sets)}" if sets else 'the file has no "sets"'
+            raise self.error(node, f"there is no set {name}; {known}")
+        return sets[name]
 
     def check_regex(self, at: ast.expr, pattern: str, compiled: Callable[[str], object], wrong: str) -> None:
         try:
@@ -339,7 +412,7 @@ class _Parser:
         hint = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(known)}"
         if name == INSIDE:
             hint = "only house rules can use it, since traces contain no poses"
-        elif what == "element" and not close:
+        elif what in {"element", "state"} and not close:
             hint += ", or your own skill, if --skills or a suite gives its file"
         return self.error(at, f"unknown {what} {name}; {hint}")
 
@@ -354,3 +427,11 @@ class _Parser:
             at = (at.end_col_offset or 0) - len(at.attr.encode())
         offset = at if isinstance(at, int) else at.col_offset
         return RtlSyntaxError(self.indent + len(self.bytes[:offset].decode(errors="replace")) + 1, problem)
+
+
+def _escaped(name: str) -> str:
+    return SPECIAL_CHARACTERS.sub(r"\\\g<0>", name)
+
+
+def _joined(kind: type[formulas.And | formulas.Or], parts: Sequence[formulas.Formula]) -> formulas.Formula:
+    return parts[0] if len(parts) == 1 else kind(tuple(parts))

@@ -16,6 +16,7 @@ from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.semantics import is_match
 
 Objection: TypeAlias = Literal["forbids", "cannot judge", "is broken by", "could not judge"]
+WhenJudged: TypeAlias = Literal["always", "leaving", "finally"]
 
 # Reasons why a rule cannot be judged, each the end of a sentence.
 NON_TEXT_OPTION = "which offers an option that is not text"
@@ -31,7 +32,8 @@ class Rule:
         name: the rule's name in messages.
         says: the rule as a sentence for people and models.
         formula: the rule as a formula.
-        when: `always` if the formula must hold after each event, `finally` if only at the end of the mission.
+        when: `always` if the formula must hold after each event, `finally` if only at the end of the mission,
+            `leaving` if there and before each drive.
         refuse: whether to skip a forbidden action and let the program continue, rather than end the mission.
         any_room: whether the rule may name rooms that the house does not have.
     """
@@ -39,7 +41,7 @@ class Rule:
     name: str
     says: str
     formula: Formula
-    when: Literal["always", "finally"] = "always"
+    when: WhenJudged = "always"
     refuse: bool = False
     any_room: bool = False
 

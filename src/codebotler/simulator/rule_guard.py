@@ -54,7 +54,7 @@ class RuleGuard:
     def __init__(self, rules: Sequence[Rule], rooms: Sequence[Room] = ()) -> None:
         self.rules, self._rooms = tuple(rules), rooms
         self._stops = {room.name: room.stand_at for room in rooms}
-        self.may_refuse = any(rule.refuse and rule.when == "always" for rule in rules)
+        self.may_refuse = any(rule.refuse and rule.when != "finally" for rule in rules)
         self.judges_poses = any(rule.inside for rule in rules)
         self._history = _History([(rule, Monitor(rule.formula)) for rule in rules])
 
@@ -71,7 +71,8 @@ class RuleGuard:
         place = self._history.names.get(robot.room, robot.room)
         attempt = attempted_event(row, arguments, place=place, time=robot.now, holding=holding)
         if attempt is not None:
-            self.judge(*_attempts(robot, attempt, arguments, is_drive=row.is_drive))
+            attempts = _attempts(robot, attempt, arguments, is_drive=row.is_drive)
+            self.judge(*attempts, is_drive=row.is_drive)
         self._is_own = SKILLS.get(skill) is not row
         self._start, self._seen, self._held, self._prevented = start, start, robot.taken, None
         request = None if self._is_own or attempt is None else attempt.text
@@ -112,18 +113,24 @@ class RuleGuard:
         try:
             self._take(robot, earlier)
             named = self._named(event, event.text)
-            self.judge(*_attempts(robot, named, (), is_drive=named.kind == GOTO))
+            is_drive = named.kind == GOTO
+            self.judge(*_attempts(robot, named, (), is_drive=is_drive), is_drive=is_drive)
         except RuleViolationError as broken:
             self._prevented = self._prevented or broken
             raise
 
-    def judge(self, *attempts: Event) -> None:
-        """Raise RuleViolationError if any of the possible next events would break a rule."""
+    def judge(self, *attempts: Event, is_drive: bool = False) -> None:
+        """Raise RuleViolationError if any of the possible next events, perhaps drives, would break a rule."""
         caught: RuleViolationError | None = None
         attempts = tuple(map(_trimmed, attempts))
+        leaves = is_drive and any(one.text.casefold() != one.place.casefold() for one in attempts)
         for rule, monitor in self._history.monitors:
-            for attempt in attempts if rule.when == "always" else ():
-                broken = _violation(rule, monitor, attempt)
+            is_judged = rule.when == "always" or (rule.when == "leaving" and leaves)
+            for attempt in attempts if is_judged else ():
+                if rule.when == "always":
+                    broken = _violation(rule, monitor, attempt)
+                else:
+                    broken = None if self._is_kept(rule, monitor) else RuleViolationError(rule, attempt)
                 if broken is not None and broken.ends_run:
                     raise broken
                 caught = caught or broken  # continue, since another rule may end the run
@@ -166,9 +173,12 @@ class RuleGuard:
     def at_end(self) -> RuleViolationError | None:
         """Return an error for the first rule that is broken if the mission ends now, or None."""
         for rule, monitor in self._history.monitors:
-            if rule.when == "finally" and (rule.name in self._history.unjudged or not monitor.holds):
+            if rule.when != "always" and not self._is_kept(rule, monitor):
                 return RuleViolationError(rule, None)
         return None
+
+    def _is_kept(self, rule: Rule, monitor: Monitor) -> bool:
+        return monitor.holds and rule.name not in self._history.unjudged
 
     def _take(self, robot: SimulatedRobot, events: Sequence[Event], request: str | None = None) -> None:
         """Add the current call's events to the history. `request` is the goal of a built-in drive."""

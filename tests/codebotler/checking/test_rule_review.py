@@ -196,6 +196,68 @@ def test_steps_are_told_with_all_that_rules_speak_of() -> None:
     assert step_sentence(Event("goto", "")) == "drives to another room"
 
 
+def leaving(name: str, formula: str) -> Rule:
+    return Rule(name, "Leave it so.", parse(formula), "leaving")
+
+
+LOCKED = 'not tr.AfterLast(place("glass")).Exists(pick("glass"))'
+
+
+@pytest.mark.parametrize("world", [None, WORLD], ids=["anywhere", "in a world"])
+def test_examples_of_a_leaving_rule_end_with_a_drive_to_another_room(world: World | None) -> None:
+    (review,) = review_rules([leaving("locked", LOCKED)], world)
+    assert review.keeps is not None
+    assert review.breaks is not None
+    assert [event.kind for event in review.keeps] == ["pick", "place", "goto"]
+    assert [event.kind for event in review.breaks] == ["pick", "goto"]
+    assert {review.keeps[-1].text, review.breaks[-1].text}.isdisjoint({"hall"})
+    assert not holds(review.rule.formula, review.breaks[:-1])
+    assert review.warnings == ()
+
+
+def test_leaving_rule_about_many_things_has_examples() -> None:
+    parts = (
+        f'tr.AfterLast(place("{thing}")).Exists(pick("{thing}"))' for thing in ("mug", "pan", "fork", "cup")
+    )
+    (review,) = review_rules([leaving("all", f"not ({' or '.join(parts)})")])
+    assert review.keeps is not None
+    assert review.breaks is not None
+    assert [event.kind for event in (*review.keeps, *review.breaks)] == [
+        *("pick", "place", "goto"),
+        *("pick", "goto"),
+    ]
+
+
+def test_leaving_rule_in_a_house_of_one_room_is_broken_at_the_end() -> None:
+    (review,) = review_rules([leaving("locked", LOCKED)], World((Room("hall", ("glass",)),), "hall"))
+    assert review.breaks is not None
+    assert [event.kind for event in review.breaks] == ["pick"]
+    assert review.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("when", "warnings"),
+    [
+        ("always", ["", 'it follows from "r0"']),
+        ("leaving", ["", 'it is equivalent to "r0"']),
+        ("finally", ['it follows from "leave"', ""]),
+    ],
+)
+def test_leaving_rules_are_compared_with_others(when: str, warnings: list[str]) -> None:
+    (other,) = rules(LOCKED, when=when)
+    other = leaving("r0", LOCKED) if when == "leaving" else other
+    found = review_rules([other, leaving("leave", LOCKED)])
+    assert [next(iter(review.warnings), "") for review in found] == warnings
+
+
+def test_leaving_rule_that_no_program_can_keep_with_another_is_reported() -> None:
+    (silent,) = rules('not tr.Exists(say(".*"))')
+    found = review_rules([silent, leaving("bye", 'tr.Exists(say("bye"))')])
+    assert found[1].warnings == ('it cannot be kept together with "r0"',)
+    (review,) = review_rules([leaving("never", 'tr.Exists(say("a")) and not tr.Exists(say("a"))')])
+    assert IMPOSSIBLE in review.warnings
+
+
 def test_the_monitor_agrees_with_every_example() -> None:
     for review in review_rules(rules(*FORMULAS), WORLD):
         monitor = Monitor(review.rule.formula)

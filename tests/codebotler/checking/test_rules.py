@@ -77,9 +77,63 @@ def test_a_rule_for_each_room_is_written_once(tmp_path: Path) -> None:
     assert [problem.line for problem in found.problems] == [8]
 
 
+SETS = """
+sets:
+  metal: [fork, "pan (old)"]
+  wet rooms: [bathroom, alice's shower]
+rules:
+  - name: a
+    says: Keep it.
+    always: not tr.Exists({})
+"""
+
+
+@pytest.mark.parametrize(
+    ("element", "expanded"),
+    [
+        ('pick("{metal}")', r'pick(r"fork|pan \(old\)")'),
+        (r'pick(r"^{metal}\b")', r'pick(r"^(?:fork|pan \(old\))\b")'),
+        ('at("{wet rooms}", say(".*"))', 'at("bathroom|alice\'s shower", say(".*"))'),
+        ("goto(without('{wet rooms}'))", 'goto(without("bathroom|alice\'s shower"))'),
+        ('say(words("{metal}", "x{2}"))', r'say(words(r"fork|pan \(old\)", "x{2}"))'),
+    ],
+)
+def test_sets_stand_for_any_of_their_names(tmp_path: Path, element: str, expanded: str) -> None:
+    (rule,) = read_rules(rules_in(tmp_path, SETS.replace("{}", element)))
+    assert str(rule.formula) == f"not tr.Exists({expanded})"
+
+
+def test_a_rule_for_each_name_of_a_set(tmp_path: Path) -> None:
+    text = SETS.replace("{}", 'at("{each}", pick("{metal}"))')
+    text = text.replace("says:", "for_each: wet rooms\n    says:")
+    (rule,) = read_rules(rules_in(tmp_path, text))
+    assert str(rule.formula) == " and ".join(
+        rf'not tr.Exists(at("{room}", pick(r"fork|pan \(old\)")))' for room in ("bathroom", "alice's shower")
+    )
+
+
+LEAVING = "rules:\n  - name: a\n    says: b\n    leaving: last_found('door')\n    refuse: true\n"
+
+
+def test_leaving_rule_may_be_false_at_first_and_refuse(tmp_path: Path) -> None:
+    (rule,) = read_rules(rules_in(tmp_path, LEAVING))
+    assert (rule.when, rule.refuse) == ("leaving", True)
+
+
 @pytest.mark.parametrize(
     ("text", "line", "named"),
     [
+        (SETS.replace("{}", 'pick("{metl}")'), 8, ["no set metl", "metal, wet rooms"]),
+        (SETS.replace("{}", 'pick("{each}")'), 8, ["{each}", '"for_each"']),
+        (SETS.replace("metal:", "each:"), 3, ["each"]),
+        (SETS.replace("metal:", "3:"), 3, []),
+        (SETS.replace('[fork, "pan (old)"]', "[]"), 3, ['"metal"']),
+        (SETS.replace('[fork, "pan (old)"]', "fork"), 3, ['"metal"']),
+        (SETS.replace("fork", "1"), 3, []),
+        (EACH_ROOM.replace("{each}", "{metal}"), 6, ['"for_each"']),
+        (EACH_ROOM.replace("{each}", "{each}{metal}"), 6, ["no set metal", '"sets"']),
+        (LEAVING.replace("refuse: true", "always: 'x'"), 4, ["has both"]),
+        (LEAVING.replace("leaving", "leave"), 4, ['"leave" is unknown']),
         (EACH_ROOM.replace("{each}", "kitchen"), 6, ["{each}", '"for_each"']),
         (EACH_ROOM.replace("alice's", '"alice"'), 5, []),
         (EACH_ROOM.replace("[kitchen, alice's office]", "[]"), 5, ['"for_each"']),
@@ -189,6 +243,20 @@ def test_two_rules_that_are_broken_at_one_line_are_two_problems(tmp_path: Path) 
 def test_a_rule_that_is_not_kept_at_the_end_is_a_problem_without_a_line(tmp_path: Path) -> None:
     (problem,) = problems(tmp_path, "go_to('kitchen')")
     assert problem.startswith('RuleViolation: the rule "report" is not kept at the end: At the end, tell')
+
+
+def test_leaving_rule_is_a_problem_at_the_drive_or_at_the_end(tmp_path: Path) -> None:
+    locked = 'not tr.AfterLast(say("^closed")).Exists(say("^opened"))'
+    text = f"rules: [{{name: locked, says: Lock up., leaving: '{locked}'}}]"
+    house_rules = read_rules(rules_in(tmp_path, text))
+    program = "def task_program():\n    say('opened')\n    {}\n    go_to('kitchen')\n    {}\n"
+    for first, last, line in (
+        ("say('hello')", "say('closed')", 4),
+        ("say('closed')", "say('opened again')", None),
+        ("say('closed')", "say('bye')", 0),
+    ):
+        found = check(program.format(first, last), rooms=ROOMS, house_rules=house_rules)
+        assert [problem.line for problem in found.problems] == ([] if line == 0 else [line])
 
 
 def test_worlds_are_looked_for_that_lead_into_every_branch(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import read_world
 from codebotler.prompts import prompt_for
 from codebotler.rtl import RtlSyntaxError, holds, parse
-from codebotler.rtl.syntax import LOOK_RESULTS, QUESTIONS, TEXT_WORDS, WRAPPERS
+from codebotler.rtl.syntax import LAST_LOOKS, LOOK_RESULTS, QUESTIONS, TEXT_WORDS, WRAPPERS
 from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
@@ -191,7 +191,39 @@ def test_formulas_compare_all_arguments_and_results(every: SkillTable, formula: 
 
 
 def test_names_that_formulas_use_otherwise_are_refused() -> None:
-    assert {*WRAPPERS, *LOOK_RESULTS, *QUESTIONS, *TEXT_WORDS, INSIDE, "tr"} == RTL_WORDS
+    assert {*WRAPPERS, *LOOK_RESULTS, *LAST_LOOKS, *QUESTIONS, *TEXT_WORDS, INSIDE, "tr"} == RTL_WORDS
+
+
+SWITCHES = """
+@skill(sets="on", fails={"Stuck": "it is stuck"})
+def turn_on(sim: Simulation, device: str) -> None: "Turn on."
+
+@skill(clears="on", fails={"Stuck": "it is stuck"})
+def turn_off(sim: Simulation, device: str) -> None: "Turn off."
+
+@skill(clears="on", when_tried=True)
+def unplug(sim: Simulation, device: str) -> None: "Unplug."
+"""
+
+
+def test_failed_attempts_count_as_setting_a_state_but_not_as_clearing_it(tmp_path: Path) -> None:
+    path = tmp_path / "switches.py"
+    path.write_text(HEAD + SWITCHES)
+    skills = skills_from(path)
+    rows = [row.recording for row in skills.rows if row.name in {"turn_on", "turn_off", "unplug"}]
+    found = [row and (row.sets, row.clears, row.judged_when_tried) for row in rows]
+    assert found == [("on", "", True), ("", "on", False), ("", "on", True)]
+    assert holds(parse('on("stove")', skills=skills), (Event("turn_on", "stove"),))
+
+
+def test_skill_may_not_have_the_name_of_a_state_in_another_file(tmp_path: Path) -> None:
+    paths = tmp_path / "switches.py", tmp_path / "on.py"
+    paths[0].write_text(HEAD + SWITCHES)
+    paths[1].write_text(HEAD + "@skill\ndef on(sim: Simulation) -> None: 'Be on.'")
+    for files in (paths, paths[::-1]):
+        with pytest.raises(UserError, match="on is the name of a skill and of a state") as caught:
+            skills_from(*files)
+        assert caught.value.file == str(files[1])
 
 
 def test_models_are_shown_types_errors_and_an_example(tmp_path: Path) -> None:
@@ -224,6 +256,14 @@ BAD = {
     "@skill\ndef wiggle(sim, who: str) -> None: pass": "wiggle has no docstring",
     "@skill\ndef print(sim, who: str) -> None: 'Wiggle.'": "print is a reserved name",
     "@skill\ndef found(sim, who: str) -> None: 'Wiggle.'": "found has another meaning in formulas",
+    "@skill(sets='holding')\ndef wiggle(sim, a: str) -> None: 'W.'": "holding has another meaning in",
+    "@skill(sets='goto')\ndef wiggle(sim, a: str) -> None: 'W.'": "goto is the name of a skill and of a",
+    "@skill(clears='pick')\ndef wiggle(sim, a: str) -> None: 'W.'": "pick is the name of a skill and of a",
+    "@skill(sets='a b')\ndef wiggle(sim, a: str) -> None: 'W.'": "sets of wiggle must be the name of a state",
+    "@skill(clears=1)\ndef wiggle(sim, a: str) -> None: 'W.'": "clears of wiggle must be the name of a state",
+    "@skill(sets='on')\ndef wiggle(sim) -> None: 'W.'": "must set or clear a state of the thing",
+    "@skill(sets='on', clears='on')\ndef wiggle(sim, a: str) -> None: 'W.'": "must set or clear a state",
+    "@skill(sets='on', event=None)\ndef wiggle(sim, a: str) -> None: 'W.'": "needs an event",
     "@skill\ndef go_to(sim, who: str) -> None: 'Wiggle.'": "there is already a skill go_to",
     "@skill(event='goto')\ndef fly(sim, who: str) -> None: 'Fly.'": 'of another skill are called "goto"',
     "@skill(verb='wiggle {to}')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "which is not a parameter",

@@ -362,6 +362,54 @@ def test_a_failed_attempt_of_an_own_skill_counts(tmp_path: Path) -> None:
     assert mission.state is MissionState.STOPPED
 
 
+SWITCHES = """
+from codebotler import Simulation, skill
+
+@skill(sets="on")
+def turn_on(sim: Simulation, device: str) -> None:
+    "Turn on a device."
+
+@skill(clears="on")
+def turn_off(sim: Simulation, device: str) -> None:
+    "Turn off a device."
+
+@skill(names="room")
+def glide_to(sim: Simulation, room: str) -> None:
+    "Glide to a room."
+"""
+
+
+@pytest.mark.parametrize(
+    ("lines", "stopped", "unkept"),
+    [
+        (["turn_on('stove')", "go_to('kitchen')"], True, False),
+        (["go_to('kitchen')", "turn_on('stove')", "go_to('kitchen')"], False, True),
+        pytest.param(["turn_on('stove')", "glide_to('kitchen')"], True, False, marks=pytest.mark.slow),
+        pytest.param(
+            ["turn_on('stove')", "turn_off('stove')", "go_to('kitchen')"],
+            False,
+            False,
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_leaving_rule_is_enforced_before_drives_and_reported_at_the_end(
+    tmp_path: Path, lines: list[str], *, stopped: bool, unkept: bool
+) -> None:
+    (tmp_path / "switches.py").write_text(SWITCHES)
+    where = "kitchen" if lines[0] == "go_to('kitchen')" else "hall"
+    robot = answering(lambda skill, _: where if skill == "get_current_location" else None)
+    robot.skills = skills_from(tmp_path / "switches.py")
+    off = Rule("off", "Turn off the stove.", parse('not on("stove")', skills=robot.skills), "leaving")
+    program = "def task_program():\n" + "".join(f"    {line}\n" for line in lines)
+    mission, log = ran(tmp_path, robot, program, [off])
+    assert mission.state is (MissionState.STOPPED if stopped else MissionState.DONE)
+    assert [line["event"] for line in log].count("skill") == len(lines) - stopped
+    assert [line.get("prevented") for line in log if line["event"] == "rule"] == (
+        [True] if stopped else [None] * unkept
+    )
+
+
 OWN = """
 from codebotler import Simulation, skill
 

@@ -10,7 +10,7 @@ from hypothesis.strategies import DataObject, SearchStrategy
 
 from codebotler.core.skills.declaration import POSE_IN_ROOM
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.skills.table import Parameter, Recording, Skill
+from codebotler.core.skills.table import Parameter, Recording, Skill, SkillTable
 from codebotler.core.skills.values import NO_VALUE
 from codebotler.core.trace import Event
 from codebotler.rtl import (
@@ -224,6 +224,99 @@ def test_a_further_skill_is_a_further_element() -> None:
     assert holds(formula, (Event("wave", "Alice"),))
     with pytest.raises(RtlSyntaxError, match="unknown element wave"):
         parse('tr.Exists(wave("alice"))')
+
+
+LOOK = Event("check", "a person", found=True)
+NO_LOOK = Event("check", "person", found=False)
+OTHER_LOOK = Event("check", "mug", found=True)
+
+
+@pytest.mark.parametrize(
+    ("trace", "found", "missed"),
+    [
+        ((), False, False),
+        ((OTHER_LOOK,), False, False),
+        ((LOOK,), True, False),
+        ((NO_LOOK, OTHER_LOOK), False, True),
+        ((NO_LOOK, LOOK, OTHER_LOOK), True, False),
+        ((LOOK, NO_LOOK), False, True),
+        ((NO_LOOK, LOOK, NO_LOOK), False, True),
+        ((LOOK, NO_LOOK, LOOK), True, False),
+    ],
+)
+def test_last_look_decides(trace: tuple[Event, ...], found: bool, missed: bool) -> None:  # noqa: FBT001 - of a table
+    for text, expected in (("last_found", found), ("last_missed", missed)):
+        formula = parse(f'{text}("person")')
+        assert holds(formula, trace) is expected
+        assert parse(str(formula)) == formula
+
+
+def stateful(name: str, sets: str = "", clears: str = "") -> Skill:
+    recording = Recording(name, "device", sets=sets, clears=clears)
+    return Skill(name, (Parameter("device"),), NO_VALUE, "Switch.", recording)
+
+
+SWITCHES = SkillTable(
+    (
+        *SKILLS.rows,
+        *(stateful("turn_on", "on"), stateful("light", "on")),
+        *(stateful("turn_off", "", "on"), stateful("unplug", "", "on"), stateful("shut", "closed", "open")),
+    )
+)
+
+
+def switched(*calls: str) -> tuple[Event, ...]:
+    parts = [call.partition(" ") for call in calls]
+    return tuple(Event(kind, thing) for kind, _, thing in parts)
+
+
+@pytest.mark.parametrize(
+    ("calls", "expected"),
+    [
+        ([], False),
+        (["turn_on stove"], True),
+        (["light stove"], True),
+        (["turn_on oven"], False),
+        (["turn_on stove", "turn_off stove"], False),
+        (["turn_on stove", "unplug stove"], False),
+        (["turn_on stove", "turn_off oven"], True),
+        (["turn_on stove", "unplug stove", "turn_off stove", "light stove"], True),
+        (["unplug stove", "turn_on stove", "turn_off stove"], False),
+    ],
+)
+def test_state_is_that_of_the_last_skill_that_changes_it(calls: list[str], expected: bool) -> None:  # noqa: FBT001 - of a table
+    formula = parse('on("stove")', skills=SWITCHES)
+    assert holds(formula, switched(*calls)) is expected
+    assert holds(parse('not on("stove")', skills=SWITCHES), switched(*calls)) is not expected
+    assert parse(str(formula), skills=SWITCHES) == formula
+
+
+def test_state_of_a_set_is_that_of_any_of_its_names() -> None:
+    formula = parse('on("{hot}")', skills=SWITCHES, sets={"hot": ["stove", "oven (big)"]})
+    assert holds(formula, switched("turn_on stove", "turn_on oven (big)", "turn_off oven (big)"))
+    assert holds(formula, switched("turn_on oven (big)", "turn_off stove"))
+    assert not holds(formula, switched("turn_on stove", "turn_off stove", "turn_on oven"))
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "named"),
+    [
+        ('on("stove|oven")', 4, "the name of one thing"),
+        ('on(words("stove"))', 4, "the name of one thing"),
+        ('on("")', 4, "the name of one thing"),
+        ("on()", 1, "1 argument"),
+        ('onn("stove")', 1, "did you mean on?"),
+        ('open("stove")', 1, "unknown state open"),
+        ('tr.Exists(on("stove"))', 11, "unknown element on"),
+        ('last_found("a", "b")', 1, "1 argument"),
+        ('found("a")', 1, "expected a test"),
+    ],
+)
+def test_wrong_states_and_looks_are_errors(text: str, column: int, named: str) -> None:
+    with pytest.raises(RtlSyntaxError) as caught:
+        parse(text, skills=SWITCHES)
+    assert caught.value.column == column
+    assert named in caught.value.problem
 
 
 def test_errors_and_formulas_travel_between_processes() -> None:

@@ -303,6 +303,108 @@ def test_what_a_skill_of_a_user_does_inside_counts(
         one.perform(skill, [argument])
 
 
+SWITCHES = """
+from codebotler import Simulation, skill
+
+@skill(sets="on", fails={"Stuck": "it is stuck"})
+def turn_on(sim: Simulation, device: str) -> None:
+    "Turn on a device."
+    if device == "old stove":
+        sim.fail("Stuck")
+
+@skill(clears="on", fails={"Stuck": "it is stuck"})
+def turn_off(sim: Simulation, device: str) -> None:
+    "Turn off a device."
+    if device == "stove, stuck":
+        sim.fail("Stuck")
+
+@skill(names="room")
+def glide_to(sim: Simulation, room: str) -> None:
+    "Glide to a room."
+
+@skill(event=None)
+def patrol(sim: Simulation) -> None:
+    "Visit a room."
+    sim.drive("office")
+"""
+ON, OFF = ("turn_on", "stove"), ("turn_off", "stove")
+
+
+@pytest.fixture(scope="module")
+def switches(tmp_path_factory: pytest.TempPathFactory) -> SkillTable:
+    path = tmp_path_factory.mktemp("switches") / "switches.py"
+    path.write_text(SWITCHES)
+    return skills_from(path)
+
+
+def leaves_off(skills: SkillTable, *, refuse: bool = False) -> Rule:
+    formula = parse('not on("stove")', skills=skills)
+    return Rule("off", "Turn off the stove before you leave.", formula, "leaving", refuse)
+
+
+@pytest.mark.parametrize(
+    ("calls", "breaks"),
+    [
+        ([("go_to", "office")], False),
+        ([ON, ("go_to", "office")], True),
+        ([ON, ("go_to", "attic")], True),
+        ([ON, OFF, ("go_to", "office")], False),
+        ([ON, ("say", "hello"), ("pick", "mug")], False),
+        ([ON, ("go_to", "Hall")], False),
+        ([("go_to", "office"), ON, ("go_to", "office")], False),
+        ([("go_to", "office"), ON, ("go_to", "hall")], True),
+        ([ON, ("glide_to", "office")], True),
+        ([ON, ("patrol",)], True),
+        ([ON, OFF, ("patrol",)], False),
+        ([("turn_on", "old stove"), ("go_to", "office")], True),
+        ([ON, ("turn_off", "stove, stuck"), ("go_to", "office")], True),
+    ],
+)
+def test_leaving_rule_stops_each_drive_out_of_a_room(
+    switches: SkillTable, calls: list[tuple[str, ...]], *, breaks: bool
+) -> None:
+    one = SimulatedRobot(WORLD, AS_WRITTEN, switches, guard=RuleGuard([leaves_off(switches)]))
+    *first, (skill, *arguments) = calls
+    for name, *given_ in first:
+        with suppress(RobotError):
+            one.perform(name, given_)
+    if breaks:
+        assert not refused(one, skill, *arguments).is_late
+    else:
+        one.perform(skill, arguments)
+
+
+def test_leaving_rule_that_cannot_be_judged_is_not_kept() -> None:
+    kept = Rule("tea", "No tea.", parse('not tr.Exists(ask("tea", "^no$"))'), "leaving")
+    guard = RuleGuard([kept])
+    one = SimulatedRobot(WORLD, AS_WRITTEN, guard=guard)
+    one.perform("ask", ["ann", "tea?", (Option("1", is_text=False), Option("yes"))])
+    refused(one, "go_to", "office")
+    assert guard.at_end() is not None
+
+
+@pytest.mark.parametrize("calls", [[ON], [ON, OFF]])
+def test_leaving_rule_must_hold_at_the_end(switches: SkillTable, calls: list[tuple[str, str]]) -> None:
+    guard = RuleGuard([leaves_off(switches)])
+    one = SimulatedRobot(WORLD, AS_WRITTEN, switches, guard=guard)
+    for name, argument in calls:
+        one.perform(name, [argument])
+    assert (guard.at_end() is None) is (OFF in calls)
+
+
+def test_program_may_catch_the_refusal_of_a_leaving_rule(worker: Worker, switches: SkillTable) -> None:
+    program = (
+        "def task_program():\n    turn_on('stove')\n    try: go_to('office')\n"
+        "    except Exception: turn_off('stove')\n    go_to('office')\n"
+    )
+    guard = RuleGuard([leaves_off(switches, refuse=True)])
+    assert guard.may_refuse
+    new_robot = partial(SimulatedRobot, WORLD, AS_WRITTEN, switches, guard=guard)
+    outcome = worker.run_alone(program, new_robot)
+    assert [event.kind for event in outcome.trace] == ["turn_on", "turn_off", "goto"]
+    assert outcome.status is Status.FINISHED
+
+
 FORMULAS = (
     r'not tr.Exists(goto("vault"))',
     'not tr.AtLeast(say(".*"), 2)',

@@ -33,6 +33,7 @@ POSE_IN_ROOM = Skill(
 RTL_WORDS = frozenset(
     {
         *("at", "holding", "to", "options", "found", "missed", "mention", "answered", "returned", "tr"),
+        *("last_found", "last_missed"),
         *("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies", INSIDE),
     }
 )
@@ -82,6 +83,8 @@ def skill(
     names: str = "thing",
     to: str | None = None,
     when_tried: bool | None = None,
+    sets: str = "",
+    clears: str = "",
     seconds: float = 1.0,
     is_idle: bool = False,
     adds_event: bool = True,
@@ -103,6 +106,8 @@ def skill(
     names: str = "thing",
     to: str | None = None,
     when_tried: bool | None = None,
+    sets: str = "",
+    clears: str = "",
     seconds: float = 1.0,
     is_idle: bool = False,
     adds_event: bool = True,
@@ -124,7 +129,10 @@ def skill(
         text: the parameter that becomes the text of the event; by default the first one.
         names: the sort of thing that the text names, such as `room`; empty for speech.
         to: the parameter that names the addressee of a question.
-        when_tried: whether failed attempts are recorded, too. By default, only house rules count them.
+        when_tried: whether failed attempts are recorded, too. By default, only house rules count them, unless
+            the skill only clears a state.
+        sets: the state into which it brings the thing that the text names, such as `on`.
+        clears: the state that it ends.
         seconds: its duration on the simulated clock in seconds, without driving.
         is_idle: whether it changes neither the robot nor its world.
         adds_event: whether the simulation records the event afterwards; False if the function does it.
@@ -211,8 +219,9 @@ class _Declaration:
             self.wrong(f"there is already a skill {self.name}; choose another name")
         if self.name in RESERVED_NAMES:
             self.wrong(f"{self.name} is a reserved name; choose another one")
-        if kind in RTL_WORDS:
-            self.wrong(f"{kind} has another meaning in formulas; choose another name")
+        for word in (kind, self.said["sets"], self.said["clears"]):
+            if word in RTL_WORDS:
+                self.wrong(f"{word} has another meaning in formulas; choose another name")
 
     def parameters(self) -> tuple[Parameter, ...]:
         code = self.does.__code__
@@ -273,7 +282,10 @@ class _Declaration:
 
     def recording(self, parameters: tuple[Parameter, ...]) -> Recording | None:
         event = self.said["event"]
+        sets, clears = self.said["sets"], self.said["clears"]
         if event is None:
+            if sets or clears:
+                self.wrong(f"{self.name} changes a state, so it needs an event; leave out event=None")
             return None
         to = self.said["to"]
         options = next((each.name for each in parameters if each.is_options), None)
@@ -284,10 +296,14 @@ class _Declaration:
                 self.wrong(f"{self.name} has no parameter {name}")
         if to and options is None:
             self.wrong("`to` is only for questions, which have a parameter options: list[str]; leave it out")
+        if (sets or clears) and (not text or options or sets == clears):
+            self.wrong(f"{self.name} must set or clear a state of the thing that its parameter names")
         more = tuple(name for name in names if name not in {text, to})
         tried = self.said["when_tried"]
+        is_judged = tried is True or (tried is None and (bool(sets) or not clears))
+        named = self.said["names"]
         return Recording(
-            event or self.name, text, options, to, self.said["names"], tried is True, tried is not False, more
+            event or self.name, text, options, to, named, tried is True, is_judged, more, sets, clears
         )
 
     def fails(self) -> Mapping[str, str]:
@@ -335,6 +351,11 @@ class _Declaration:
         return RosAction(kind, server, goal, result, package=package)
 
 
+def is_state_name(name: object) -> bool:
+    """Return whether a name can be that of a state, or is empty for no state."""
+    return isinstance(name, str) and (not name or (name.isidentifier() and not iskeyword(name)))
+
+
 SORTS_OF_THINGS = ("room", "object", "object or person", "thing", "")
 COROUTINE_FLAG, MORE_ARGUMENTS_FLAGS = 0x80, 0x04 | 0x08  # bits of `co_flags`
 SKILL_OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
@@ -363,6 +384,8 @@ SKILL_OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "names": (lambda it: it in SORTS_OF_THINGS, "one of " + ", ".join(f'"{one}"' for one in SORTS_OF_THINGS)),
     "to": (lambda it: it is None or isinstance(it, str), "the name of a parameter"),
     "when_tried": (lambda it: it is None or isinstance(it, bool), "True, False or None"),
+    "sets": (is_state_name, 'the name of a state, such as "on"'),
+    "clears": (is_state_name, 'the name of a state, such as "on"'),
     "seconds": (lambda it: type(it) in {int, float} and 0 <= it < inf, "a number of at least 0"),
     "is_idle": (lambda it: isinstance(it, bool), "True or False"),
     "adds_event": (lambda it: isinstance(it, bool), "True or False"),

@@ -85,3 +85,9 @@ def _expect_new(row: Skill, rows: list[Skill]) -> None:
         row.wrong(f"there is already a skill {row.name}; choose another name")
     if row.recording is not None and row.recording.kind in kinds:
         row.wrong(f'the events of another skill are called "{row.recording.kind}"; choose another name')
+    every = [*rows, row]
+    recordings = [one.recording for one in every if one.recording is not None]
+    states = {state for one in recordings for state in (one.sets, one.clears)}
+    both = states & {*(one.name for one in every), *(one.kind for one in recordings)}
+    if both:
+        row.wrong(f"{min(both)} is the name of a skill and of a state; choose another name")

@@ -45,6 +45,8 @@ class Recording:
     when_tried: bool = False  # whether failed attempts are recorded, too
     judged_when_tried: bool = False  # whether failed attempts count for house rules
     more: tuple[str, ...] = ()  # further parameters whose values the event contains
+    sets: str = ""  # the state into which it brings the thing that the text names
+    clears: str = ""  # the state that it ends
 
     @property
     def is_spoken(self) -> bool:
