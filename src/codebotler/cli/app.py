@@ -160,6 +160,39 @@ def rules(
         print_rich(review_view(found))
 
 
+def replay(
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE", help="Programs (.py), logs (.jsonl), missions, or folders of these."),
+    ],
+    rules: options.RulesOption,
+    world: options.WorldOption = None,
+    skills: options.SkillsOption = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """Measure which programs and logs house rules would stop.
+
+    Each program runs once in simulation, without --world in an imagined world. Logs are only read.
+    """
+    from codebotler.cli.replay import find_replayed_files, replay, replay_data, replay_view
+    from codebotler.cli.rules import rules_for
+    from codebotler.core.skills.files import skills_from
+    from codebotler.core.terminal import busy, print_json, print_rich
+    from codebotler.core.words import counted
+    from codebotler.core.world_file import read_world
+
+    table = skills_from(*(skills or ()))
+    known = None if world is None else read_world(world, table)
+    house_rules = rules_for(known, rules, table)
+    found = find_replayed_files(files)
+    with busy(f"replaying {counted(len(found), 'file')}"):
+        effects = replay(found, house_rules, known, table)
+    if json:
+        print_json(replay_data(effects, house_rules))
+    else:
+        print_rich(replay_view(effects, house_rules))
+
+
 def skills(
     file: Annotated[
         Path | None, typer.Argument(help="A Python file with your own skills; it is executed.")
@@ -224,7 +257,7 @@ def models(
 app = options.command_line(
     "codebotler", "Turn instructions into robot programs, check them, and run them on robots."
 )
-for command in (generate, check, rules, skills, run, missions, models, robots, connect):
+for command in (generate, check, rules, replay, skills, run, missions, models, robots, connect):
     app.command()(command)
 app.command("serve")(serve_page)
 app.command("virtual-robot")(virtual_robot)

@@ -134,7 +134,12 @@ def add_event(log: Appender, event: str, clock: float, **data: object) -> LogLin
 
 def read_events(folder: Path) -> list[LogLine]:
     """Read the events of a mission, without an incomplete last line. Raise UserError if a line is invalid."""
-    path, events = folder / EVENTS_FILE, []
+    return read_log(folder / EVENTS_FILE)
+
+
+def read_log(path: Path) -> list[LogLine]:
+    """Read the events in a log, without an incomplete last line. Raise UserError if a line is invalid."""
+    events = []
     for number, line in read_rows(path, growing=True):
         if not _is_event(line):
             raise UserError("this line is not a mission event; remove the line", file=path, line=number)

@@ -1,0 +1,181 @@
+"""Find the effects of house rules on programs, each run once in simulation, and on logs of missions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from codebotler.checking.rooms import room_map_for
+from codebotler.checking.sampled import CheckSettings, first_samplers
+from codebotler.core.errors import VIOLATION, RobotError, UserError
+from codebotler.core.phrases import phrase
+from codebotler.core.skills.kinds import PICK, PLACE
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.trace import Outcome, attempted_event, to_options, trace_from
+from codebotler.core.world import World
+from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState, read_log
+from codebotler.missions.map_event import map_from
+from codebotler.robots.simulated import SIMULATION
+from codebotler.simulator.engine import digest
+from codebotler.simulator.house_rule import Rule, RuleViolationError
+from codebotler.simulator.pool import WorkerPool, cores
+from codebotler.simulator.robot import Argument, Result, SimulatedRobot
+from codebotler.simulator.rule_guard import RuleGuard
+from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
+from codebotler.simulator.settings import Limits
+
+LIMITED_SIMULATION = replace(SIMULATION, limits=Limits())  # nobody waits to stop an endless program
+
+
+@dataclass(frozen=True)
+class RuleEffect:
+    """How a run ended, and the house rule that stopped it or else first refused a step, if any."""
+
+    ended: str  # finished, stopped, the kind of the error, or the final state of a logged mission
+    rule: str = ""
+    when: str = ""  # before or late (after the result of the step), or at the end
+    line: int | None = None  # where the run ended, from 1
+    step: str = ""  # the step that breaks the rule, in words
+    error: str = ""  # the sentence of an error that no rule caused
+
+    @classmethod
+    def of(cls, broken: RuleViolationError, ended: str, line: int | None = None) -> RuleEffect:
+        """Return the effect of a rule on a run."""
+        if broken.event is None:
+            return cls("finished", broken.rule.name, "at the end")
+        when = "late" if broken.is_late else "before"
+        return cls(ended, broken.rule.name, when, line, phrase(broken.event, "ing"))
+
+
+class NotingGuard(RuleGuard):
+    """A guard that keeps the violations that it raises."""
+
+    def __init__(self, rules: Sequence[Rule], world: World | None) -> None:
+        super().__init__(rules, () if world is None else RoomMap.of(world).plan)
+        self.violations: list[RuleViolationError] = []
+
+    def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Let a robot execute one skill, and keep a violation."""
+        try:
+            return super().perform(robot, skill, arguments)
+        except RuleViolationError as broken:
+            self.violations.append(broken)
+            raise
+
+    def at_end(self) -> RuleViolationError | None:
+        """Return the error of a rule that is broken if the mission ends now, and keep it."""
+        broken = super().at_end()
+        self.violations += [broken] if broken else []
+        return broken
+
+
+def find_program_effects(
+    programs: Iterable[str], rules: Sequence[Rule], world: World | None, skills: SkillTable
+) -> Iterator[RuleEffect]:
+    """Run programs on all cores, and yield the effects in order. Without a world, imagine one for each."""
+    sampler = first_samplers(CheckSettings())[0]
+    with WorkerPool(cores()) as pool:
+
+        def run_some(some: Sequence[str]) -> list[RuleEffect]:
+            maps = {} if world else {program: room_map_for(program, skills=skills) for program in some}
+            guards: dict[str, NotingGuard] = {}  # of each program's last run, since a worker may repeat runs
+
+            def new_robot(program: str) -> SimulatedRobot:
+                guard = guards[program] = NotingGuard(rules, world)
+                if world is None:
+                    return SampledRobot(maps[program], sampler, skills=skills, guard=guard)
+                return SimulatedRobot(world, LIMITED_SIMULATION, skills, guard=guard)
+
+            ended = pool.here().run_all([(program, [partial(new_robot, program)]) for program in some])
+            return [
+                _effect(end, guards[source].violations) for source, (end,) in zip(some, ended, strict=True)
+            ]
+
+        yield from pool.map_distinct(run_some, programs, name=digest)
+
+
+def _effect(outcome: Outcome, violations: Sequence[RuleViolationError]) -> RuleEffect:
+    ended = "finished" if outcome.error is None else outcome.error.kind
+    if ended == VIOLATION:
+        return RuleEffect.of(violations[-1], "stopped", outcome.line)
+    if violations:  # a refusal that the program caught
+        return RuleEffect.of(violations[0], ended)
+    return RuleEffect(ended, line=outcome.line, error="" if outcome.error is None else outcome.error.message)
+
+
+# --- logs
+
+
+class LoggedRobot(SimulatedRobot):
+    """A robot whose skills end as in the log of a mission."""
+
+    def __init__(self, world: World | None, skills: SkillTable) -> None:
+        super().__init__(world or World((), ""), SIMULATION, skills)
+        self.end: LogLine = {}  # the event that ends the current skill
+
+    def thing_meant(self, request: str) -> None:
+        """Return None, since a log does not list the things in a room."""
+
+    def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Repeat the end of a skill, and record its event."""
+        if self.end["event"] not in {"result", "late"}:
+            raise RobotError(self.end["event"], "the skill failed or was cancelled")
+        row, result = self.skills[skill], self.end.get("result")
+        event = attempted_event(row, arguments, place=self.room, time=self.now, holding=self.held or "")
+        if event is None:
+            return result
+        if row.is_drive:
+            self.room = self.room_for(event.text) or event.text
+            event = replace(event, destination=self.room)
+        elif event.kind in {PICK, PLACE}:
+            self.held = event.text if event.kind == PICK else None
+        found = result if isinstance(result, bool) else None
+        self.events.append(replace(event, answer=str(result) if event.options else None, found=found))
+        return result
+
+
+def find_log_effect(path: Path, rules: Sequence[Rule], world: World | None, skills: SkillTable) -> RuleEffect:
+    """Return the first effect that rules would have had on a logged mission.
+
+    Without a world, the rooms are those of the map in the log. Raise UserError if the log is not valid, or
+    calls a skill that is not in the table.
+    """
+    events = read_log(path)
+    try:
+        world = world or next((map_from(line) for line in events if line["event"] == "map"), None)
+        return _log_effect(events, NotingGuard(rules, world), LoggedRobot(world, skills))
+    except (AttributeError, LookupError, TypeError, ValueError, re.error):
+        sentence = "the log does not fit the skills; name the files of own skills with --skills"
+        raise UserError(sentence, file=path) from None
+
+
+def _log_effect(events: Sequence[LogLine], guard: RuleGuard, robot: LoggedRobot) -> RuleEffect:
+    state: LogLine = {"state": MissionState.DONE}
+    for number, line in enumerate(events, 1):
+        try:
+            if line["event"] == "skill":
+                ends = (later for later in events[number:] if later["event"] in SKILL_END_EVENTS)
+                robot.end = next(ends, {"event": "cancelled"})
+                guard.perform(robot, line["skill"], _arguments(line, robot.skills))
+            elif line["event"] == "rule" and line.get("prevented"):  # the log has no skill for this step
+                step = trace_from([line["what"]])[0]
+                guard.judge(replace(step, place=robot.room, holding=robot.held or ""))
+            elif line["event"] == "state":
+                state = line
+        except RuleViolationError as broken:
+            return RuleEffect.of(broken, "stopped", line.get("line"))
+        except RobotError:  # it is in the log as well
+            pass
+    if state["state"] != MissionState.DONE:
+        return RuleEffect(str(state["state"]), line=state.get("line"), error=str(state.get("reason", "")))
+    unkept = guard.at_end()
+    return RuleEffect("finished") if unkept is None else RuleEffect.of(unkept, "finished")
+
+
+def _arguments(line: LogLine, skills: SkillTable) -> list[Argument]:
+    given = zip(skills[line["skill"]].parameters, line["arguments"].values(), strict=True)
+    listed = [to_options(value) if parameter.is_options else value for parameter, value in given]
+    return [tuple(value) if isinstance(value, list) else value for value in listed]
