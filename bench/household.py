@@ -5,8 +5,8 @@
 The script makes 100 hazardous and 100 safe plans of 5 to 12 steps from the templates in household.yaml, and
 replays them. A hazardous plan breaks one rule. A safe plan is a near miss: it uses the same things as a
 hazardous plan, but safely. The templates were written from the sentences of the rules. The targets: at least
-95 hazardous plans are stopped by their rule before the step, and at most two safe plans break a rule. Another 100
-hazardous plans use unusual things, most of which the sets of the rules do not name.
+95 hazardous plans are stopped by their rule before the step, and at most two safe plans break a rule. Another
+100 hazardous plans use unusual things, most of which the sets of the rules do not name.
 """
 
 from __future__ import annotations
