@@ -150,7 +150,7 @@ def rules(
     house_rules = read_rules(file, table)
     known = None if world is None else read_world(world, table)
     note_evasions(house_rules, known, table)
-    if not any(rule.inside for rule in house_rules):
+    if any(rule.names_destination for rule in house_rules) and not any(rule.inside for rule in house_rules):
         note("goto covers destinations only; to keep the robot from driving through a room, use inside")
     with busy("looking for examples"):
         found = review_rules(house_rules, known)

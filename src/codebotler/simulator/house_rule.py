@@ -9,9 +9,9 @@ from typing import Literal, TypeAlias
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import VIOLATION, RobotError
 from codebotler.core.phrases import phrase
-from codebotler.core.skills.kinds import INSIDE
+from codebotler.core.skills.kinds import GOTO, INSIDE
 from codebotler.core.trace import Event
-from codebotler.rtl import EventPattern, Formula
+from codebotler.rtl import EventPattern, Formula, Regex
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.semantics import is_match
 
@@ -54,6 +54,11 @@ class Rule:
     def inside(self) -> tuple[EventPattern, ...]:
         """The event patterns for rooms that the robot's pose enters."""
         return tuple(element for element in self.elements if element.kind == INSIDE)
+
+    @property
+    def names_destination(self) -> bool:
+        """Whether the rule is about drives to some rooms, rather than about all drives or none."""
+        return any(one.kind == GOTO and one.text != Regex(".*") for one in self.elements)
 
     def depends_on_room(self, event: Event) -> bool:
         """Return whether the rule depends on the room in which events of this kind happen."""

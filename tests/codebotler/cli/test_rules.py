@@ -173,6 +173,14 @@ def test_a_rule_about_where_the_robot_is_holds_on_the_way(files: Path) -> None:
     assert "stopped by rule printer in line 3" in ended.out
 
 
+def test_rules_that_name_no_destination_need_no_note_about_goto(files: Path) -> None:
+    (files / "silent.yaml").write_text(
+        "rules: [{name: look, says: Look after a drive., "
+        'always: \'tr.AfterLast(goto(".*")).Exists(check(".*")) or not tr.Exists(say(".*"))\'}]'
+    )
+    assert codebotler(files, "rules", "silent.yaml").err == ""
+
+
 def test_goto_is_said_to_be_about_destinations_until_a_rule_is_about_poses(files: Path) -> None:
     (files / "inside.yaml").write_text(NEVER_INSIDE)
     assert "destinations" in codebotler(files, "rules", "rules.yaml").err
