@@ -344,7 +344,7 @@ class SampledRobot(SimulatedRobot):
         words = WORDS_FOR_PEOPLE if is_person else ("thing", "object")
         entities = [Entity(name, trait_words(self.traits(name).items())) for name in known]
         fitting = [one.label for one in entities if best_fits(wanted, [one], words)]
-        names = [normalized(name) for name in fitting or (wanted, f"another {wanted}")]
+        names = dict.fromkeys(normalized(name) for name in fitting or (wanted, f"another {wanted}"))
         before, goals = self.room, self._goals_in(where)
         found = []
         for self.room in goals:

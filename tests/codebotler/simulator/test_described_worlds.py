@@ -135,6 +135,7 @@ def test_skills_read_the_world(robot: SimulatedRobot) -> None:
     assert robot.things("kitchen", is_="fruit") == ["apple", "pear"]
     assert robot.things("hall") == []
     assert robot.people("kitchen", wears="red coat") == ["Angel"]
+    assert robot.people("sink", is_="waving person") == ["Angel"]  # people are in the room around a place
     assert robot.people(is_="person") == ["Cy", "Angel", "Bo"]
     assert robot.traits("apple")["size"] == 2
     assert robot.value("number of cups", 0, 1) == 3
@@ -166,6 +167,15 @@ def test_a_sampled_world_keeps_what_it_has_drawn(world: World) -> None:
         there = robot.things("hall", is_="fruit")
         assert robot.things("hall", is_="fruit") == there
         assert robot.perform("is_in_room", ["apple"]) is ("apple" in there)
+
+
+def test_skills_read_rooms_of_a_guessed_map() -> None:
+    counts = set()
+    for number in range(10):
+        robot = SampledRobot(RoomMap(("hall",), "hall", guessed=True), FactSampler(sample=number))
+        robot.drive("loft")
+        counts.add(len(robot.people("loft", is_="person")))
+    assert counts == {0, 1}
 
 
 def test_a_person_who_was_moved_is_there(world: World) -> None:
