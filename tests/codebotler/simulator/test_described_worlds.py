@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import RobotError, UserError
+from codebotler.core.trace import Option
 from codebotler.core.world import World, is_within, laid_out
 from codebotler.core.world_file import read_world
 from codebotler.robots.simulated import SIMULATION
@@ -159,6 +160,28 @@ def test_sampled_worlds_draw_known_things_and_people(world: World) -> None:
     assert names == {"angel"}
     unknown = {name for number in range(30) for name in sampled(world, number).things("hall", is_="toy")}
     assert unknown == {"toy", "another toy"}
+
+
+def test_people_who_were_found_in_a_room_can_be_asked_there(world: World) -> None:
+    for number in range(20):
+        robot = sampled(world, number)
+        robot.perform("go_to", ["kitchen"])
+        for name in robot.people("kitchen", is_="waving person"):
+            assert isinstance(robot.perform("ask", [name, "Tea?", (Option("yes"), Option("no"))]), int)
+
+
+@pytest.mark.parametrize(
+    ("request_", "finds"), [("waving person", "people"), ("person", "people"), ("fruit", "things")]
+)
+def test_a_skill_finds_what_a_look_has_found(world: World, request_: str, finds: str) -> None:
+    for number in range(30):
+        robot = sampled(world, number)
+        robot.perform("go_to", ["bathroom"])
+        is_there = robot.perform("is_in_room", [request_])
+        assert bool(getattr(robot, finds)("bathroom", is_=request_)) is is_there
+        robot.perform("go_to", ["hall"])
+        if not getattr(robot, finds)("hall", is_=request_):
+            assert not robot.perform("is_in_room", [request_])
 
 
 def test_a_sampled_world_keeps_what_it_has_drawn(world: World) -> None:
