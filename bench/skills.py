@@ -1,6 +1,6 @@
 """Measures how much misuse of custom skills the check finds before a robot moves.
 
-Each right program of the five sets in `examples/skills` is changed by the operators for custom skills, and by
+Each right program of the six sets in `examples/skills` is changed by the operators for custom skills, and by
 swapping steps. A changed program is a misuse if it passes an argument that a skill does not accept, or if it
 ends in an error or breaks a house rule of the set in any of WORLDS sampled worlds. For each operator, the
 script prints how many changed programs are a misuse, how many of these the check finds in 5 worlds, and how
