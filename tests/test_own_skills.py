@@ -1,4 +1,4 @@
-"""Five sets of own skills, from the model's prompt to the robot, the benchmark and the page."""
+"""Six sets of own skills, from the model's prompt to the robot, the benchmark and the page."""
 
 import inspect
 import json
@@ -30,6 +30,7 @@ from roboeval.suites.solutions import solutions
 SETS = Path(__file__).parent.parent / "examples" / "skills"
 BREAKS = {
     "drone": "take_off()",
+    "gpsr": 'go_to("kitchen")\n    open_door("fridge")\n    go_to("hall")',
     "hotel_lift": "if call_lift():\n        ride_to(5)",
     "lab_bench": 'new_tip()\n    aspirate("ethanol", 20)\n    dispense("A1")',
     "quadruped": 'open_door("glass door")',
@@ -37,11 +38,13 @@ BREAKS = {
 }
 RULES = {
     "drone": "land",
+    "gpsr": "close-doors",
     "hotel_lift": "staff-floor",
     "lab_bench": "no-ethanol-in-row-a",
     "quadruped": "knock",
     "tidy_arm": "no-pens-in-the-bin",
 }
+TASKS = {"gpsr": 14}  # of the sets that do not have three
 
 
 DEAR = {
@@ -54,8 +57,11 @@ DEAR = {
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "own" in metafunc.fixturenames:
         first, *others = BREAKS
-        marks = [pytest.mark.slow] * (metafunc.definition.name in DEAR)
-        sets = [first, *(pytest.param(name, marks=marks) for name in others)]
+        is_dear = metafunc.definition.name in DEAR
+        sets = [
+            first,
+            *(pytest.param(one, marks=[pytest.mark.slow] * (is_dear or one in TASKS)) for one in others),
+        ]
         metafunc.parametrize("own", sets, indirect=True)
 
 
@@ -95,11 +101,11 @@ def asked(*words: str, status: int = 0) -> str:
     return done.output
 
 
-def test_there_are_five_with_three_tasks_each_and_at_most_ten_lines_a_skill() -> None:
+def test_each_set_has_its_tasks_and_at_most_ten_lines_a_skill() -> None:
     assert sorted(BREAKS) == sorted(path.name for path in SETS.iterdir() if path.is_dir())
     for name in BREAKS:
         own = Own(SETS / name)
-        assert len(own.suite.tasks) == 3
+        assert len(own.suite.tasks) == TASKS.get(name, 3)
         for skill in own.skills.rows[len(SKILLS) :]:
             assert skill.does is not None
             source, first = inspect.getsourcelines(inspect.unwrap(skill.does))
@@ -122,7 +128,8 @@ def test_right_programs_pass_and_wrong_ones_fail_as_they_say(own: Own) -> None:
 
 def test_tasks_have_no_findings(own: Own) -> None:
     done = CliRunner().invoke(roboeval, ["tasks", "--suite", str(own.folder), "--lint"])
-    assert (done.exit_code, done.stdout) == (0, "no findings\n"), done.output
+    assert done.exit_code == 0, done.output
+    assert "warning" not in done.stdout
 
 
 def test_the_check_accepts_right_programs_and_finds_errors_that_nobody_handles(own: Own) -> None:

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal, TypeAlias
 
 from codebotler.core.errors import RobotError
@@ -344,11 +345,20 @@ class SampledRobot(SimulatedRobot):
         words = WORDS_FOR_PEOPLE if is_person else ("thing", "object")
         entities = [Entity(name, trait_words(self.traits(name).items())) for name in known]
         fitting = [one.label for one in entities if best_fits(wanted, [one], words)]
-        names = [normalized(name) for name in fitting or (wanted, f"another {wanted}")]
-        before, goals = self.room, self._goals_in(where)
+        names = dict.fromkeys(normalized(name) for name in fitting or (wanted, f"another {wanted}"))
+        goals: Sequence[str] = self._goals_in(where)
+        if is_person:  # who is at a place is in its room
+            goals = [self.goal_of(where)] if where else self.rooms
+        before = self.room
         found = []
+        described = normalized(wanted)
         for self.room in goals:
-            found += [name for name in names if self._find(name, is_person=is_person)]
+            is_known = described in self.here.missed  # an earlier look for this description found nothing
+            finds = self.is_here if is_known else partial(self._find, is_person=is_person)
+            there = [name for name in names if finds(name)]
+            if not there and not self.is_here(described):
+                self.here.missed.add(described)
+            found += there or ([described] if self.is_here(described) else [])
         self.room = before
         return found
 

@@ -81,8 +81,11 @@ class SimulatedWorld:
         """The people in the robot's room, also those who will arrive later."""
         if len(self.rooms) == len(self.goals):
             return self.occupants[self.room]
-        around = next((room.within for room in self.world.rooms if room.name == self.room), "") or self.room
-        return [one for goal in self._reach[around] for one in self.occupants[goal]]
+        return [one for goal in self._reach[self._room_around(self.room)] for one in self.occupants[goal]]
+
+    def _room_around(self, goal: str) -> str:
+        """Return the room in which a place is, or the room itself."""
+        return next((room.within for room in self.world.rooms if room.name == goal), "") or goal
 
     def possible_rooms(self, request: str) -> Sequence[str]:
         """Return all rooms that a request may refer to; for an exact name, only where it would lead."""
@@ -129,15 +132,19 @@ class SimulatedWorld:
         return [thing.label for thing in found if not is_ or best_fits(is_, [thing.entity])]
 
     def people(self, where: str = "", is_: str = "", **traits: str) -> list[str]:
-        """Return the names of the people in a room, or anywhere, who fit all descriptions."""
-        found = [one for goal in self._goals_in(where) for one in self.occupants[goal] if one.is_here]
+        """Return the names of the people in a room, around a place, or anywhere, who fit all descriptions."""
+        around = self._room_around(self.goal_of(where)) if where else ""
+        found = [one for goal in self._goals_in(around) for one in self.occupants[goal] if one.is_here]
         wanted = [text for text in (is_, *traits.values()) if text]
         words = self.settings.words_for_people or WORDS_FOR_PEOPLE
         return [o.person.name for o in found if all(best_fits(text, [o.entity], words) for text in wanted)]
 
     def _goals_in(self, where: str) -> Sequence[str]:
         """Return a room and the places in it, or all of them if no room is given."""
-        return self._reach[self.goal_of(where)] if where else self.goals
+        if not where:
+            return self.goals
+        goal = self.goal_of(where)
+        return self._reach.get(goal, (goal,))  # on a guessed map, there are more rooms
 
     def goal_of(self, request: str) -> str:
         """Return the room or place that a request refers to; raise RobotError if there is none or several."""

@@ -96,7 +96,8 @@ def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
     from roboeval.linting.trials import judge_solutions
 
     wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
-    linted = (lint(one, judge_solutions(one, suite, workers=cores())) for one in wanted)
+    matching = suite.settings.matching
+    linted = (lint(one, judge_solutions(one, suite, workers=cores()), matching) for one in wanted)
     findings = [found for several in show_progress(linted, "linting", len(wanted)) for found in several]
     print_text(render(findings, accepted=accepted))
     if any(finding.accepted is None for finding in findings):

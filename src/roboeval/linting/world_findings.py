@@ -17,7 +17,7 @@ from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.regex_samples import samples
 from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
-from codebotler.simulator.matching import resolve_room
+from codebotler.simulator.matching import Matching, resolve_room
 from roboeval.linting.absent_names import absent_names
 from roboeval.linting.findings import Finding, FindingKind
 from roboeval.suites.load import Requirement, Scenario, Task, TaskCheck
@@ -33,6 +33,7 @@ class JudgedWorld:
     number: int  # the number of the world, from 1
     scenario: Scenario
     ablated: bool
+    matching: Matching = "label-in-request"  # how requests refer to rooms
 
     @property
     def name(self) -> str:
@@ -127,8 +128,11 @@ class JudgedWorld:
 
     @cached_property
     def _plain_moves(self) -> Reasoner:
-        moves = {request: resolve_room(self._rooms, request) or request for request in self._requests}
+        moves = {request: self._room_for(request) or request for request in self._requests}
         return Reasoner((r.formula for r in self.require), moves, self.scenario.world.robot)
+
+    def _room_for(self, request: str) -> str | None:
+        return resolve_room(self._rooms, request, self.matching)
 
     @property
     def _rooms(self) -> list[str]:
@@ -137,8 +141,7 @@ class JudgedWorld:
     @cached_property
     def _requests(self) -> list[str]:
         """Return a short request for each room that makes the robot drive there."""
-        rooms = self._rooms
-        return [next((t for t in samples(r) if resolve_room(rooms, t) == r), r) for r in rooms]
+        return [next((t for t in samples(r) if self._room_for(t) == r), r) for r in self._rooms]
 
     def dead_regexes(self, requirement: Requirement) -> Iterator[Finding]:
         """Yield findings about regexes in a requirement that match nothing, and visits that lead nowhere."""
@@ -162,11 +165,11 @@ class JudgedWorld:
         if any(map(text.matches, self._requests)):
             return True
         others = distinct_strings((text, *map(Regex, self._rooms)))
-        return any(text.matches(one) and resolve_room(self._rooms, one) for one in others)
+        return any(text.matches(one) and self._room_for(one) for one in others)
 
 
-def judged_worlds(task: Task) -> Iterator[JudgedWorld]:
+def judged_worlds(task: Task, matching: Matching = "label-in-request") -> Iterator[JudgedWorld]:
     """Yield the worlds of a task, then those of its ablation."""
     for ablated in (False, True):
         for number, scenario in enumerate(task.judged_in(ablated=ablated), 1):
-            yield JudgedWorld(task, number, scenario, ablated)
+            yield JudgedWorld(task, number, scenario, ablated, matching)

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import RobotError, UserError
+from codebotler.core.trace import Option
 from codebotler.core.world import World, is_within, laid_out
 from codebotler.core.world_file import read_world
 from codebotler.robots.simulated import SIMULATION
@@ -135,6 +136,7 @@ def test_skills_read_the_world(robot: SimulatedRobot) -> None:
     assert robot.things("kitchen", is_="fruit") == ["apple", "pear"]
     assert robot.things("hall") == []
     assert robot.people("kitchen", wears="red coat") == ["Angel"]
+    assert robot.people("sink", is_="waving person") == ["Angel"]  # people are in the room around a place
     assert robot.people(is_="person") == ["Cy", "Angel", "Bo"]
     assert robot.traits("apple")["size"] == 2
     assert robot.value("number of cups", 0, 1) == 3
@@ -160,12 +162,43 @@ def test_sampled_worlds_draw_known_things_and_people(world: World) -> None:
     assert unknown == {"toy", "another toy"}
 
 
+def test_people_who_were_found_in_a_room_can_be_asked_there(world: World) -> None:
+    for number in range(20):
+        robot = sampled(world, number)
+        robot.perform("go_to", ["kitchen"])
+        for name in robot.people("kitchen", is_="waving person"):
+            assert isinstance(robot.perform("ask", [name, "Tea?", (Option("yes"), Option("no"))]), int)
+
+
+@pytest.mark.parametrize(
+    ("request_", "finds"), [("waving person", "people"), ("person", "people"), ("fruit", "things")]
+)
+def test_a_skill_finds_what_a_look_has_found(world: World, request_: str, finds: str) -> None:
+    for number in range(30):
+        robot = sampled(world, number)
+        robot.perform("go_to", ["bathroom"])
+        is_there = robot.perform("is_in_room", [request_])
+        assert bool(getattr(robot, finds)("bathroom", is_=request_)) is is_there
+        robot.perform("go_to", ["hall"])
+        if not getattr(robot, finds)("hall", is_=request_):
+            assert not robot.perform("is_in_room", [request_])
+
+
 def test_a_sampled_world_keeps_what_it_has_drawn(world: World) -> None:
     for number in range(20):
         robot = sampled(world, number)
         there = robot.things("hall", is_="fruit")
         assert robot.things("hall", is_="fruit") == there
         assert robot.perform("is_in_room", ["apple"]) is ("apple" in there)
+
+
+def test_skills_read_rooms_of_a_guessed_map() -> None:
+    counts = set()
+    for number in range(10):
+        robot = SampledRobot(RoomMap(("hall",), "hall", guessed=True), FactSampler(sample=number))
+        robot.drive("loft")
+        counts.add(len(robot.people("loft", is_="person")))
+    assert counts == {0, 1}
 
 
 def test_a_person_who_was_moved_is_there(world: World) -> None:

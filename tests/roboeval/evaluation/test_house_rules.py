@@ -73,7 +73,7 @@ def test_what_was_refused_would_have_failed(measuring: Measuring) -> None:
 
 
 def test_a_guard_that_sees_nothing_is_noticed(measuring: Measuring, monkeypatch: pytest.MonkeyPatch) -> None:
-    def nothing(_: RuleGuard, *events: Event) -> None:
+    def nothing(_: RuleGuard, *events: Event, is_drive: bool = False) -> None:
         """Take what there is."""
 
     monkeypatch.setattr(RuleGuard, "judge", nothing)

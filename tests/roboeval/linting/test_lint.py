@@ -54,11 +54,15 @@ def linted(tmp_path: Path) -> Lint:
         replaced: tuple[str, str] = ("", ""),
         edited: Sequence[tuple[str, str]] = (),
         skills: str = "",
+        matching: str = "label-in-request",
     ) -> list[Finding]:
         suite = tmp_path / f"suite{len([*tmp_path.iterdir()])}"
         (suite / "tasks").mkdir(parents=True)
         (suite / "solutions").mkdir()
-        (suite / "suite.yaml").write_text("name: mine\nversion: 1\n" + "skills: [own.py]\n" * bool(skills))
+        head = f"name: mine\nversion: 1\nrules: {{matching: {matching}}}\n" + "skills: [own.py]\n" * bool(
+            skills
+        )
+        (suite / "suite.yaml").write_text(head)
         (suite / "own.py").write_text(skills)
         (suite / "solutions" / "Hello.yaml").write_text(solutions)
         lines = ["name: Hello", "summary: Greet.", "prompts: [Say hello in the kitchen.]", "checks:"]
@@ -77,7 +81,8 @@ def linted(tmp_path: Path) -> Lint:
         (suite / "tasks" / "Hello.yaml").write_text(text)
         loaded = load_suite(str(suite))
         task = loaded.task("Hello")
-        findings = lint(task, judge_solutions(task, loaded) if untripped else [])
+        verdicts = judge_solutions(task, loaded) if untripped else []
+        findings = lint(task, verdicts, loaded.settings.matching)
         wanted = {"untripped": untripped, "unworded": unworded}
         return [one for one in findings if wanted.get(one.kind, True)]
 
@@ -108,6 +113,16 @@ def test_a_requirement_that_cannot_hold(linted: Lint) -> None:
     assert "world 1" in finding.message
     assert finding.line == 5  # of the check, which can hold in no world
     assert linted({"even": 'tr.Exists(say("a|b")) and not tr.Exists(say("a"))'}, ["even"]) == []
+
+
+@pytest.mark.parametrize(("matching", "can_hold"), [("label-in-request", False), ("longest-name", True)])
+def test_a_place_is_reached_if_the_suite_prefers_longer_names(
+    linted: Lint, matching: str, *, can_hold: bool
+) -> None:
+    places = ("rooms: [kitchen, ", "rooms: [{{name: kitchen, places: [kitchen table]}}, ")
+    formula = 'tr.Exists(at("kitchen table", place("mug")))'
+    found = linted({"puts": formula}, ["puts"], replaced=places, matching=matching)
+    assert ("unsatisfiable" in {one.kind for one in found}) is not can_hold
 
 
 def test_requirements_that_cannot_hold_together(linted: Lint) -> None:
