@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations
@@ -254,8 +255,9 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
     if world is None:
         return
     rooms = [room.name for room in world.rooms]
-    things = [label for room in world.rooms for label in room.objects]
-    people = [person.name for room in world.rooms for person in room.people]
+    described = [*map(re.escape, world.descriptions)]
+    things = [*described, *(label for room in world.rooms for label in room.objects)]
+    people = [*described, *(person.name for room in world.rooms for person in room.people)]
     for element in dict.fromkeys(elements(rule.formula)):
         named: list[tuple[str, TextPattern | None, list[str]]] = [("thing", element.holding, things)]
         named.append(("person", element.to, people))

@@ -88,6 +88,14 @@ class HouseRuleFile(BaseModel):
             raise file.wrong(f"{sentence}; {mend}", *at, "always")
         return Rule(self.name, self.says, formula, when, self.refuse, self.any_)
 
+    def with_single_names(
+        self, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Sets
+    ) -> Iterator[Rule]:
+        """Yield the rule with each name of a set alone, so that a misspelled one is noticed."""
+        text = self.always or self.leaving or self.finally_ or ""
+        for used in {tag[1] for tag in SET_TAG.finditer(text)} & {*sets}:
+            yield from (self.rule(file, at, skills, {**sets, used: [name]}) for name in sets[used])
+
     def _formula(self, text: str, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Sets) -> Formula:
         if self.for_each is not None and EACH_TAG not in text:
             raise file.wrong(f'"for_each" needs {EACH_TAG} in the formula', *at)
@@ -134,9 +142,11 @@ def read_rules(path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (
             raise file.wrong(f'the rule "{name}" is listed twice; rename one', "rules", number, "name")
     sets = content.sets
     rules = tuple(form.rule(file, ("rules", number), skills, sets) for number, form in enumerate(forms))
-    for number, rule in enumerate(rules):
-        for sentence in unknown_rooms_in(rule, rooms):
-            raise file.wrong(sentence, "rules", number, rule.when)
+    for number, (form, rule) in enumerate(zip(forms, rules, strict=True)):
+        single = form.with_single_names(file, ("rules", number), skills, sets) if rooms else ()
+        for one in (rule, *single):
+            for sentence in unknown_rooms_in(one, rooms):
+                raise file.wrong(sentence, "rules", number, rule.when)
     return rules
 
 

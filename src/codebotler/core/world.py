@@ -61,6 +61,11 @@ class Room:
     def __post_init__(self) -> None:
         compose_fields(self)
 
+    @property
+    def full_name(self) -> str:
+        """The name in traces and for rules, such as `sink in kitchen` for a place in a room."""
+        return f"{self.name} in {self.within}" if self.within else self.name
+
 
 @dataclass(frozen=True)
 class World:
@@ -84,6 +89,13 @@ class World:
 
     def __post_init__(self) -> None:
         compose_fields(self)
+
+    @property
+    def descriptions(self) -> list[str]:
+        """The texts that describe its things and people, such as `fruit` or `red coat`."""
+        values = [value for _, traits in self.traits for _, value in traits]
+        lists = [one if isinstance(one, tuple) else (one,) for one in values]
+        return [text for texts in lists for text in texts if isinstance(text, str)]
 
     def __repr__(self) -> str:
         return f"World({counted(len(self.rooms), 'room')}, robot={self.robot!r})"

@@ -231,7 +231,10 @@ class LiveRobot:
     def _rooms_meant(self, request: str) -> list[str]:
         """Return the rooms that a request may refer to, as rules name them."""
         rooms = [] if self._room_map is None else self._room_map.possible_rooms(request)
-        return [*dict.fromkeys(name_of(room, request) for room in rooms)]
+        return [*dict.fromkeys(name_of(self._full_name(room), request) for room in rooms)]
+
+    def _full_name(self, room: str) -> str:
+        return room if self._room_map is None else self._room_map.full_name(room)
 
     def _ask_room(self) -> str | None:
         """Ask the robot for its current room, but only once. Return None if the robot does not know."""
@@ -242,8 +245,9 @@ class LiveRobot:
             here = str(check_answer(self.skills[ROOM_SKILL], self.robot.perform(ROOM_SKILL, ()))).strip()
         except (RobotError, CancelledError):
             return None
-        listed = (here,) if self._room_map is None else self._room_map.rooms
+        listed = (here,) if self._room_map is None else self._room_map.goals
         room = next((room for room in listed if room.strip().casefold() == here.casefold()), "")
+        room = self._full_name(room)
         words = name_of(room, self._place)
         return (words if words in self._rooms_meant(self._place) else room) or None
 

@@ -68,7 +68,10 @@ def _plan(robot: Robot, world: World) -> tuple[Room, ...]:
     """Return the rooms of a map. Only robots that drive on our grid get its default footprints."""
     rooms = laid_out(world).rooms if robot.rooms_are_regexes else world.rooms
     is_straight = robot.name == "simulated"
-    return tuple(Room(r.name, (), (), r.footprint, r.stand_at if is_straight else None) for r in rooms)
+    return tuple(
+        replace(room, objects=(), people=(), stand_at=room.stand_at if is_straight else None)
+        for room in rooms
+    )
 
 
 def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -79,6 +79,16 @@ def meant_by(request: str, labels: Iterable[str], *, plain: bool = False) -> lis
     return [*_meant_by(request, labels, tuple(map(_escaped, labels)) if plain else labels)]
 
 
+def prefer_places(rooms: Sequence[str], around: Mapping[str, str]) -> list[str]:
+    """Drop a room if a place in it is meant as well, as in "the desk in the office".
+
+    Args:
+        rooms: the rooms and places that a request may mean.
+        around: the room that contains each place.
+    """
+    return [room for room in rooms if all(around.get(place) != room for place in rooms)]
+
+
 @lru_cache(maxsize=4096)
 def _escaped(label: str) -> str:
     return r"\s+".join(map(re.escape, label.split()))
@@ -101,7 +111,8 @@ def _matched_words(request: str, regex: str) -> int:
 
 def _longest_match(request: str, regex: str) -> tuple[int, str]:
     """Return the number of words that a regex matches at most, and the words of the request beside them."""
-    found = [match for match in _pattern(whole_words(regex)).finditer(request) if match[0].strip()]
+    whole = rf"(?<!\w[-.'\u2019]){whole_words(regex)}(?![-.'\u2019]\w)"  # "room 2.1" is not room 2
+    found = [match for match in _pattern(whole).finditer(request) if match[0].strip()]
     counts = [
         (len(_WORD.findall(one[0])) or 1, f"{request[: one.start()]} {request[one.end() :]}") for one in found
     ]

@@ -109,10 +109,11 @@ class SimulatedRobot(SimulatedWorld):
     def drive(self, location: str) -> None:
         """Drive to the first room whose name occurs in the request."""
         room = self.room_for(location)
+        goal = None if room is None else self.full_names.get(room, room)
         if self.settings.events == "as-requested":
-            self.record(GOTO, location, destination=room)
-        elif room is not None:
-            self.record(GOTO, room, destination=room)
+            self.record(GOTO, location, destination=goal)
+        elif goal is not None:
+            self.record(GOTO, goal, destination=goal)
         if room is None:
             raise unknown_room(location, self.possible_rooms(location))
         self.room = room
@@ -136,7 +137,10 @@ class SimulatedRobot(SimulatedWorld):
             raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
         asked = self.person_meant(person)
         if asked is None:
-            raise RobotError("AskNoPerson", f'nobody is in "{self.room}" to be asked "{question}"')
+            nobody, is_named = f'nobody is in "{self.room}"', self.settings.matching == "longest-name"
+            if is_named and any(one.is_here for one in self.people_here):
+                nobody = f'nobody in "{self.room}" fits "{person}"'
+            raise RobotError("AskNoPerson", f'{nobody} to be asked "{question}"')
         answer = asked.answer(question, self.settings)
         chosen = None if answer is None else choose(answer, question, options, self.settings)
         if chosen is None:
@@ -169,7 +173,8 @@ class SimulatedRobot(SimulatedWorld):
             holds = "nothing" if self.held is None else f'"{self.held}"'
             raise RobotError("PlaceNoObject", f'the robot cannot place "{obj}": it holds {holds}')
         self.record(PLACE, taken.label if taken else obj)
-        self.contents[self.room].append(taken or Thing(obj, is_pattern=False))
+        same = self.taken if self.settings.matching == "longest-name" else taken
+        self.contents[self.room].append(same or Thing(obj, is_pattern=False))
         self.held = self.taken = None
 
     # --- the user's own skills
@@ -222,7 +227,7 @@ class SimulatedRobot(SimulatedWorld):
         """Execute one of the user's own skills, and record its event."""
         event, at = None, len(self.events)
         if row.adds_event:
-            event = attempted_event(row, arguments, place=self.room, time=self.now, holding=self.held or "")
+            event = attempted_event(row, arguments, place=self.place, time=self.now, holding=self.held or "")
         is_tried = row.recording is not None and row.recording.when_tried
         if event is not None and is_tried:
             self.events.append(event)
@@ -235,7 +240,7 @@ class SimulatedRobot(SimulatedWorld):
                 at = len(self.events)
                 self.events.append(event)
             if row.is_drive:
-                event = self.events[at] = replace(event, destination=self.room)
+                event = self.events[at] = replace(event, destination=self.place)
             if event.options:
                 chosen = next(n for n, option in enumerate(event.options) if option.text == result)
                 self.events[at] = replace(event, answer=event.options[chosen].text)
@@ -262,7 +267,7 @@ class SimulatedRobot(SimulatedWorld):
     ) -> None:
         """Record an event at the current place and time, without whitespace around its text."""
         given = text.strip(), to_options(options), None, found
-        event = Event(kind, *given, self.room, self.now, self.held or "", to, destination=destination)
+        event = Event(kind, *given, self.place, self.now, self.held or "", to, destination=destination)
         if self.guard is not None:
             self.guard.judge_inside(self, event)
         self.events.append(event)

@@ -53,7 +53,10 @@ class RuleGuard:
 
     def __init__(self, rules: Sequence[Rule], rooms: Sequence[Room] = ()) -> None:
         self.rules, self._rooms = tuple(rules), rooms
-        self._stops = {room.name: room.stand_at for room in rooms}
+        self._stops = {room.full_name: room.stand_at for room in rooms}
+        self._around = {
+            name: room.within for room in rooms if room.within for name in (room.name, room.full_name)
+        }
         self.may_refuse = any(rule.refuse and rule.when != "finally" for rule in rules)
         self.judges_poses = any(rule.inside for rule in rules)
         self._history = _History([(rule, Monitor(rule.formula)) for rule in rules])
@@ -68,7 +71,7 @@ class RuleGuard:
         """Let a robot execute one skill. Raise RuleViolationError if it would break, or broke, a rule."""
         row, start = robot.skills[skill], len(robot.events)
         holding = "" if robot.held is None else self._history.holding or robot.held
-        place = self._history.names.get(robot.room, robot.room)
+        place = self._history.names.get(robot.place, robot.place)
         attempt = attempted_event(row, arguments, place=place, time=robot.now, holding=holding)
         if attempt is not None:
             attempts = _attempts(robot, attempt, arguments, is_drive=row.is_drive)
@@ -123,7 +126,7 @@ class RuleGuard:
         """Raise RuleViolationError if any of the possible next events, perhaps drives, would break a rule."""
         caught: RuleViolationError | None = None
         attempts = tuple(map(_trimmed, attempts))
-        leaves = is_drive and any(one.text.casefold() != one.place.casefold() for one in attempts)
+        leaves = is_drive and any(map(self._leaves, attempts[1:] or attempts))
         for rule, monitor in self._history.monitors:
             is_judged = rule.when == "always" or (rule.when == "leaving" and leaves)
             for attempt in attempts if is_judged else ():
@@ -136,6 +139,11 @@ class RuleGuard:
                 caught = caught or broken  # continue, since another rule may end the run
         if caught is not None:
             raise caught
+
+    def _leaves(self, drive: Event) -> bool:
+        """Return whether a drive ends outside the room where it begins."""
+        goal, place = (self._around.get(name, name) for name in (drive.text, drive.place))
+        return goal.casefold() != place.casefold()
 
     def happened(self, event: Event) -> None:
         """Add an event to the history. Raise RuleViolationError if its result broke a rule."""
@@ -246,7 +254,8 @@ def _attempts(
     names: list[str] = []
     for request in dict.fromkeys((attempt.text, *(each for each in arguments if isinstance(each, str)))):
         if is_drive:
-            names += [name_of(room, request) for room in robot.possible_rooms(request)]
+            rooms = robot.possible_rooms(request)
+            names += [name_of(robot.full_names.get(room, room), request) for room in rooms]
         else:
             names += _names_of_thing(robot, attempt.kind, request)
     for name in dict.fromkeys(names):

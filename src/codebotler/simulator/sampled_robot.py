@@ -6,7 +6,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal, TypeAlias
 
@@ -20,7 +20,7 @@ from codebotler.core.trace import to_options
 from codebotler.core.unicode import compose_fields
 from codebotler.core.words import brief, listed
 from codebotler.core.world import Room, Trait, World, laid_out
-from codebotler.simulator.entities import Thing
+from codebotler.simulator.entities import NO_WORDS, Thing
 from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.matching import (
     WORDS_FOR_PEOPLE,
@@ -29,7 +29,7 @@ from codebotler.simulator.matching import (
     content_words,
     means_anybody,
     meant_by,
-    trait_words,
+    prefer_places,
 )
 from codebotler.simulator.robot import SimulatedRobot, SkillGuard
 from codebotler.simulator.settings import SimulationSettings
@@ -60,7 +60,7 @@ class RoomMap:
     @classmethod
     def of(cls, world: World) -> RoomMap:
         """Make the map of a world from a suite or file."""
-        plan = [Room(room.name, (), (), room.footprint, room.stand_at) for room in laid_out(world).rooms]
+        plan = [replace(room, objects=(), people=()) for room in laid_out(world).rooms]
         return cls(
             tuple(room.name for room in world.rooms if not room.within),
             world.robot,
@@ -93,7 +93,13 @@ class RoomMap:
         return [room for room in self.rooms if room.strip().casefold() in wanted]
 
     def _meant(self, request: str) -> list[str]:
-        return meant_by(request, self.goals, plain=self.guessed or self.plain)
+        meant = meant_by(request, self.goals, plain=self.guessed or self.plain)
+        return prefer_places(meant, dict(self.places))
+
+    def full_name(self, room: str) -> str:
+        """Return a room's name as rules know it, with the room around it if it is a place."""
+        within = dict(self.places).get(room)
+        return f"{room} in {within}" if within else room
 
     @property
     def goals(self) -> tuple[str, ...]:
@@ -264,10 +270,11 @@ class SampledRobot(SimulatedRobot):
 
     def is_here(self, name: str) -> bool | None:
         """Return whether a person or thing is in this room, or None if that is undecided."""
-        things = self.contents[self.room] if name != SOMEBODY else []
+        things = self.things_here if name != SOMEBODY else []
         if name in self.here.people or any(thing.is_meant_by(name, "longest-name") for thing in things):
             return True
-        return False if self.here.lacks(name) else None
+        is_missed = self.here.lacks(name) or self.explored[self._room_around(self.room)].lacks(name)
+        return False if is_missed else None
 
     def settle(self, name: str, *, is_random: bool) -> bool:
         """Decide whether a person or thing is in this room: at random, or as the program assumes."""
@@ -312,7 +319,11 @@ class SampledRobot(SimulatedRobot):
     def look(self, entity: str) -> bool:
         """Look for an object or a person. The first look draws whether they are present."""
         name = normalized(entity)
-        found = self._find(name, is_person=means_person(entity))
+        described = [] if self.is_here(name) is not None else self._described(entity)
+        if described:  # each of them is there or not
+            found = any(self._find(normalized(one), is_person=means_person(entity)) for one in described)
+        else:
+            found = self._find(name, is_person=means_person(entity))
         search = self.searches[name]
         (search.found if found else search.vain).add(self.room)
         self.record(CHECK, entity, found=found)
@@ -329,8 +340,20 @@ class SampledRobot(SimulatedRobot):
             if found and (name == SOMEBODY or is_person):
                 room.people |= {name, SOMEBODY}
             if found and name != SOMEBODY:
-                self.contents[self.room].append(Thing(name, is_pattern=False))
+                self._add(name)
         return found
+
+    def _add(self, name: str) -> None:
+        known = (one for one in (*self.room_map.things, *self.room_map.people) if normalized(one) == name)
+        traits = self._trait_words.get(next(known, ""), NO_WORDS)
+        self.contents[self.room].append(Thing(name, is_pattern=False, traits=traits))
+
+    def _described(self, entity: str) -> list[str]:
+        """Return the known things or people that a request describes without naming them."""
+        is_person = means_person(entity)
+        known = self.room_map.people if is_person else self.room_map.things
+        fitting = self._fitting(known, entity, WORDS_FOR_PEOPLE if is_person else ())
+        return [] if means_anybody(entity) or meant_by(entity, known, plain=True) else fitting
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
         """Return the names of things that fit a description. Whether each is there is random."""
@@ -343,9 +366,8 @@ class SampledRobot(SimulatedRobot):
 
     def _all_of(self, known: Sequence[str], where: str, wanted: str, *, is_person: bool) -> list[str]:
         words = WORDS_FOR_PEOPLE if is_person else ("thing", "object")
-        entities = [Entity(name, trait_words(self.traits(name).items())) for name in known]
-        fitting = [one.label for one in entities if best_fits(wanted, [one], words)]
-        names = dict.fromkeys(normalized(name) for name in fitting or (wanted, f"another {wanted}"))
+        fitting = self._fitting(known, wanted, words)
+        names = {normalized(name): name for name in fitting or (wanted, f"another {wanted}")}
         goals: Sequence[str] = self._goals_in(where)
         if is_person:  # who is at a place is in its room
             goals = [self.goal_of(where)] if where else self.rooms
@@ -355,18 +377,29 @@ class SampledRobot(SimulatedRobot):
         for self.room in goals:
             is_known = described in self.here.missed  # an earlier look for this description found nothing
             finds = self.is_here if is_known else partial(self._find, is_person=is_person)
-            there = [name for name in names if finds(name)]
+            there = [names[name] for name in names if finds(name)]
             if not there and not self.is_here(described):
                 self.here.missed.add(described)
             found += there or ([described] if self.is_here(described) else [])
         self.room = before
         return found
 
+    def _fitting(self, known: Sequence[str], wanted: str, words: Sequence[str]) -> list[str]:
+        """Return the known names that fit a description."""
+        return [name for name in known if best_fits(wanted, [self._entity(name)], words)]
+
+    def _entity(self, name: str) -> Entity:
+        return Entity(name, self._trait_words.get(name, NO_WORDS))
+
     def move_person(self, name: str, room: str) -> None:
-        """Move a person to a room or place."""
+        """Move a person to a room or place. Where they were, they are no longer."""
         goal, who = self.goal_of(room), normalized(name)
-        for explored in self.explored.values():
+        for place, explored in self.explored.items():
+            things = self.contents[place]
+            if who in explored.people or any(thing.label == who for thing in things):
+                explored.missed.add(who)
             explored.people.discard(who)
+            things[:] = [thing for thing in things if thing.label != who]
         self.explored[goal].missed -= {who, SOMEBODY}
         self.explored[goal].people |= {who, SOMEBODY}
 
@@ -402,12 +435,13 @@ class SampledRobot(SimulatedRobot):
         """Pick up an object, which is present unless an earlier look failed to find it."""
         name = normalized(obj)
         if self.held is None and self.is_here(name) is None and self._lies_there(name):
-            self.contents[self.room].append(Thing(name, is_pattern=False))
+            self._add(name)
         search = self.search(name)
         again = self.held is not None and normalized(self.held) == name and len(search.found) > 1
         with self.excused(when=again or search.is_lost):
             super().take(obj)
-        self.here.gone.add(name)
+        for goal in self._reach.get(self.room, (self.room,)):
+            self.explored[goal].gone.add(name)
         self.here.people.discard(name)
 
     def _lies_there(self, name: str) -> bool:

@@ -20,6 +20,7 @@ from codebotler.simulator.matching import (
     best_fits,
     finds,
     meant_by,
+    prefer_places,
     resolve_room,
     trait_words,
 )
@@ -44,6 +45,12 @@ class SimulatedWorld:
         self.rooms = tuple(room.name for room in world.rooms if not room.within)
         self.goals = tuple(room.name for room in world.rooms)
         self.room = world.robot
+        self.full_names = {room.name: room.full_name for room in world.rooms if room.within}
+
+    @property
+    def place(self) -> str:
+        """Where the robot is, as traces name it."""
+        return self.full_names.get(self.room, self.room)
 
     @cached_property
     def contents(self) -> dict[str, list[Thing]]:
@@ -74,7 +81,8 @@ class SimulatedWorld:
         """The things in the robot's room and at the places in it, or only at the place where the robot is."""
         if len(self.rooms) == len(self.goals):
             return self.contents[self.room]
-        return [thing for goal in self._reach[self.room] for thing in self.contents[goal]]
+        goals = self._reach.get(self.room, (self.room,))  # on a guessed map, there are more rooms
+        return [thing for goal in goals for thing in self.contents[goal]]
 
     @property
     def people_here(self) -> list[Somebody]:
@@ -85,12 +93,15 @@ class SimulatedWorld:
 
     def _room_around(self, goal: str) -> str:
         """Return the room in which a place is, or the room itself."""
+        if not self.full_names:
+            return goal
         return next((room.within for room in self.world.rooms if room.name == goal), "") or goal
 
     def possible_rooms(self, request: str) -> Sequence[str]:
         """Return all rooms that a request may refer to; for an exact name, only where it would lead."""
         if self.settings.matching == "longest-name":
-            return meant_by(request, self.goals)
+            around = {room.name: room.within for room in self.world.rooms if room.within}
+            return prefer_places(meant_by(request, self.goals), around)
         wanted = request.strip().lower()
         named = [room for room in self.goals if room.lower() == wanted]
         if named:
@@ -99,7 +110,10 @@ class SimulatedWorld:
         return [room for room in self.goals if finds(request, room, self.settings.matching)]
 
     def room_for(self, request: str) -> str | None:
-        """Return the first room whose name occurs in a request, or None if there is none."""
+        """Return the room that a request means, or None if it means none or could mean several."""
+        if self.settings.matching == "longest-name":
+            possible = self.possible_rooms(request)
+            return possible[0] if len(possible) == 1 else None
         return resolve_room(self.goals, request, self.settings.matching)
 
     def thing_meant(self, request: str) -> Thing | None:
@@ -161,9 +175,10 @@ class SimulatedWorld:
         """Move the person whom a request refers to, wherever they are, to a room or place."""
         goal = self.goal_of(room)
         everybody = [one for goal in self.goals for one in self.occupants[goal] if one.is_here]
-        meant = best_fits(name, [one.entity for one in everybody])
+        words = self.settings.words_for_people or WORDS_FOR_PEOPLE
+        meant = best_fits(name, [one.entity for one in everybody], words)
         if len(meant) != 1:
-            raise UserError(f'the simulated world has no person "{name}" to move')
+            raise RobotError("AskNoPerson", f'no person can be moved who fits "{name}"')
         for here in self.occupants.values():
             here[:] = [one for one in here if one is not everybody[meant[0]]]
         self.occupants[goal].append(everybody[meant[0]])

@@ -10,7 +10,7 @@ from codebotler.checking.rule_rooms import may_mean
 from codebotler.core.program import parse_expression
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.world import Room
+from codebotler.core.world import Room, World
 from codebotler.rtl import EventPattern
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import patterns
@@ -21,17 +21,16 @@ WORDS_FOR_ANYBODY = ("person", "people", "human", "anybody", "anyone", "somebody
 
 def absent_names(requirement: Requirement, scenario: Scenario, task: Task) -> Iterator[tuple[str, str]]:
     """Yield the category and name of everything that a requirement names but its world lacks."""
-    for category, name, known in _names(requirement, scenario.world.rooms, task):
+    for category, name, known in _names(requirement, scenario.world, task):
         if not may_mean(name, known):
             yield category, name
 
 
-def _names(
-    requirement: Requirement, rooms: Sequence[Room], task: Task
-) -> Iterator[tuple[str, str, Sequence[str]]]:
+def _names(requirement: Requirement, world: World, task: Task) -> Iterator[tuple[str, str, Sequence[str]]]:
     """Yield the category and name of everything that a requirement names, and all names in that category."""
-    objects = [label for room in rooms for label in room.objects]
-    people = [person.name for room in rooms for person in room.people]
+    rooms, described = world.rooms, [*map(re.escape, world.descriptions)]
+    objects = [*described, *(label for room in rooms for label in room.objects)]
+    people = [*described, *(person.name for room in rooms for person in room.people)]
     known_names = {
         "room": [room.name for room in rooms],
         "object": objects,

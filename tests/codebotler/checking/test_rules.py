@@ -322,3 +322,15 @@ def test_a_misspelt_room_is_found_anywhere_in_a_rule(tmp_path: Path, formula: st
     text = BOB.replace('not tr.Exists(goto("bobs office"))', formula)
     with pytest.raises(UserError, match="bobs office"):
         read_rules(rules_in(tmp_path, text), rooms=HOUSE)
+
+
+def test_a_misspelled_room_in_a_set_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "house.yaml"
+    path.write_text(
+        "sets: {forbidden: [server room, valt]}\nrules:\n  - name: out\n    says: Stay out.\n"
+        '    always: not tr.Exists(goto("{forbidden}"))\n'
+    )
+    assert read_rules(path, rooms=["server room", "valt"])
+    with pytest.raises(UserError, match="valt") as raised:
+        read_rules(path, rooms=["server room", "vault"])
+    assert raised.value.line == 5

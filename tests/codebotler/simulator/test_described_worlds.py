@@ -1,5 +1,6 @@
 """Worlds whose things and people have properties, with places in rooms; and skills that read them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,8 +10,11 @@ from codebotler.core.trace import Option
 from codebotler.core.world import World, is_within, laid_out
 from codebotler.core.world_file import read_world
 from codebotler.robots.simulated import SIMULATION
+from codebotler.rtl import parse
 from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 
 FLAT = """
@@ -74,7 +78,7 @@ def test_mistakes_name_the_line(tmp_path: Path, old: str, new: str, line: int) -
 def test_a_place_is_a_goal_inside_its_room_but_no_room(world: World, robot: SimulatedRobot) -> None:
     assert robot.perform("get_all_rooms", []) == ["hall", "kitchen", "bathroom"]
     robot.perform("go_to", ["the kitchen table"])
-    assert (robot.room, robot.trace[-1].text) == ("kitchen table", "the kitchen table")
+    assert (robot.room, robot.trace[-1].destination) == ("kitchen table", "kitchen table in kitchen")
     rooms = {room.name: room for room in laid_out(world).rooms}
     for place in ("kitchen table", "sink"):
         assert all(
@@ -149,7 +153,9 @@ def test_people_can_be_moved(robot: SimulatedRobot) -> None:
     robot.move_person("Angel", "bathroom")
     assert robot.people("bathroom") == ["Angel"]
     assert robot.people("kitchen") == ["Bo"]
-    with pytest.raises(UserError):
+    robot.move_person("sitting person", "hall")
+    assert robot.people("hall") == ["Cy", "Bo"]
+    with pytest.raises(RobotError):
         robot.move_person("Dora", "bathroom")
 
 
@@ -157,7 +163,7 @@ def test_sampled_worlds_draw_known_things_and_people(world: World) -> None:
     counts = {len(sampled(world, number).things("kitchen", is_="fruit")) for number in range(30)}
     assert {0, 1, 2} <= counts
     names = {name for number in range(30) for name in sampled(world, number).people("hall", pose="waving")}
-    assert names == {"angel"}
+    assert names == {"Angel"}
     unknown = {name for number in range(30) for name in sampled(world, number).things("hall", is_="toy")}
     assert unknown == {"toy", "another toy"}
 
@@ -207,3 +213,78 @@ def test_a_person_who_was_moved_is_there(world: World) -> None:
         robot.move_person("Angel", "bathroom")
         robot.perform("go_to", ["bathroom"])
         assert robot.perform("is_in_room", ["Angel"])
+
+
+# --- places and house rules
+
+
+def guarded(world: World, *rules: Rule) -> list[SimulatedRobot]:
+    room_map = RoomMap.of(world)
+    simulated = SimulatedRobot(world, SIMULATION, guard=RuleGuard(rules, room_map.plan))
+    return [simulated, SampledRobot(room_map, FactSampler(), guard=RuleGuard(rules, room_map.plan))]
+
+
+def test_who_is_at_a_place_is_in_its_room(world: World) -> None:
+    stay_out = Rule("kitchen", "Stay out.", parse('not tr.Exists(goto("kitchen$"))'))
+    be_silent = Rule("silent", "Be silent there.", parse('not tr.Exists(at("kitchen", say(".")))'))
+    for robot in guarded(world, stay_out):
+        with pytest.raises(RuleViolationError):
+            robot.perform("go_to", ["sink"])
+    for robot in guarded(world, be_silent):
+        robot.perform("go_to", ["sink"])
+        with pytest.raises(RuleViolationError):
+            robot.perform("say", ["hello"])
+
+
+def test_a_drive_to_a_place_in_the_room_does_not_leave_it(world: World) -> None:
+    said = Rule("said", "Speak before you leave.", parse('tr.Exists(say("."))'), "leaving")
+    start = replace(world, robot="kitchen")
+    for robot in guarded(start, said):
+        robot.perform("go_to", ["sink"])
+        robot.perform("go_to", ["the kitchen table"])
+        with pytest.raises(RuleViolationError):
+            robot.perform("go_to", ["hall"])
+
+
+# --- what is said of rooms, and where things are
+
+
+def test_a_place_is_meant_where_its_room_is_named_as_well(world: World) -> None:
+    for robot in (SimulatedRobot(world, SIMULATION), sampled(world)):
+        robot.perform("go_to", ["the sink in the kitchen"])
+        assert robot.room == "sink"
+
+
+@pytest.mark.parametrize("request_", ["kitchen-hall", "the sink's owner", "hall.2", "hall-"])
+def test_parts_of_compound_words_are_no_names(robot: SimulatedRobot, request_: str) -> None:
+    assert (robot.room_for(request_) is not None) == (request_ == "hall-")
+
+
+def test_what_was_picked_up_by_a_property_keeps_its_name(robot: SimulatedRobot) -> None:
+    robot.perform("go_to", ["kitchen table"])
+    robot.perform("pick", ["red fruit"])
+    robot.perform("go_to", ["sink"])
+    robot.perform("place", ["red fruit"])
+    assert robot.perform("is_in_room", ["apple"])
+
+
+def test_imagined_looks_agree_with_what_lies_at_places(world: World) -> None:
+    for number in range(20):
+        robot = sampled(world, number)
+        robot.perform("go_to", ["kitchen table"])
+        found = robot.perform("is_in_room", ["apple"])
+        robot.perform("go_to", ["kitchen"])
+        if found:
+            assert robot.perform("is_in_room", ["apple"])
+            assert robot.perform("is_in_room", ["red fruit"])
+            robot.perform("pick", ["apple"])
+            robot.perform("go_to", ["kitchen table"])
+            assert not robot.perform("is_in_room", ["apple"])
+
+
+def test_a_person_who_was_moved_is_no_longer_where_they_were(world: World) -> None:
+    for number in range(20):
+        robot = sampled(world, number)
+        if robot.perform("is_in_room", ["Angel"]):
+            robot.move_person("Angel", "bathroom")
+            assert not robot.perform("is_in_room", ["Angel"])
