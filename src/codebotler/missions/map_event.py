@@ -11,7 +11,12 @@ from codebotler.core.world import Point, Room, World, laid_out
 def map_data(world: World) -> dict[str, Any]:
     """Return the data of a `map` event: the rooms with their corners and stopping points, in metres."""
     rooms = [
-        {"name": room.name, "footprint": room.footprint, "stand_at": room.stand_at}
+        {
+            "name": room.name,
+            "footprint": room.footprint,
+            "stand_at": room.stand_at,
+            **({"within": room.within} if room.within else {}),
+        }
         for room in laid_out(world).rooms
     ]
     return {"rooms": rooms, "robot": world.robot}
@@ -20,7 +25,12 @@ def map_data(world: World) -> dict[str, Any]:
 def map_from(data: Mapping[str, Any]) -> World:
     """Return the world described by a `map` event: only its rooms and the robot's starting room."""
     rooms = [
-        Room(room["name"], footprint=tuple(map(_point, room["footprint"])), stand_at=_point(room["stand_at"]))
+        Room(
+            room["name"],
+            footprint=tuple(map(_point, room["footprint"])),
+            stand_at=_point(room["stand_at"]),
+            within=room.get("within", ""),
+        )
         for room in data["rooms"]
     ]
     return World(tuple(rooms), data["robot"])

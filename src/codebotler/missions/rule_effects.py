@@ -124,12 +124,12 @@ class LoggedRobot(SimulatedRobot):
         if self.end["event"] not in {"result", "late"}:
             raise RobotError(self.end["event"], "the skill failed or was cancelled")
         row, result = self.skills[skill], self.end.get("result")
-        event = attempted_event(row, arguments, place=self.room, time=self.now, holding=self.held or "")
+        event = attempted_event(row, arguments, place=self.place, time=self.now, holding=self.held or "")
         if event is None:
             return result
         if row.is_drive:
             self.room = self.room_for(event.text) or event.text
-            event = replace(event, destination=self.room)
+            event = replace(event, destination=self.place)
         elif event.kind in {PICK, PLACE}:
             self.held = event.text if event.kind == PICK else None
         found = result if isinstance(result, bool) else None
@@ -162,7 +162,7 @@ def _log_effect(events: Sequence[LogLine], guard: RuleGuard, robot: LoggedRobot)
                 guard.perform(robot, line["skill"], _arguments(line, robot.skills))
             elif line["event"] == "rule" and line.get("prevented"):  # the log has no skill for this step
                 step = trace_from([line["what"]])[0]
-                attempt = replace(step, place=robot.room, holding=robot.held or "")
+                attempt = replace(step, place=robot.place, holding=robot.held or "")
                 recording = robot.skills.recordings.get(step.kind)
                 guard.judge(attempt, is_drive=recording is not None and recording.is_drive)
             elif line["event"] == "state":

@@ -9,6 +9,7 @@ from codebotler.core.errors import RobotError, UserError
 from codebotler.core.trace import Option
 from codebotler.core.world import World, is_within, laid_out
 from codebotler.core.world_file import read_world
+from codebotler.missions.map_event import map_data, map_from
 from codebotler.robots.simulated import SIMULATION
 from codebotler.rtl import parse
 from codebotler.simulator.fact_sampler import FactSampler
@@ -288,3 +289,11 @@ def test_a_person_who_was_moved_is_no_longer_where_they_were(world: World) -> No
         if robot.perform("is_in_room", ["Angel"]):
             robot.move_person("Angel", "bathroom")
             assert not robot.perform("is_in_room", ["Angel"])
+
+
+def test_the_map_of_a_mission_knows_which_room_a_place_is_in(world: World) -> None:
+    rooms = map_from(map_data(world)).rooms
+    assert {room.name: room.within for room in rooms if room.within} == {
+        "kitchen table": "kitchen",
+        "sink": "kitchen",
+    }
