@@ -94,7 +94,8 @@ def _anchor(name: str) -> str:
 def _examples() -> str:
     parts = ["# Examples", "Small, complete, and run by the tests of the project."]
     folder = ROOT / "examples"
-    further = [*sorted(folder.glob("robots/*.py")), *sorted(folder.glob("skills/*/skills.py"))]
+    globs = ("robots/*.py", "rules/*.yaml", "worlds/*.yaml", "skills/*.py", "skills/*/skills.py")
+    further = [path for pattern in globs for path in sorted(folder.glob(pattern))]
     for path in [*sorted(one for one in folder.iterdir() if one.is_file()), *further]:
         language = {".py": "python", ".yaml": "yaml"}.get(path.suffix, "text")
         name = str(path.relative_to(folder))
