@@ -103,9 +103,7 @@ def test_the_table_ends_with_numbers_for_each_rule(folder: Path) -> None:
     chosen = [f"plans/{name}.py" for name in ("before", "late", "at-end", "kept", "failed", "wild")]
     ended = replay(folder, *chosen, "--world", "world.yaml", "--rules", "rules.yaml")
     assert ended.status == 0
-    assert re.search(
-        r'^plans/before.py +stopped +vault +before +line 3: going to "vault"$', ended.out, re.MULTILINE
-    )
+    assert re.search(r"^plans/before.py +stopped +vault +before +line 3: going to", ended.out, re.MULTILINE)
     assert "6 files: 2 before, 1 late, 1 at the end, 2 not at all (1 of these did not finish)" in ended.out
     assert re.search(
         r"^rule +before +late +at the end\nvault +2 +0 +0\nno-means-no +0 +1 +0\n", ended.out, re.MULTILINE
@@ -261,7 +259,7 @@ def test_what_cannot_be_replayed_is_refused(folder: Path, arguments: list[str], 
 @pytest.mark.slow
 def test_ctrl_c_ends_it_at_once(folder: Path) -> None:
     for number in range(40):
-        body = f"n = {number}\n    while True:\n        [x * x for x in range(100_000)]"
+        body = f"n = {number}\n    while True:\n        sum(range(10**7))"  # few ticks, much time
         (folder / "plans" / f"{number}.py").write_text(f"def task_program():\n    {body}\n")
     arguments = ("replay", "plans", "--rules", "rules.yaml")
     with Forked("codebotler", *arguments, cwd=folder, environment=os.environ) as process:
