@@ -73,7 +73,12 @@ def folder(tmp_path: Path) -> Path:
 
 
 def replay(folder: Path, *arguments: str) -> Ended:
-    environment = {**os.environ, "NO_COLOR": "1", "CODEBOTLER_HOME": str(folder / "home")}
+    environment = {
+        **os.environ,
+        "NO_COLOR": "1",
+        "COLUMNS": "200",
+        "CODEBOTLER_HOME": str(folder / "home"),
+    }
     return command("codebotler", "replay", *arguments, cwd=folder, environment=environment)
 
 
