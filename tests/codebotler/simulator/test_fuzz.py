@@ -19,6 +19,8 @@ from typing import TypeVar
 import pytest
 from hypothesis import HealthCheck, example, given, note, seed, settings
 from hypothesis import strategies as st
+from hypothesis.internal.conjecture import providers
+from hypothesis.internal.constants_ast import Constants
 
 from codebotler.core.program import Flaw, find_flaws
 from codebotler.core.trace import Outcome, Status
@@ -103,6 +105,13 @@ WORLDS = (
 def seeded(check: Check) -> Check:
     """With a seed of our own, where a nightly run gives none: Hypothesis derives one from the test's text."""
     return check if NIGHTLY else seed(SEED)(check)
+
+
+@pytest.fixture(autouse=True)
+def no_constants_of_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw the same programs in each process, since Hypothesis also draws constants of loaded modules."""
+    monkeypatch.setattr(providers, "_get_local_constants", Constants)
+    monkeypatch.setattr(providers, "CONSTANTS_CACHE", type(providers.CONSTANTS_CACHE)(1024))
 
 
 @pytest.fixture(scope="module")
