@@ -193,7 +193,7 @@ def test_requests_are_spread_over_the_minute_tries_included(server: Server) -> N
     paced, _ = use(server, many(5), requests_per_minute=1200)
     assert paced.requests == 6
     starts = [request.at for request in server.requests]
-    assert starts[-1] - starts[0] > 3 * 0.05  # of five pauses, since a busy server notes the first too late
+    assert starts[-1] - starts[0] > 4 * 0.05
 
 
 def test_counters_add_up(server: Server) -> None:
