@@ -141,7 +141,8 @@ class Unwalled(Bare):
         try:
             return self.robot.perform(name, given)
         except RobotError as error:
-            self.errors.append(error.with_traceback(None))  # a traceback would keep frames alive
+            error.__context__ = None  # a traceback, also that of its context, would keep frames alive
+            self.errors.append(error.with_traceback(None))
         finally:
             sys.setrecursionlimit(limit)
         last = self.errors[-1]

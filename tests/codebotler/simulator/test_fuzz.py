@@ -60,6 +60,19 @@ def task_program():
     pick("nothing")
 """
 
+FAILED_WHILE_CLOSED = """
+def spoken():
+    try:
+        yield
+    finally:
+        pick("nothing")
+
+def task_program():
+    next(spoken())
+    waiting = spoken()
+    next(waiting)
+"""
+
 DEEP = """
 deepest = 0
 
@@ -180,6 +193,7 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
     @example("def task_program():\n    say(undefined_name)\n", WORLDS[0])
     @example(DEEP, WORLDS[0])
     @example(CLOSED_BY_AN_ERROR, WORLDS[0])
+    @example(FAILED_WHILE_CLOSED, WORLDS[0])
     def check(source: str, world: World) -> None:
         note(source)
         outcome = seen[source, world] = outcome_of(pool, source, world)
