@@ -21,7 +21,8 @@ from codebotler.checking.sampled import DEFAULT_SAMPLES, CheckSettings
 from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
+from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion

@@ -38,8 +38,9 @@ from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.matching import meant_by
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
+from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.worker import NewRobot, Worker
 from roboeval.evaluation.judge import judge
 from roboeval.evaluation.runs.source import recorded_completions

@@ -22,8 +22,9 @@ from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
+from codebotler.simulator.sampled_robot import AS_WRITTEN, SampledRobot
 from roboeval.mutation.mutants import Mutant, mutants, originals
 from roboeval.mutation.operator import Context, Operator, operators_in
 from roboeval.mutation.operators import control_flow, misuse

@@ -19,7 +19,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.world_file import read_world
 from codebotler.missions.store import read_missions
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 from roboeval.cli.app import app as roboeval
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion

@@ -26,7 +26,8 @@ from codebotler.core.trace import Outcome
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
-from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
+from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.sampled_robot import AS_WRITTEN
 from codebotler.simulator.worker import Meanwhile, Worker
 
 WORLDS_PER_WORKER = 16  # in each batch

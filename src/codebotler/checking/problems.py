@@ -12,7 +12,8 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, outcome_data
 from codebotler.core.words import brief, counted, listed
 from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.sampled_robot import RoomMap, SampledFact
+from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.sampled_facts import SampledFact
 from codebotler.simulator.simulated_world import ambiguous
 
 

@@ -13,7 +13,7 @@ from codebotler.core.labels import check_label
 from codebotler.core.skills.kinds import GOTO
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 
 DEFAULT_START = "start_loc"  # the name in the paper's prompt
 PLACEHOLDER_ROOMS = ("room 1", "room 2")  # for a program that visits all rooms but names none

@@ -17,8 +17,9 @@ from codebotler.core.words import listed
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.process.exit_status import PROCESSOR_TIME
+from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
+from codebotler.simulator.sampled_robot import AS_WRITTEN, SampledRobot
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import DO_NOTHING, Job, Meanwhile, Worker
 

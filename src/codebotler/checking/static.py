@@ -23,7 +23,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.skills.values import ValueType
 from codebotler.simulator.isolated_call import IsolatedCallError, isolated
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 
 EVERYTHING = frozenset({"Exception", "BaseException"})
 ENDING_NODES = (ast.Return, ast.Raise, ast.Continue, ast.Break)

@@ -38,7 +38,7 @@ def generate(
     from codebotler.core.world_file import read_world
     from codebotler.models.chosen import choose_model
     from codebotler.prompts import prompt_for
-    from codebotler.simulator.sampled_robot import RoomMap
+    from codebotler.simulator.room_map import RoomMap
 
     chosen = choose_model(model, base_url)
     settings = chosen.add_server(model_settings(**sampling))
@@ -101,7 +101,7 @@ def check(
     from codebotler.cli.rules import rules_for
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
-    from codebotler.simulator.sampled_robot import RoomMap
+    from codebotler.simulator.room_map import RoomMap
 
     table = skills_from(*(skills or ()))
     _, connection = options.read_connect_option(connect, None, table)

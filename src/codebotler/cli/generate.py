@@ -20,7 +20,7 @@ from codebotler.models.recorded import RECORDED_NOTICE, UnknownInstructionError,
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 
 MAX_REPLY_SHOWN = 300  # how many characters to show of a reply without a program
 

@@ -27,7 +27,7 @@ from codebotler.models.base import Model
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
 from codebotler.robots.base import Robot
 from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 
 SIGNALS = {
     signal.SIGINT: "Ctrl-C",

@@ -23,7 +23,9 @@ from codebotler.core.trace import Event, Option
 from codebotler.core.words import listed
 from codebotler.prompts.rendering import stub
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.sampled_robot import RandomOutcome, RoomMap, SampledRobot
+from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.sampled_facts import RandomOutcome
+from codebotler.simulator.sampled_robot import SampledRobot
 
 WORLD_COUNT = 40  # the number of sampled worlds to try each skill in
 PROMPT_EXAMPLE_ROOMS = RoomMap(("room", "start_loc"), "start_loc", guessed=True)

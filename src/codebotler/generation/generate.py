@@ -21,7 +21,7 @@ from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 
 Checker: TypeAlias = Callable[[str], Sequence[str]]
 """Returns the problems of a program, one sentence each; none if the program is accepted."""

@@ -22,8 +22,8 @@ from codebotler.robots import base
 from codebotler.robots.base import CameraPicture, CancelledError, RobotLostError
 from codebotler.simulator.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, RuleViolationError
 from codebotler.simulator.robot import Argument, Result
+from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import RuleGuard, name_of
-from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.settings import ENDLESS, SimulationSettings
 
 EventWriter: TypeAlias = Callable[..., None]

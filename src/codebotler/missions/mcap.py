@@ -23,7 +23,7 @@ from codebotler.missions.map_event import map_from
 from codebotler.missions.pictures import read_picture
 from codebotler.missions.progress import Progress, position_on_map
 from codebotler.missions.wording import event_text
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 
 TimeSource: TypeAlias = Literal["wall", "robot"]
 

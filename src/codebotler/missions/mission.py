@@ -25,8 +25,8 @@ from codebotler.missions.wording import stop_text
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import EngineError, Worker
 
 STOP_GRACE_SECONDS = 10.0

@@ -17,7 +17,7 @@ from codebotler.missions.live import check_answer
 from codebotler.models.recorded import UnknownInstructionError, find_closest, open_recorded
 from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotLostError, RobotResult
 from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 
 MAX_CHECKED_ROOMS = 1_000
 """The limit for a check, which compares each drive with all rooms."""

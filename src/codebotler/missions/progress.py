@@ -13,7 +13,7 @@ from codebotler.core.terminal import shortened
 from codebotler.core.world import Point, World, laid_out
 from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState
 from codebotler.missions.wording import activity, event_text, stop_text
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 
 POSITION_FEEDBACK = re.compile(r"at \((-?\d{1,7}(?:\.\d{1,20})?), (-?\d{1,7}(?:\.\d{1,20})?)\)")
 _MAX_MOMENTS, _MAX_STEPS = 200, 60

@@ -23,8 +23,9 @@ from codebotler.simulator.engine import digest
 from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.pool import WorkerPool, cores
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
+from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
+from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.settings import Limits
 
 LIMITED_SIMULATION = replace(SIMULATION, limits=Limits())  # nobody waits to stop an endless program

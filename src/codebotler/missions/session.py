@@ -38,7 +38,7 @@ from codebotler.models.recorded import UnknownInstructionError
 from codebotler.robots.base import CancelledError, NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.worker import EngineError
 
 _logger = logging.getLogger("codebotler.missions")

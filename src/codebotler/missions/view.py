@@ -13,7 +13,7 @@ from codebotler.missions.log import MissionState
 from codebotler.missions.progress import Progress
 from codebotler.prompts import clean_instruction
 from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 
 _SYNTAX_ERRORS = frozenset({"SyntaxError", "IndentationError", "TabError"})
 """The kinds of problems that prevent a program from starting."""

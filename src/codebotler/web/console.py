@@ -25,7 +25,7 @@ from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 
 MAX_PROGRAM_CHARACTERS = 200_000
 """The maximum length of a program or an instruction."""

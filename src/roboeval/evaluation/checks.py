@@ -12,7 +12,7 @@ from codebotler.checking.check import check_together
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.files import Appender, to_line, to_text, write_whole
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import PYTHON_VERSION, OpenEngine, Work
 from roboeval.evaluation.runs.completions import Completion

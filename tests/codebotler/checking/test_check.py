@@ -14,7 +14,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.trace import Status
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.worker import Worker
 
 ROOMS = ("start_loc", "kitchen", "alice's office", "bob's office")

@@ -34,8 +34,8 @@ from codebotler.robots.spelling import SpellingRobot
 from codebotler.rtl import parse
 from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from doubles import Answering

@@ -24,7 +24,7 @@ from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
 from codebotler.simulator.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, Rule
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 from doubles import Answering
 
 VAULT = Rule("vault", "Never go into the vault.", parse('not tr.Exists(goto("vault"))'))

@@ -15,8 +15,9 @@ from codebotler.rtl import parse
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
+from codebotler.simulator.sampled_robot import SampledRobot
 
 FLAT = """
 robot: hall

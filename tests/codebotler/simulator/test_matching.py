@@ -8,7 +8,8 @@ from codebotler.robots.simulated import SIMULATION
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.matching import meant_by
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
+from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.sampled_robot import SampledRobot
 
 ROOMS = ("kitchen", "kitchen table", "shelf", "bookshelf", "lab 1", "lab 10", "alice's office")
 

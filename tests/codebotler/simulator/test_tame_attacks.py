@@ -30,7 +30,8 @@ from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
+from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.skill_protocol import arguments_of

@@ -30,7 +30,7 @@ from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, Robot, RobotResult
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.panes.instruction import examples
 from doubles import Answering

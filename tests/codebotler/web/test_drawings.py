@@ -16,7 +16,7 @@ from codebotler.missions.progress import _MAX_MOMENTS, _MAX_STEPS, Find, Moment,
 from codebotler.missions.view import SessionView
 from codebotler.missions.wording import title
 from codebotler.robots.simulated import OFFICE
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 from codebotler.web.floorplan import _HALO_RADIUS, MAX_DRAWN_ROOMS, MapState, floorplan
 from codebotler.web.panes.past_mission import timeline
 from codebotler.web.panes.robot import map_state

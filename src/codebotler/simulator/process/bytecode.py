@@ -51,7 +51,9 @@ SIMULATION_MODULES = (
             "ledger",
             "matching",
             "robot",
+            "room_map",
             "settings",
+            "sampled_facts",
             "sampled_robot",
         )
     ),

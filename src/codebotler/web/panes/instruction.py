@@ -16,7 +16,7 @@ from codebotler.missions.store import read_missions
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.recorded import is_recorded
 from codebotler.models.usable import MODEL_HINT
-from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.room_map import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, scroll_to, scroll_up, warn
 
