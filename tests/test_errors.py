@@ -25,7 +25,7 @@ MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     "codebotler.models.base.BudgetSpentError": ((1_000, 1_012), {}),
     "codebotler.models.base.ModelError": (A_SENTENCE, {"may_pass": True, "retry_after": 2.5}),
     "codebotler.rtl.semantics.Inconclusive": ((4, 1, Option("3", is_text=False)), {}),
-    "codebotler.rtl.syntax.RtlSyntaxError": ((3, "a bracket is missing"), {}),
+    "codebotler.rtl.source.RtlSyntaxError": ((3, "a bracket is missing"), {}),
     "codebotler.core.errors.RobotError": (("PickInvalidObject", "there is no mug"), {}),
     "codebotler.simulator.isolated_call.IsolatedCallError": (("MemoryError", "it is too large"), {}),
     "codebotler.simulator.house_rule.RuleViolationError": (

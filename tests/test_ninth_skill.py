@@ -9,7 +9,7 @@ import pytest
 from codebotler.checking.check import check
 from codebotler.checking.storyboard import step_text, steps_of
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.program import Flaw, find_flaws
+from codebotler.core.program import Flaw
 from codebotler.core.skills.declaration import skill
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, SkillTable
@@ -21,6 +21,8 @@ from codebotler.prompts import prompt_for
 from codebotler.rtl import holds, parse
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import SimulatedRobot
+from flaws import find_flaws
+from other_functions import with_functions
 from roboeval.suites.load import SUITES, load_suite
 
 
@@ -169,7 +171,7 @@ def test_a_check_in_imagined_worlds_knows_it() -> None:
     def wave_at_anybody(_: SimulatedRobot, person: str) -> None:
         assert person
 
-    table = TABLE.with_functions(wave=wave_at_anybody)
+    table = with_functions(TABLE, wave=wave_at_anybody)
     found = check(PROGRAMS["waves"], rooms=["hall", "lab"], skills=table)
     assert found.problems == ()
     assert found.data(TABLE)["samples"][0]["trace"][1] == ["wave", "alice"]

@@ -19,7 +19,7 @@ ERRORS = {
     "RefusedError": "codebotler.web.guard",
     "RobotError": "codebotler.simulator.robot",
     "RobotLostError": "codebotler.robots.base",
-    "RtlSyntaxError": "codebotler.rtl.syntax",
+    "RtlSyntaxError": "codebotler.rtl.source",
 }
 """Those whose text a user reads, and where they are defined."""
 SOURCES = Path(import_module("codebotler").__path__[0]).parent

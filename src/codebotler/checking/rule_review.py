@@ -241,10 +241,8 @@ def _follows(rule: Rule, other: Rule, world: World | None) -> bool:
     """Whether a rule can be broken, but only together with another rule."""
     if ORDER.index(rule.when) < ORDER.index(other.when):
         return False
-    return (
-        _trace([Not(rule.formula)], [], world) is not None
-        and _trace([Not(rule.formula)], [other], world) is None
-    )
+    breaks = [Not(rule.formula)]
+    return _trace(breaks, [], world) is not None and _trace(breaks, [other], world) is None
 
 
 # --- names
@@ -258,23 +256,20 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
     described = [*map(re.escape, world.descriptions)]
     things = [*described, *(label for room in world.rooms for label in room.objects)]
     people = [*described, *(person.name for room in world.rooms for person in room.people)]
+    sorts = {"room": rooms, "object": things, "object or person": [*things, *people, *WORDS_FOR_PEOPLE]}
     for element in dict.fromkeys(elements(rule.formula)):
-        named: list[tuple[str, TextPattern | None, list[str]]] = [("thing", element.holding, things)]
-        named.append(("person", element.to, people))
-        named.append(("room", None if element.place is None else Regex(element.place), rooms))
-        sorts = {
-            "room": rooms,
-            "object": things,
-            "object or person": [*things, *people, *WORDS_FOR_PEOPLE],
-        }
         row = by_event(element.kind)
         sort = row.recording.names if row is not None and row.recording is not None else ""
-        named.append(
-            (SHOWN_SORTS.get(sort, sort), element.text if sort in sorts else None, sorts.get(sort, []))
-        )
+        named: list[tuple[str, TextPattern | None, list[str] | None]] = [
+            ("thing", element.holding, things),
+            ("person", element.to, people),
+            ("room", None if element.place is None else Regex(element.place), rooms),
+            (SHOWN_SORTS.get(sort, sort), element.text, sorts.get(sort)),
+        ]
         for what, text, known in named:
-            may_lack = what == "room" and rule.any_room
-            if isinstance(text, Regex) and not may_lack and not may_mean(text.pattern, known):
+            if known is None or not isinstance(text, Regex) or (what == "room" and rule.any_room):
+                continue
+            if not may_mean(text.pattern, known):
                 yield f'it names the {what} "{text.pattern}", which is not in this world'
 
 

@@ -220,7 +220,7 @@ def skills(
     from codebotler.core.terminal import print_json, print_rich
 
     if new is not None:
-        write_new(new, SKILLS_TEMPLATE.format(name=new))
+        write_new(new, SKILLS_TEMPLATE.replace("NAME", str(new)))
         note(f"wrote {new}; `codebotler skills {new}` shows its skills")
         return
     table = skills_from(*([] if file is None else [file]))

@@ -29,32 +29,7 @@ from codebotler.simulator.sampled_robot import SampledRobot
 
 WORLD_COUNT = 40  # the number of sampled worlds to try each skill in
 PROMPT_EXAMPLE_ROOMS = RoomMap(("room", "start_loc"), "start_loc", guessed=True)
-SKILLS_TEMPLATE = '''\
-"""Further skills of this robot; `codebotler skills {name}` shows them as models see them."""
-
-from codebotler import Simulation, skill
-
-
-@skill(
-    verb="open {{door}}",  # describes the action to people: opens, opened, opening ...
-    results=("it did not move", "it opened"),  # the meanings of False and True
-    fails={{"DoorLocked": "the door is locked"}},  # errors that programs can catch
-    ros="lab_msgs/OpenDoor:/open_door",  # the action as package/Type:/topic, for robots on ROS
-    example='open_door("glass door")',  # an example call for models
-)
-def open_door(sim: Simulation, door: str) -> bool:  # str, int, float, bool, Literal, an Enum, lists
-    """Open a door of the room; return False if it did not move."""
-    # The simulation: a world file can set facts under `truths`; all other facts are random.
-    if sim.truth(f"{{door}} is locked"):
-        sim.fail("DoorLocked")
-    return sim.truth(f"{{door}} opens")
-
-
-@skill(verb="measure the temperature")
-def temperature(sim: Simulation) -> float:
-    """Measure the temperature in the room, in degrees Celsius."""
-    ...  # without a simulation, the result is random
-'''
+SKILLS_TEMPLATE = Path(__file__).with_name("new-skills.txt").read_text()
 
 
 @dataclass(frozen=True)

@@ -238,18 +238,7 @@ def _pyflakes() -> tuple[Any, Callable[..., Any]]:
 # --- definite errors
 
 
-def find_flaws(source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
-    """Find the definite errors in a program without running it, and sort them by line.
-
-    Args:
-        source: the program; pass untrusted text only in an isolated process.
-        skills: the skills that the program may call.
-    """
-    tree = parse_program(source, compiled=True)
-    return (tree,) if isinstance(tree, Flaw) else find_tree_flaws(tree, source, skills)
-
-
-def find_tree_flaws(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
+def find_tree_flaws(tree: ast.Module, source: str, skills: SkillTable) -> tuple[Flaw, ...]:
     """Find the definite errors in a program that compiles, and sort them by line."""
     try:
         found = [*_entry_flaws(tree, source), *_name_flaws(tree, skills), *_call_flaws(tree, skills)]

@@ -13,6 +13,7 @@ from typing import Annotated, TypeAlias
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
@@ -22,7 +23,6 @@ from pydantic import (
     StrictStr,
     StringConstraints,
     Tag,
-    model_validator,
 )
 
 from codebotler.core.labels import check_label
@@ -82,6 +82,9 @@ AnswerFile = Annotated[
 ]
 
 
+MAY_BE_NAME = BeforeValidator(lambda data: data if isinstance(data, dict | BaseModel) else {"name": data})
+
+
 class _Described(BaseModel):
     """A thing or person, with any further properties."""
 
@@ -106,13 +109,8 @@ class _Described(BaseModel):
                 yield key, f'"{key}" must be a string, a number, true, false or a list of texts'
 
 
-class ThingFile(_Described):
-    """A thing in a world file: a label, alone or with properties."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _label_alone(cls, data: object) -> object:
-        return data if isinstance(data, dict | ThingFile) else {"name": data}
+ThingFile: TypeAlias = Annotated[_Described, MAY_BE_NAME]
+"""A thing in a world file: a label, alone or with properties."""
 
 
 class PersonFile(_Described):
@@ -141,16 +139,11 @@ class PlaceFile(_Form):
     footprint: Annotated[list[Corner], Field(min_length=3)] | None = None
     stand_at: Corner | None = None
 
-    @model_validator(mode="before")
-    @classmethod
-    def _name_alone(cls, data: object) -> object:
-        return data if isinstance(data, dict | PlaceFile) else {"name": data}
-
 
 class RoomFile(PlaceFile):
     """A room in a world file, with the places in it."""
 
-    places: list[PlaceFile] = []
+    places: list[Annotated[PlaceFile, MAY_BE_NAME]] = []
 
 
 class WorldFile(_Form):
@@ -158,7 +151,7 @@ class WorldFile(_Form):
 
     about: YamlText = ""
     robot: Name
-    rooms: Annotated[list[RoomFile], Field(min_length=1, max_length=5_000)]
+    rooms: Annotated[list[Annotated[RoomFile, MAY_BE_NAME]], Field(min_length=1, max_length=5_000)]
     objects: dict[YamlText, list[ThingFile]] = {}
     people: dict[YamlText, list[PersonFile]] = {}
     may_wait_forever: Annotated[bool, Field(strict=True)] = False

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any, Protocol, TypeAlias
 
-from codebotler.models.no_program import NoProgram, classify_reply, is_cut_off
+from codebotler.models.no_program import NoProgram, classify_reply
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.prompts.extract import read_reply
@@ -41,11 +41,6 @@ class Reply:
     finish_reason: str | None  # why the server ended the reply, such as `stop` or `length`; None if unknown
     reasoning: str = field(default="", repr=False)  # the model's reasoning, where the server shows it
     no_program: NoProgram | None = None  # why there is no program; None if there is, or may be, a program
-
-    @property
-    def is_cut_off(self) -> bool:
-        """Whether the reply reached the token limit. Its program may still be complete."""
-        return is_cut_off(self.finish_reason)
 
     def data(self) -> dict[str, Any]:
         """Return the reply as plain data for a row of JSON."""

@@ -22,7 +22,6 @@ from codebotler.models.base import (
     ModelError,
     Reply,
     TextListener,
-    Usage,
     ignore_text,
 )
 from codebotler.models.sampling import SamplingSettings
@@ -62,7 +61,6 @@ class RateLimited:
     first_wait: float = 0.5
     requests: int = field(default=0, init=False)  # including retries
     retry_count: int = field(default=0, init=False)
-    usage: Usage = field(default_factory=Usage, init=False)  # of all replies
     tokens_used: int = field(default=0, init=False)  # estimated if the model does not count them
     _has_replied: bool = field(default=False, init=False, repr=False)
     _free: asyncio.Semaphore = field(init=False, repr=False)
@@ -140,11 +138,6 @@ class RateLimited:
                 self.tokens_used += _estimate(prompt, length)
             raise
         self._has_replied = True
-        self.usage = Usage(
-            _sum(self.usage.input_tokens, reply.usage.input_tokens),
-            _sum(self.usage.output_tokens, reply.usage.output_tokens),
-            _sum(self.usage.reasoning_tokens, reply.usage.reasoning_tokens),
-        )
         self.tokens_used += reply.usage.total or _estimate(prompt, len(reply.text))
         return reply
 
@@ -181,10 +174,6 @@ def _retry_after(state: RetryCallState) -> float:
 
 def _is_retryable(error: BaseException) -> bool:
     return isinstance(error, ModelError) and error.may_pass and (error.retry_after or 0) <= MAX_RETRY_AFTER
-
-
-def _sum(one: int | None, other: int | None) -> int | None:
-    return one if other is None else (one or 0) + other
 
 
 def _estimate(prompt: Prompt, length: int) -> int:

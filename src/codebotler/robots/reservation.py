@@ -14,7 +14,6 @@ from hashlib import sha256
 from ipaddress import ip_address
 from pathlib import Path
 from tempfile import gettempdir
-from types import TracebackType
 from typing import Self
 from urllib.parse import urlsplit
 
@@ -59,9 +58,7 @@ class Reservation:
             raise
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         try:
             self.robot.disconnect()
         finally:

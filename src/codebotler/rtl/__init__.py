@@ -22,7 +22,8 @@ from codebotler.rtl.formulas import (
 )
 from codebotler.rtl.monitor import Monitor
 from codebotler.rtl.semantics import Inconclusive, holds
-from codebotler.rtl.syntax import RtlSyntaxError, parse
+from codebotler.rtl.source import RtlSyntaxError
+from codebotler.rtl.syntax import parse
 from codebotler.rtl.text.claims import Claim, Number, Time
 
 __all__ = [

@@ -148,20 +148,16 @@ def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
 def _presence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     at = next(at for at in _positions(test, trace) if is_match(test.element, trace[at], at))
     element = replace(test.element, place=None)
-    done, did = (
-        f"{verb(element.kind).past} {describe_event(trace[at], element)}",
-        describe_action(element, "past"),
-    )
+    done = f"{verb(element.kind).past} {describe_event(trace[at], element)}"
+    did = describe_action(element, "past")
     place = "" if test.element.place is None else f" in {room(formulas.Regex(test.element.place))}"
     stay = f" in {room(test.arrival.text)}" if isinstance(test, _AtPlace) else ""
     step = f"{place}{stay}{' last,' * isinstance(test, formulas.Last)} at step {at + 1}"
     where = _where(test.scopes, trace, is_true=True)
     if is_plain(element):
         return _Fact(at, f"{done}{step}{where}", ", which it must not do", short=f"{done}{step}")
-    text, short = (
-        describe_action(element, "past", when=step, where=where),
-        describe_action(element, "past", when=step),
-    )
+    text = describe_action(element, "past", when=step, where=where)
+    short = describe_action(element, "past", when=step)
     return _Fact(at, text, ", which it must not do", "" if done == did else f": it {done}", short=short)
 
 

@@ -6,18 +6,17 @@ import ast
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from types import MappingProxyType
 from typing import get_args
 
 from codebotler.core.program import parse_expression
-from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import TRUTH_TYPE, ValueType, as_text
 from codebotler.core.unicode import compose
 from codebotler.rtl import formulas
 from codebotler.rtl.pattern import compile_regex, whole_word
+from codebotler.rtl.source import SKILL_KINDS, FormulaSource, RtlSyntaxError
 from codebotler.rtl.text.claims import Claim, Number, Time, minutes
 
 SCOPE_NAMES: dict[str, formulas.ScopeName] = {name: name for name in get_args(formulas.ScopeName)}
@@ -27,7 +26,6 @@ ANSWERED = "answered"
 QUESTIONS = ("mention", ANSWERED)
 LOOK_RESULTS = {"found": True, "missed": False}
 LAST_LOOKS = {"last_found": True, "last_missed": False}
-SKILL_KINDS = {skill.name: skill.recording.kind for skill in SKILLS.rows if skill.recording}
 WRAPPERS = ("at", "holding", "to", "options", "returned")  # further conditions on an event
 NOT_STATES = frozenset({*TESTS, *SCOPE_NAMES, *QUESTIONS, *LOOK_RESULTS, *WRAPPERS, *SKILL_KINDS})
 
@@ -39,24 +37,6 @@ NO_MEANINGS: Mapping[str, str] = MappingProxyType({})
 
 MAX_FORMULA_DEPTH = 50  # low enough for Python's stack during every evaluation
 MAX_OPTIONS = 100  # the most options that a formula may require
-_MAX_SHOWN_LENGTH = 40
-
-
-class RtlSyntaxError(ValueError):
-    """Raised for a string that is not a formula, with a message that says where and why.
-
-    Args:
-        column: the position, counted from 1.
-        problem: what is wrong there.
-    """
-
-    def __init__(self, column: int, problem: str) -> None:
-        super().__init__(f"column {column}: {problem}")
-        self.column = column
-        self.problem = problem
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return type(self), (self.column, self.problem), vars(self)
 
 
 def parse(
@@ -81,7 +61,7 @@ def parse(
     return _Parser(compose(text), skills, means, sets).formula()
 
 
-class _Parser:
+class _Parser(FormulaSource):
     def __init__(
         self,
         text: str,
@@ -89,10 +69,8 @@ class _Parser:
         means: Mapping[str, str],
         sets: Mapping[str, Sequence[str]] | None,
     ) -> None:
+        super().__init__(text)
         self.means, self.sets = means, sets
-        self.indent = len(text) - len(text.lstrip())
-        self.text = re.sub(r"[\r\n\f]", " ", text).strip()
-        self.bytes = self.text.encode(errors="replace")  # `ast` counts columns in bytes
         self.recordings = skills.recordings
         self.skill_of = {s.recording.kind: s for s in skills.rows if s.recording}
         self.types = {
@@ -405,27 +383,6 @@ class _Parser:
             takes = f"{wanted or 'no'} argument{'s' * (wanted > 1)}"
             raise self.error(at, f"{name} takes {takes}, not {found}")
         return call.args
-
-    def unknown(self, at: ast.expr, what: str, name: str, known: Iterable[str]) -> RtlSyntaxError:
-        close = [SKILL_KINDS[name]] if name in SKILL_KINDS else get_close_matches(name, known, 1)
-        hint = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(known)}"
-        if name == INSIDE:
-            hint = "only house rules can use it, since traces contain no poses"
-        elif what in {"element", "state"} and not close:
-            hint += ", or your own skill, if --skills or a suite gives its file"
-        return self.error(at, f"unknown {what} {name}; {hint}")
-
-    def expected(self, what: str, node: ast.expr) -> RtlSyntaxError:
-        found = ast.get_source_segment(self.text, node) or "something else"
-        found = found if len(found) <= _MAX_SHOWN_LENGTH else found[: _MAX_SHOWN_LENGTH - 3] + "..."
-        hint = "; put quotes around it" if "string" in what and isinstance(node, ast.Name) else ""
-        return self.error(node.col_offset, f"expected {what}, found {found}{hint}")
-
-    def error(self, at: ast.expr | int, problem: str) -> RtlSyntaxError:
-        if isinstance(at, ast.Attribute):
-            at = (at.end_col_offset or 0) - len(at.attr.encode())
-        offset = at if isinstance(at, int) else at.col_offset
-        return RtlSyntaxError(self.indent + len(self.bytes[:offset].decode(errors="replace")) + 1, problem)
 
 
 def no_set(name: str, sets: Iterable[str]) -> str:

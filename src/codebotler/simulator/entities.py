@@ -22,13 +22,8 @@ class Thing:
 
     @property
     def entity(self) -> Entity:
-        """The label and the traits by which requests refer to this thing."""
-        return Entity(self.regex, self.traits)
-
-    @property
-    def regex(self) -> str:
-        """The label as a regex."""
-        return self.label if self.is_pattern else re.escape(self.label)
+        """The label, as a regex, and the traits by which requests refer to this thing."""
+        return Entity(self.label if self.is_pattern else re.escape(self.label), self.traits)
 
     def is_meant_by(self, request: str, matching: Matching = "label-in-request") -> bool:
         """Return whether a request refers to this thing."""

@@ -100,13 +100,8 @@ def _meant_by(request: str, labels: tuple[str, ...], regexes: tuple[str, ...]) -
     same = tuple(label for label in labels if " ".join(label.casefold().split()) == request.casefold() != "")
     if same:
         return same[:1]
-    words = [_matched_words(request, regex) for regex in regexes]
+    words = [_longest_match(request, regex)[0] for regex in regexes]
     return tuple(label for label, count in zip(labels, words, strict=True) if count == max(words) > 0)
-
-
-def _matched_words(request: str, regex: str) -> int:
-    """Return how many words of a request a regex matches at most."""
-    return _longest_match(request, regex)[0]
 
 
 def _longest_match(request: str, regex: str) -> tuple[int, str]:
@@ -144,7 +139,7 @@ def best_fits(request: str, entities: Sequence[Entity], anybody: Sequence[str] =
     """
     counts = [_fit(request, *entity, tuple(anybody)) for entity in entities]
     best = [number for number, count in enumerate(counts) if count == max(counts) > 0]
-    named = {entities[n].label: n for n in reversed(best) if _matched_words(request, entities[n].label)}
+    named = {entities[n].label: n for n in reversed(best) if _longest_match(request, entities[n].label)[0]}
     return sorted(named.values()) or best[:1]
 
 

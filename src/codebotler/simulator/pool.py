@@ -158,7 +158,7 @@ class WorkerPool:
     ) -> Iterator[Any]:
         """Call a function on batches of keys in pool threads. `map_batches` explains the arguments."""
         return map_batches(
-            lambda some: self._threads.submit(function, some),
+            lambda some: self.submit(function, some),
             keys,
             workers=self.workers,
             name=name,
@@ -191,7 +191,8 @@ def map_batches(
     running: dict[Future[Sequence[_Called]], list[bytes]] = {}
     ended: SimpleQueue[Future[Sequence[_Called]]] = SimpleQueue()
     calls = CALLS_PER_THREAD * workers
-    with ResultFile() as done:
+    with ResultFile() as done, contextlib.ExitStack() as at_end:
+        at_end.callback(lambda: [future.cancel() for future in running])  # after an interrupt or an error
         while True:
             while len(running) < calls and (batch := distinct.batch(workers)):
                 try:

@@ -12,7 +12,7 @@ from codebotler.core.skills.calling import call_skill
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.core.skills.values import Scalar, ValueType, as_text, plain, sample_values, written_call
+from codebotler.core.skills.values import Scalar, as_text, plain, sample_values, written_call
 from codebotler.core.trace import Event, Option, Trace, attempted_event, to_options
 from codebotler.core.world import World
 from codebotler.simulator.entities import Thing
@@ -196,7 +196,8 @@ class SimulatedRobot(SimulatedWorld):
                 raise UserError(f"the world sets {call} to {known!r}, but {must}")
             return plain(known)
         asks = [one for one, parameter in zip(arguments, row.parameters, strict=True) if parameter.is_options]
-        results = tuple(asks[0]) if asks and asks[0] else self._possible_results(row.returns)
+        names = self.known_names(row.returns.names) if row.returns.names else ()
+        results = tuple(asks[0]) if asks and asks[0] else sample_values(row.returns, names)
         if len(results) == 1 and not row.fails:
             return results[0]
         words = [f"gives {result!r}" if result is not None else "works" for result in results]
@@ -204,9 +205,6 @@ class SimulatedRobot(SimulatedWorld):
         if number >= len(results):
             self.fail(kinds[number - len(results)])
         return results[number]
-
-    def _possible_results(self, value: ValueType) -> tuple[Any, ...]:
-        return sample_values(value, self.known_names(value.names) if value.names else ())
 
     def fail(self, kind: str) -> NoReturn:
         """End the current skill with an error that it declares in `fails`."""

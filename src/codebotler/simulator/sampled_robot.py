@@ -255,10 +255,8 @@ class SampledRobot(SimulatedRobot):
 
     def _fitting(self, known: Sequence[str], wanted: str, words: Sequence[str]) -> list[str]:
         """Return the known names that fit a description."""
-        return [name for name in known if best_fits(wanted, [self._entity(name)], words)]
-
-    def _entity(self, name: str) -> Entity:
-        return Entity(name, self._trait_words.get(name, NO_WORDS))
+        entities = (Entity(name, self._trait_words.get(name, NO_WORDS)) for name in known)
+        return [entity.label for entity in entities if best_fits(wanted, [entity], words)]
 
     def move_person(self, name: str, room: str) -> None:
         """Move a person to a room or place. Where they were, they are no longer."""

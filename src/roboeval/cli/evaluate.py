@@ -35,6 +35,8 @@ from roboeval.cli.output import fail, note, progress_meter, show_progress
 from roboeval.cli.show import house_of, print_summary
 
 if TYPE_CHECKING:
+    from roboeval.analysis.summary import EvaluationSummary
+    from roboeval.analysis.tally import Tally
     from roboeval.evaluation.batches import ImportResult
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.completions import CompletionKey
@@ -65,10 +67,8 @@ def evaluate(
     """Judge whether each completion does what its prompt asks."""
     isolation = {"require_isolation": require_isolation, "one_process_per_run": one_process_per_run}
     with engine_named(engine, workers, **isolation) as engine_for:
-        from roboeval.analysis.metrics import judged_count
         from roboeval.analysis.summary import summarise
         from roboeval.analysis.tally import Tally
-        from roboeval.evaluation.runs.completions import how_many
         from roboeval.evaluation.runs.folder import RunFolder, about_of, tasks_to_judge
         from roboeval.evaluation.runs.scope import JudgingScope
         from roboeval.evaluation.runs.source import open_source
@@ -79,7 +79,7 @@ def evaluate(
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
         if left:
             note(f"not judged because they have no ablation: {', '.join(left)}")
-        tally, table, is_started = Tally(), None if rules is None else _new_table(), False
+        tally, table = Tally(), None if rules is None else _new_table()
         run = None if out is None else RunFolder(out)
         try:
             opened = open_source(source, judged_by)
@@ -93,7 +93,6 @@ def evaluate(
             running = engine_for(scope.total)
             rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
             for row in show_progress(rows, "judging", scope.total):
-                is_started = True
                 tally.add(row)
                 if table is not None:
                     table.add(row)
@@ -101,14 +100,21 @@ def evaluate(
             house = None if table is None else house_of(run, judged_by, table.table(), ablated=ablation)
             print_summary(counted, title=source, as_json=json, house=house)
         except KeyboardInterrupt:
-            note(f"roboeval: {stop_sentence(is_kept=run is not None, is_started=is_started, redo=redo)}")
+            note(f"roboeval: {stop_sentence(run, tally, redo=redo)}")
             raise SystemExit(STOPPED) from None
-        if run is not None:
-            _name_next_command(run, tally.first_failed, suite=suite, ablated=ablation, rules=rules)
-        if (left_out := scope.total - judged_count(counted.prompts)) > 0:
-            again = "all others are judged" if run is None else "run the same command to try again"
-            note(f"roboeval: not judged: {how_many(left_out)} of {scope.total:,}; {again}")
-            raise SystemExit(1)
+        _name_next_command(run, tally.first_failed, suite=suite, ablated=ablation, rules=rules)
+        _expect_all_judged(counted, scope.total, is_kept=run is not None)
+
+
+def _expect_all_judged(summary: EvaluationSummary, total: int, *, is_kept: bool) -> None:
+    """Exit with status 1 if some completions could not be judged."""
+    from roboeval.analysis.metrics import judged_count
+    from roboeval.evaluation.runs.completions import how_many
+
+    if (left_out := total - judged_count(summary.prompts)) > 0:
+        again = "run the same command to try again" if is_kept else "all others are judged"
+        note(f"roboeval: not judged: {how_many(left_out)} of {total:,}; {again}")
+        raise SystemExit(1)
 
 
 def _new_table() -> TableBuilder:
@@ -118,21 +124,23 @@ def _new_table() -> TableBuilder:
 
 
 def _name_next_command(
-    run: RunFolder, failed: CompletionKey | None, *, suite: str, ablated: bool, rules: Path | None
+    run: RunFolder | None, failed: CompletionKey | None, *, suite: str, ablated: bool, rules: Path | None
 ) -> None:
     from roboeval.evaluation.runs.completions import name_of
 
+    if run is None:
+        return
     shown = [] if failed is None else [name_of(failed)]
     again = command("show", run.path, *shown, suite=suite, ablated=ablated, rules=rules)
     does = "explains the first failure" if shown else "prints these tables again"
     note(f"the verdicts are in {run.path}; `{again}` {does}")
 
 
-def stop_sentence(*, is_kept: bool, is_started: bool, redo: bool) -> str:
+def stop_sentence(run: RunFolder | None, tally: Tally, *, redo: bool) -> str:
     """Return a sentence about what was saved before Ctrl-C, and how to continue."""
-    if not is_kept:
+    if run is None:
         return "stopped; nothing was saved (add --out RUN to save verdicts)"
-    if redo and not is_started:  # earlier verdicts may still be there
+    if redo and not tally.judged:  # earlier verdicts may still be there
         return "stopped; run the same command again"
     return f"stopped; the same command {'without --redo ' * redo}continues where it stopped"
 

@@ -12,7 +12,7 @@ import typer
 
 from roboeval.cli.completion_names import task_names
 from roboeval.cli.inputs import load
-from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, path_to
+from roboeval.cli.options import MutantWorldsOption, ProcessOption, SuiteOption, WorkersOption, path_to
 from roboeval.cli.output import note, print_rich, show_progress
 
 if TYPE_CHECKING:
@@ -36,12 +36,7 @@ def mutate(
             "`roboeval evaluate` reads; may be given several times."
         ),
     ] = None,
-    worlds: Annotated[
-        int | None,
-        typer.Option(
-            min=1, max=10_000, help="Number of worlds to try mutants in, if the suite samples worlds."
-        ),
-    ] = None,
+    worlds: MutantWorldsOption = None,
     seed: Annotated[int, typer.Option(min=0, help="Random seed for mutants and worlds.")] = 1,
     most: Annotated[
         int,

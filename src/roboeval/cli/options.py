@@ -116,3 +116,24 @@ NumOption = Annotated[int, typer.Option(min=1, max=10_000, help="Number of compl
 ConcurrencyOption = Annotated[int, typer.Option(min=1, help="Maximum number of concurrent requests.")]
 RateOption = Annotated[float | None, typer.Option(min=0.001, help="Maximum number of requests per minute.")]
 BudgetOption = Annotated[int | None, typer.Option(min=1, help="Stop after using this many tokens.")]
+PublishedOption = Annotated[
+    bool, typer.Option("--published", help="Add the failure causes that the paper published.")
+]
+PricesOption = Annotated[
+    list[str] | None,
+    typer.Option(help="MODEL=INPUT/OUTPUT, the prices per million tokens; may be given several times."),
+]
+LabelsOption = Annotated[
+    list[str] | None,
+    typer.Option(help="RUN=TEXT, the name of a run in tables and figures; may be given several times."),
+]
+BesideOption = Annotated[
+    str | None, typer.Option(help="Compare with the verdicts of another suite that judged the runs.")
+]
+CheckOption = Annotated[
+    bool, typer.Option(help="Run the check on programs not checked yet, for rejection sampling.")
+]
+MutantWorldsOption = Annotated[
+    int | None,
+    typer.Option(min=1, max=10_000, help="Number of worlds to try mutants in, if the suite samples worlds."),
+]

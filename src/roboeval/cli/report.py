@@ -9,7 +9,17 @@ import typer
 
 from roboeval.cli.compare import check_run
 from roboeval.cli.inputs import command, expect_same_suite, note_houses, open_current
-from roboeval.cli.options import HouseRulesOption, SuiteOption, WorkersOption, path_to
+from roboeval.cli.options import (
+    BesideOption,
+    CheckOption,
+    HouseRulesOption,
+    LabelsOption,
+    PricesOption,
+    PublishedOption,
+    SuiteOption,
+    WorkersOption,
+    path_to,
+)
 from roboeval.cli.output import fail, note, show_progress
 
 if TYPE_CHECKING:
@@ -22,23 +32,11 @@ def report(
     runs: Annotated[list[Path], typer.Argument(help="Judged runs.", parser=path_to("a run"))],
     out: Annotated[Path, typer.Option(help="The folder to write to.", parser=path_to("a folder"))],
     suite: SuiteOption = "paper",
-    published: Annotated[
-        bool, typer.Option("--published", help="Add the failure causes that the paper published.")
-    ] = False,
-    price: Annotated[
-        list[str] | None,
-        typer.Option(help="MODEL=INPUT/OUTPUT, the prices per million tokens; may be given several times."),
-    ] = None,
-    label: Annotated[
-        list[str] | None,
-        typer.Option(help="RUN=TEXT, the name of a run in tables and figures; may be given several times."),
-    ] = None,
-    beside: Annotated[
-        str | None, typer.Option(help="Compare with the verdicts of another suite that judged the runs.")
-    ] = None,
-    check: Annotated[
-        bool, typer.Option(help="Run the check on programs not checked yet, for rejection sampling.")
-    ] = True,
+    published: PublishedOption = False,
+    price: PricesOption = None,
+    label: LabelsOption = None,
+    beside: BesideOption = None,
+    check: CheckOption = True,
     workers: WorkersOption = None,
     rules: HouseRulesOption = None,
 ) -> None:

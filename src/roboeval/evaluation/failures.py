@@ -13,11 +13,9 @@ from roboeval.suites.load import Requirement
 from roboeval.suites.schema import Category
 
 NO_PROGRAM_CLASS = "NoProgram"
-PYTHON_ERROR_CLASS, ROBOT_ERROR_CLASS, TASK_ERROR_CLASS = (
-    "PythonError",
-    "RobotExecutionError",
-    "TaskCompletionError",
-)
+PYTHON_ERROR_CLASS = "PythonError"
+ROBOT_ERROR_CLASS = "RobotExecutionError"
+TASK_ERROR_CLASS = "TaskCompletionError"
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,8 @@ import os
 import threading
 from collections import OrderedDict
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from itertools import chain
 from os import PathLike
 from statistics import fmean
 from typing import Generic, TypeVar
@@ -17,7 +15,7 @@ from typing import Generic, TypeVar
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
-from codebotler.simulator.pool import CALLS_PER_THREAD, MAX_BATCH_KEYS, shared_pool
+from codebotler.simulator.pool import shared_pool
 from roboeval.evaluation.judge import are_met, is_met, may_satisfy, robot_in
 from roboeval.evaluation.runs.completions import find_key_fault
 from roboeval.suites.load import Scenario, Suite, load_suite
@@ -66,7 +64,7 @@ def reward(
         chosen = chosen.with_worlds(worlds, seed)
     if (problem := find_key_fault((task, prompt, 0), chosen)) is not None:
         raise UserError(problem)
-    return REWARDS.of(chosen, task, first_equal_prompt(chosen, task, prompt), programs)
+    return rewards_of(chosen, task, first_equal_prompt(chosen, task, prompt), programs)
 
 
 @dataclass(frozen=True)
@@ -137,37 +135,19 @@ class RewardCache(Generic[Judged]):
                 self._known.popitem(last=False)
 
 
-class Rewards:
-    """Computes rewards of programs, with a cache so that each program is judged once."""
-
-    def __init__(self) -> None:
-        self._known: RewardCache[float] = RewardCache()
-
-    def of(self, suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
-        """Return the reward of each program, in input order."""
-        names = [digest(suite.digest, task, str(prompt), program) for program in programs]
-        rewards = self._known.among(names)
-        new = {name: program for name, program in zip(names, programs, strict=True) if name not in rewards}
-        futures: list[Future[list[float]]] = []
-        try:
-            pool = shared_pool()
-            futures.extend(
-                pool.submit(judge_programs, suite, task, prompt, batch)
-                for batch in split_programs([*new.values()], pool.workers)
-            )
-            found = chain.from_iterable(future.result() for future in futures)
-            rewards.update(zip(new, found, strict=True))
-        finally:  # after an interrupt, cancel the rest
-            for future in futures:
-                future.cancel()
-        self._known.add(rewards)
-        return [rewards[name] for name in names]
+REWARD_CACHE: RewardCache[float] = RewardCache()
 
 
-def split_programs(programs: Sequence[str], workers: int) -> list[Sequence[str]]:
-    """Split programs into enough batches to keep all workers busy."""
-    size = max(1, min(MAX_BATCH_KEYS, -(-len(programs) // (CALLS_PER_THREAD * workers))))
-    return [programs[start : start + size] for start in range(0, len(programs), size)]
+def rewards_of(suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
+    """Return the reward of each program, in input order. Equal programs are judged once."""
+    names = [digest(suite.digest, task, str(prompt), program) for program in programs]
+    rewards = REWARD_CACHE.among(names)
+    new = {name: program for name, program in zip(names, programs, strict=True) if name not in rewards}
+    judging = partial(judge_programs, suite, task, prompt)
+    found = shared_pool().map_distinct(judging, new.values(), name=digest)
+    rewards.update(zip(new, found, strict=True))
+    REWARD_CACHE.add(rewards)
+    return [rewards[name] for name in names]
 
 
 def judge_programs(suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
@@ -179,6 +159,3 @@ def judge_programs(suite: Suite, task: str, prompt: int, programs: Sequence[str]
         total([Share.of(outcome, *one) for outcome, one in zip(outcomes, asked, strict=True)])
         for outcomes in ran
     ]
-
-
-REWARDS = Rewards()

@@ -16,7 +16,6 @@ from roboeval.report.sheets import Cell, Prose, Section, Sheet, section, sheet
 
 NO_INSTRUCTION = "instruction not recorded"
 REPORTING_TASKS = "come back and report"
-UNKNOWN_COUNT = "an unknown number (judged by an earlier version)"
 MAX_DISTINCT_WORDS = 12
 
 

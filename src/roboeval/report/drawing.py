@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -42,34 +43,12 @@ MAX_COLOURED_RUNS = len(COLOURS)
 MAX_LEGEND_NAME = 16  # characters; two of these names fit side by side below a narrow figure
 
 FIGURE_STYLE: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 7.5,
-    "axes.titlesize": 8,
-    "axes.labelsize": 7.5,
-    "xtick.labelsize": 7,
-    "ytick.labelsize": 7,
-    "legend.fontsize": 7,
-    "legend.frameon": False,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.6,
+    **mpl.rc_params_from_file(Path(__file__).with_name("figures.mplstyle"), use_default_template=False),
     **dict.fromkeys(
         ("axes.edgecolor", "axes.labelcolor", "text.color", "xtick.color", "ytick.color"), FOREGROUND
     ),
     **dict.fromkeys(("axes.facecolor", "figure.facecolor", "savefig.facecolor"), BACKGROUND),
-    "axes.axisbelow": True,
-    "text.hinting": "none",  # hinting distorts letters and has no benefit at 300 dpi
-    "text.parse_math": False,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
     "grid.color": PALE,
-    "grid.linewidth": 0.5,
-    "hatch.linewidth": 0.5,
-    "lines.linewidth": 1.4,
-    "svg.hashsalt": "roboeval",
-    "svg.fonttype": "path",
-    "pdf.fonttype": 42,
-    "pdf.compression": 6,
 }
 
 

@@ -16,11 +16,8 @@ from roboeval.report.runs import JudgedRun, coverage_of
 from roboeval.report.sheets import Cell, Groups, Prose, ReportFigure, Section, Sheet, note, section, sheet
 from roboeval.suites.task import check_label
 
-MAX_GROUPS_PER_RUN, MIN_GROUPS_PER_RUN, MAX_GROUPS_SHOWN = (
-    100,
-    4,
-    200,
-)  # number of groups on the page: at most and at least per run, and in total
+MAX_GROUPS_PER_RUN, MIN_GROUPS_PER_RUN = 100, 4  # number of groups of a run on the page
+MAX_GROUPS_SHOWN = 200  # number of groups on the page
 
 
 # --- causes

@@ -132,10 +132,8 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
                 notes.append(f"{pair}: {'; '.join(others)}.")
         over = found.over_prompts, found.over_tasks
         ends = [end for estimate in over for end in (estimate.low, estimate.high)]
-        ps, sizes = (
-            (found.p_prompts, found.p_tasks),
-            (found.sample_sizes.completions, found.sample_sizes.prompts),
-        )
+        ps = found.p_prompts, found.p_tasks
+        sizes = found.sample_sizes.completions, found.sample_sizes.prompts
         rows.append([f"{second.name} minus {first.name}", found.prompts, over[0].mean, *ends, *ps, *sizes])
     notes = [*([note("many-pairs")] if len(rows) > 1 else []), *notes]
     return section("differences", Prose(sentences), sheet("differences", rows, notes=notes))

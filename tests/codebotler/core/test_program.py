@@ -7,12 +7,12 @@ import threading
 import pytest
 
 from codebotler.core import program
-from codebotler.core.program import find_flaws
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill
 from codebotler.core.skills.values import NO_VALUE
 from codebotler.models.recorded import RECORDED_NAMES, open_recorded
 from codebotler.prompts.extract import program_of
+from flaws import find_flaws
 
 RECORDED = [
     reply
@@ -210,9 +210,9 @@ def test_threads_parse_at_the_same_time() -> None:
 
 ODD = r"""
 import re
-from codebotler.core.program import find_flaws, parse_expression
+from codebotler.core.program import parse_expression, parse_program
 from codebotler.core.world import World
-find_flaws("def task_program():\n    say('\\d' if 1 is 1 else '')\n")
+parse_program("def task_program():\n    say('\\d' if 1 is 1 else '')\n", compiled=True)
 parse_expression(r"'\d'")
 re.compile("[[a] nested")
 """

@@ -9,6 +9,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError, Reply, Usage
+from codebotler.models.no_program import is_cut_off
 from codebotler.models.open import open_model
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import prompt_for
@@ -250,7 +251,7 @@ def test_cut_off_reply_holds_a_program_if_it_goes_on_behind_it(
 ) -> None:
     streams(server, chunk(CHAT, f"```python\n{TASK}{BODY}{after}"), chunk(CHAT, None, "length"), DONE)
     reply = ask(CHAT, server)
-    assert (reply.program, reply.no_program, reply.is_cut_off) == (TASK + BODY, why, True)
+    assert (reply.program, reply.no_program, is_cut_off(reply.finish_reason)) == (TASK + BODY, why, True)
 
 
 @both

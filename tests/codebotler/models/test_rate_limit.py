@@ -199,11 +199,7 @@ def test_requests_are_spread_over_the_minute_tries_included(server: Server) -> N
 def test_counters_add_up(server: Server) -> None:
     paced, replies = use(server, many(5))
     assert (paced.requests, paced.retry_count) == (5, 0)
-    assert paced.usage == Usage(
-        sum(reply.usage.input_tokens or 0 for reply in replies),
-        sum(reply.usage.output_tokens or 0 for reply in replies),
-    )
-    assert paced.tokens_used == paced.usage.total
+    assert paced.tokens_used == sum(reply.usage.total for reply in replies)
 
 
 def spend(paced: RateLimited) -> Awaitable[tuple[int, BudgetSpentError]]:
@@ -256,7 +252,6 @@ def test_budget_holds_where_nobody_counts_tokens(name: str, server: Server) -> N
     server.counts = False
     paced, (replies, _) = use(server, spend, name=name, token_budget=5_000)
     assert 2 <= replies <= 6
-    assert paced.usage == Usage(None, None)
     assert paced.tokens_used >= 5_000
 
 

@@ -4,10 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codebotler.core.program import find_flaws, undefined_names
+from codebotler.core.program import undefined_names
 from codebotler.core.skills.table import SkillTable
 from codebotler.models.recorded import RECORDED_NAMES, open_recorded
 from codebotler.prompts.extract import extract, program_of
+from flaws import find_flaws
 
 RECORDED = [
     reply

@@ -5,7 +5,6 @@ from difflib import SequenceMatcher
 import pytest
 
 from codebotler import prompts
-from codebotler.core.program import find_flaws
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill
 from codebotler.core.skills.values import NO_VALUE
@@ -15,6 +14,7 @@ from codebotler.prompts import Prompt, PromptMessage, prompt_for, rendering, tem
 from codebotler.prompts.extract import program_of
 from codebotler.prompts.rendering import Example, examples, task_end
 from codebotler.simulator import run
+from flaws import find_flaws
 from roboeval.suites.load import Suite
 
 WAVE = Skill("wave", (Parameter("person"),), NO_VALUE, "Wave at a person in the room.")

@@ -32,6 +32,7 @@ from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.worker import EngineError, Job, Worker
 from in_process import all_of
+from other_functions import with_functions
 from processes import are_gone, children_of
 
 WORLDS = (
@@ -337,7 +338,7 @@ class Waves:
         self.wave, self.others = wave, others
 
     def robot(self) -> SimulatedRobot:
-        return SimulatedRobot(WORLD, RULES, TABLE.with_functions(wave=self._waved, **self.others))
+        return SimulatedRobot(WORLD, RULES, with_functions(TABLE, wave=self._waved, **self.others))
 
     def _waved(self, robot: SimulatedRobot, person: str) -> Result:
         self.processes.append(os.getpid())

@@ -35,6 +35,7 @@ from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, PREPARER
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.skill_protocol import OVERRUN, SkillProtocol
 from codebotler.simulator.worker import EngineError, Worker
+from other_functions import with_functions
 from processes import are_gone, children_of, engine_processes, fork_servers
 
 WORLD = World((Room("start_loc"), Room("lab")), "start_loc")
@@ -55,7 +56,7 @@ def said(outcome: Outcome) -> list[str]:
 
 def doing(say: Callable[..., None]) -> SkillTable:
     """The eight skills, of which one does something else."""
-    return SKILLS.with_functions(say=say)
+    return with_functions(SKILLS, say=say)
 
 
 def links_in(folder: Path) -> list[Path]:

@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from hypothesis.internal.conjecture import providers
 from hypothesis.internal.constants_ast import Constants
 
-from codebotler.core.program import Flaw, find_flaws
+from codebotler.core.program import Flaw
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
@@ -30,6 +30,7 @@ from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.settings import PAPER_SETTINGS, Limits, SimulationSettings
 from codebotler.simulator.worker import Worker
+from flaws import find_flaws
 from in_process import OrdinaryProcess, all_of, without_addresses
 from random_programs import broken_programs, programs, tame_programs
 from roboeval.suites.load import Suite

@@ -16,6 +16,7 @@ from codebotler.core.world import Room, World
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox.isolation import NOBODY
 from codebotler.simulator.worker import Worker
+from other_functions import with_functions
 from processes import children_of, lives
 
 WORLD = World((Room("start_loc"),), "start_loc")
@@ -77,7 +78,7 @@ def enclosed() -> Iterator[dict[str, Enclosed]]:
                 found[message] = Enclosed.of(pid)
 
     def new_robot() -> SimulatedRobot:
-        return SimulatedRobot(WORLD, skills=SKILLS.with_functions(say=say))
+        return SimulatedRobot(WORLD, skills=with_functions(SKILLS, say=say))
 
     program = "def task_program():\n    say('child')\n"
     worker.run(program.replace("child", "child of a batch"), new_robot)

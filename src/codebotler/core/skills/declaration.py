@@ -7,12 +7,12 @@ import functools
 import re
 from collections.abc import Callable, Mapping
 from keyword import iskeyword
-from math import inf
 from types import FunctionType
 from typing import Any, NoReturn, overload
 
 from codebotler.core.errors import VIOLATION, UserError
 from codebotler.core.skills.kinds import INSIDE
+from codebotler.core.skills.options import SKILL_OPTIONS
 from codebotler.core.skills.own_modules import is_own_module
 from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, refuse
 from codebotler.core.skills.values import NO_VALUE, TEXT_TYPE, ValueType, plain, value_type
@@ -40,6 +40,8 @@ RTL_WORDS = frozenset(
 """Words with a meaning in formulas, which cannot name events."""
 _DECLARED: dict[str, Skill] = {}
 PAPER_MODULE = "codebotler.core.skills.paper"
+COROUTINE_FLAG, MORE_ARGUMENTS_FLAGS = 0x80, 0x04 | 0x08  # bits of `co_flags`
+ROS_TYPES = {"str": "string", "int": "int64", "float": "float64", "bool": "bool"}
 USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a list of one of these"
 
 
@@ -349,48 +351,6 @@ class _Declaration:
         goal = tuple(f"{_ros_type(each.type)} {each.name}" for each in parameters)
         result = None if returns.base is None else _ros_type(returns)
         return RosAction(kind, server, goal, result, package=package)
-
-
-def is_state_name(name: object) -> bool:
-    """Return whether a name can be that of a state, or is empty for no state."""
-    return isinstance(name, str) and (not name or (name.isidentifier() and not iskeyword(name)))
-
-
-SORTS_OF_THINGS = ("room", "object", "object or person", "thing", "")
-COROUTINE_FLAG, MORE_ARGUMENTS_FLAGS = 0x80, 0x04 | 0x08  # bits of `co_flags`
-SKILL_OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
-    "verb": (lambda it: it is None or isinstance(it, str | Verb), 'a string such as "open {door}"'),
-    "past": (lambda it: isinstance(it, str), "a string"),
-    "results": (
-        lambda it: isinstance(it, tuple | list) and len(it) == 2 and all(isinstance(one, str) for one in it),  # noqa: PLR2004 - for False and True
-        "two texts, for False and True",
-    ),
-    "fails": (
-        lambda it: (
-            isinstance(it, Mapping) and all(isinstance(one, str) for pair in it.items() for one in pair)
-        ),
-        'errors with clauses, as in {"DoorLocked": "the door is locked"}',
-    ),
-    "ros": (
-        lambda it: it is None or isinstance(it, str | RosAction),
-        "a string such as lab_msgs/OpenDoor:/open_door",
-    ),
-    "example": (lambda it: isinstance(it, str), "a string that calls the skill"),
-    "event": (
-        lambda it: it is None or (isinstance(it, str) and (it or "x").isidentifier()),
-        "a name, or None",
-    ),
-    "text": (lambda it: isinstance(it, str), "the name of a parameter"),
-    "names": (lambda it: it in SORTS_OF_THINGS, "one of " + ", ".join(f'"{one}"' for one in SORTS_OF_THINGS)),
-    "to": (lambda it: it is None or isinstance(it, str), "the name of a parameter"),
-    "when_tried": (lambda it: it is None or isinstance(it, bool), "True, False or None"),
-    "sets": (is_state_name, 'the name of a state, such as "on"'),
-    "clears": (is_state_name, 'the name of a state, such as "on"'),
-    "seconds": (lambda it: type(it) in {int, float} and 0 <= it < inf, "a number of at least 0"),
-    "is_idle": (lambda it: isinstance(it, bool), "True or False"),
-    "adds_event": (lambda it: isinstance(it, bool), "True or False"),
-}
-ROS_TYPES = {"str": "string", "int": "int64", "float": "float64", "bool": "bool"}
 
 
 def _ros_type(value: ValueType) -> str:

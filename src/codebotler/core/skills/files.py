@@ -10,7 +10,7 @@ from traceback import extract_tb
 from types import ModuleType
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills.declaration import SKILL_OPTIONS
+from codebotler.core.skills.options import SKILL_OPTIONS
 from codebotler.core.skills.own_modules import is_own_module, load_own_module, location_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable

@@ -8,40 +8,7 @@ from pathlib import Path
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import SkillTable
 
-PACKAGE_XML = """\
-<?xml version="1.0"?>
-<package format="3">
-  <name>{package}</name>
-  <version>1.0.0</version>
-  <description>Actions of a robot's skills.</description>
-  <maintainer email="robot@example.com">The makers of the robot</maintainer>
-  <license>MIT</license>
-
-  <buildtool_depend>ament_cmake</buildtool_depend>
-  <buildtool_depend>rosidl_default_generators</buildtool_depend>
-  <depend>action_msgs</depend>
-  <exec_depend>rosidl_default_runtime</exec_depend>
-  <member_of_group>rosidl_interface_packages</member_of_group>
-
-  <export>
-    <build_type>ament_cmake</build_type>
-  </export>
-</package>
-"""
-CMAKE = """\
-cmake_minimum_required(VERSION 3.8)
-project({package})
-
-find_package(ament_cmake REQUIRED)
-find_package(rosidl_default_generators REQUIRED)
-
-rosidl_generate_interfaces(${{PROJECT_NAME}}
-{files}
-)
-
-ament_export_dependencies(rosidl_default_runtime)
-ament_package()
-"""
+TEMPLATE = Path(__file__).with_name("ros_package_template")
 
 
 def ros_packages(skills: SkillTable) -> Mapping[str, Mapping[str, str]]:
@@ -53,8 +20,8 @@ def ros_packages(skills: SkillTable) -> Mapping[str, Mapping[str, str]]:
             actions[f"action/{skill.ros.type}.action"] = skill.ros.definition
     for package, files in packages.items():
         names = "\n".join(f'  "{name}"' for name in sorted(files))
-        files["package.xml"] = PACKAGE_XML.format(package=package)
-        files["CMakeLists.txt"] = CMAKE.format(package=package, files=names)
+        for path in TEMPLATE.iterdir():
+            files[path.name] = path.read_text().replace("PACKAGE", package).replace("FILES", names)
     return packages
 
 

@@ -123,10 +123,6 @@ class Skill:
             return find_object, (location_of(name), self.name)
         return super().__reduce_ex__(protocol)
 
-    def with_function(self, does: Callable[..., Any]) -> Skill:
-        """Return a copy of this skill with another function."""
-        return replace(self, does=does, is_idle=False)
-
     @property
     def is_drive(self) -> bool:
         """Whether its event names a room that the robot drives to."""
@@ -234,12 +230,3 @@ class SkillTable(Mapping[str, Skill]):
         """Return a copy of this table without the skills that have these names."""
         omitted = {*names}
         return SkillTable(tuple(row for row in self.rows if row.name not in omitted))
-
-    def with_functions(self, **does: Callable[..., Any]) -> SkillTable:
-        """Return a copy of this table in which the named skills have other functions."""
-        return SkillTable(tuple(s.with_function(does[s.name]) if s.name in does else s for s in self.rows))
-
-    @property
-    def verbs(self) -> Mapping[str, Verb]:
-        """The verb for each kind of event."""
-        return {s.recording.kind: s.verb for s in self.rows if s.recording and s.verb}

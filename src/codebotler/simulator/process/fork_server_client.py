@@ -7,6 +7,7 @@ import marshal
 import os
 import socket
 import sys
+from pathlib import Path
 
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import message
@@ -23,35 +24,7 @@ EMPTY_PROGRAM = marshal.dumps(compile("task_program = int", "<program>", "exec")
 REHEARSALS = 8
 
 # Code typical of programs. A fork server runs it first, so that all children share the specialized bytecode.
-WARM_UP = """
-def find(thing, rooms):
-    for number, room in enumerate(sorted(rooms)):
-        go_to(room)
-        if is_in_room(thing):
-            return [room, number + 1]
-    return None
-
-def task_program():
-    start = get_current_location()
-    rooms = [room for room in get_all_rooms() if room != start and "all" not in room]
-    found = find("mug", rooms)
-    if found is not None and len(found) > 0:
-        pick("mug")
-        answer = ask("", "Is it yours, " + found[0] + "?", ["Yes", "No"])
-        counts = {"yes": 0}
-        counts[answer.lower()] = counts.get("yes", 0) + 1
-        time.sleep(1)
-        place("mug")
-    try:
-        go_to("nowhere")
-    except Exception as error:
-        say(str(error))
-    go_to(start)
-    message = f"{', '.join(rooms)}: {counts['yes']} of {len(rooms)}"
-    while not message.endswith("."):
-        message += "."
-    say(message)
-"""
+WARM_UP = Path(__file__).with_name("warm-up.txt").read_text()
 WARM_UP_CODE = marshal.dumps(prepared(WARM_UP, lowercase=False)[0], WITHOUT_REFERENCES)
 WARM_UP_WORLD = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
 WARM_UP_RUNS = 20  # the interpreter specializes code that has run a few times
@@ -118,18 +91,14 @@ class ForkServer:
         for _ in range(self._read_report()):
             self._warm_up()
         self.has_seccomp = self._read_report() == 1
-        for _ in range(REHEARSALS):
-            self._rehearse()
+        for _ in range(REHEARSALS):  # until the heap, which programs can observe, is stable
+            SkillProtocol(self.fork(), EMPTY_PROGRAM, SimulatedRobot(WARM_UP_WORLD)).outcome()
 
     def _warm_up(self) -> None:
         channel = self._ask_for_channel()
         itself = IsolatedProcess(lambda: self.pid, channel, self._process.wait, has_seccomp=False)
         SkillProtocol(itself, WARM_UP_CODE, SimulatedRobot(WARM_UP_WORLD)).talk()
         itself.hang_up()
-
-    def _rehearse(self) -> None:
-        """Run an empty program until the fork server's heap, which programs can observe, is stable."""
-        SkillProtocol(self.fork(), EMPTY_PROGRAM, SimulatedRobot(WARM_UP_WORLD)).outcome()
 
     def _ask_for_channel(self) -> socket.socket:
         ours, theirs = socket.socketpair()

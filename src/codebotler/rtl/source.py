@@ -1,0 +1,64 @@
+"""The source of an RTL formula, and errors that name the columns of mistakes in it."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+from codebotler.core.skills.kinds import INSIDE
+from codebotler.core.skills.paper import SKILLS
+
+SKILL_KINDS = {skill.name: skill.recording.kind for skill in SKILLS.rows if skill.recording}
+_MAX_SHOWN_LENGTH = 40
+
+
+class RtlSyntaxError(ValueError):
+    """Raised for a string that is not a formula, with a message that says where and why.
+
+    Args:
+        column: the position, counted from 1.
+        problem: what is wrong there.
+    """
+
+    def __init__(self, column: int, problem: str) -> None:
+        super().__init__(f"column {column}: {problem}")
+        self.column = column
+        self.problem = problem
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.column, self.problem), vars(self)
+
+
+class FormulaSource:
+    """The text of one formula."""
+
+    def __init__(self, text: str) -> None:
+        self.indent = len(text) - len(text.lstrip())
+        self.text = re.sub(r"[\r\n\f]", " ", text).strip()
+        self.bytes = self.text.encode(errors="replace")  # `ast` counts columns in bytes
+
+    def unknown(self, at: ast.expr, what: str, name: str, known: Iterable[str]) -> RtlSyntaxError:
+        """Return the error for an unknown name, with a hint at known names."""
+        close = [SKILL_KINDS[name]] if name in SKILL_KINDS else get_close_matches(name, known, 1)
+        hint = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(known)}"
+        if name == INSIDE:
+            hint = "only house rules can use it, since traces contain no poses"
+        elif what in {"element", "state"} and not close:
+            hint += ", or your own skill, if --skills or a suite gives its file"
+        return self.error(at, f"unknown {what} {name}; {hint}")
+
+    def expected(self, what: str, node: ast.expr) -> RtlSyntaxError:
+        """Return the error for a node of the wrong kind."""
+        found = ast.get_source_segment(self.text, node) or "something else"
+        found = found if len(found) <= _MAX_SHOWN_LENGTH else found[: _MAX_SHOWN_LENGTH - 3] + "..."
+        hint = "; put quotes around it" if "string" in what and isinstance(node, ast.Name) else ""
+        return self.error(node.col_offset, f"expected {what}, found {found}{hint}")
+
+    def error(self, at: ast.expr | int, problem: str) -> RtlSyntaxError:
+        """Return the error for a problem at a node, or after a number of bytes."""
+        if isinstance(at, ast.Attribute):
+            at = (at.end_col_offset or 0) - len(at.attr.encode())
+        offset = at if isinstance(at, int) else at.col_offset
+        return RtlSyntaxError(self.indent + len(self.bytes[:offset].decode(errors="replace")) + 1, problem)
