@@ -30,7 +30,7 @@ from codebotler.web.access import AGENT_PATH
 from codebotler.web.console import Console
 from codebotler.web.server import Companion
 
-MAX_LINE_BYTES = 16_000_000
+MAX_MESSAGE_BYTES = 16_000_000
 """The limit for one message on standard input."""
 
 _INSTRUCTIONS = """CodeBotler runs programs on a robot, but only programs that a person has approved.
@@ -142,7 +142,7 @@ async def _serve_stdio(server: MCPServer[Gatekeeper]) -> None:
 
 async def _lines() -> asyncio.StreamReader:
     """Read lines from standard input without a thread, which no signal could interrupt."""
-    reader = asyncio.StreamReader(limit=MAX_LINE_BYTES)
+    reader = asyncio.StreamReader(limit=MAX_MESSAGE_BYTES)
     pipe = os.fdopen(os.dup(0), "rb", buffering=0)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)  # so that no child of ours reads messages

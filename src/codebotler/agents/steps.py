@@ -24,7 +24,7 @@ from codebotler.simulator.process.errors import ProtocolError
 from codebotler.simulator.robot import Argument
 from codebotler.simulator.skill_protocol import arguments_of
 
-POLL_SECONDS = 0.1
+IDLE_POLL_SECONDS = 0.1
 """How often an idle mission looks whether it was stopped."""
 
 NOT_RUNNING = "this mission is not running; call run_mission first, or begin_steps for a new one"
@@ -94,7 +94,7 @@ class Steps:
         while True:
             live.check_end()
             try:
-                return self._calls.get(timeout=POLL_SECONDS)
+                return self._calls.get(timeout=IDLE_POLL_SECONDS)
             except Empty:
                 continue
 

@@ -37,7 +37,7 @@ def serve_agents(
     base_url: options.BaseUrlOption = None,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
-    """Let agents propose missions, which run once a person approves them.
+    """Let agents use the robot over MCP, with a person's approval.
 
     An MCP client, such as Claude Code, starts this command.
     """
