@@ -37,9 +37,9 @@ def serve_agents(
     base_url: options.BaseUrlOption = None,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
-    """Let agents use the robot over MCP, with a person's approval.
+    """Let agents use the robot, with a person's approval.
 
-    An MCP client, such as Claude Code, starts this command.
+    Clients of the Model Context Protocol (MCP), such as Claude Code, start this command.
     """
     from codebotler.agents import server
     from codebotler.agents.gatekeeper import Gatekeeper
