@@ -7,12 +7,14 @@ import json
 import os
 import signal
 import stat
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import asdict
+from io import BufferedWriter, FileIO, TextIOWrapper
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
+import anyio
 from mcp.server import MCPServer
 from mcp.server.mcpserver.exceptions import ResourceNotFoundError
 from mcp.server.stdio import stdio_server
@@ -32,6 +34,14 @@ from codebotler.web.server import Companion
 
 MAX_MESSAGE_BYTES = 16_000_000
 """The limit for one message on standard input."""
+
+
+class Streams(NamedTuple):
+    """The two streams over which a client speaks to us."""
+
+    received: FileIO
+    sent: BufferedWriter
+
 
 _INSTRUCTIONS = """CodeBotler runs programs on a robot, but only programs that a person has approved.
 Call read_robot first. Then propose_mission, tell the person what you propose, and call run_mission with the
@@ -64,22 +74,26 @@ def _add_resources(server: MCPServer[Gatekeeper], home: Path) -> None:
     @server.resource("codebotler://missions", mime_type="application/json")
     def missions() -> str:
         """List all missions, oldest first."""
-        return json.dumps([asdict(summary) for summary in read_missions(home)])
+        with _as_resource_errors():
+            return json.dumps([asdict(summary) for summary in read_missions(home)])
 
     @server.resource("codebotler://missions/{mission}", mime_type="application/json")
     def mission(mission: str) -> str:
         """Read a mission: its program, its state and the reason."""
-        return _read(home, mission, SUMMARY_FILE)
+        with _as_resource_errors():
+            return read_text(find_mission(home, mission) / SUMMARY_FILE)
 
     @server.resource("codebotler://missions/{mission}/log", mime_type="application/jsonl")
     def log(mission: str) -> str:
         """Read the log of a mission, one event per line."""
-        return _read(home, mission, EVENTS_FILE)
+        with _as_resource_errors():
+            return read_text(find_mission(home, mission) / EVENTS_FILE)
 
 
-def _read(home: Path, mission: str, name: str) -> str:
+@contextmanager
+def _as_resource_errors() -> Iterator[None]:
     try:
-        return read_text(find_mission(home, mission) / name)
+        yield
     except UserError as error:
         raise ResourceNotFoundError(error.sentence) from None
 
@@ -87,8 +101,8 @@ def _read(home: Path, mission: str, name: str) -> str:
 # --- transports
 
 
-def over_http(server: MCPServer[Gatekeeper], gatekeeper: Gatekeeper, say: Callable[[str], None]) -> Companion:
-    """Return what serves agents over HTTP on the page's port. `say` receives the page's address."""
+def over_http(server: MCPServer[Gatekeeper], announce: Callable[[str], None]) -> Companion:
+    """Return what serves agents over HTTP on the page's port. `announce` receives the page's address."""
     security = TransportSecuritySettings(enable_dns_rebinding_protection=False)  # the page's guard has it
     app = server.streamable_http_app(streamable_http_path=AGENT_PATH, transport_security=security)
 
@@ -96,12 +110,23 @@ def over_http(server: MCPServer[Gatekeeper], gatekeeper: Gatekeeper, say: Callab
         async with server.session_manager.run():
             await asyncio.Event().wait()
 
-    return Companion(tuple(app.routes), run, _announced(gatekeeper, say))
+    return Companion(tuple(app.routes), run, announce)
 
 
-def over_stdio(server: MCPServer[Gatekeeper], gatekeeper: Gatekeeper) -> Companion:
+def over_stdio(server: MCPServer[Gatekeeper], streams: Streams, announce: Callable[[str], None]) -> Companion:
     """Return what serves one agent on standard input and output, until it closes them."""
-    return Companion((), lambda: _serve_stdio(server), _announced(gatekeeper, lambda _: None))
+    server.streamable_http_app()  # makes the session manager, the public way to the server below
+    running = server.session_manager.app
+
+    async def run() -> None:
+        lines = asyncio.StreamReader(limit=MAX_MESSAGE_BYTES)  # needs no thread, so that signals interrupt it
+        loop, protocol = asyncio.get_running_loop(), asyncio.StreamReaderProtocol(lines)
+        await loop.connect_read_pipe(lambda: protocol, streams.received)
+        sent = anyio.wrap_file(TextIOWrapper(streams.sent, encoding="utf-8"))
+        async with stdio_server(stdin=cast("Any", lines), stdout=sent) as (reading, writing):
+            await running.run(reading, writing, running.create_initialization_options())
+
+    return Companion((), run, announce)
 
 
 def serve_without_page(companion: Companion, console: Console) -> None:
@@ -118,34 +143,18 @@ def serve_without_page(companion: Companion, console: Console) -> None:
         asyncio.run(main())
 
 
-def expect_client() -> None:
-    """Raise UserError if no client can be behind standard input."""
+def take_streams() -> Streams:
+    """Take standard input and output for the protocol, so that all that is printed goes to standard error.
+
+    Raises:
+        UserError: no client can be behind standard input.
+    """
     kind = os.fstat(0).st_mode
     if not (stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind)):
         raise UserError("an MCP client starts this command and talks to it; --http serves agents over HTTP")
-
-
-def _announced(gatekeeper: Gatekeeper, say: Callable[[str], None]) -> Callable[[str], None]:
-    def announce(page: str) -> None:
-        gatekeeper.page = page
-        say(page)
-
-    return announce
-
-
-async def _serve_stdio(server: MCPServer[Gatekeeper]) -> None:
-    server.streamable_http_app()  # makes the session manager, the public way to the server below
-    running = server.session_manager.app
-    async with stdio_server(stdin=cast("Any", await _lines())) as (received, sent):
-        await running.run(received, sent, running.create_initialization_options())
-
-
-async def _lines() -> asyncio.StreamReader:
-    """Read lines from standard input without a thread, which no signal could interrupt."""
-    reader = asyncio.StreamReader(limit=MAX_MESSAGE_BYTES)
-    pipe = os.fdopen(os.dup(0), "rb", buffering=0)
+    streams = Streams(os.fdopen(os.dup(0), "rb", buffering=0), os.fdopen(os.dup(1), "wb"))
     nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)  # so that no child of ours reads messages
+    os.dup2(nothing, 0)
     os.close(nothing)
-    await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), pipe)
-    return reader
+    os.dup2(2, 1)
+    return streams

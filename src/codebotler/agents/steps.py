@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass, field
 from queue import Empty, Queue
 from threading import Lock
@@ -14,7 +15,7 @@ from codebotler.agents.reports import SkillOutcome
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.terminal import visible
-from codebotler.core.trace import Outcome
+from codebotler.core.trace import Option, Outcome
 from codebotler.core.unicode import compose
 from codebotler.core.words import listed
 from codebotler.missions.live import LiveRobot
@@ -28,7 +29,6 @@ IDLE_POLL_SECONDS = 0.1
 """How often an idle mission looks whether it was stopped."""
 
 NOT_RUNNING = "this mission is not running; call run_mission first, or begin_steps for a new one"
-
 _PROGRAM = """# Step by step: an agent chooses each call after it has seen the result of the last one.
 # The check cannot foresee the calls; house rules apply to each.
 # It may call only: {skills}
@@ -41,17 +41,12 @@ _Call: TypeAlias = tuple[Skill, list[Argument], "Future[SkillOutcome]"]
 
 @dataclass
 class Steps:
-    """Hands an agent's calls to the thread of its mission, one at a time.
+    """Hands an agent's calls to the thread of its mission, one at a time."""
 
-    Args:
-        purpose: the purpose in the agent's words.
-        skills: the skills that it may call.
-    """
-
-    purpose: str
-    skills: SkillTable
+    purpose: str  # in the agent's words
+    skills: SkillTable  # those that the agent may call
     key: str = field(default_factory=lambda: secrets.token_urlsafe(12))  # so that agents are not mixed up
-    _calls: Queue[_Call | None] = field(default_factory=Queue)
+    _calls: Queue[_Call | None] = field(default_factory=Queue)  # None ends the mission
     _is_over: bool = False
     _lock: Lock = field(default_factory=Lock)
 
@@ -63,16 +58,13 @@ class Steps:
     def call(self, name: str, arguments: Mapping[str, object]) -> Future[SkillOutcome]:
         """Call a skill of the running mission. Raise UserError for a wrong call."""
         if name not in self.skills:
-            raise UserError(
-                f"this mission has no skill {name}; it may call {listed(list(self.skills), 'or')}"
-            )
-        skill, called = self.skills[name], Future[SkillOutcome]()
-        given = _arguments(skill, arguments)
+            raise UserError(f"this mission may call only {listed(list(self.skills))}")
+        call = self.skills[name], _arguments(self.skills[name], arguments), Future[SkillOutcome]()
         with self._lock:
             if self._is_over:
                 raise MissionError(NOT_RUNNING)
-            self._calls.put((skill, given, called))
-        return called
+            self._calls.put(call)
+        return call[2]
 
     def end(self) -> None:
         """End the mission after the calls so far."""
@@ -80,15 +72,13 @@ class Steps:
 
     def drive(self, live: LiveRobot) -> Outcome:
         """Execute the calls on the mission's thread until `end`, or until the mission is stopped."""
-        ledger = Ledger(live)
+        ledger, call = Ledger(live), None
         try:
-            while (call := self._next(live)) is not None:
-                _execute(ledger, *call)
-                if ledger.limit is not None:
-                    break
+            while ledger.limit is None and (call := self._next(live)) is not None:
+                call[2].set_result(_perform(ledger, *call[:2]))
             return ledger.outcome_at_end({"end": "finished"})
         finally:
-            self._close()
+            self._close(call)
 
     def _next(self, live: LiveRobot) -> _Call | None:
         while True:
@@ -98,56 +88,35 @@ class Steps:
             except Empty:
                 continue
 
-    def _close(self) -> None:
+    def _close(self, call: _Call | None) -> None:
+        """Answer the current call and all that wait."""
         with self._lock:
             self._is_over = True
-            while not self._calls.empty():
-                if (call := self._calls.get()) is not None:
-                    call[2].set_exception(MissionError("the mission ended before this call"))
+            while call is not None or not self._calls.empty():
+                if call is not None and not call[2].done():
+                    call[2].set_exception(MissionError("the mission ended before the end of this call"))
+                call = None if self._calls.empty() else self._calls.get()
 
 
-def _execute(
-    ledger: Ledger, skill: Skill, arguments: Sequence[Argument], called: Future[SkillOutcome]
-) -> None:
-    try:
-        answer = ledger.perform(skill.name, arguments)
-    except BaseException:
-        called.set_exception(MissionError("the mission ended during this call"))
-        raise
-    match answer:
+def _perform(ledger: Ledger, skill: Skill, arguments: Sequence[Argument]) -> SkillOutcome:
+    match ledger.perform(skill.name, arguments):
         case ("ok", result):
-            called.set_result(SkillOutcome(result=_plain(skill, arguments, result)))  # type: ignore[arg-type]  # a result of a skill
+            given = zip(skill.parameters, arguments, strict=True)
+            options = next((one for parameter, one in given if parameter.is_options), None)
+            chosen = options[result] if isinstance(options, tuple) else result
+            return SkillOutcome(result=chosen.text if isinstance(chosen, Option) else chosen)
         case ("error", (_, kind, message)):
-            called.set_result(SkillOutcome(error=f"{kind}: {message}"))
+            return SkillOutcome(error=f"{kind}: {message}")
         case _:
-            called.set_exception(MissionError(ledger.limit or "the mission ended during this call"))
-
-
-def _plain(skill: Skill, arguments: Sequence[Argument], result: object) -> object:
-    """Replace the position of a chosen option by its text."""
-    offered = [
-        one for parameter, one in zip(skill.parameters, arguments, strict=True) if parameter.is_options
-    ]
-    if offered and isinstance(offered[0], tuple) and type(result) is int:
-        return getattr(offered[0][result], "text", result)
-    return result
+            return SkillOutcome(error=ledger.limit or "the mission has ended")
 
 
 def _arguments(skill: Skill, given: Mapping[str, object]) -> list[Argument]:
-    names = [parameter.name for parameter in skill.parameters]
-    if {*given} != {*names}:
-        raise UserError(f"{skill.signature} takes {listed(names) or 'no arguments'}")
-    values: list[object] = []
-    for parameter in skill.parameters:
-        value = given[parameter.name]
-        if parameter.is_options and isinstance(value, list):
-            values.append([[compose(str(one)), isinstance(one, str)] for one in value])
-        elif isinstance(value, list):
-            values.append([compose(one) if isinstance(one, str) else one for one in value])
-        else:
-            values.append(compose(value) if isinstance(value, str) else value)
-    try:
-        return arguments_of(skill, values)
-    except ProtocolError:
-        words = ", ".join(f"{one.name}: {one.words}" for one in skill.parameters)
-        raise UserError(f"{skill.name} takes {words}") from None
+    values = [compose(given.get(parameter.name)) for parameter in skill.parameters]
+    for number, parameter in enumerate(skill.parameters):
+        if parameter.is_options and isinstance(options := values[number], list):
+            values[number] = [[str(one), isinstance(one, str)] for one in options]
+    with suppress(ProtocolError):
+        if {*given} == {parameter.name for parameter in skill.parameters}:
+            return arguments_of(skill, values)
+    raise UserError(f"call it as {skill.signature}")

@@ -14,16 +14,8 @@ from mcp.server.mcpserver.exceptions import ToolError
 from mcp.server.mcpserver.resolve import Elicit, Resolve
 from pydantic import BaseModel, Field
 
-from codebotler.agents.gatekeeper import BY_CONTRACT, Gatekeeper, approve_for_person
-from codebotler.agents.reports import (
-    CheckReport,
-    MissionReport,
-    RobotReport,
-    SkillOutcome,
-    WrittenProgram,
-    question,
-    report_check,
-)
+from codebotler.agents.gatekeeper import Gatekeeper
+from codebotler.agents.reports import CheckReport, MissionReport, RobotReport, SkillOutcome, question
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.missions.authoring import ModelAuthor, prompt_of
@@ -80,33 +72,30 @@ def check_program(
 
     It changes nothing and needs no approval. Mend all problems before you propose the program.
     """
-    console = _gatekeeper(ctx).console
     with _as_tool_errors():
-        return report_check(console.check(program, console.view.room_map, console.rules))
+        return _gatekeeper(ctx).check(program)
 
 
 def write_program(
     instruction: Annotated[str, Field(description="What the robot should do, in plain words.")],
     ctx: AgentContext,
-) -> WrittenProgram:
+) -> CheckReport:
     """Have CodeBotler's own language model write a program, and check it. It runs nothing.
 
     You may also write the program yourself; read_robot explains how.
     """
-    gatekeeper = _gatekeeper(ctx)
-    console = gatekeeper.console
+    gatekeeper, console = _gatekeeper(ctx), _gatekeeper(ctx).console
     with _as_tool_errors():
         if not gatekeeper.writes:
             raise UserError("no model is configured; write the program yourself, as read_robot explains")
-        view = SessionView(
+        asked = SessionView(
             instruction=clean_instruction(instruction), room_map=console.view.room_map, rules=console.rules
         )
         author = ModelAuthor(console.open_model, console.models[0])
-        model, made = author.write(prompt_of(view, console.robot, repair=False), ignore_text)
-        check = report_check(console.check(made.program, view.room_map, console.rules))
-    if made.programless is not None:
-        check = CheckReport(accepted=False, problems=[made.programless.sentence], storyboards=[])
-    return WrittenProgram(program=made.program, model=model, check=check)
+        _, made = author.write(prompt_of(asked, console.robot, repair=False), ignore_text)
+        if made.programless is not None:
+            raise UserError(made.programless.sentence)
+        return gatekeeper.check(made.program)
 
 
 async def propose_mission(
@@ -271,14 +260,15 @@ def _take_answer(
     client: str,
 ) -> None:
     """Approve the program if a person or a contract accepts it. End the mission if a person declines."""
+    view, person = session.view, f"a person, asked by {client}"
     if isinstance(answer, AcceptedElicitation) and isinstance(answer.data, NotAsked):
-        if session.view.may_be_approved and not session.view.problems and gatekeeper.approves(session.view):
-            approve_for_person(session, digest, BY_CONTRACT)
+        if view.may_be_approved and not view.problems and gatekeeper.approves(view):
+            session.approve(digest, by="the contract given at the start")
     elif isinstance(answer, AcceptedElicitation) and answer.data.approve:
-        if session.view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
-            approve_for_person(session, digest, f"a person, asked by {client}")
+        if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
+            session.approve(digest, despite_problems=bool(view.problems), by=person)
     elif not isinstance(answer, CancelledElicitation):
-        session.stop_soon(f"a person, asked by {client}")
+        session.stop_soon(person)
 
 
 async def _prepared(gatekeeper: Gatekeeper, session: MissionSession) -> MissionReport:

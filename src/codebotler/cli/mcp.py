@@ -61,8 +61,7 @@ def serve_agents(
         raise UserError("nobody could approve a mission; leave out --no-page or --page-only")
     if agent_token is not None and not http:
         raise UserError("--agent-token is for --http; leave it out")
-    if not http:
-        server.expect_client()
+    streams = None if http else server.take_streams()
     kind, settings, rules = options.robot_settings(**options_for(options.robot_settings, shared))
     options.note_office(kind, shared["world"])
     default = choose_model().name
@@ -75,14 +74,17 @@ def serve_agents(
     gatekeeper = Gatekeeper(console, asks_client=asks, writes=writes)
     agents = server.make_server(gatekeeper)
     access = Access.from_options(token, None, open_to_all=False, is_private=True)
-    if http:
+
+    def announce(address: str) -> None:
+        gatekeeper.page = address
+        if http:
+            note(f"Agents use {address}{AGENT_PATH[1:]} with\n\n    Authorization: Bearer {access.agent}\n")
+
+    if streams is None:
         access = access.with_agents(agent_token)
-        link = (
-            f"Agents use {{}}{AGENT_PATH[1:]} with the header\n\n    Authorization: Bearer {access.agent}\n"
-        )
-        companion = server.over_http(agents, gatekeeper, lambda page: note(link.format(page)))
+        companion = server.over_http(agents, announce)
     else:
-        companion = server.over_stdio(agents, gatekeeper)
+        companion = server.over_stdio(agents, streams, announce)
     if page:
         serve(console, PageAddress(port=port), access, companion=companion)
     else:

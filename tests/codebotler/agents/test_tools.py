@@ -21,9 +21,11 @@ from codebotler.missions.log import MissionState
 from codebotler.missions.preflight import known_instructions
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.recorded import open_recorded
+from codebotler.robots.base import RobotLostError, RobotResult
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.house_rule import Rule
 from codebotler.web.console import Console
+from doubles import Answering, raising
 
 WORLD = World((Room("hall"), Room("kitchen"), Room("vault")), "hall")
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
@@ -117,14 +119,14 @@ def test_an_agent_reads_the_robot_and_checks_programs(gatekeeper: Gatekeeper) ->
     async def act(agent: Agent) -> None:
         robot = await agent.call("read_robot")
         assert robot["rooms"] == ["hall", "kitchen", "vault"]
-        assert any(one["signature"].startswith("go_to(location: str)") for one in robot["skills"])
+        assert "go_to(location: str) -> None" in robot["skills"]
         assert "def go_to" in robot["how_to_write"]
         good, bad = (
             await agent.call("check_program", program=HELLO),
             await agent.call("check_program", program="("),
         )
         assert good["accepted"]
-        assert 'kitchen: "hello"' in good["storyboards"][0]["steps"]
+        assert '- kitchen: "hello"\n' in good["storyboards"][0]
         assert (bad["accepted"], len(bad["problems"])) == (False, 1)
         assert gatekeeper.console.session is None
 
@@ -160,7 +162,7 @@ def test_writing_needs_a_model(gatekeeper: Gatekeeper) -> None:
         assert "def task_program" in written["program"]
         assert gatekeeper.console.session is None
         proposed = await agent.call("propose_mission", instruction=known)
-        assert "def task_program" in proposed["program"]
+        assert "def task_program" in proposed["check"]["program"]
 
     use(gatekeeper, act)
 
@@ -303,6 +305,7 @@ def test_problems_are_shown_to_the_person_and_a_contract_never_approves_them(gat
         gatekeeper.asks_client = True
         await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
         assert "PROBLEMS" in asked[0]
+        assert "cellar" in asked[0]
         broken = await agent.call("propose_mission", program="(")
         await agent.call("run_mission", digest=broken["digest"], seconds=0.05)
         assert len(asked) == 1
@@ -428,6 +431,12 @@ async def read(agent: Agent, uri: str) -> str:
 
 # --- step by step
 
+ANSWERS: dict[str, RobotResult] = {
+    "get_all_rooms": ["hall"],
+    "get_current_location": "hall",
+    "ask": " YES ",
+}
+
 
 async def began(agent: Agent, gatekeeper: Gatekeeper, *skills: str) -> tuple[str, dict[str, Any]]:
     """The key of an approved step-by-step mission, and what run_mission answers."""
@@ -443,7 +452,7 @@ def test_skills_are_called_one_at_a_time_and_logged_as_a_mission(gatekeeper: Gat
     async def act(agent: Agent) -> None:
         key, begun = await began(agent, gatekeeper)
         assert begun["state"] == "running"
-        assert "\n# It may call: nothing" not in begun["program"]
+        assert "\n# It may call: nothing" not in begun["check"]["program"]
         assert (await agent.call("call_skill", steps=key, name="get_current_location"))["result"] == "hall"
         await agent.call("call_skill", steps=key, name="go_to", arguments={"location": "kitchen"})
         assert (await agent.call("call_skill", steps=key, name="get_current_location"))["result"] == "kitchen"
@@ -465,7 +474,7 @@ def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
         key, _ = await began(agent, gatekeeper, "go_to", "ask")
         for wrong in ({}, {"location": 3}, {"location": ["kitchen"]}, {"location": "kitchen", "more": 1}):
             assert "go_to" in await agent.fails("call_skill", steps=key, name="go_to", arguments=wrong)
-        assert "it may call" in await agent.fails(
+        assert "may call only" in await agent.fails(
             "call_skill", steps=key, name="say", arguments={"message": "a"}
         )
         arguments = {"location": "kitchen"}
@@ -479,6 +488,40 @@ def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
         await agent.call("stop")
 
     use(gatekeeper, act)
+
+
+def test_a_question_is_asked_and_its_answer_is_one_of_the_options(tmp_path: Path) -> None:
+    robot = Answering(lambda skill, _: ANSWERS.get(skill))
+    gatekeeper = Gatekeeper(Console(robot, tmp_path, open_recorded))
+
+    async def act(agent: Agent) -> None:
+        key, _ = await began(agent, gatekeeper, "ask")
+        question = {"person": "", "question": "Tea?", "options": ["no", "yes"]}
+        assert (await agent.call("call_skill", steps=key, name="ask", arguments=question))["result"] == "yes"
+        failed = await agent.call("call_skill", steps=key, name="ask", arguments=question | {"options": []})
+        assert failed["error"].startswith("AskEmptyOptions")
+        for wrong in ("yes", None, 3):
+            await agent.fails("call_skill", steps=key, name="ask", arguments=question | {"options": wrong})
+        await agent.call("stop")
+
+    with gatekeeper.console:
+        use(gatekeeper, act)
+
+
+def test_a_robot_that_is_lost_ends_the_steps(tmp_path: Path) -> None:
+    robot = Answering(lambda skill, _: ANSWERS.get(skill))
+    gatekeeper = Gatekeeper(Console(robot, tmp_path, open_recorded))
+
+    async def act(agent: Agent) -> None:
+        key, _ = await began(agent, gatekeeper)
+        robot.answer = raising(RobotLostError("its battery is empty"))
+        assert "ended" in await agent.fails("call_skill", steps=key, name="say", arguments={"message": "a"})
+        await until(gatekeeper, lambda view: view.is_over)
+        report = await agent.call("follow_mission")
+        assert (report["state"], "battery" in report["reason"]) == ("failed", True)
+
+    with gatekeeper.console:
+        use(gatekeeper, act)
 
 
 @pytest.mark.slow

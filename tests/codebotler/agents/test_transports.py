@@ -288,13 +288,25 @@ def tool(number: int, name: str, **arguments: Any) -> dict[str, Any]:  # noqa: A
     return {"jsonrpc": "2.0", "id": number, "method": "tools/call", "params": params}
 
 
+NOISY = """
+import os
+from codebotler import Simulation, skill
+print("noise at the import")
+os.system("echo noise of a child")
+
+@skill
+def wave(sim: Simulation) -> None:
+    \"\"\"Wave.\"\"\"
+    print("noise of a skill")
+"""
 BEGUN = lines(INITIALIZE, {"jsonrpc": "2.0", "method": "notifications/initialized"})
 
 
 @pytest.mark.parametrize("page", ["--page", "--no-page"])
 def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path, page: str) -> None:
+    (folder / "skills.py").write_text(NOISY)
     with subprocess.Popen(
-        command(page),
+        command(page, "--skills", "skills.py", "--speed", "0"),
         cwd=folder,
         env=variables(folder),
         stdin=subprocess.PIPE,
@@ -303,7 +315,7 @@ def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path, page: st
     ) as running:
         assert running.stdin is not None
         assert running.stdout is not None
-        program = "def task_program():\n    print('noise')\n    say('a')\n"
+        program = "def task_program():\n    print('noise')\n    wave()\n"
         running.stdin.write(BEGUN + b"not json\n" + lines(tool(2, "check_program", program=program)))
         running.stdin.write(lines(tool(3, "propose_mission", program=program), tool(4, "no_such_tool")))
         running.stdin.flush()
