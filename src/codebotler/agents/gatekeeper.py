@@ -80,13 +80,15 @@ class Gatekeeper:
         steps, session = self._steps, self._session
         if steps is None or session is None or not compare_digest(steps.key.encode(), key.encode()):
             raise MissionError("there is no step-by-step mission with this key; begin_steps begins one")
-        if session.view.state is not MissionState.RUNNING:
+        if not self.takes_steps(session):
             raise MissionError(NOT_RUNNING)
         return session, steps
 
-    def is_stepwise(self, session: MissionSession) -> bool:
-        """Whether an agent calls the skills of a session one at a time."""
-        return self._steps is not None and session is self._session
+    def takes_steps(self, session: MissionSession) -> bool:
+        """Whether a session runs step by step now, and not a program that a person wrote in its place."""
+        steps, view = self._steps, session.view
+        is_ours = steps is not None and session is self._session and view.program == steps.program
+        return is_ours and view.state is MissionState.RUNNING
 
     def may_ask_client(self, view: SessionView) -> bool:
         """Whether a client may ask its person to approve a program, which must fit into a dialog."""

@@ -19,7 +19,6 @@ from codebotler.agents.reports import CheckReport, MissionReport, RobotReport, S
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.missions.authoring import ModelAuthor, prompt_of
-from codebotler.missions.log import MissionState
 from codebotler.missions.mission import MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import MissionOrder, SessionView
@@ -136,7 +135,7 @@ async def begin_steps(
     return report.model_copy(update={"steps": steps.key})
 
 
-def _find_session(digest: str, ctx: AgentContext) -> MissionSession:
+async def _find_session(digest: str, ctx: AgentContext) -> MissionSession:
     with _as_tool_errors():
         return _gatekeeper(ctx).find_session(digest)
 
@@ -291,14 +290,10 @@ async def _follow(
 ) -> None:
     """Report new events as progress until the mission is over, or steps may begin, for some seconds."""
 
-    def is_done() -> bool:
-        view = session.view
-        return view.is_over or (view.state is MissionState.RUNNING and gatekeeper.is_stepwise(session))
-
     with suppress(TimeoutError):
         async with asyncio.timeout(seconds), aclosing(gatekeeper.console.notifier.changes()) as changes:
             async for _ in changes:
-                is_last = is_done()
+                is_last = session.view.is_over or gatekeeper.takes_steps(session)
                 for line in session.events(known):
                     known += 1
                     if text := event_text(line):

@@ -567,14 +567,17 @@ def test_house_rules_judge_each_step(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_program_that_a_person_put_in_place_of_the_steps_runs_instead(gatekeeper: Gatekeeper) -> None:
+def test_a_program_that_a_person_put_in_place_of_the_steps_runs_instead(tmp_path: Path) -> None:
+    gatekeeper = gatekeeper_at(tmp_path, speed=1.0)
+
     async def act(agent: Agent) -> None:
         proposed = await agent.call("begin_steps", purpose="look around")
-        gatekeeper.console.edit(HELLO)
+        gatekeeper.console.edit(FAR)
         await until(gatekeeper, lambda view: view.may_be_approved)
         approve(gatekeeper)
-        await until(gatekeeper, lambda view: view.is_over)
-        assert view_of(gatekeeper).state is MissionState.DONE
-        await agent.fails("call_skill", steps=proposed["steps"], name="get_all_rooms")
+        await until(gatekeeper, lambda view: view.progress.is_driving)
+        assert "not running" in await agent.fails("call_skill", steps=proposed["steps"], name="get_all_rooms")
+        assert 'drives to "kitchen"' in (await agent.call("stop"))["events"]
 
-    use(gatekeeper, act)
+    with gatekeeper.console:
+        use(gatekeeper, act)
