@@ -289,7 +289,6 @@ async def _follow(
     gatekeeper: Gatekeeper, session: MissionSession, ctx: AgentContext, seconds: float, known: int = 0
 ) -> None:
     """Report new events as progress until the mission is over, or steps may begin, for some seconds."""
-
     with suppress(TimeoutError):
         async with asyncio.timeout(seconds), aclosing(gatekeeper.console.notifier.changes()) as changes:
             async for _ in changes:

@@ -293,6 +293,18 @@ def test_an_answer_does_not_approve_a_program_that_replaced_the_one_shown(
     use(gatekeeper, act, answer=answer, mode=mode)
 
 
+def test_a_program_too_long_for_a_dialog_is_approved_on_the_page_only(gatekeeper: Gatekeeper) -> None:
+    gatekeeper.asks_client = True
+    answer, asked = answering("accept", approve=True)
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=HELLO + "#" * 4_000)
+        waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
+        assert (waiting["state"], asked) == ("checked", [])
+
+    use(gatekeeper, act, answer=answer)
+
+
 def test_problems_are_shown_to_the_person_and_a_contract_never_approves_them(gatekeeper: Gatekeeper) -> None:
     gatekeeper.approves = lambda _: True
     answer, asked = answering("cancel")
@@ -485,7 +497,8 @@ def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
         session = gatekeeper.console.session
         assert session is not None
         assert [line for line in session.events() if line["event"] == "skill"] == []
-        await agent.call("stop")
+        stopped = await agent.call("stop")
+        assert (stopped["state"], stopped["is_over"]) == ("stopped", True)
 
     use(gatekeeper, act)
 

@@ -24,7 +24,10 @@ from mcp.client.session import ClientRequestContext
 from mcp.client.streamable_http import streamable_http_client
 from mcp_types import ElicitRequestParams, ElicitResult
 
+from codebotler.cli.mcp import serve_agents
+from codebotler.core.errors import UserError
 from codebotler.missions.store import read_missions
+from codebotler.web.access import Access, Role
 from pageserver import WORLD, PageServer
 
 pytestmark = pytest.mark.slow
@@ -390,3 +393,27 @@ def test_a_person_who_starts_it_is_told_what_it_needs(folder: Path) -> None:
     assert (ended.returncode, ended.stdout) == (2, b"")
     assert b"--http" in ended.stderr
     assert len(ended.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "advice"),
+    [
+        ({"http": True, "page": False}, "--no-page"),
+        ({"page": False, "ask_client": False}, "nobody could approve"),
+        ({"agent_token": "0123456789abcdef"}, "--http"),
+    ],
+)
+def test_options_that_contradict_each_other_are_refused(options: dict[str, Any], advice: str) -> None:
+    with pytest.raises(UserError, match=advice):
+        serve_agents(**options)
+
+
+def test_an_agents_token_is_long_and_differs_from_the_others() -> None:
+    access = Access("operator's own token")
+    for wrong in ("short", "operator's own token", access.face):
+        with pytest.raises(UserError, match="token"):
+            access.with_agents(wrong)
+    made = access.with_agents(None)
+    assert made.agent is not None
+    assert made.of_token(made.agent, "") is Role.AGENT
+    assert access.of_token(made.agent, "") is None
