@@ -86,9 +86,17 @@ class Gatekeeper:
 
     def takes_steps(self, session: MissionSession) -> bool:
         """Whether a session runs step by step now, and not a program that a person wrote in its place."""
-        steps, view = self._steps, session.view
-        is_ours = steps is not None and session is self._session and view.program == steps.program
-        return is_ours and view.state is MissionState.RUNNING
+        return self._is_stepwise(session) and session.view.state is MissionState.RUNNING
+
+    def approves_alone(self, session: MissionSession) -> bool:
+        """Whether the contract given at the start approves a session's program. Steps need a person."""
+        view = session.view
+        is_sound = view.may_be_approved and not view.problems and not self._is_stepwise(session)
+        return is_sound and self.approves(view)
+
+    def _is_stepwise(self, session: MissionSession) -> bool:
+        steps = self._steps
+        return steps is not None and session is self._session and session.view.program == steps.program
 
     def may_ask_client(self, view: SessionView) -> bool:
         """Whether a client may ask its person to approve a program, which must fit into a dialog."""

@@ -72,6 +72,7 @@ def question(view: SessionView, robot: str, contract: str) -> str:
     """Return the question by which a client asks its person to approve a program."""
     problems = "\n".join(f"- {shortened(problem)}" for problem in view.problems)
     boards = [] if view.check is None else strips(view.check)
+    boards = [board for board in boards if len(board.scenes) > 1 or board.scenes[0].deeds]
     parts = [
         f"An agent asks to run a program on the robot {robot}.",
         f"It says: {shortened(view.instruction)}" if view.instruction else "",

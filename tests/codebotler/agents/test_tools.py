@@ -537,6 +537,20 @@ def test_a_robot_that_is_lost_ends_the_steps(tmp_path: Path) -> None:
         use(gatekeeper, act)
 
 
+def test_steps_need_a_person_whatever_the_contract_says(gatekeeper: Gatekeeper) -> None:
+    gatekeeper.approves, gatekeeper.asks_client = lambda _: True, True
+    answer, asked = answering("cancel")
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("begin_steps", purpose="look around", skills=["say"])
+        waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
+        assert (waiting["state"], len(asked)) == ("checked", 1)
+        assert "It may call only: say" in asked[0]
+        assert "For example" not in asked[0]
+
+    use(gatekeeper, act, answer=answer)
+
+
 @pytest.mark.slow
 def test_a_step_waits_for_approval_and_stop_ends_all(tmp_path: Path) -> None:
     gatekeeper = gatekeeper_at(tmp_path, speed=1.0)
