@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
 
 from codebotler.core.terminal import shortened, visible_lines
 from codebotler.missions.view import SessionView
 from codebotler.web.storyboard import Scene, Strip, strips
 
 
-class CheckReport(BaseModel):
+class _Report(BaseModel):
+    @model_validator(mode="before")
+    @classmethod
+    def _escape_surrogates(cls, data: object) -> object:
+        return _sendable(data)
+
+
+class CheckReport(_Report):
     """The result of checking a program in imagined worlds."""
 
     accepted: bool = Field(description="Whether there are no problems.")
@@ -21,7 +28,7 @@ class CheckReport(BaseModel):
     program: str
 
 
-class RobotReport(BaseModel):
+class RobotReport(_Report):
     """The robot, its rooms and skills, and the house rules."""
 
     robot: str
@@ -32,7 +39,7 @@ class RobotReport(BaseModel):
     can_write_program: bool = Field(description="Whether a model is configured for write_program.")
 
 
-class MissionReport(BaseModel):
+class MissionReport(_Report):
     """A mission: what it would do, what it has done, and what can happen next."""
 
     mission: str = Field(description="The ID of the mission.")
@@ -48,7 +55,7 @@ class MissionReport(BaseModel):
     steps: str = Field(default="", description="From begin_steps: the key for call_skill and end_steps.")
 
 
-class SkillOutcome(BaseModel):
+class SkillOutcome(_Report):
     """The result of one call of a skill."""
 
     result: Any = Field(default=None, description="The result of the skill, if it returns one.")
@@ -82,6 +89,15 @@ def question(view: SessionView, robot: str, contract: str) -> str:
         f"Mission {view.id}, digest {view.digest}, program:\n{visible_lines(view.program.strip())}",
     ]
     return "\n\n".join(filter(None, parts))
+
+
+def _sendable(value: object) -> object:
+    """Escape lone surrogates, which programs and errors may contain, but messages cannot."""
+    if isinstance(value, str):
+        return value.encode(errors="backslashreplace").decode()
+    if isinstance(value, list):
+        return [*map(_sendable, value)]
+    return {name: _sendable(one) for name, one in value.items()} if isinstance(value, dict) else value
 
 
 def _board_text(strip: Strip) -> str:

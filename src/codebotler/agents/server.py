@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import os
 import signal
 import stat
@@ -55,6 +56,7 @@ def make_server(gatekeeper: Gatekeeper) -> MCPServer[Gatekeeper]:
     async def lifespan(_: MCPServer[Gatekeeper]) -> AsyncIterator[Gatekeeper]:
         yield gatekeeper
 
+    handlers = logging.root.handlers[:]
     server = MCPServer(
         "codebotler",
         title="CodeBotler",
@@ -63,6 +65,7 @@ def make_server(gatekeeper: Gatekeeper) -> MCPServer[Gatekeeper]:
         lifespan=lifespan,
         log_level="WARNING",
     )
+    logging.root.handlers[:] = handlers  # our own log escapes control characters
     for tools, only_reads in ((READING, True), (ACTING, False)):
         for tool in tools:
             server.add_tool(tool, annotations=ToolAnnotations(read_only_hint=only_reads))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 from collections.abc import Callable, Coroutine, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from mcp.client.session import ClientRequestContext, ElicitationFnT
 from mcp_types import ElicitRequestParams, ElicitResult
 
 from codebotler.agents.gatekeeper import Gatekeeper
+from codebotler.agents.reports import SkillOutcome
 from codebotler.agents.server import make_server
 from codebotler.checking.rules import read_rules
 from codebotler.core.world import Room, World
@@ -165,6 +167,24 @@ def test_writing_needs_a_model(gatekeeper: Gatekeeper) -> None:
         assert "def task_program" in proposed["check"]["program"]
 
     use(gatekeeper, act)
+
+
+@pytest.mark.slow
+def test_texts_that_are_no_unicode_do_not_keep_an_agent_from_stopping(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        program = "def task_program():\n    say('\\ud800')\n    raise ValueError('\\udfff')\n"
+        assert "\\udfff" in (await agent.call("check_program", program=program))["problems"][0]
+        await agent.call("propose_mission", program=program)
+        assert (await agent.call("stop"))["state"] == "stopped"
+        assert SkillOutcome(result=["\ud800"]).model_dump_json() == '{"result":["\\\\ud800"],"error":""}'
+
+    use(gatekeeper, act)
+
+
+def test_the_sdk_leaves_our_log_alone(gatekeeper: Gatekeeper) -> None:
+    before = logging.root.handlers[:]
+    make_server(gatekeeper)
+    assert logging.root.handlers == before
 
 
 # --- who approves
