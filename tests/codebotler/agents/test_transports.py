@@ -30,7 +30,6 @@ from codebotler.missions.store import read_missions
 from codebotler.web.access import Access, Role
 from pageserver import WORLD, PageServer
 
-pytestmark = pytest.mark.slow
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
 FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('hall')\n"
 SERVE = ("codebotler", "mcp", "--http", "--world", "world.yaml")
@@ -88,6 +87,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AgentServer]:
         yield made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["auto", "legacy"])
 def test_all_tools_work_over_http(server: AgentServer, mode: str) -> None:
     async def main() -> None:
@@ -128,6 +128,7 @@ def test_all_tools_work_over_http(server: AgentServer, mode: str) -> None:
     asyncio.run(main())
 
 
+@pytest.mark.slow
 def test_a_second_client_stops_what_the_first_runs(server: AgentServer) -> None:
     async def main() -> None:
         async with asyncio.timeout(SOON), server.client() as first, server.client() as second:
@@ -220,6 +221,7 @@ class PlainClient:
         return result["structuredContent"]
 
 
+@pytest.mark.slow
 def test_a_client_without_the_sdk_drives_a_mission(server: AgentServer) -> None:
     client = PlainClient(server)
     assert client.name == "codebotler"
@@ -248,6 +250,7 @@ def variables(folder: Path) -> dict[str, str]:
     return {**os.environ, "CODEBOTLER_HOME": str(folder / "home")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mode", "page"), [("auto", "--page"), ("legacy", "--no-page")])
 def test_all_tools_work_over_stdio(folder: Path, mode: str, page: str) -> None:
     program, *arguments = command("--speed", "0", page)
@@ -305,6 +308,7 @@ def wave(sim: Simulation) -> None:
 BEGUN = lines(INITIALIZE, {"jsonrpc": "2.0", "method": "notifications/initialized"})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", ["--page", "--no-page"])
 def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path, page: str) -> None:
     (folder / "skills.py").write_text(NOISY)
@@ -335,6 +339,7 @@ def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path, page: st
     assert summary.state == "stopped"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", ["--page", "--no-page"])
 @pytest.mark.parametrize("ending", ["signal", "closed input"])
 def test_a_running_robot_stops_with_the_server(folder: Path, page: str, ending: str) -> None:
@@ -381,6 +386,7 @@ def wait_for_drive(folder: Path) -> None:
         time.sleep(0.02)
 
 
+@pytest.mark.slow
 def test_a_person_who_starts_it_is_told_what_it_needs(folder: Path) -> None:
     ended = subprocess.run(
         command(),
@@ -395,6 +401,7 @@ def test_a_person_who_starts_it_is_told_what_it_needs(folder: Path) -> None:
     assert len(ended.stderr.splitlines()) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "advice"),
     [
