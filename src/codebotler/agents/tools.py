@@ -58,7 +58,7 @@ def read_robot(ctx: AgentContext) -> RobotReport:
     return _gatekeeper(ctx).report_robot()
 
 
-def check_program(
+async def check_program(
     program: Annotated[
         str,
         Field(
@@ -72,10 +72,12 @@ def check_program(
     It changes nothing and needs no approval. Mend all problems before you propose the program.
     """
     with _as_tool_errors():
-        return _gatekeeper(ctx).check(program)
+        return await asyncio.to_thread(
+            _gatekeeper(ctx).check, program
+        )  # not on the SDK's threads, which answer
 
 
-def write_program(
+async def write_program(
     instruction: Annotated[str, Field(description="What the robot should do, in plain words.")],
     ctx: AgentContext,
 ) -> CheckReport:
@@ -91,10 +93,11 @@ def write_program(
             instruction=clean_instruction(instruction), room_map=console.view.room_map, rules=console.rules
         )
         author = ModelAuthor(console.open_model, console.models[0])
-        _, made = author.write(prompt_of(asked, console.robot, repair=False), ignore_text)
+        prompt = prompt_of(asked, console.robot, repair=False)
+        _, made = await asyncio.to_thread(author.write, prompt, ignore_text)
         if made.programless is not None:
             raise UserError(made.programless.sentence)
-        return gatekeeper.check(made.program)
+        return await asyncio.to_thread(gatekeeper.check, made.program)
 
 
 async def propose_mission(
