@@ -48,6 +48,7 @@ def without_extras(command: str, folder: Path, server: Server) -> tuple[int, str
         ("codebotler generate Hello --model hf:m", "transformers"),
         ("codebotler run Hello --yes --world office.yaml --model openai-chat:gpt-5.1", "models"),
         ("codebotler serve --world office.yaml", "page"),
+        ("codebotler mcp --world office.yaml", "mcp"),
         ("codebotler run say.py --yes --robot rosbridge --address ws://localhost:1", "robots"),
         ("codebotler run say.py --yes --robot pyrobosim --world office.yaml", "pyrobosim"),
         ("codebotler missions last --mcap a.mcap", "robots"),

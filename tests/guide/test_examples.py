@@ -8,6 +8,7 @@ import pytest
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHOWS = {
+    "agent_loop.py": "the mission is stopped\n",
     "api_client.py": "problems: []\n",
     "judge_a_program.py": "looks_into_every_lab: the robot went to sam's lab at step 1 but did not look",
     "run_a_program.py": "finished\ngoto: kitchen\ncheck: mug\nsay: True\n",

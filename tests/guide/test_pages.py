@@ -38,6 +38,7 @@ NOT_RUN = {
     "index.md": ["makes an environment of its own"],
     "install.md": ["makes an environment of its own", "makes an environment of its own"],
     "roboeval-plus.md": ["takes minutes"],
+    "mcp.md": [*["needs a client"] * 3, "needs a person"],
     "robots.md": ["needs pyrobosim, with which `make test-pyrobosim` tests the robot"],
     "ros1.md": ["needs root, and a Debian or Ubuntu"],
     "serve.md": ["needs a running server"],

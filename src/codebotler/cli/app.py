@@ -9,6 +9,7 @@ import typer
 
 from codebotler.cli import options
 from codebotler.cli.ending import obey
+from codebotler.cli.mcp import serve_agents
 from codebotler.cli.model_options import inherit_options, model_settings
 from codebotler.cli.operating import connect, missions, robots, run, serve_page, virtual_robot
 from codebotler.core.terminal import note, report_problems
@@ -261,6 +262,7 @@ for command in (generate, check, rules, replay, skills, run, missions, models, r
     app.command()(command)
 app.command("serve")(serve_page)
 app.command("virtual-robot")(virtual_robot)
+app.command("mcp")(serve_agents)
 
 
 def main() -> None:

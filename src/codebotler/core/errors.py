@@ -16,6 +16,7 @@ EXTRAS = {
     **dict.fromkeys(("PIL", "mcap", "websockets"), "robots"),
     **dict.fromkeys(("jinja2", "torch", "transformers"), "transformers"),
     "matplotlib": "report",
+    "mcp": "mcp",
     "pyrobosim": "pyrobosim",
     "ray": "ray",
 }

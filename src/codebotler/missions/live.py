@@ -105,6 +105,10 @@ class LiveRobot:
             if skill not in SKILLS:  # a custom skill may have moved the robot
                 self._room, self._has_asked = None, False
 
+    def check_end(self) -> None:
+        """Raise an error if the mission must end. The first call starts the program's clock."""
+        self._check_end()
+
     def _execute(self, row: Skill, arguments: Sequence[Argument]) -> Result:
         is_drive = row.is_drive
         if is_drive:  # rules must judge exactly the text that the robot receives

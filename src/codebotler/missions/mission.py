@@ -14,7 +14,7 @@ from typing import Self, TypeAlias
 
 from codebotler.core.files import Appender, make_folder
 from codebotler.core.terminal import visible
-from codebotler.core.trace import RunError, Status, Trace
+from codebotler.core.trace import Outcome, RunError, Status, Trace
 from codebotler.core.world import World
 from codebotler.missions.live import LiveRobot, StoppedError
 from codebotler.missions.log import NEXT_STATES, LogLine, MissionState, MissionSummary, add_event, open_log
@@ -51,6 +51,9 @@ class MissionError(Exception):
 
 EventListener: TypeAlias = Callable[[LogLine], None]
 """A function that receives each logged event. Calls may come from any thread, but never overlap."""
+
+Driver: TypeAlias = Callable[[LiveRobot], Outcome]
+"""A function that calls the robot's skills in place of a program, on the mission's thread."""
 
 
 class Mission:
@@ -136,14 +139,19 @@ class Mission:
                 raise MissionError(f"mission {self.id} has no program to check")
             self._step(MissionState.CHECKED, "be checked", problems=tuple(problems))
 
-    def approve(self, *, despite_problems: bool = False) -> None:
-        """Approve the program, or raise MissionError if it is unchecked or has problems not yet accepted."""
+    def approve(self, *, despite_problems: bool = False, by: str = "") -> None:
+        """Approve the program, or raise MissionError if it is unchecked or has problems not yet accepted.
+
+        `by` is the source of the approval for the log, if it is not the page or the terminal.
+        """
         with self._writing:
             if self.state is MissionState.CHECKED and self.summary.problems and not despite_problems:
                 raise MissionError(
                     f"the program of mission {self.id} has problems; approve it despite them, or change it"
                 )
             self._step(MissionState.APPROVED, "be approved")
+            if by:
+                self.note(f"approved by {by}")
 
     def fail(self, reason: str) -> None:
         """Mark the mission as failed, or raise MissionError if it is running or has ended."""
@@ -181,6 +189,7 @@ class Mission:
         *,
         rules: Sequence[Rule] = (),
         room_map: RoomMap | None = None,
+        drive: Driver | None = None,
     ) -> MissionState:
         """Run the program on a robot, and return the final state: done, failed or stopped.
 
@@ -191,6 +200,7 @@ class Mission:
             place: the robot's current room, or "" if unknown.
             rules: the house rules. Breaking one of them stops the mission.
             room_map: the rooms that the robot knows.
+            drive: calls the skills in place of the program.
 
         Raises:
             MissionError: the program is not approved.
@@ -206,7 +216,7 @@ class Mission:
                 reserved.use()
                 self._live, self.stop_button.robot = live, reserved.robot
             self._step(MissionState.RUNNING, "run", if_tool_dies=reserved.robot.if_tool_dies)
-        threading.Thread(target=self._execute, args=(live,), name=self.id, daemon=True).start()
+        threading.Thread(target=self._execute, args=(live, drive), name=self.id, daemon=True).start()
         try:
             self.stop_button.ended.wait()
         except BaseException:
@@ -220,14 +230,10 @@ class Mission:
             raise self._fault
         return self.state
 
-    def _execute(self, live: LiveRobot) -> None:
+    def _execute(self, live: LiveRobot, drive: Driver | None) -> None:
         """Run the program. This needs its own thread, because a skill may never return."""
         try:
-            with closing(Worker(is_live=True)) as worker:
-                self.stop_button.on_press(worker.stop)
-                if self.stop_button.ended.is_set():
-                    raise StoppedError  # noqa: TRY301 - handled like any other error
-                outcome = worker.run_live(self.summary.program, live)
+            outcome = self._run_program(live) if drive is None else drive(live)
         except BaseException as error:  # noqa: BLE001 - any error must stop the robot
             try:
                 live.stop()
@@ -242,6 +248,13 @@ class Mission:
             self._end(
                 live, MissionState.DONE if done else MissionState.FAILED, reason, outcome.line, is_lost=False
             )
+
+    def _run_program(self, live: LiveRobot) -> Outcome:
+        with closing(Worker(is_live=True)) as worker:
+            self.stop_button.on_press(worker.stop)
+            if self.stop_button.ended.is_set():
+                raise StoppedError
+            return worker.run_live(self.summary.program, live)
 
     def _end(self, live: LiveRobot, state: MissionState, reason: str, line: object, *, is_lost: bool) -> None:
         """Enter a final state, but only once. A stop that did not reach the robot counts as a failure."""

@@ -152,15 +152,15 @@ class MissionSession:
             self._next_task = partial(self._ask, repair=repair)
             self._change(busy=f"asking {self._view.model}", is_written=True, reply="", disabled_rules=())
 
-    def approve(self, seen: str, *, despite_problems: bool = False) -> None:
-        """Approve the program that the person saw, identified by its digest."""
+    def approve(self, seen: str, *, despite_problems: bool = False, by: str = "") -> None:
+        """Approve the program that the person saw, identified by its digest. `by` goes to the log."""
         with self._editing:
             view, mission = self._view, self._mission
             if mission is None or view.busy:
                 raise MissionError("the program has not been checked yet")
             if seen != view.digest or seen != program_digest(mission.summary.program):
                 raise MissionError("the program has changed; review it again")
-            mission.approve(despite_problems=despite_problems)
+            mission.approve(despite_problems=despite_problems, by=by)
 
     def reject(self, reason: str) -> None:
         """End the mission before it runs."""
@@ -250,7 +250,8 @@ class MissionSession:
         with suppress(MissionError, CancelledError):  # the mission was stopped before it could run
             if keep_out is not None:
                 keep_out(rules)
-            mission.run(reserved, place, rules=rules, room_map=room_map)
+            drive = self._order.drive if mission.summary.program == self._order.program else None
+            mission.run(reserved, place, rules=rules, room_map=room_map, drive=drive)
 
     @property
     def _is_stopped(self) -> bool:

@@ -10,6 +10,7 @@ from codebotler.checking.problems import CheckResult
 from codebotler.generation.no_program import ProgramlessReply
 from codebotler.generation.partial_reply import PartialReply, split_partial
 from codebotler.missions.log import MissionState
+from codebotler.missions.mission import Driver
 from codebotler.missions.progress import Progress
 from codebotler.prompts import clean_instruction
 from codebotler.simulator.house_rule import Rule
@@ -30,7 +31,8 @@ class MissionOrder:
     instruction: str = ""
     model: str = ""  # empty if no model may be asked
     program: str = ""
-    author: str = ""  # the model that wrote the program, if any
+    author: str = ""  # the model or the agent that wrote the program, if any
+    drive: Driver | None = None  # controls the robot in place of exactly this program
 
     def __post_init__(self) -> None:
         if not self.has_program:

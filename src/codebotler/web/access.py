@@ -11,7 +11,7 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from codebotler.core.errors import UserError
@@ -24,14 +24,20 @@ MAX_ADDRESSES = 10_000
 MIN_TOKEN_LENGTH = 16
 LOCAL_HOST_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 PAGE_PORTS = range(8080, 8100)
+AGENT_PATH = "/mcp"
+"""The path at which agents use the Model Context Protocol."""
 _LISTEN_BACKLOG = 128  # connections
 
 
 class Role(StrEnum):
-    """The role of a visitor: an operator may do everything, a face may only answer questions and stop."""
+    """The role of a visitor: an operator may do everything, a face may only answer questions and stop.
+
+    An agent may only use `AGENT_PATH`, so that it cannot approve its own missions over the API.
+    """
 
     OPERATOR = "operator"
     FACE = "face"
+    AGENT = "agent"
 
 
 class TooManyTriesError(Exception):
@@ -51,6 +57,7 @@ class Access:
     face: str = field(default_factory=new_token)
     unguessable: frozenset[Role] = frozenset()  # roles with random tokens, for which there is no limit
     now: Callable[[], float] = time.monotonic
+    agent: str | None = None  # None if there is no access for agents
     _wrong: dict[str, deque[float]] = field(default_factory=dict)
 
     @classmethod
@@ -67,6 +74,15 @@ class Access:
         made = {Role.OPERATOR: operator is None, Role.FACE: face is None}
         unguessable = frozenset(role for role, is_new in made.items() if is_new)
         return cls(None if open_to_all else operator or new_token(), face or new_token(), unguessable)
+
+    def with_agents(self, token: str | None) -> Access:
+        """Return a copy with a token for agents, by default a new one. Raise UserError if it is unsafe."""
+        if token is not None and len(token) < MIN_TOKEN_LENGTH:
+            raise UserError(f"this token is too short; use at least {MIN_TOKEN_LENGTH} characters")
+        if token is not None and token in {self.operator, self.face}:
+            raise UserError("the agents' token must differ from the others; choose another token")
+        unguessable = self.unguessable | ({Role.AGENT} if token is None else set())
+        return replace(self, agent=token or new_token(), unguessable=unguessable)
 
     def of_token(self, token: str, address: str) -> Role | None:
         """Return a token's role, or None for an invalid token, which counts towards the address's limit."""
@@ -90,10 +106,14 @@ class Access:
 
     def cookie(self, role: Role) -> str:
         """Return a role's cookie, from which the token cannot be derived."""
-        return _cookie_value(self.face if role is Role.FACE else self.operator or "")
+        return _cookie_value(self._tokens[role] or "")
+
+    @property
+    def _tokens(self) -> Mapping[Role, str | None]:
+        return {Role.OPERATOR: self.operator, Role.FACE: self.face, Role.AGENT: self.agent}
 
     def _of(self, shown: str, form: Callable[[str], str]) -> Role | None:
-        for role, token in ((Role.OPERATOR, self.operator), (Role.FACE, self.face)):
+        for role, token in self._tokens.items():
             if token and hmac.compare_digest(form(token).encode(), shown.encode(errors="replace")):
                 return role
         return None

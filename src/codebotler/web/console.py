@@ -56,7 +56,7 @@ class Console:
         if face is not None:
             face.changed = self.notifier.change
         self.interrupted: tuple[MissionSummary, ...] = ()
-        self._open_model = open_model
+        self.open_model = open_model
         self._lock = threading.Lock()  # held briefly
         self.session: MissionSession | None = None  # the current session, or else the last one
         self._checking = threading.Lock()
@@ -101,7 +101,7 @@ class Console:
                 self.robot,
                 self.home,
                 order,
-                open_model=self._open_model,
+                open_model=self.open_model,
                 check=self.check,
                 rules=self.rules,
                 changed=self.notifier.change,

@@ -17,7 +17,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
 from codebotler.core.terminal import note
-from codebotler.web.access import GuardRules, Role, TooManyTriesError
+from codebotler.web.access import AGENT_PATH, GuardRules, Role, TooManyTriesError
 from codebotler.web.proxy import OuterAddress, path_of, prefix_of
 
 MAX_BODY_BYTES = 2_000_000
@@ -242,6 +242,8 @@ def _check_role(role: Role | None, path: str) -> None:
         raise RefusedError(HTTPStatus.UNAUTHORIZED, "open the printed link, which contains the token")
     if role is Role.FACE and not any(path == place or path.startswith(f"{place}/") for place in _FACE_PATHS):
         raise RefusedError(HTTPStatus.FORBIDDEN, "your link opens only the robot's face")
+    if role is Role.AGENT and path != AGENT_PATH:
+        raise RefusedError(HTTPStatus.FORBIDDEN, f"the token of agents opens only {AGENT_PATH}")
 
 
 def _check_length(request: HTTPConnection) -> None:

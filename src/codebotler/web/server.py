@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import logging
 import socket
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass
 from functools import partial
 from http import HTTPStatus
 from pathlib import Path
 from types import FrameType
+from typing import Any
 from urllib.parse import urlencode
 
 import nicegui
@@ -46,6 +48,15 @@ _STREAM_END_SECONDS = 3
 """The time that streams have to end when the server stops, in seconds."""
 
 
+@dataclass(frozen=True)
+class Companion:
+    """A server that shares the page's process and robot."""
+
+    routes: Sequence[BaseRoute]  # on the page's port, behind the guard
+    run: Callable[[], Coroutine[Any, Any, None]]  # returns at its end
+    announce: Callable[[str], None]  # receives the page's address before the start
+
+
 def serve(
     console: Console | None,
     place: PageAddress,
@@ -54,14 +65,16 @@ def serve(
     runs: Path = RUNS_FOLDER,
     *,
     alone_for: float | None = None,
+    companion: Companion | None = None,
 ) -> None:
     """Serve the page until Ctrl-C, which also stops a running robot. Without a console, serve only `further`.
 
     Unless `alone_for` is None, a running robot is also stopped that many seconds after all operators left.
+    The page ends with `companion`.
     """
     with place.listen() as bound, console or nullcontext():
         port = bound.getsockname()[1]
-        pages = application(console, further, runs)
+        pages = application(console, further, runs, () if companion is None else companion.routes)
         _check_prefixes(pages, place)
         app: ASGIApp = pages
         if console and alone_for is not None:
@@ -78,12 +91,13 @@ def serve(
             timeout_graceful_shutdown=_STREAM_END_SECONDS,
         )
         note(_links(place, port, access, console))
-        _Server(settings, console).run([bound])
+        if companion is not None:
+            companion.announce(_address(place, port))
+        _Server(settings, console, companion).run([bound])
 
 
 def _links(place: PageAddress, port: int, access: Access, console: Console | None) -> str:
-    shown = "localhost" if place.is_loopback else socket.gethostname()
-    addresses = [*(proxy.page for proxy in place.proxies), f"http://{shown}:{port}/"]
+    addresses = [*(proxy.page for proxy in place.proxies), _address(place, port)]
 
     def links(page: str, token: str) -> list[str]:
         query = "" if access.operator is None else f"?{urlencode({'token': token})}"
@@ -102,6 +116,11 @@ def _links(place: PageAddress, port: int, access: Access, console: Console | Non
     return "\n".join(lines)
 
 
+def _address(place: PageAddress, port: int) -> str:
+    shown = "localhost" if place.is_loopback else socket.gethostname()
+    return f"http://{shown}:{port}/"
+
+
 def _check_prefixes(app: FastAPI, place: PageAddress) -> None:
     """Refuse prefixes that look like our own paths, because proxies may or may not remove them."""
     routes = (*app.routes, *nicegui.app.routes)
@@ -114,7 +133,12 @@ def _check_prefixes(app: FastAPI, place: PageAddress) -> None:
             )
 
 
-def application(console: Console | None, further: Sequence[Pages] = (), runs: Path = RUNS_FOLDER) -> FastAPI:
+def application(
+    console: Console | None,
+    further: Sequence[Pages] = (),
+    runs: Path = RUNS_FOLDER,
+    routes: Sequence[BaseRoute] = (),
+) -> FastAPI:
     """Create the application, without the guard."""
     links = tuple((pages.name, pages.address) for pages in further)
     to_face = (FACE_LINK,) if console and console.face else ()
@@ -139,6 +163,7 @@ def application(console: Console | None, further: Sequence[Pages] = (), runs: Pa
     for pages in further:
         pages.add(Site(app, frame, runs))
     app.add_exception_handler(RequestValidationError, api.invalid_request)
+    app.router.routes.extend(routes)
     app.mount("/static", StaticFiles(directory=STATIC_FOLDER))
     core.sio.eio.cors_allowed_origins = []  # NiceGUI allows all origins, but the guard only ours
     nicegui.app.config.socket_io_js_transports = ["websocket"]
@@ -207,9 +232,32 @@ class Presence:
 class _Server(uvicorn.Server):
     """A server that stops the robot before it handles a signal."""
 
-    def __init__(self, config: uvicorn.Config, console: Console | None) -> None:
+    def __init__(
+        self, config: uvicorn.Config, console: Console | None, companion: Companion | None = None
+    ) -> None:
         super().__init__(config)
-        self._console = console
+        self._console, self._companion = console, companion
+        self._accompanying: asyncio.Task[None] | None = None
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start the companion before the first request can arrive."""
+        if self._companion is not None:
+            self._accompanying = asyncio.create_task(self._accompany(self._companion))
+        await super().startup(sockets)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End the companion first, since it may keep connections open."""
+        if self._accompanying is not None:
+            self._accompanying.cancel()
+        await super().shutdown(sockets)
+
+    async def _accompany(self, companion: Companion) -> None:
+        try:
+            await companion.run()
+        finally:
+            self.should_exit = True
+            if self._console:
+                self._console.stop(BY_SHUTDOWN)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         if self._console:

@@ -417,10 +417,10 @@ def test_no_other_program_is_asked_for_while_one_is_being_approved(
         view = until(console, lambda view: view.may_be_approved)
         approve = Mission.approve
 
-        def slowly(mission: Mission, *, despite_problems: bool = False) -> None:
+        def slowly(mission: Mission, *, despite_problems: bool = False, by: str = "") -> None:
             thread.start()
             thread.join(0.2)
-            approve(mission, despite_problems=despite_problems)
+            approve(mission, despite_problems=despite_problems, by=by)
 
         refused: list[MissionError] = []
 

@@ -1,0 +1,160 @@
+"""`Gatekeeper`: takes proposals from agents, which a person or a contract must approve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from secrets import compare_digest
+
+from codebotler.agents.reports import CheckReport, MissionReport, RobotReport, report_check
+from codebotler.agents.steps import NOT_RUNNING, Steps
+from codebotler.core.errors import UserError
+from codebotler.core.words import listed
+from codebotler.missions.log import MissionState
+from codebotler.missions.mission import MissionError
+from codebotler.missions.preflight import missing_skills
+from codebotler.missions.session import MissionSession
+from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.missions.wording import event_text
+from codebotler.prompts import prompt_for
+from codebotler.web.console import Console
+
+MAX_ASKED_CHARACTERS = 4_000
+"""The limit for a program in a client's dialog. Longer programs are reviewed on the page."""
+
+
+@dataclass
+class Gatekeeper:
+    """Passes the wishes of agents to the console that the page also uses. No method approves for an agent.
+
+    Args:
+        console: the robot and its current mission.
+        asks_client: whether a client may ask its person, in a dialog that its agent cannot answer.
+        writes: whether a model is configured that can write programs.
+        approves: whether a contract, given at the start, approves a program without asking a person.
+        contract_text: describes what a checked program can do at most, or returns "" if this is unknown.
+        page: the address of the page, without its token; empty without a page.
+    """
+
+    console: Console
+    asks_client: bool = False
+    writes: bool = False
+    approves: Callable[[SessionView], bool] = lambda _: False
+    contract_text: Callable[[SessionView], str] = lambda _: ""
+    page: str = ""
+    _session: MissionSession | None = field(default=None, init=False)  # the latest one of an agent
+    _steps: Steps | None = field(default=None, init=False)  # of that session, if it is step by step
+
+    def propose(self, order: MissionOrder, steps: Steps | None = None) -> MissionSession:
+        """Begin a mission that waits for approval. Raise MissionError if the console is busy with another."""
+        before = self.console.session
+        if before is not None and not before.view.is_over and before is not self._session:
+            raise MissionError("a person is working on a mission of their own; wait until it is over")
+        if not order.has_program and not self.writes:
+            raise UserError("no model is configured that can write programs; send a program")
+        session = self.console.begin(order)
+        self._session, self._steps = session, steps
+        return session
+
+    def propose_steps(self, purpose: str, skills: list[str], author: str) -> tuple[MissionSession, Steps]:
+        """Propose a mission in which the agent calls skills one at a time. An empty list means all skills."""
+        known = self.console.robot.skills.without(self.console.robot.missing)
+        if unknown := [name for name in skills if name not in known]:
+            raise UserError(f"this robot has no skill {listed(unknown, 'or')}; it has {listed(list(known))}")
+        steps = Steps(purpose, known.without(known.keys() - set(skills)) if skills else known)
+        order = MissionOrder(purpose, program=steps.program, author=author, drive=steps.drive)
+        return self.propose(order, steps), steps
+
+    def find_session(self, digest: str) -> MissionSession:
+        """Return the current session if its program has this digest, or else raise MissionError."""
+        session = self.console.session
+        if session is None or session.view.is_over:
+            ended = "" if session is None else f"; mission {session.view.id} is {session.view.phase}"
+            raise MissionError(f"no mission is waiting or running{ended}; propose one")
+        if session.view.digest != digest:
+            raise MissionError("the current mission has another program; follow_mission shows its digest")
+        return session
+
+    def find_steps(self, key: str) -> tuple[MissionSession, Steps]:
+        """Return the running step-by-step mission with this key, or else raise MissionError."""
+        steps, session = self._steps, self._session
+        if steps is None or session is None or not compare_digest(steps.key.encode(), key.encode()):
+            raise MissionError("there is no step-by-step mission with this key; begin_steps begins one")
+        if not self.takes_steps(session):
+            raise MissionError(NOT_RUNNING)
+        return session, steps
+
+    def takes_steps(self, session: MissionSession) -> bool:
+        """Whether a session runs step by step now, and not a program that a person wrote in its place."""
+        return self._is_stepwise(session) and session.view.state is MissionState.RUNNING
+
+    def approves_alone(self, session: MissionSession) -> bool:
+        """Whether the contract given at the start approves a session's program. Steps need a person."""
+        view = session.view
+        is_sound = view.may_be_approved and not view.problems and not self._is_stepwise(session)
+        return is_sound and self.approves(view)
+
+    def _is_stepwise(self, session: MissionSession) -> bool:
+        steps = self._steps
+        return steps is not None and session is self._session and session.view.program == steps.program
+
+    def may_ask_client(self, view: SessionView) -> bool:
+        """Whether a client may ask its person to approve a program, which must fit into a dialog."""
+        return self.asks_client and view.can_run and len(view.program) <= MAX_ASKED_CHARACTERS
+
+    def check(self, program: str) -> CheckReport:
+        """Check a program without a mission, in the rooms that are known now."""
+        room_map, rules = self.console.view.room_map, self.console.rules
+        checked = self.console.check(program, room_map, rules)
+        missing = tuple(missing_skills(program, self.console.robot))
+        view = SessionView(
+            program=program, check=checked, missing_skills=missing, room_map=room_map, rules=rules
+        )
+        report = report_check(view, self.contract_text(view))
+        assert report is not None, "it was checked"
+        return report
+
+    def report(self, session: MissionSession | None, after: int = 0) -> MissionReport:
+        """Return a session's mission, with its events after a position."""
+        view = SessionView() if session is None else session.view
+        events = [] if session is None else session.events()
+        return MissionReport(
+            mission=view.id,
+            state=view.phase,
+            reason=view.reason or view.error,
+            digest=view.digest,
+            check=report_check(view, self.contract_text(view) if view.check else ""),
+            remarks=[*view.unknown_rooms, *view.remarks],
+            events=[text for text in map(event_text, events[after:]) if text],
+            event_count=len(events),
+            is_over=view.is_over,
+            next=self._next(view),
+        )
+
+    def report_robot(self) -> RobotReport:
+        """Return the robot with all that is known now."""
+        console, room_map = self.console, self.console.view.room_map
+        on_map = [] if console.world is None else [room.name for room in console.world.rooms]
+        skills = console.robot.skills.without(console.robot.missing)
+        return RobotReport(
+            robot=console.robot.name,
+            rooms=on_map if room_map is None else room_map.described,
+            skills=[skill.signature for skill in skills.values()],
+            house_rules=[f"{rule.name}: {rule.says}" for rule in console.rules],
+            how_to_write=prompt_for("instruction", skills=skills).messages[0].text,
+            can_write_program=self.writes,
+        )
+
+    def _next(self, view: SessionView) -> str:
+        if view.is_over:
+            return "This mission is over; propose another." if view.number else "Propose a mission."
+        if view.is_running:
+            return "Follow the mission with follow_mission, or call its skills; stop stops the robot."
+        if not view.may_be_approved:
+            return view.error or "The program is not ready: call follow_mission, or propose another one."
+        if not view.can_run:
+            return "This program cannot run. Mend it, and propose it again."
+        dialog = ["in the dialog that run_mission opens, if this client has dialogs"]
+        page = [f"on the page {self.page}, whose link with its token was printed at the start"]
+        where = listed(dialog * self.may_ask_client(view) + page * bool(self.page), "or")
+        return f"A person must approve this program {where}. Then call run_mission with its digest."

@@ -1,0 +1,111 @@
+"""What agents and people read about a robot, a check and a mission."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, Field, model_validator
+
+from codebotler.core.terminal import shortened, visible_lines
+from codebotler.missions.view import SessionView
+from codebotler.web.storyboard import Scene, Strip, strips
+
+
+class _Report(BaseModel):
+    @model_validator(mode="before")
+    @classmethod
+    def _escape_surrogates(cls, data: object) -> object:
+        return _sendable(data)
+
+
+class CheckReport(_Report):
+    """The result of checking a program in imagined worlds."""
+
+    accepted: bool = Field(description="Whether there are no problems.")
+    problems: list[str]
+    contract: str = Field(description="What the program can do at most; empty if this is unknown.")
+    storyboards: list[str] = Field(description="What the robot would do in different imagined worlds.")
+    program: str
+
+
+class RobotReport(_Report):
+    """The robot, its rooms and skills, and the house rules."""
+
+    robot: str
+    rooms: list[str] = Field(description="Empty until a first proposal has connected the robot.")
+    skills: list[str] = Field(description="The signatures of the skills that this robot has.")
+    house_rules: list[str] = Field(description="Sentences that each program must obey; they are enforced.")
+    how_to_write: str = Field(description="How to write a program, with all skills.")
+    can_write_program: bool = Field(description="Whether a model is configured for write_program.")
+
+
+class MissionReport(_Report):
+    """A mission: what it would do, what it has done, and what can happen next."""
+
+    mission: str = Field(description="The ID of the mission.")
+    state: str = Field(description="checked, running, done, failed, stopped and so on.")
+    reason: str = Field(description="Why it is in this state.")
+    digest: str = Field(description="Identifies exactly this program; run_mission needs it.")
+    check: CheckReport | None = Field(description="None while the program is being checked.")
+    remarks: list[str] = Field(description="Likely mistakes that are no problems.")
+    events: list[str] = Field(description="What happened since the event `after`.")
+    event_count: int = Field(description="Pass this as `after` to see only later events.")
+    is_over: bool
+    next: str = Field(description="What can be done now.")
+    steps: str = Field(default="", description="From begin_steps: the key for call_skill and end_steps.")
+
+
+class SkillOutcome(_Report):
+    """The result of one call of a skill."""
+
+    result: Any = Field(default=None, description="The result of the skill, if it returns one.")
+    error: str = Field(default="", description="Why the skill failed; empty if it succeeded.")
+
+
+def report_check(view: SessionView, contract: str) -> CheckReport | None:
+    """Return the result of a view's check, if any, with the storyboards that people see on the page."""
+    if view.check is None:
+        return None
+    return CheckReport(
+        accepted=not view.problems,
+        problems=list(view.problems),
+        contract=contract,
+        storyboards=[_board_text(strip) for strip in strips(view.check)],
+        program=view.program,
+    )
+
+
+def question(view: SessionView, robot: str, contract: str) -> str:
+    """Return the question by which a client asks its person to approve a program."""
+    problems = "\n".join(f"- {shortened(problem)}" for problem in view.problems)
+    boards = [] if view.check is None else strips(view.check)
+    boards = [board for board in boards if len(board.scenes) > 1 or board.scenes[0].deeds]
+    parts = [
+        f"An agent asks to run a program on the robot {robot}.",
+        f"It says: {shortened(view.instruction)}" if view.instruction else "",
+        f"At most, the program can do this:\n{visible_lines(contract)}" if contract else "",
+        f"For example:\n{_board_text(boards[0])}" if boards else "",
+        f"THE CHECK FOUND PROBLEMS:\n{problems}" if problems else "The check found no problems.",
+        f"Mission {view.id}, digest {view.digest}, program:\n{visible_lines(view.program.strip())}",
+    ]
+    return "\n\n".join(filter(None, parts))
+
+
+def _sendable(value: object) -> object:
+    """Escape lone surrogates, which programs and errors may contain, but messages cannot."""
+    if isinstance(value, str):
+        return value.encode(errors="backslashreplace").decode()
+    if isinstance(value, list):
+        return [*map(_sendable, value)]
+    return {name: _sendable(one) for name, one in value.items()} if isinstance(value, dict) else value
+
+
+def _board_text(strip: Strip) -> str:
+    lines = (strip.world, *map(_scene_text, strip.scenes), strip.ending)
+    return "\n".join(f"- {line}" for line in lines if line)
+
+
+def _scene_text(scene: Scene) -> str:
+    deeds = "; ".join(f'"{one.text}"' if one.kind in {"say", "answer"} else one.text for one in scene.deeds)
+    where = scene.room if scene.is_found else f"{scene.room} (there is no such room)"
+    return f"{where}: {deeds}" if deeds else where

@@ -1,0 +1,163 @@
+"""Serve agents by the Model Context Protocol, over standard input and output or over HTTP."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import os
+import signal
+import stat
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager, suppress
+from dataclasses import asdict
+from io import BufferedWriter, FileIO, TextIOWrapper
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import anyio
+from mcp.server import MCPServer
+from mcp.server.mcpserver.exceptions import ResourceNotFoundError
+from mcp.server.stdio import stdio_server
+from mcp.server.transport_security import TransportSecuritySettings
+from mcp_types import ToolAnnotations
+
+from codebotler import __version__
+from codebotler.agents.gatekeeper import Gatekeeper
+from codebotler.agents.tools import ACTING, READING
+from codebotler.core.errors import UserError
+from codebotler.core.files import read_text
+from codebotler.missions.log import EVENTS_FILE, SUMMARY_FILE
+from codebotler.missions.store import find_mission, read_missions
+from codebotler.web.access import AGENT_PATH
+from codebotler.web.console import Console
+from codebotler.web.server import Companion
+
+MAX_MESSAGE_BYTES = 16_000_000
+"""The limit for one message on standard input."""
+
+
+class Streams(NamedTuple):
+    """The two streams over which a client speaks to us."""
+
+    received: FileIO
+    sent: BufferedWriter
+
+
+_INSTRUCTIONS = """CodeBotler runs programs on a robot, but only programs that a person has approved.
+Call read_robot first. Then propose_mission, tell the person what you propose, and call run_mission with the
+digest: it waits for the person's approval, which you cannot give. Call stop whenever anything is wrong."""
+
+
+def make_server(gatekeeper: Gatekeeper) -> MCPServer[Gatekeeper]:
+    """Create the server with all tools and resources."""
+
+    @asynccontextmanager
+    async def lifespan(_: MCPServer[Gatekeeper]) -> AsyncIterator[Gatekeeper]:
+        yield gatekeeper
+
+    handlers = logging.root.handlers[:]
+    server = MCPServer(
+        "codebotler",
+        title="CodeBotler",
+        instructions=_INSTRUCTIONS,
+        version=__version__,
+        lifespan=lifespan,
+        log_level="WARNING",
+    )
+    logging.root.handlers[:] = handlers  # our own log escapes control characters
+    for tools, only_reads in ((READING, True), (ACTING, False)):
+        for tool in tools:
+            server.add_tool(tool, annotations=ToolAnnotations(read_only_hint=only_reads))
+    _add_resources(server, gatekeeper.console.home)
+    return server
+
+
+def _add_resources(server: MCPServer[Gatekeeper], home: Path) -> None:
+    @server.resource("codebotler://missions", mime_type="application/json")
+    def missions() -> str:
+        """List all missions, oldest first."""
+        with _as_resource_errors():
+            return json.dumps([asdict(summary) for summary in read_missions(home)])
+
+    @server.resource("codebotler://missions/{mission}", mime_type="application/json")
+    def mission(mission: str) -> str:
+        """Read a mission: its program, its state and the reason."""
+        with _as_resource_errors():
+            return read_text(find_mission(home, mission) / SUMMARY_FILE)
+
+    @server.resource("codebotler://missions/{mission}/log", mime_type="application/jsonl")
+    def log(mission: str) -> str:
+        """Read the log of a mission, one event per line."""
+        with _as_resource_errors():
+            return read_text(find_mission(home, mission) / EVENTS_FILE)
+
+
+@contextmanager
+def _as_resource_errors() -> Iterator[None]:
+    try:
+        yield
+    except UserError as error:
+        raise ResourceNotFoundError(error.sentence) from None
+
+
+# --- transports
+
+
+def over_http(server: MCPServer[Gatekeeper], announce: Callable[[str], None]) -> Companion:
+    """Return what serves agents over HTTP on the page's port. `announce` receives the page's address."""
+    security = TransportSecuritySettings(enable_dns_rebinding_protection=False)  # the page's guard has it
+    app = server.streamable_http_app(streamable_http_path=AGENT_PATH, transport_security=security)
+
+    async def run() -> None:
+        async with server.session_manager.run():
+            await asyncio.Event().wait()
+
+    return Companion(tuple(app.routes), run, announce)
+
+
+def over_stdio(server: MCPServer[Gatekeeper], streams: Streams, announce: Callable[[str], None]) -> Companion:
+    """Return what serves one agent on standard input and output, until it closes them."""
+    server.streamable_http_app()  # makes the session manager, the public way to the server below
+    running = server.session_manager.app
+
+    async def run() -> None:
+        lines = asyncio.StreamReader(limit=MAX_MESSAGE_BYTES)  # needs no thread, so that signals interrupt it
+        loop, protocol = asyncio.get_running_loop(), asyncio.StreamReaderProtocol(lines)
+        await loop.connect_read_pipe(lambda: protocol, streams.received)
+        sent = anyio.wrap_file(TextIOWrapper(streams.sent, encoding="utf-8"))
+        async with stdio_server(stdin=cast("Any", lines), stdout=sent) as (reading, writing):
+            await running.run(reading, writing, running.create_initialization_options())
+
+    return Companion((), run, announce)
+
+
+def serve_without_page(companion: Companion, console: Console) -> None:
+    """Serve agents until their input ends or a signal arrives, which also stops a running robot."""
+
+    async def main() -> None:
+        task = asyncio.ensure_future(companion.run())
+        for number in (signal.SIGINT, signal.SIGTERM):
+            asyncio.get_running_loop().add_signal_handler(number, task.cancel)
+        with suppress(asyncio.CancelledError):
+            await task
+
+    with console:
+        asyncio.run(main())
+
+
+def take_streams() -> Streams:
+    """Take standard input and output for the protocol, so that all that is printed goes to standard error.
+
+    Raises:
+        UserError: no client can be behind standard input.
+    """
+    kind = os.fstat(0).st_mode
+    if not (stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind)):
+        raise UserError("an MCP client starts this command and talks to it; --http serves agents over HTTP")
+    streams = Streams(os.fdopen(os.dup(0), "rb", buffering=0), os.fdopen(os.dup(1), "wb"))
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    os.dup2(2, 1)
+    return streams

@@ -1,0 +1,122 @@
+"""`Steps`: a mission without a program, in which an agent calls one skill after another."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass, field
+from queue import Empty, Queue
+from threading import Lock
+from typing import TypeAlias
+
+from codebotler.agents.reports import SkillOutcome
+from codebotler.core.errors import UserError
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.terminal import visible
+from codebotler.core.trace import Option, Outcome
+from codebotler.core.unicode import compose
+from codebotler.core.words import listed
+from codebotler.missions.live import LiveRobot
+from codebotler.missions.mission import MissionError
+from codebotler.simulator.ledger import Ledger
+from codebotler.simulator.process.errors import ProtocolError
+from codebotler.simulator.robot import Argument
+from codebotler.simulator.skill_protocol import arguments_of
+
+IDLE_POLL_SECONDS = 0.1
+"""How often an idle mission looks whether it was stopped."""
+
+NOT_RUNNING = "this mission is not running; call run_mission first, or begin_steps for a new one"
+_PROGRAM = """# Step by step: an agent chooses each call after it has seen the result of the last one.
+# The check cannot foresee the calls; house rules apply to each.
+# It may call only: {skills}
+# It says: {purpose}
+def task_program():
+    pass
+"""
+_Call: TypeAlias = tuple[Skill, list[Argument], "Future[SkillOutcome]"]
+
+
+@dataclass
+class Steps:
+    """Hands an agent's calls to the thread of its mission, one at a time."""
+
+    purpose: str  # in the agent's words
+    skills: SkillTable  # those that the agent may call
+    key: str = field(default_factory=lambda: secrets.token_urlsafe(12))  # so that agents are not mixed up
+    _calls: Queue[_Call | None] = field(default_factory=Queue)  # None ends the mission
+    _is_over: bool = False
+    _lock: Lock = field(default_factory=Lock)
+
+    @property
+    def program(self) -> str:
+        """The text that a person approves in place of a program."""
+        return _PROGRAM.format(skills=", ".join(self.skills), purpose=visible(" ".join(self.purpose.split())))
+
+    def call(self, name: str, arguments: Mapping[str, object]) -> Future[SkillOutcome]:
+        """Call a skill of the running mission. Raise UserError for a wrong call."""
+        if name not in self.skills:
+            raise UserError(f"this mission may call only {listed(list(self.skills))}")
+        call = self.skills[name], _arguments(self.skills[name], arguments), Future[SkillOutcome]()
+        with self._lock:
+            if self._is_over:
+                raise MissionError(NOT_RUNNING)
+            self._calls.put(call)
+        return call[2]
+
+    def end(self) -> None:
+        """End the mission after the calls so far."""
+        self._calls.put(None)
+
+    def drive(self, live: LiveRobot) -> Outcome:
+        """Execute the calls on the mission's thread until `end`, or until the mission is stopped."""
+        ledger, call = Ledger(live), None
+        try:
+            while ledger.limit is None and (call := self._next(live)) is not None:
+                call[2].set_result(_perform(ledger, *call[:2]))
+            return ledger.outcome_at_end({"end": "finished"})
+        finally:
+            self._close(call)
+
+    def _next(self, live: LiveRobot) -> _Call | None:
+        while True:
+            live.check_end()
+            try:
+                return self._calls.get(timeout=IDLE_POLL_SECONDS)
+            except Empty:
+                continue
+
+    def _close(self, call: _Call | None) -> None:
+        """Answer the current call and all that wait."""
+        with self._lock:
+            self._is_over = True
+            while call is not None or not self._calls.empty():
+                if call is not None and not call[2].done():
+                    call[2].set_exception(MissionError("the mission ended before the end of this call"))
+                call = None if self._calls.empty() else self._calls.get()
+
+
+def _perform(ledger: Ledger, skill: Skill, arguments: Sequence[Argument]) -> SkillOutcome:
+    match ledger.perform(skill.name, arguments):
+        case ("ok", result):
+            given = zip(skill.parameters, arguments, strict=True)
+            options = next((one for parameter, one in given if parameter.is_options), None)
+            chosen = options[result] if isinstance(options, tuple) else result
+            return SkillOutcome(result=chosen.text if isinstance(chosen, Option) else chosen)
+        case ("error", (_, kind, message)):
+            return SkillOutcome(error=f"{kind}: {message}")
+        case _:
+            return SkillOutcome(error=ledger.limit or "the mission has ended")
+
+
+def _arguments(skill: Skill, given: Mapping[str, object]) -> list[Argument]:
+    values = [compose(given.get(parameter.name)) for parameter in skill.parameters]
+    for number, parameter in enumerate(skill.parameters):
+        if parameter.is_options and isinstance(options := values[number], list):
+            values[number] = [[str(one), isinstance(one, str)] for one in options]
+    with suppress(ProtocolError):
+        if {*given} == {parameter.name for parameter in skill.parameters}:
+            return arguments_of(skill, values)
+    raise UserError(f"call it as {skill.signature}")

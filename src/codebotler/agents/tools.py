@@ -1,0 +1,322 @@
+"""The tools that agents call. None of them approves a mission."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import aclosing, contextmanager, suppress
+from typing import Annotated, Any, TypeAlias
+
+import anyio
+from mcp.server.elicitation import AcceptedElicitation, CancelledElicitation, ElicitationResult
+from mcp.server.mcpserver import Context
+from mcp.server.mcpserver.exceptions import ToolError
+from mcp.server.mcpserver.resolve import Elicit, Resolve
+from pydantic import BaseModel, Field
+
+from codebotler.agents.gatekeeper import Gatekeeper
+from codebotler.agents.reports import CheckReport, MissionReport, RobotReport, SkillOutcome, question
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import shortened
+from codebotler.missions.authoring import ModelAuthor, prompt_of
+from codebotler.missions.mission import MissionError
+from codebotler.missions.session import MissionSession
+from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.missions.wording import event_text
+from codebotler.models.base import ModelError, ignore_text
+from codebotler.prompts import clean_instruction
+from codebotler.web.console import MAX_PROGRAM_CHARACTERS
+
+AgentContext: TypeAlias = Context[Gatekeeper, Any]
+_Digest = Annotated[str, Field(description="The digest of the program, from propose_mission or begin_steps.")]
+_Key = Annotated[str, Field(description="The key `steps` from begin_steps.")]
+_After = Annotated[int, Field(ge=0, description="Leave out this many earlier events.")]
+_Seconds = Annotated[
+    float, Field(ge=0, le=600, description="How long to wait. Then the answer says how far the mission is.")
+]
+
+
+class Consent(BaseModel):
+    """The form in which a client asks its person."""
+
+    approve: bool = Field(
+        title="Run it on the robot", description="Tick this to let the robot do exactly this."
+    )
+
+
+class NotAsked(Consent):
+    """The answer to a question that nobody was asked."""
+
+    approve: bool = False
+
+
+def read_robot(ctx: AgentContext) -> RobotReport:
+    """Read the robot's rooms, its skills, the house rules, and how to write a program for it.
+
+    Call this first. It changes nothing.
+    """
+    return _gatekeeper(ctx).report_robot()
+
+
+async def check_program(
+    program: Annotated[
+        str,
+        Field(
+            max_length=MAX_PROGRAM_CHARACTERS, description="The whole program, which defines task_program()."
+        ),
+    ],
+    ctx: AgentContext,
+) -> CheckReport:
+    """Check a program in imagined worlds without a robot: its problems, and what the robot would do.
+
+    It changes nothing and needs no approval. Mend all problems before you propose the program.
+    """
+    with _as_tool_errors():
+        return await asyncio.to_thread(
+            _gatekeeper(ctx).check, program
+        )  # not on the SDK's threads, which answer
+
+
+async def write_program(
+    instruction: Annotated[str, Field(description="What the robot should do, in plain words.")],
+    ctx: AgentContext,
+) -> CheckReport:
+    """Have CodeBotler's own language model write a program, and check it. It runs nothing.
+
+    You may also write the program yourself; read_robot explains how.
+    """
+    gatekeeper, console = _gatekeeper(ctx), _gatekeeper(ctx).console
+    with _as_tool_errors():
+        if not gatekeeper.writes:
+            raise UserError("no model is configured; write the program yourself, as read_robot explains")
+        asked = SessionView(
+            instruction=clean_instruction(instruction), room_map=console.view.room_map, rules=console.rules
+        )
+        author = ModelAuthor(console.open_model, console.models[0])
+        prompt = prompt_of(asked, console.robot, repair=False)
+        _, made = await asyncio.to_thread(author.write, prompt, ignore_text)
+        if made.programless is not None:
+            raise UserError(made.programless.sentence)
+        return await asyncio.to_thread(gatekeeper.check, made.program)
+
+
+async def propose_mission(
+    ctx: AgentContext,
+    instruction: Annotated[str, Field(description="What the robot should do, as people read it.")] = "",
+    program: Annotated[str, Field(description="The program; if empty, CodeBotler's model writes it.")] = "",
+) -> MissionReport:
+    """Propose a mission, which checks the program and shows it to a person. The robot does not move.
+
+    The answer has the problems, storyboards, and a digest. You cannot approve it yourself. Call run_mission,
+    which waits until a person has approved exactly this program.
+    """
+    gatekeeper = _gatekeeper(ctx)
+    with _as_tool_errors():
+        author = _name(ctx) if program.strip() else ""
+        session = gatekeeper.propose(MissionOrder(instruction, program=program, author=author))
+    return await _prepared(gatekeeper, session)
+
+
+async def begin_steps(
+    ctx: AgentContext,
+    purpose: Annotated[
+        str, Field(min_length=1, max_length=500, description="What you want to do, for people.")
+    ],
+    skills: Annotated[
+        Sequence[str], Field(description="The skills that you need; by default all. Ask only for these.")
+    ] = (),
+) -> MissionReport:
+    """Propose a mission in which you call skills one at a time, instead of writing a program.
+
+    Call run_mission with the digest, which waits until a person has approved it. Then call call_skill with
+    the key `steps` as often as you need, and end_steps at the end.
+    """
+    gatekeeper = _gatekeeper(ctx)
+    with _as_tool_errors():
+        session, steps = gatekeeper.propose_steps(purpose, list(skills), _name(ctx))
+    report = await _prepared(gatekeeper, session)
+    return report.model_copy(update={"steps": steps.key})
+
+
+async def _find_session(digest: str, ctx: AgentContext) -> MissionSession:
+    with _as_tool_errors():
+        return _gatekeeper(ctx).find_session(digest)
+
+
+def _ask_person(
+    session: Annotated[MissionSession, Resolve(_find_session)], ctx: AgentContext
+) -> Elicit[Consent] | NotAsked:
+    """Have the client ask its person, unless the program is already approved or the client cannot ask."""
+    gatekeeper, view = _gatekeeper(ctx), session.view
+    may_ask = view.may_be_approved and gatekeeper.may_ask_client(view) and _has_dialogs(ctx)
+    if not may_ask or gatekeeper.approves_alone(session):
+        return NotAsked()
+    return Elicit(question(view, gatekeeper.console.robot.name, gatekeeper.contract_text(view)), Consent)
+
+
+async def run_mission(
+    digest: _Digest,
+    ctx: AgentContext,
+    session: Annotated[MissionSession, Resolve(_find_session)],
+    answer: Annotated[ElicitationResult[Consent], Resolve(_ask_person)],
+    seconds: _Seconds = 45,
+) -> MissionReport:
+    """Run a proposed mission on the robot as soon as a person has approved it, and follow it to its end.
+
+    A person approves on the page or, if this client can ask, in a dialog. If nobody approves it in time, or
+    the mission is still running, the answer says so. Then call run_mission or follow_mission again. If you
+    cancel this call while the robot works, the robot stops.
+    """
+    gatekeeper = _gatekeeper(ctx)
+    with _as_tool_errors():
+        _take_answer(gatekeeper, session, digest, answer, _name(ctx))
+    with _stopping_if_cancelled(session, _name(ctx)):
+        await _follow(gatekeeper, session, ctx, seconds)
+    return gatekeeper.report(session)
+
+
+async def follow_mission(ctx: AgentContext, after: _After = 0, seconds: _Seconds = 45) -> MissionReport:
+    """Wait until the current mission is over, at most some seconds, and read what has happened.
+
+    It reports progress while it waits. Cancelling this call stops nothing.
+    """
+    gatekeeper = _gatekeeper(ctx)
+    session = gatekeeper.console.session
+    if session is not None:
+        await _follow(gatekeeper, session, ctx, seconds, after)
+    return gatekeeper.report(session, after)
+
+
+async def call_skill(
+    steps: _Key,
+    name: Annotated[str, Field(description="The name of the skill, such as go_to.")],
+    ctx: AgentContext,
+    arguments: Annotated[dict[str, Any] | None, Field(description="Its arguments by name.")] = None,
+) -> SkillOutcome:
+    """Call one skill in an approved step-by-step mission, and wait for its result.
+
+    House rules judge each call first. If you cancel this call, the robot stops.
+    """
+    with _as_tool_errors():
+        session, known = _gatekeeper(ctx).find_steps(steps)
+        called = known.call(name, arguments or {})
+        with _stopping_if_cancelled(session, _name(ctx)):
+            return await asyncio.shield(asyncio.wrap_future(called))
+
+
+async def end_steps(steps: _Key, ctx: AgentContext) -> MissionReport:
+    """End a step-by-step mission, so that the robot is free for others."""
+    gatekeeper = _gatekeeper(ctx)
+    with _as_tool_errors():
+        session, known = gatekeeper.find_steps(steps)
+    known.end()
+    await gatekeeper.console.notifier.until(lambda: session.view.is_over, 15)
+    return gatekeeper.report(session)
+
+
+async def stop(ctx: AgentContext) -> MissionReport:
+    """Stop the robot and the current mission at once. It needs no approval and always works.
+
+    Call it whenever anything is wrong, also while another call is waiting.
+    """
+    gatekeeper = _gatekeeper(ctx)
+    session = gatekeeper.console.session
+    if gatekeeper.console.stop(_name(ctx)) and session is not None:
+        await gatekeeper.console.notifier.until(lambda: session.view.is_over, 15)
+    return gatekeeper.report(session)
+
+
+READING: Sequence[Callable[..., object]] = (read_robot, check_program, follow_mission, write_program)
+ACTING: Sequence[Callable[..., object]] = (
+    propose_mission,
+    begin_steps,
+    run_mission,
+    call_skill,
+    end_steps,
+    stop,
+)
+
+
+def _gatekeeper(ctx: AgentContext) -> Gatekeeper:
+    return ctx.request_context.lifespan_context
+
+
+def _name(ctx: AgentContext) -> str:
+    """Return the agent's name for logs, as its client gives it."""
+    known = ctx.session.client_params
+    return f"agent {shortened(known.client_info.name, 60)}" if known is not None else "an agent"
+
+
+def _has_dialogs(ctx: AgentContext) -> bool:
+    capabilities = ctx.client_capabilities
+    forms = None if capabilities is None else capabilities.elicitation
+    return forms is not None and (forms.form is not None or forms.url is None)
+
+
+def _take_answer(
+    gatekeeper: Gatekeeper,
+    session: MissionSession,
+    digest: str,
+    answer: ElicitationResult[Consent],
+    client: str,
+) -> None:
+    """Approve the program if a person or a contract accepts it. End the mission if a person declines."""
+    view, person = session.view, f"a person, asked by {client}"
+    if isinstance(answer, AcceptedElicitation) and isinstance(answer.data, NotAsked):
+        if gatekeeper.approves_alone(session):
+            session.approve(digest, by="the contract given at the start")
+    elif isinstance(answer, AcceptedElicitation) and answer.data.approve:
+        if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
+            session.approve(digest, despite_problems=bool(view.problems), by=person)
+    elif not isinstance(answer, CancelledElicitation):
+        session.stop_soon(person)
+
+
+async def _prepared(gatekeeper: Gatekeeper, session: MissionSession) -> MissionReport:
+    """Wait until a program can be approved, or cannot be made."""
+
+    def is_ready() -> bool:
+        view = session.view
+        return view.is_over or view.may_be_approved or view.waits_for_program
+
+    try:
+        await gatekeeper.console.notifier.until(is_ready)
+    except anyio.get_cancelled_exc_class():
+        session.stop_soon("the agent, which gave up")
+        raise
+    return gatekeeper.report(session)
+
+
+async def _follow(
+    gatekeeper: Gatekeeper, session: MissionSession, ctx: AgentContext, seconds: float, known: int = 0
+) -> None:
+    """Report new events as progress until the mission is over, or steps may begin, for some seconds."""
+    with suppress(TimeoutError):
+        async with asyncio.timeout(seconds), aclosing(gatekeeper.console.notifier.changes()) as changes:
+            async for _ in changes:
+                is_last = session.view.is_over or gatekeeper.takes_steps(session)
+                for line in session.events(known):
+                    known += 1
+                    if text := event_text(line):
+                        await ctx.report_progress(known, message=text)
+                if is_last:
+                    return
+
+
+@contextmanager
+def _stopping_if_cancelled(session: MissionSession, by: str) -> Iterator[None]:
+    try:
+        yield
+    except anyio.get_cancelled_exc_class():
+        if session.view.is_running:
+            session.stop_soon(f"{by}, which cancelled its call")
+        raise
+
+
+@contextmanager
+def _as_tool_errors() -> Iterator[None]:
+    """Tell agents about mistakes in a sentence."""
+    try:
+        yield
+    except (UserError, MissionError, ModelError) as error:
+        raise ToolError(error.sentence) from None

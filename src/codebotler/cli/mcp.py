@@ -1,0 +1,91 @@
+"""`codebotler mcp`: let agents use the robot over the Model Context Protocol."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from codebotler.cli import options
+from codebotler.cli.model_options import inherit_options, model_settings, options_for
+
+
+@inherit_options(options.robot_settings)
+@inherit_options(model_settings)
+def serve_agents(
+    http: Annotated[
+        bool,
+        typer.Option("--http", help="Serve agents over HTTP on the page's port, not over standard input."),
+    ] = False,
+    page: Annotated[
+        bool,
+        typer.Option("--page/--no-page", help="Also serve the page, on which a person approves missions."),
+    ] = True,
+    ask_client: Annotated[
+        bool | None,
+        typer.Option(
+            "--ask-client/--page-only",
+            help="Whether the agent's client may ask its person for approval; by default not with --http.",
+        ),
+    ] = None,
+    port: options.PortOption = None,
+    token: options.TokenOption = None,
+    agent_token: Annotated[
+        str | None, typer.Option(help="The access token for agents with --http; a new one by default.")
+    ] = None,
+    model: options.ModelsOption = None,
+    base_url: options.BaseUrlOption = None,
+    **shared: Any,  # noqa: ANN401 - of several kinds
+) -> None:
+    """Let agents use the robot, with a person's approval.
+
+    Clients of the Model Context Protocol (MCP), such as Claude Code, start this command.
+    """
+    from codebotler.agents import server
+    from codebotler.agents.gatekeeper import Gatekeeper
+    from codebotler.cli.run import tell_missing
+    from codebotler.core.errors import UserError
+    from codebotler.core.files import home
+    from codebotler.core.terminal import note
+    from codebotler.models.chosen import choose_model, make_opener
+    from codebotler.models.recorded import is_recorded
+    from codebotler.robots.open import open_robot
+    from codebotler.web.access import AGENT_PATH, Access, PageAddress
+    from codebotler.web.console import Console
+    from codebotler.web.server import serve
+
+    asks = not http if ask_client is None else ask_client
+    if http and not page:
+        raise UserError("--http uses the page's port; leave out --no-page")
+    if not page and not asks:
+        raise UserError("nobody could approve a mission; leave out --no-page or --page-only")
+    if agent_token is not None and not http:
+        raise UserError("--agent-token is for --http; leave it out")
+    streams = None if http else server.take_streams()
+    kind, settings, rules = options.robot_settings(**options_for(options.robot_settings, shared))
+    options.note_office(kind, shared["world"])
+    default = choose_model().name
+    models = tuple(model or dict.fromkeys((default, "recorded:careful", "recorded:hasty")))
+    opened = make_opener(models, base_url, model_settings(**options_for(model_settings, shared)))
+    body = open_robot(kind, settings)
+    tell_missing(body)
+    console = Console(body, home(), opened, models=models, world=settings.world, rules=rules)
+    writes = bool(model) or not is_recorded(default)
+    gatekeeper = Gatekeeper(console, asks_client=asks, writes=writes)
+    agents = server.make_server(gatekeeper)
+    access = Access.from_options(token, None, open_to_all=False, is_private=True)
+
+    def announce(address: str) -> None:
+        gatekeeper.page = address
+        if http:
+            note(f"Agents use {address}{AGENT_PATH[1:]} with\n\n    Authorization: Bearer {access.agent}\n")
+
+    if streams is None:
+        access = access.with_agents(agent_token)
+        companion = server.over_http(agents, announce)
+    else:
+        companion = server.over_stdio(agents, streams, announce)
+    if page:
+        serve(console, PageAddress(port=port), access, companion=companion)
+    else:
+        server.serve_without_page(companion, console)

@@ -1,0 +1,630 @@
+"""The tools of agents, by the SDK's own client: none approves, and a person always decides."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Callable, Coroutine, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcp import Client
+from mcp.client.session import ClientRequestContext, ElicitationFnT
+from mcp_types import ElicitRequestParams, ElicitResult
+
+from codebotler.agents.gatekeeper import Gatekeeper
+from codebotler.agents.reports import SkillOutcome
+from codebotler.agents.server import make_server
+from codebotler.checking.rules import read_rules
+from codebotler.core.world import Room, World
+from codebotler.missions.log import MissionState
+from codebotler.missions.preflight import known_instructions
+from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.models.recorded import open_recorded
+from codebotler.robots.base import RobotLostError, RobotResult
+from codebotler.robots.simulated import Simulated
+from codebotler.simulator.house_rule import Rule
+from codebotler.web.console import Console
+from doubles import Answering, raising
+
+WORLD = World((Room("hall"), Room("kitchen"), Room("vault")), "hall")
+HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
+FAULTY = "def task_program():\n    go_to('cellar')\n"
+FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('hall')\n"
+SOON = 30.0
+MODES = pytest.mark.parametrize("mode", ["auto", "legacy"])
+
+
+def gatekeeper_at(home: Path, *, speed: float | None = None, rules: tuple[Rule, ...] = ()) -> Gatekeeper:
+    robot = Simulated(WORLD, speed=speed)
+    return Gatekeeper(
+        Console(robot, home, open_recorded, world=WORLD, rules=rules), page="http://localhost:1/"
+    )
+
+
+@pytest.fixture
+def gatekeeper(tmp_path: Path) -> Iterator[Gatekeeper]:
+    made = gatekeeper_at(tmp_path)
+    with made.console:
+        yield made
+
+
+class Agent:
+    """A client whose calls give their structured results."""
+
+    def __init__(self, client: Client) -> None:
+        self.client = client
+
+    async def call(self, tool: str, **arguments: Any) -> Any:  # noqa: ANN401 - any tool's result
+        result = await self.client.call_tool(tool, arguments)
+        assert not result.is_error, result.content
+        return result.structured_content
+
+    async def fails(self, tool: str, **arguments: Any) -> str:  # noqa: ANN401 - any tool's arguments
+        result = await self.client.call_tool(tool, arguments)
+        assert result.is_error, result.structured_content
+        return getattr(result.content[0], "text", "")
+
+
+def use(
+    gatekeeper: Gatekeeper,
+    act: Callable[[Agent], Coroutine[Any, Any, None]],
+    *,
+    answer: ElicitationFnT | None = None,
+    mode: str = "auto",
+) -> None:
+    """Let an agent act, with a client that may ask its person."""
+
+    async def main() -> None:
+        async with (
+            asyncio.timeout(SOON),
+            Client(make_server(gatekeeper), elicitation_callback=answer, mode=mode) as client,
+        ):
+            await act(Agent(client))
+
+    asyncio.run(main())
+
+
+def answering(action: Any, *, approve: bool | None = None) -> tuple[ElicitationFnT, list[str]]:  # noqa: ANN401 - one of three
+    """A person who answers each question so, and the questions."""
+    asked: list[str] = []
+
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+        asked.append(params.message)
+        return ElicitResult(action=action, content=None if approve is None else {"approve": approve})
+
+    return answer, asked
+
+
+def view_of(gatekeeper: Gatekeeper) -> SessionView:
+    return gatekeeper.console.view
+
+
+def approve(gatekeeper: Gatekeeper) -> None:
+    """Approve the current program, as a person does on the page."""
+    session = gatekeeper.console.session
+    assert session is not None
+    session.approve(session.view.digest)
+
+
+async def until(gatekeeper: Gatekeeper, holds: Callable[[SessionView], bool]) -> None:
+    assert await gatekeeper.console.notifier.until(lambda: holds(view_of(gatekeeper)), SOON)
+
+
+# --- reading and checking
+
+
+@pytest.mark.slow
+def test_an_agent_reads_the_robot_and_checks_programs(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        robot = await agent.call("read_robot")
+        assert robot["rooms"] == ["hall", "kitchen", "vault"]
+        assert "go_to(location: str) -> None" in robot["skills"]
+        assert "def go_to" in robot["how_to_write"]
+        good, bad = (
+            await agent.call("check_program", program=HELLO),
+            await agent.call("check_program", program="("),
+        )
+        assert good["accepted"]
+        assert '- kitchen: "hello"\n' in good["storyboards"][0]
+        assert (bad["accepted"], len(bad["problems"])) == (False, 1)
+        assert gatekeeper.console.session is None
+
+    use(gatekeeper, act)
+
+
+def test_every_tool_has_a_description_and_typed_arguments_and_none_approves(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        tools = {tool.name: tool for tool in (await agent.client.list_tools()).tools}
+        assert {*tools} == {
+            *("read_robot", "check_program", "write_program", "propose_mission", "begin_steps"),
+            *("run_mission", "follow_mission", "call_skill", "end_steps", "stop"),
+        }
+        for tool in tools.values():
+            assert len(tool.description or "") > 60
+            assert tool.output_schema
+            for argument in tool.input_schema.get("properties", {}).values():
+                assert argument.get("description")
+        assert {*tools["run_mission"].input_schema["properties"]} == {"digest", "seconds"}
+
+    use(gatekeeper, act)
+
+
+@pytest.mark.slow
+def test_writing_needs_a_model(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        assert "no model is configured" in await agent.fails("write_program", instruction="Say hello.")
+        assert "no model is configured" in await agent.fails("propose_mission", instruction="Say hello.")
+        gatekeeper.writes = True
+        assert "has no program" in await agent.fails("write_program", instruction="Say hello.")
+        known = next(iter(known_instructions(None)))
+        written = await agent.call("write_program", instruction=known)
+        assert "def task_program" in written["program"]
+        assert gatekeeper.console.session is None
+        proposed = await agent.call("propose_mission", instruction=known)
+        assert "def task_program" in proposed["check"]["program"]
+
+    use(gatekeeper, act)
+
+
+@pytest.mark.slow
+def test_texts_that_are_no_unicode_do_not_keep_an_agent_from_stopping(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        program = "def task_program():\n    say('\\ud800')\n    raise ValueError('\\udfff')\n"
+        assert "\\udfff" in (await agent.call("check_program", program=program))["problems"][0]
+        await agent.call("propose_mission", program=program)
+        assert (await agent.call("stop"))["state"] == "stopped"
+        assert SkillOutcome(result=["\ud800"]).model_dump_json() == '{"result":["\\\\ud800"],"error":""}'
+
+    use(gatekeeper, act)
+
+
+def test_the_sdk_leaves_our_log_alone(gatekeeper: Gatekeeper) -> None:
+    before = logging.root.handlers[:]
+    make_server(gatekeeper)
+    assert logging.root.handlers == before
+
+
+# --- who approves
+
+
+@pytest.mark.slow
+def test_nothing_runs_until_a_person_approves_on_the_page(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", instruction="say hello", program=HELLO)
+        assert (proposed["state"], proposed["check"]["accepted"]) == ("checked", True)
+        assert "http://localhost:1/" in proposed["next"]
+        waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
+        assert (waiting["state"], waiting["events"][-1], waiting["is_over"]) == ("checked", "checked", False)
+        running = asyncio.create_task(agent.call("run_mission", digest=proposed["digest"]))
+        await asyncio.sleep(0.05)
+        approve(gatekeeper)
+        done = await running
+        assert (done["state"], done["is_over"]) == ("done", True)
+        assert 'says "hello"' in done["events"]
+        assert "no mission is waiting" in await agent.fails("run_mission", digest=proposed["digest"])
+
+    use(gatekeeper, act)
+
+
+@pytest.mark.slow
+def test_run_refuses_a_digest_of_another_program(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        first = await agent.call("propose_mission", program=HELLO)
+        second = await agent.call("propose_mission", program=HELLO + "    say('bye')\n")
+        assert first["digest"] != second["digest"]
+        assert "another program" in await agent.fails("run_mission", digest=first["digest"])
+        gatekeeper.console.edit(HELLO + "    say('a person wrote this')\n")
+        await until(gatekeeper, lambda view: view.may_be_approved)
+        assert "another program" in await agent.fails("run_mission", digest=second["digest"])
+        for wrong in ("", second["digest"][:-1], second["digest"].upper() + "é"):
+            assert "another program" in await agent.fails("run_mission", digest=wrong)
+        assert not view_of(gatekeeper).progress.has_begun
+
+    use(gatekeeper, act)
+
+
+@pytest.mark.slow
+@MODES
+def test_a_person_accepts_in_the_clients_dialog(gatekeeper: Gatekeeper, mode: str) -> None:
+    gatekeeper.asks_client = True
+    answer, asked = answering("accept", approve=True)
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", instruction="say hello", program=HELLO)
+        done = await agent.call("run_mission", digest=proposed["digest"])
+        assert done["state"] == "done"
+        (question,) = asked
+        assert proposed["digest"] in question
+        assert proposed["mission"] in question
+        assert all(line in question for line in HELLO.splitlines())
+        assert "no problems" in question
+        assert any("approved by a person, asked by" in event for event in done["events"])
+
+    use(gatekeeper, act, answer=answer, mode=mode)
+
+
+@MODES
+@pytest.mark.parametrize(
+    ("action", "ticked", "is_over"),
+    [("decline", None, True), ("cancel", None, False), ("accept", False, True)],
+)
+def test_only_an_explicit_yes_approves(
+    gatekeeper: Gatekeeper, mode: str, action: str, *, ticked: bool | None, is_over: bool
+) -> None:
+    gatekeeper.asks_client = True
+    answer, asked = answering(action, approve=ticked)
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=HELLO)
+        answered = await agent.call("run_mission", digest=proposed["digest"], seconds=1 if is_over else 0.05)
+        assert (answered["is_over"], answered["state"]) == (is_over, "stopped" if is_over else "checked")
+        assert len(asked) == 1
+        assert not view_of(gatekeeper).progress.has_begun
+
+    use(gatekeeper, act, answer=answer, mode=mode)
+
+
+@MODES
+def test_an_accepted_form_without_content_does_not_approve(gatekeeper: Gatekeeper, mode: str) -> None:
+    gatekeeper.asks_client = True
+    answer, _ = answering("accept")
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=HELLO)
+        await agent.fails("run_mission", digest=proposed["digest"], seconds=0.05)
+        assert view_of(gatekeeper).state is MissionState.CHECKED
+
+    use(gatekeeper, act, answer=answer, mode=mode)
+
+
+def test_a_client_is_not_asked_unless_the_operator_allows_it(gatekeeper: Gatekeeper) -> None:
+    answer, asked = answering("accept", approve=True)
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=HELLO)
+        waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
+        assert (waiting["state"], asked) == ("checked", [])
+
+    use(gatekeeper, act, answer=answer)
+
+
+@pytest.mark.slow
+@MODES
+def test_an_answer_does_not_approve_a_program_that_replaced_the_one_shown(
+    gatekeeper: Gatekeeper, mode: str
+) -> None:
+    gatekeeper.asks_client = True
+    asked: list[str] = []
+
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+        asked.append(params.message)
+        gatekeeper.console.edit(FAR)
+        await until(gatekeeper, lambda view: view.may_be_approved and view.program == FAR)
+        return ElicitResult(action="accept", content={"approve": True})
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=HELLO)
+        await agent.fails("run_mission", digest=proposed["digest"], seconds=0.05)
+        assert (view_of(gatekeeper).state, len(asked)) == (MissionState.CHECKED, 1)
+
+    use(gatekeeper, act, answer=answer, mode=mode)
+
+
+def test_a_program_too_long_for_a_dialog_is_approved_on_the_page_only(gatekeeper: Gatekeeper) -> None:
+    gatekeeper.asks_client = True
+    answer, asked = answering("accept", approve=True)
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=HELLO + "#" * 4_000)
+        waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
+        assert (waiting["state"], asked) == ("checked", [])
+
+    use(gatekeeper, act, answer=answer)
+
+
+def test_problems_are_shown_to_the_person_and_a_contract_never_approves_them(gatekeeper: Gatekeeper) -> None:
+    gatekeeper.approves = lambda _: True
+    answer, asked = answering("cancel")
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=FAULTY)
+        assert not proposed["check"]["accepted"]
+        waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
+        assert waiting["state"] == "checked"
+        gatekeeper.asks_client = True
+        await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
+        assert "PROBLEMS" in asked[0]
+        assert "cellar" in asked[0]
+        broken = await agent.call("propose_mission", program="(")
+        await agent.call("run_mission", digest=broken["digest"], seconds=0.05)
+        assert len(asked) == 1
+
+    use(gatekeeper, act, answer=answer)
+
+
+@pytest.mark.slow
+def test_a_contract_given_at_the_start_approves(gatekeeper: Gatekeeper) -> None:
+    gatekeeper.approves = lambda view: "hello" in view.program
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=HELLO)
+        done = await agent.call("run_mission", digest=proposed["digest"])
+        assert done["state"] == "done"
+        assert "approved by the contract given at the start" in done["events"]
+        other = await agent.call("propose_mission", program=FAR)
+        waiting = await agent.call("run_mission", digest=other["digest"], seconds=0.05)
+        assert waiting["state"] == "checked"
+
+    use(gatekeeper, act)
+
+
+# --- one robot, several agents and a person
+
+
+@pytest.mark.slow
+def test_an_agent_neither_replaces_a_persons_mission_nor_runs_a_second_one(tmp_path: Path) -> None:
+    gatekeeper = gatekeeper_at(tmp_path, speed=1.0)
+
+    async def act(agent: Agent) -> None:
+        gatekeeper.console.begin(MissionOrder(program=FAR))
+        await until(gatekeeper, lambda view: view.may_be_approved)
+        mine = view_of(gatekeeper).id
+        assert "a person is working" in await agent.fails("propose_mission", program=HELLO)
+        approve(gatekeeper)
+        await until(gatekeeper, lambda view: view.is_running)
+        await agent.fails("propose_mission", program=HELLO)
+        assert (view_of(gatekeeper).id, view_of(gatekeeper).is_running) == (mine, True)
+        stopped = await agent.call("stop")
+        assert (stopped["mission"], stopped["state"]) == (mine, "stopped")
+        proposed = await agent.call("propose_mission", program=FAR)
+        running = asyncio.create_task(agent.call("run_mission", digest=proposed["digest"]))
+        approve(gatekeeper)
+        await until(gatekeeper, lambda view: view.is_running)
+        assert "stop it first" in await agent.fails("propose_mission", program=HELLO)
+        await agent.call("stop")
+        await running
+
+    with gatekeeper.console:
+        use(gatekeeper, act)
+
+
+@pytest.mark.slow
+def test_a_second_client_stops_while_the_first_waits_and_sees_progress(tmp_path: Path) -> None:
+    gatekeeper = gatekeeper_at(tmp_path, speed=1.0)
+
+    async def act(agent: Agent) -> None:
+        said: list[str] = []
+
+        async def hear(progress: float, total: float | None, message: str | None) -> None:  # noqa: ARG001 - as the SDK calls it
+            said.append(message or "")
+
+        proposed = await agent.call("propose_mission", program=FAR)
+        arguments = {"digest": proposed["digest"]}
+        running = asyncio.create_task(
+            agent.client.call_tool("run_mission", arguments, progress_callback=hear)
+        )
+        approve(gatekeeper)
+        await until(gatekeeper, lambda view: view.is_running and view.progress.is_driving)
+        async with Client(make_server(gatekeeper)) as other:
+            stopped = await Agent(other).call("stop")
+        ended = (await running).structured_content
+        assert ended is not None
+        assert (stopped["state"], ended["state"], ended["is_over"]) == ("stopped", "stopped", True)
+        assert 'drives to "kitchen"' in said
+
+    with gatekeeper.console:
+        use(gatekeeper, act)
+
+
+@pytest.mark.slow
+@MODES
+def test_the_robot_stops_if_the_call_is_cancelled(tmp_path: Path, mode: str) -> None:
+    gatekeeper = gatekeeper_at(tmp_path, speed=1.0)
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=FAR)
+        running = asyncio.create_task(agent.call("run_mission", digest=proposed["digest"]))
+        await asyncio.sleep(0.05)
+        approve(gatekeeper)
+        await until(gatekeeper, lambda view: view.is_running)
+        running.cancel()
+        await until(gatekeeper, lambda view: view.is_over)
+        assert view_of(gatekeeper).state is MissionState.STOPPED
+        assert "cancelled" in view_of(gatekeeper).reason
+
+    with gatekeeper.console:
+        use(gatekeeper, act, mode=mode)
+
+
+def test_missions_and_their_logs_are_resources(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=HELLO)
+        await agent.call("stop")
+        listed = await read(agent, "codebotler://missions")
+        assert [one["id"] for one in json.loads(listed)] == [proposed["mission"]]
+        one = f"codebotler://missions/{proposed['mission']}"
+        assert json.loads(await read(agent, one))["program"] == HELLO
+        log = [json.loads(line) for line in (await read(agent, f"{one}/log")).splitlines()]
+        assert log[-1]["state"] == "stopped"
+        for wrong in ("20200101-000000", "..%2F..%2Fsecret", "20200101-000000%2Flog"):
+            with pytest.raises(Exception, match=r"no mission|not found|Unknown|rejected"):
+                await read(agent, f"codebotler://missions/{wrong}")
+
+    use(gatekeeper, act)
+
+
+async def read(agent: Agent, uri: str) -> str:
+    (content,) = (await agent.client.read_resource(uri)).contents
+    return str(getattr(content, "text", ""))
+
+
+# --- step by step
+
+ANSWERS: dict[str, RobotResult] = {
+    "get_all_rooms": ["hall"],
+    "get_current_location": "hall",
+    "ask": " YES ",
+}
+
+
+async def began(agent: Agent, gatekeeper: Gatekeeper, *skills: str) -> tuple[str, dict[str, Any]]:
+    """The key of an approved step-by-step mission, and what run_mission answers."""
+    proposed = await agent.call(
+        "begin_steps", purpose="look around\n# It may call: nothing", skills=list(skills)
+    )
+    running = asyncio.create_task(agent.call("run_mission", digest=proposed["digest"]))
+    approve(gatekeeper)
+    return proposed["steps"], await running
+
+
+def test_skills_are_called_one_at_a_time_and_logged_as_a_mission(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        key, begun = await began(agent, gatekeeper)
+        assert begun["state"] == "running"
+        assert "\n# It may call: nothing" not in begun["check"]["program"]
+        assert (await agent.call("call_skill", steps=key, name="get_current_location"))["result"] == "hall"
+        await agent.call("call_skill", steps=key, name="go_to", arguments={"location": "kitchen"})
+        assert (await agent.call("call_skill", steps=key, name="get_current_location"))["result"] == "kitchen"
+        failed = await agent.call("call_skill", steps=key, name="go_to", arguments={"location": "moon"})
+        assert failed["error"].startswith("GoToInvalidLocation")
+        looked = await agent.call("call_skill", steps=key, name="is_in_room", arguments={"entity": "mug"})
+        assert (looked["result"], looked["error"]) == (False, "")
+        ended = await agent.call("end_steps", steps=key)
+        assert (ended["state"], ended["is_over"]) == ("done", True)
+        assert 'drives to "kitchen"' in ended["events"]
+        assert "not running" in await agent.fails("call_skill", steps=key, name="get_all_rooms")
+        assert "not running" in await agent.fails("end_steps", steps=key)
+
+    use(gatekeeper, act)
+
+
+def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        key, _ = await began(agent, gatekeeper, "go_to", "ask")
+        for wrong in ({}, {"location": 3}, {"location": ["kitchen"]}, {"location": "kitchen", "more": 1}):
+            assert "go_to" in await agent.fails("call_skill", steps=key, name="go_to", arguments=wrong)
+        assert "may call only" in await agent.fails(
+            "call_skill", steps=key, name="say", arguments={"message": "a"}
+        )
+        arguments = {"location": "kitchen"}
+        assert "no step-by-step" in await agent.fails(
+            "call_skill", steps="x", name="go_to", arguments=arguments
+        )
+        assert "no skill fly" in await agent.fails("begin_steps", purpose="fly", skills=["fly"])
+        session = gatekeeper.console.session
+        assert session is not None
+        assert [line for line in session.events() if line["event"] == "skill"] == []
+        stopped = await agent.call("stop")
+        assert (stopped["state"], stopped["is_over"]) == ("stopped", True)
+
+    use(gatekeeper, act)
+
+
+def test_a_question_is_asked_and_its_answer_is_one_of_the_options(tmp_path: Path) -> None:
+    robot = Answering(lambda skill, _: ANSWERS.get(skill))
+    gatekeeper = Gatekeeper(Console(robot, tmp_path, open_recorded))
+
+    async def act(agent: Agent) -> None:
+        key, _ = await began(agent, gatekeeper, "ask")
+        question = {"person": "", "question": "Tea?", "options": ["no", "yes"]}
+        assert (await agent.call("call_skill", steps=key, name="ask", arguments=question))["result"] == "yes"
+        failed = await agent.call("call_skill", steps=key, name="ask", arguments=question | {"options": []})
+        assert failed["error"].startswith("AskEmptyOptions")
+        for wrong in ("yes", None, 3):
+            await agent.fails("call_skill", steps=key, name="ask", arguments=question | {"options": wrong})
+        await agent.call("stop")
+
+    with gatekeeper.console:
+        use(gatekeeper, act)
+
+
+def test_a_robot_that_is_lost_ends_the_steps(tmp_path: Path) -> None:
+    robot = Answering(lambda skill, _: ANSWERS.get(skill))
+    gatekeeper = Gatekeeper(Console(robot, tmp_path, open_recorded))
+
+    async def act(agent: Agent) -> None:
+        key, _ = await began(agent, gatekeeper)
+        robot.answer = raising(RobotLostError("its battery is empty"))
+        assert "ended" in await agent.fails("call_skill", steps=key, name="say", arguments={"message": "a"})
+        await until(gatekeeper, lambda view: view.is_over)
+        report = await agent.call("follow_mission")
+        assert (report["state"], "battery" in report["reason"]) == ("failed", True)
+
+    with gatekeeper.console:
+        use(gatekeeper, act)
+
+
+def test_steps_need_a_person_whatever_the_contract_says(gatekeeper: Gatekeeper) -> None:
+    gatekeeper.approves, gatekeeper.asks_client = lambda _: True, True
+    answer, asked = answering("cancel")
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("begin_steps", purpose="look around", skills=["say"])
+        waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
+        assert (waiting["state"], len(asked)) == ("checked", 1)
+        assert "It may call only: say" in asked[0]
+        assert "For example" not in asked[0]
+
+    use(gatekeeper, act, answer=answer)
+
+
+@pytest.mark.slow
+def test_a_step_waits_for_approval_and_stop_ends_all(tmp_path: Path) -> None:
+    gatekeeper = gatekeeper_at(tmp_path, speed=1.0)
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("begin_steps", purpose="look around")
+        arguments = {"steps": proposed["steps"], "name": "go_to", "arguments": {"location": "kitchen"}}
+        assert "not running" in await agent.fails("call_skill", **arguments)
+        key, _ = await began(agent, gatekeeper)
+        arguments["steps"] = key
+        moving = asyncio.create_task(agent.client.call_tool("call_skill", arguments))
+        await until(gatekeeper, lambda view: view.progress.is_driving)
+        waiting = asyncio.create_task(agent.client.call_tool("call_skill", arguments))
+        stopped = await agent.call("stop")
+        assert stopped["state"] == "stopped"
+        assert (await moving).is_error
+        assert (await waiting).is_error
+
+    with gatekeeper.console:
+        use(gatekeeper, act)
+
+
+@pytest.mark.slow
+def test_house_rules_judge_each_step(tmp_path: Path) -> None:
+    (tmp_path / "house.yaml").write_text(
+        "rules: [{name: vault, says: Stay out of the vault., always: 'not tr.Exists(goto(\"vault\"))'}]\n"
+    )
+    gatekeeper = gatekeeper_at(tmp_path, rules=tuple(read_rules(tmp_path / "house.yaml")))
+
+    async def act(agent: Agent) -> None:
+        assert (await agent.call("read_robot"))["house_rules"] == ["vault: Stay out of the vault."]
+        for spelling in ("vault", " Vault "):
+            key, _ = await began(agent, gatekeeper)
+            await agent.call("call_skill", steps=key, name="go_to", arguments={"location": "kitchen"})
+            await agent.fails("call_skill", steps=key, name="go_to", arguments={"location": spelling})
+            ended = await agent.call("follow_mission")
+            assert (ended["state"], ended["reason"]) == ("stopped", "stopped by rule vault")
+
+    with gatekeeper.console:
+        use(gatekeeper, act)
+
+
+@pytest.mark.slow
+def test_a_program_that_a_person_put_in_place_of_the_steps_runs_instead(tmp_path: Path) -> None:
+    gatekeeper = gatekeeper_at(tmp_path, speed=1.0)
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("begin_steps", purpose="look around")
+        gatekeeper.console.edit(FAR)
+        await until(gatekeeper, lambda view: view.may_be_approved)
+        approve(gatekeeper)
+        await until(gatekeeper, lambda view: view.progress.is_driving)
+        assert "not running" in await agent.fails("call_skill", steps=proposed["steps"], name="get_all_rooms")
+        assert 'drives to "kitchen"' in (await agent.call("stop"))["events"]
+
+    with gatekeeper.console:
+        use(gatekeeper, act)

@@ -1,0 +1,426 @@
+"""Agents over standard input and output, and over HTTP, in real processes."""
+
+from __future__ import annotations
+
+import asyncio
+import http.client
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote_plus
+
+import httpx2
+import pytest
+from mcp import Client, StdioServerParameters
+from mcp.client.session import ClientRequestContext
+from mcp.client.streamable_http import streamable_http_client
+from mcp_types import ElicitRequestParams, ElicitResult
+
+from codebotler.cli.mcp import serve_agents
+from codebotler.core.errors import UserError
+from codebotler.missions.store import read_missions
+from codebotler.web.access import Access, Role
+from pageserver import WORLD, PageServer
+
+HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
+FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('hall')\n"
+SERVE = ("codebotler", "mcp", "--http", "--world", "world.yaml")
+SOON = 60.0
+
+
+async def call(client: Client, tool: str, **arguments: Any) -> Any:  # noqa: ANN401 - any tool's result
+    result = await client.call_tool(tool, arguments)
+    assert not result.is_error, result.content
+    return result.structured_content
+
+
+# --- over HTTP, beside the page
+
+
+class AgentServer(PageServer):
+    """`codebotler mcp --http`."""
+
+    @property
+    def agent_token(self) -> str:
+        ends = time.monotonic() + SOON
+        while (found := re.search(r"Authorization: Bearer (\S+)\n", self.said)) is None:
+            assert time.monotonic() < ends, self.said
+            time.sleep(0.02)
+        return found[1]
+
+    @asynccontextmanager
+    async def client(self, mode: str = "auto") -> AsyncIterator[Client]:
+        headers = {"authorization": f"Bearer {self.agent_token}"}
+        async with (
+            httpx2.AsyncClient(headers=headers, timeout=SOON) as http_client,
+            Client(
+                streamable_http_client(f"http://127.0.0.1:{self.port}/mcp", http_client=http_client),
+                mode=mode,
+            ) as client,
+        ):
+            yield client
+
+    def approve(self) -> None:
+        """Approve the current program, as the page does."""
+        digest = self.call("GET", "/api/missions/current").data["digest"]
+        answer = self.call("POST", "/api/missions/current/approve", {"program": digest})
+        assert answer.status == 200, answer.text
+
+    def until(self, state: str) -> None:
+        ends = time.monotonic() + SOON
+        while (now := self.call("GET", "/api/robot").data["state"]) != state:
+            assert time.monotonic() < ends, now
+            time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AgentServer]:
+    with AgentServer(tmp_path_factory.mktemp("http"), "--speed", "3", serve=SERVE) as made:
+        yield made
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["auto", "legacy"])
+def test_all_tools_work_over_http(server: AgentServer, mode: str) -> None:
+    async def main() -> None:
+        async with asyncio.timeout(SOON), server.client(mode=mode) as client:
+            robot = await call(client, "read_robot")
+            assert robot["rooms"] == ["hall", "kitchen", "study"]
+            assert (await call(client, "check_program", program=HELLO))["accepted"]
+            proposed = await call(client, "propose_mission", instruction="hello", program=HELLO)
+            assert f"http://localhost:{server.port}/" in proposed["next"]
+            assert server.token not in json.dumps(proposed)
+            said: list[str | None] = []
+
+            async def hear(progress: float, total: float | None, message: str | None) -> None:  # noqa: ARG001 - as the SDK calls it
+                said.append(message)
+
+            arguments = {"digest": proposed["digest"]}
+            running = asyncio.create_task(client.call_tool("run_mission", arguments, progress_callback=hear))
+            await asyncio.sleep(0.2)
+            await asyncio.to_thread(server.approve)
+            done = (await running).structured_content
+            assert done is not None
+            assert (done["state"], done["mission"]) == ("done", proposed["mission"])
+            assert 'drives to "kitchen"' in said
+            stepwise = await call(client, "begin_steps", purpose="look", skills=["go_to"])
+            starting = asyncio.create_task(call(client, "run_mission", digest=stepwise["digest"]))
+            await asyncio.to_thread(server.approve)
+            assert (await starting)["state"] == "running"
+            moved = await call(
+                client, "call_skill", steps=stepwise["steps"], name="go_to", arguments={"location": "study"}
+            )
+            assert moved["error"] == ""
+            assert (await call(client, "end_steps", steps=stepwise["steps"]))["state"] == "done"
+            assert (await call(client, "follow_mission", seconds=0))["is_over"]
+            assert (await call(client, "stop"))["is_over"]
+            log = await client.read_resource(f"codebotler://missions/{proposed['mission']}/log")
+            assert "hello" in getattr(log.contents[0], "text", "")
+
+    asyncio.run(main())
+
+
+@pytest.mark.slow
+def test_a_second_client_stops_what_the_first_runs(server: AgentServer) -> None:
+    async def main() -> None:
+        async with asyncio.timeout(SOON), server.client() as first, server.client() as second:
+            proposed = await call(first, "propose_mission", program=FAR)
+            running = asyncio.create_task(call(first, "run_mission", digest=proposed["digest"]))
+            await asyncio.to_thread(server.approve)
+            await asyncio.to_thread(server.until, "running")
+            assert (await call(second, "stop"))["state"] == "stopped"
+            assert (await running)["state"] == "stopped"
+
+    asyncio.run(main())
+
+
+def test_an_agents_token_opens_nothing_but_its_own_path(server: AgentServer) -> None:
+    with_token = {"authorization": f"Bearer {server.agent_token}"}
+    assert server.agent_token not in {server.token, unquote_plus(server.token)}
+    for method, path in (
+        *(("GET", path) for path in ("/", "/api/robot", "/missions", "/api/missions", "/mcp/", "/mcp/x")),
+        *(("POST", path) for path in ("/api/missions", "/api/missions/current/approve", "/api/stop")),
+    ):
+        assert server.ask(method, path, {} if method == "POST" else None, **with_token).status == 403, path
+    opened = server.ask("GET", f"/?token={server.agent_token}")
+    cookie = opened.headers.get("set-cookie", "").partition(";")[0]
+    assert server.ask("GET", "/api/robot", cookie=cookie).status == 403
+    assert server.ask("GET", "/api/robot", cookie=server.cookie).status == 200
+
+
+@pytest.mark.parametrize("token", ["", "Bearer wrong", "Bearer", "Basic wrong"])
+def test_a_wrong_token_is_refused(server: AgentServer, token: str) -> None:
+    headers = {"authorization": token} if token else {}
+    accept = "application/json, text/event-stream"
+    assert server.ask("POST", "/mcp", INITIALIZE, accept=accept, **headers).status == 401
+
+
+def test_pages_of_other_sites_and_other_hosts_are_refused(server: AgentServer) -> None:
+    headers = {
+        "authorization": f"Bearer {server.agent_token}",
+        "accept": "application/json, text/event-stream",
+    }
+    assert server.ask("POST", "/mcp", INITIALIZE, **headers, origin="http://evil.example").status == 403
+    assert server.ask("POST", "/mcp", INITIALIZE, **headers, host="evil.example").status == 421
+    assert server.ask("POST", "/mcp", INITIALIZE, **headers).status == 200
+
+
+INITIALIZE = {
+    "jsonrpc": "2.0",
+    "id": 1,
+    "method": "initialize",
+    "params": {
+        "protocolVersion": "2025-06-18",
+        "capabilities": {},
+        "clientInfo": {"name": "plain", "version": "1"},
+    },
+}
+"""What clients of last year's protocol send first."""
+
+
+class PlainClient:
+    """A client without the SDK, which speaks last year's protocol over HTTP."""
+
+    def __init__(self, server: AgentServer) -> None:
+        self._server, self._number, self._session = server, 1, ""
+        self.name = self.send(INITIALIZE)["serverInfo"]["name"]
+        self.send({"jsonrpc": "2.0", "method": "notifications/initialized"})
+
+    def send(self, message: dict[str, Any]) -> Any:  # noqa: ANN401 - any result
+        connection = http.client.HTTPConnection("127.0.0.1", self._server.port, timeout=SOON)
+        headers = {
+            "authorization": f"Bearer {self._server.agent_token}",
+            "content-type": "application/json",
+            "accept": "application/json, text/event-stream",
+            **({"mcp-session-id": self._session} if self._session else {}),
+        }
+        connection.request("POST", "/mcp", json.dumps(message), headers)
+        answer = connection.getresponse()
+        text = answer.read().decode()
+        self._session = answer.headers.get("mcp-session-id", self._session)
+        connection.close()
+        if "id" not in message:
+            assert answer.status == 202, text
+            return None
+        answers = [json.loads(line[6:]) for line in text.splitlines() if line.startswith("data: {")]
+        return next(one["result"] for one in answers if one.get("id") == message["id"])
+
+    def call(self, tool: str, **arguments: Any) -> Any:  # noqa: ANN401 - any tool's result
+        self._number += 1
+        params = {"name": tool, "arguments": arguments}
+        result = self.send({"jsonrpc": "2.0", "id": self._number, "method": "tools/call", "params": params})
+        assert not result.get("isError"), result
+        return result["structuredContent"]
+
+
+@pytest.mark.slow
+def test_a_client_without_the_sdk_drives_a_mission(server: AgentServer) -> None:
+    client = PlainClient(server)
+    assert client.name == "codebotler"
+    assert client.call("read_robot")["robot"] == "simulated"
+    proposed = client.call("propose_mission", program=HELLO)
+    assert client.call("run_mission", digest=proposed["digest"], seconds=0.1)["state"] == "checked"
+    server.approve()
+    assert client.call("run_mission", digest=proposed["digest"], seconds=50)["state"] == "done"
+    assert client.call("stop")["state"] == "done"
+
+
+# --- over standard input and output
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "codebotler", "mcp", "--world", "world.yaml", "--port", "0", *arguments]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "world.yaml").write_text(WORLD)
+    return tmp_path
+
+
+def variables(folder: Path) -> dict[str, str]:
+    return {**os.environ, "CODEBOTLER_HOME": str(folder / "home")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("mode", "page"), [("auto", "--page"), ("legacy", "--no-page")])
+def test_all_tools_work_over_stdio(folder: Path, mode: str, page: str) -> None:
+    program, *arguments = command("--speed", "0", page)
+    started = StdioServerParameters(command=program, args=arguments, env=variables(folder), cwd=folder)
+    questions: list[str] = []
+
+    async def accept(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+        questions.append(params.message)
+        return ElicitResult(action="accept", content={"approve": True})
+
+    async def main() -> None:
+        async with (
+            asyncio.timeout(SOON),
+            Client(started, elicitation_callback=accept, mode=mode) as client,
+        ):
+            assert len((await client.list_tools()).tools) == 10
+            assert (await call(client, "read_robot"))["rooms"] == ["hall", "kitchen", "study"]
+            assert (await call(client, "check_program", program=HELLO))["accepted"]
+            proposed = await call(client, "propose_mission", instruction="hello", program=HELLO)
+            assert ("http://localhost:" in proposed["next"]) == (page == "--page")
+            done = await call(client, "run_mission", digest=proposed["digest"])
+            assert (done["state"], len(questions)) == ("done", 1)
+            stepwise = await call(client, "begin_steps", purpose="look")
+            await call(client, "run_mission", digest=stepwise["digest"])
+            key = stepwise["steps"]
+            assert (await call(client, "call_skill", steps=key, name="get_all_rooms"))["result"]
+            assert (await call(client, "end_steps", steps=key))["state"] == "done"
+            assert (await call(client, "stop"))["is_over"]
+            assert (await call(client, "follow_mission"))["state"] == "done"
+
+    asyncio.run(main())
+    assert [summary.state for summary in read_missions(folder / "home")] == ["done", "done"]
+
+
+def lines(*messages: dict[str, Any]) -> bytes:
+    return b"".join(json.dumps(message).encode() + b"\n" for message in messages)
+
+
+def tool(number: int, name: str, **arguments: Any) -> dict[str, Any]:  # noqa: ANN401 - any arguments
+    params = {"name": name, "arguments": arguments}
+    return {"jsonrpc": "2.0", "id": number, "method": "tools/call", "params": params}
+
+
+NOISY = """
+import os
+from codebotler import Simulation, skill
+print("noise at the import")
+os.system("echo noise of a child")
+
+@skill
+def wave(sim: Simulation) -> None:
+    \"\"\"Wave.\"\"\"
+    print("noise of a skill")
+"""
+BEGUN = lines(INITIALIZE, {"jsonrpc": "2.0", "method": "notifications/initialized"})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["--page", "--no-page"])
+def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path, page: str) -> None:
+    (folder / "skills.py").write_text(NOISY)
+    with subprocess.Popen(
+        command(page, "--skills", "skills.py", "--speed", "0"),
+        cwd=folder,
+        env=variables(folder),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as running:
+        assert running.stdin is not None
+        assert running.stdout is not None
+        program = "def task_program():\n    print('noise')\n    wave()\n"
+        running.stdin.write(BEGUN + b"not json\n" + lines(tool(2, "check_program", program=program)))
+        running.stdin.write(lines(tool(3, "propose_mission", program=program), tool(4, "no_such_tool")))
+        running.stdin.flush()
+        answers: dict[object, Any] = {}
+        while {1, 2, 3, 4} - {*answers}:
+            message = json.loads(running.stdout.readline())
+            assert message["jsonrpc"] == "2.0"
+            answers[message.get("id")] = message
+        assert answers[3]["result"]["structuredContent"]["state"] == "checked"
+        rest, said = running.communicate(timeout=SOON)
+        assert (rest, running.returncode) == (b"", 0)
+        assert (b"?token=" in said) == (page == "--page")
+    (summary,) = read_missions(folder / "home")
+    assert summary.state == "stopped"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["--page", "--no-page"])
+@pytest.mark.parametrize("ending", ["signal", "closed input"])
+def test_a_running_robot_stops_with_the_server(folder: Path, page: str, ending: str) -> None:
+    with subprocess.Popen(
+        command(page),
+        cwd=folder,
+        env=variables(folder),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    ) as running:
+        assert running.stdin is not None
+        assert running.stdout is not None
+        asking = {**INITIALIZE, "params": {**INITIALIZE["params"], "capabilities": {"elicitation": {}}}}  # type: ignore[dict-item]  # a dictionary
+        running.stdin.write(lines(asking, {"jsonrpc": "2.0", "method": "notifications/initialized"}))
+        running.stdin.write(lines(tool(2, "propose_mission", program=FAR)))
+        running.stdin.flush()
+        while (message := json.loads(running.stdout.readline())).get("id") != 2:
+            pass
+        digest = message["result"]["structuredContent"]["digest"]
+        running.stdin.write(lines(tool(3, "run_mission", digest=digest)))
+        running.stdin.flush()
+        while (message := json.loads(running.stdout.readline())).get("method") != "elicitation/create":
+            pass
+        result = {"action": "accept", "content": {"approve": True}}
+        running.stdin.write(lines({"jsonrpc": "2.0", "id": message["id"], "result": result}))
+        running.stdin.flush()
+        wait_for_drive(folder)
+        if ending == "signal":
+            running.send_signal(signal.SIGTERM)
+            running.wait(SOON)
+        running.stdin.close()
+        running.stdout.read()
+        running.wait(SOON)
+    (summary,) = read_missions(folder / "home")
+    assert summary.state == "stopped"
+
+
+def wait_for_drive(folder: Path) -> None:
+    """Wait until the robot drives."""
+    ends = time.monotonic() + SOON
+    while '"go_to"' not in "".join(path.read_text() for path in folder.glob("home/missions/*/events.jsonl")):
+        assert time.monotonic() < ends
+        time.sleep(0.02)
+
+
+@pytest.mark.slow
+def test_a_person_who_starts_it_is_told_what_it_needs(folder: Path) -> None:
+    ended = subprocess.run(
+        command(),
+        cwd=folder,
+        env=variables(folder),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        check=False,
+    )
+    assert (ended.returncode, ended.stdout) == (2, b"")
+    assert b"--http" in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("options", "advice"),
+    [
+        ({"http": True, "page": False}, "--no-page"),
+        ({"page": False, "ask_client": False}, "nobody could approve"),
+        ({"agent_token": "0123456789abcdef"}, "--http"),
+    ],
+)
+def test_options_that_contradict_each_other_are_refused(options: dict[str, Any], advice: str) -> None:
+    with pytest.raises(UserError, match=advice):
+        serve_agents(**options)
+
+
+def test_an_agents_token_is_long_and_differs_from_the_others() -> None:
+    access = Access("operator's own token")
+    for wrong in ("short", "operator's own token", access.face):
+        with pytest.raises(UserError, match="token"):
+            access.with_agents(wrong)
+    made = access.with_agents(None)
+    assert made.agent is not None
+    assert made.of_token(made.agent, "") is Role.AGENT
+    assert access.of_token(made.agent, "") is None
