@@ -8,6 +8,7 @@ from functools import cache, partial
 from typing import TypeAlias
 
 from codebotler.checking.problems import CheckResult, Sample
+from codebotler.checking.proof import extend_check
 from codebotler.checking.rooms import add_visited_rooms, room_map_for
 from codebotler.checking.sampled import (
     DEFAULT_SAMPLES,
@@ -47,6 +48,7 @@ def check(
     pool: WorkerPool | None = None,
     room_map: RoomMap | None = None,
     house_rules: Sequence[Rule] = (),
+    explores: bool = False,
 ) -> CheckResult:
     """Find the problems of a program by static analysis and by runs in sampled worlds.
 
@@ -62,6 +64,8 @@ def check(
         pool: the pool that runs the programs; without `workers`, it defaults to the pool of this process.
         room_map: a map that replaces `rooms` and `start` if more is known about the rooms.
         house_rules: the rules that the program must keep in every world.
+        explores: whether to explore all worlds that the program can tell apart, up to a budget, for its
+            contract and for a proof of each rule.
 
     Raises:
         UserError: a room's name is not a regular expression, the start is not a room, or the number of
@@ -76,8 +80,12 @@ def check(
         if samples > WORLDS_PER_WORKER and not opened.is_here:
             known = room_map or room_map_for(program, skills=skills)
             run = _runner_on_pool(opened, program, settings)
-            return _run_check(program, known, settings, run, WORLDS_PER_WORKER * opened.workers)
-        return opened.call(lambda: check_on(opened.here(), program, room_map, settings))
+            found = _run_check(program, known, settings, run, WORLDS_PER_WORKER * opened.workers)
+        else:
+            found = opened.call(lambda: check_on(opened.here(), program, room_map, settings))
+        if not explores:
+            return found
+        return opened.call(lambda: extend_check(opened.here(), program, found, settings))
 
 
 @contextmanager

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal, TypeAlias
 
+from codebotler.checking.contract_file import contract_data
+from codebotler.core.errors import VIOLATION
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, outcome_data
 from codebotler.core.words import brief, counted, listed
+from codebotler.simulator.contract import Contract
 from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.sampled_facts import SampledFact
@@ -36,11 +39,53 @@ class Problem:
     samples: tuple[int, ...] = ()
 
     @property
+    def rule(self) -> str:
+        """The name of the house rule that the program breaks, or an empty string."""
+        return self.message.split('"')[1] if self.kind == VIOLATION else ""
+
+    @property
     def sentence(self) -> str:
         """The problem in one sentence, for a person or a model."""
         line = "" if self.line is None else f"line {self.line}: "
         where = f", where {self.where}" if self.where else ""
         return f"{line}{self.kind}: {self.message}{where}"
+
+
+RuleVerdict: TypeAlias = Literal["never", "possible", "unknown"]
+
+
+@dataclass(frozen=True)
+class RuleProof:
+    """What an exploration shows about a house rule.
+
+    Args:
+        rule: its name.
+        verdict: whether no world of these rooms lets the program break it, or a possible one does; unknown if
+            there are more worlds than were explored.
+        cases: the number of explored worlds.
+        sample: the number of the world in which the program breaks it; None if there is none.
+    """
+
+    rule: str
+    verdict: RuleVerdict
+    cases: int
+    sample: int | None = None
+
+    @property
+    def words(self) -> str:
+        """The proof in words, without the rule."""
+        worlds = counted(self.cases, "world")
+        if self.verdict == "never":
+            return f"cannot be broken, whatever the program meets ({worlds})"
+        if self.verdict == "possible":
+            return "can be broken"
+        return f"was kept in {worlds}, but there are more"
+
+    @property
+    def sentence(self) -> str:
+        """The proof in words."""
+        world = "" if self.sample is None else f", as in imagined world {self.sample}"
+        return f'the rule "{self.rule}" {self.words}{world}'
 
 
 @dataclass(frozen=True)
@@ -79,6 +124,8 @@ class CheckResult:
         room_map: the rooms of all worlds.
         seed: the seed of the worlds.
         strict: whether all facts were random.
+        proofs: what is proved of each house rule; empty unless all worlds were explored.
+        contract: what the program may do at most; None unless all worlds were explored.
     """
 
     problems: tuple[Problem, ...]
@@ -86,6 +133,8 @@ class CheckResult:
     room_map: RoomMap
     seed: int = 0
     strict: bool = False
+    proofs: tuple[RuleProof, ...] = ()
+    contract: Contract | None = None
 
     def __repr__(self) -> str:
         return (
@@ -134,6 +183,8 @@ class CheckResult:
             "rooms_are_guessed": self.rooms_are_guessed,
             "seed": self.seed,
             "strict": self.strict,
+            "contract": None if self.contract is None else contract_data(self.contract, skills),
+            "proofs": [asdict(proof) for proof in self.proofs],
             "samples": [
                 {
                     "sample": sample.number,

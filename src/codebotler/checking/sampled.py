@@ -53,7 +53,7 @@ class SampledRuns:
     ) -> None:
         self.program, self.room_map = program, room_map
         self.samplers, self.settings = samplers, settings
-        self._robots: dict[int, SampledRobot] = {}
+        self.robots: dict[int, SampledRobot] = {}
         self.job: Job = program, [partial(self._new_robot, number) for number in range(len(samplers))]
 
     def samples_on(self, worker: Worker, known: Mapping[int, Outcome]) -> list[Sample]:
@@ -66,17 +66,20 @@ class SampledRuns:
                 continue
             else:
                 outcome = worker.run_alone(self.program, partial(self._new_robot, number))
-            robot = self._robots[number]
+            robot = self.robots[number]
             facts, draws = tuple(robot.facts), tuple(robot.draws)
             ran.append(Sample(sampler.sample, outcome, facts, draws, _is_in_vain(outcome, robot)))
         return ran
 
+    def new_guard(self) -> RuleGuard | None:
+        """Return a guard for one run, or None if it needs none."""
+        rules = self.settings.house_rules
+        return RuleGuard(rules, self.room_map.plan) if rules else None
+
     def _new_robot(self, number: int) -> SampledRobot:
-        how = self.settings
-        guard = RuleGuard(how.house_rules, self.room_map.plan) if how.house_rules else None
-        sampler = self.samplers[number]
+        how, sampler, guard = self.settings, self.samplers[number], self.new_guard()
         robot = SampledRobot(self.room_map, sampler, how.simulation, how.skills, guard=guard)
-        self._robots[number] = robot
+        self.robots[number] = robot
         return robot
 
 

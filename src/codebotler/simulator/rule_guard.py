@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from copy import copy
@@ -11,9 +12,11 @@ from codebotler.core.errors import RobotError
 from codebotler.core.labels import PLAIN_LABEL
 from codebotler.core.skills.kinds import GOTO, INSIDE, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, attempted_event
 from codebotler.core.world import Point, Room, rooms_along
 from codebotler.rtl import Inconclusive, Monitor
+from codebotler.simulator.contract import Contract, RequestedCall, contract_violation, is_goal
 from codebotler.simulator.entities import Thing
 from codebotler.simulator.house_rule import NON_TEXT_OPTION, Objection, Rule, RuleViolationError
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
@@ -25,6 +28,19 @@ def name_of(label: str, request: str) -> str:
     """Return the name of a room or thing for rules: its label, or the request if the label is a regex."""
     is_name = PLAIN_LABEL.fullmatch(label) or not request or label.casefold() in request.casefold()
     return label if is_name else request
+
+
+def rooms_meant(robot: SimulatedRobot, request: str) -> list[str]:
+    """Return the names for rules of all rooms that a request for a drive may refer to."""
+    return [name_of(robot.full_names.get(room, room), request) for room in robot.possible_rooms(request)]
+
+
+def goals_meant(robot: SimulatedRobot, row: Skill, arguments: Sequence[Argument]) -> list[str]:
+    """Return the names for rules of the rooms that the goal of a call may mean; none if it is no drive."""
+    goals = (
+        one for parameter, one in zip(row.parameters, arguments, strict=True) if is_goal(row, parameter.name)
+    )
+    return [room for goal in goals for room in rooms_meant(robot, str(goal))]
 
 
 @dataclass
@@ -49,10 +65,14 @@ class RuleGuard:
     Args:
         rules: the rules in force.
         rooms: the known rooms and their footprints.
+        contract: the bound of what the program may do, or None for no bound.
     """
 
-    def __init__(self, rules: Sequence[Rule], rooms: Sequence[Room] = ()) -> None:
-        self.rules, self._rooms = tuple(rules), rooms
+    def __init__(
+        self, rules: Sequence[Rule], rooms: Sequence[Room] = (), contract: Contract | None = None
+    ) -> None:
+        self.rules, self._rooms, self.contract = tuple(rules), rooms, contract
+        self._calls: Counter[str] = Counter()  # by skill
         self._stops = {room.full_name: room.stand_at for room in rooms}
         self._around = {
             name: room.within for room in rooms if room.within for name in (room.name, room.full_name)
@@ -72,6 +92,7 @@ class RuleGuard:
         row, start = robot.skills[skill], len(robot.events)
         holding = "" if robot.held is None else self._history.holding or robot.held
         place = self._history.names.get(robot.place, robot.place)
+        self.judge_call(row, arguments, goals_meant(robot, row, arguments), place)
         attempt = attempted_event(row, arguments, place=place, time=robot.now, holding=holding)
         if attempt is not None:
             attempts = _attempts(robot, attempt, arguments, is_drive=row.is_drive)
@@ -82,6 +103,7 @@ class RuleGuard:
         try:
             result = self._execute(robot, skill, arguments)
         except RobotError:
+            self.uncount_call(row)
             events = robot.events[start:]
             is_tried = row.recording is not None and row.recording.judged_when_tried
             if attempt is not None and is_tried and all(event.kind != attempt.kind for event in events):
@@ -122,9 +144,34 @@ class RuleGuard:
             self._prevented = self._prevented or broken
             raise
 
+    def judge_call(self, row: Skill, arguments: Sequence[Argument], goals: Sequence[str], place: str) -> None:
+        """Count the next call, or raise RuleViolationError if the contract does not allow it.
+
+        Args:
+            row: the skill.
+            arguments: its arguments.
+            goals: the rooms that the goal of a drive may mean, as rules name them.
+            place: the robot's room, or "" if it is unknown.
+        """
+        if self.contract is None:
+            return
+        call = RequestedCall.of(row, arguments, goals, place)
+        if why := self.contract.objection(call, self._calls[row.name]):
+            raise contract_violation(row, arguments, place, why)
+        self._calls[row.name] += 1
+
+    def uncount_call(self, row: Skill) -> None:
+        """Count the last call of a skill no longer, because it failed, and the program may try again."""
+        self._calls[row.name] -= 1
+
     def judge(self, *attempts: Event, is_drive: bool = False) -> None:
         """Raise RuleViolationError if any of the possible next events, perhaps drives, would break a rule."""
-        caught: RuleViolationError | None = None
+        found = list(self.find_violations(attempts, is_drive=is_drive))
+        if found:
+            raise min(found, key=lambda broken: not broken.ends_run)  # another rule may end the run
+
+    def find_violations(self, attempts: Sequence[Event], *, is_drive: bool) -> Iterator[RuleViolationError]:
+        """Yield an error for each rule, and possible next event, perhaps a drive, that would break it."""
         attempts = tuple(map(_trimmed, attempts))
         leaves = is_drive and any(map(self._leaves, attempts[1:] or attempts))
         for rule, monitor in self._history.monitors:
@@ -134,11 +181,8 @@ class RuleGuard:
                     broken = _violation(rule, monitor, attempt)
                 else:
                     broken = None if self._is_kept(rule, monitor) else RuleViolationError(rule, attempt)
-                if broken is not None and broken.ends_run:
-                    raise broken
-                caught = caught or broken  # continue, since another rule may end the run
-        if caught is not None:
-            raise caught
+                if broken is not None:
+                    yield broken
 
     def _leaves(self, drive: Event) -> bool:
         """Return whether a drive ends outside the room where it begins."""
@@ -147,11 +191,16 @@ class RuleGuard:
 
     def happened(self, event: Event) -> None:
         """Add an event to the history. Raise RuleViolationError if its result broke a rule."""
+        if broken := self.add_event(event):
+            raise broken[0]
+
+    def add_event(self, event: Event) -> list[RuleViolationError]:
+        """Add an event to the history, and return an error for each rule that its result broke."""
         if event.destination is not None:
             self._history.names[event.destination] = event.text
         elif event.kind in KINDS_OF_MOVES:
             self._history.holding = event.text if event.kind == PICK else ""
-        late: RuleViolationError | None = None
+        late = []
         event = _trimmed(event)
         for rule, monitor in self._history.monitors:
             if event.kind == INSIDE and not rule.inside:  # must not count as the last event for other rules
@@ -161,10 +210,9 @@ class RuleGuard:
             except Inconclusive:
                 self._history.unjudged.add(rule.name)
                 holds = False
-            if not holds and rule.when == "always" and late is None:
-                late = RuleViolationError(rule, event, "is broken by")
-        if late is not None:
-            raise late
+            if not holds and rule.when == "always":
+                late.append(RuleViolationError(rule, event, "is broken by"))
+        return late
 
     def moved(self, start: Point, end: Point, holding: str) -> None:
         """Add a straight drive between two poses. Raise RuleViolationError if it broke a rule."""
@@ -180,10 +228,13 @@ class RuleGuard:
 
     def at_end(self) -> RuleViolationError | None:
         """Return an error for the first rule that is broken if the mission ends now, or None."""
+        return next(self.find_unkept(), None)
+
+    def find_unkept(self) -> Iterator[RuleViolationError]:
+        """Yield an error for each rule that is broken if the mission ends now."""
         for rule, monitor in self._history.monitors:
             if rule.when != "always" and not self._is_kept(rule, monitor):
-                return RuleViolationError(rule, None)
-        return None
+                yield RuleViolationError(rule, None)
 
     def _is_kept(self, rule: Rule, monitor: Monitor) -> bool:
         return monitor.holds and rule.name not in self._history.unjudged
@@ -254,8 +305,7 @@ def _attempts(
     names: list[str] = []
     for request in dict.fromkeys((attempt.text, *(each for each in arguments if isinstance(each, str)))):
         if is_drive:
-            rooms = robot.possible_rooms(request)
-            names += [name_of(robot.full_names.get(room, room), request) for room in rooms]
+            names += rooms_meant(robot, request)
         else:
             names += _names_of_thing(robot, attempt.kind, request)
     for name in dict.fromkeys(names):

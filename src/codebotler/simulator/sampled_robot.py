@@ -102,6 +102,7 @@ class SampledRobot(SimulatedRobot):
         self.draws: list[Draw] = []
         self.searches: defaultdict[str, RoomSearch] = defaultdict(RoomSearch)
         self.excuses: set[str] = set()  # messages of excused errors
+        self.has_assumed = False  # whether a fact holds that strict worlds would draw
 
     @property
     def idle_skills(self) -> frozenset[str]:
@@ -151,6 +152,7 @@ class SampledRobot(SimulatedRobot):
         if is_random:
             is_there = self.sampler.is_there(self.room, name)
             self.draws.append(Draw("is_there", (self.room, name), is_there))
+        self.has_assumed |= not is_random
         self.facts.append(Whereabouts(name, self.room, is_there, is_random))
         if not is_there:
             self.here.missed.add(name)
@@ -313,6 +315,7 @@ class SampledRobot(SimulatedRobot):
 
     def _lies_there(self, name: str) -> bool:
         if name in self.here.gone:  # there may have been several of the same kind
+            self.has_assumed |= not self.sampler.strict
             return not self.sampler.strict
         return self.settle(name, is_random=self.sampler.strict)
 

@@ -399,6 +399,8 @@ def test_data_is_what_json_can_hold(checks: Checks) -> None:
         "rooms_are_guessed",
         "seed",
         "strict",
+        "contract",
+        "proofs",
         "samples",
     ]
     assert not data["accepted"]

@@ -1,0 +1,114 @@
+"""Read and write contracts as YAML."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict
+
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.text_template import TextTemplate
+from codebotler.core.world_file import YamlText
+from codebotler.core.yaml_files import YamlFile
+from codebotler.simulator.contract import Contract, SkillBound, Templates, has_place
+
+ANY, AT_MOST, IN = "any", "at most", "in"
+WIDTH = 110  # characters of a line
+
+
+class ContractFile(BaseModel):
+    """A file with a contract."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    version: Literal[1]
+    skills: Mapping[str, Mapping[str, int | Literal["any"] | list[YamlText]]]
+
+
+def read_contract(path: Path, skills: SkillTable = SKILLS) -> Contract:
+    """Read a contract.
+
+    Args:
+        path: the file.
+        skills: the skills that it may name.
+
+    Raises:
+        UserError: the file is not valid; the message gives the line and the fix.
+    """
+    return _contract_in(YamlFile.read(path), skills)
+
+
+def contract_from(data: Mapping[str, Any], skills: SkillTable) -> Contract:
+    """Convert the bounds of skills, as in a file, to a contract. Raise UserError if they are not valid."""
+    return _contract_in(YamlFile(json.dumps({"version": 1, "skills": data}), "the contract"), skills)
+
+
+def _contract_in(file: YamlFile, skills: SkillTable) -> Contract:
+    content = file.validate(ContractFile)
+    bounds = {}
+    for name, given in content.skills.items():
+        if name not in skills:
+            raise file.wrong(
+                f'there is no skill "{name}"; the skills are: {", ".join(skills)}', "skills", name
+            )
+        bounds[name] = _read_bound(file, skills[name], given)
+    return Contract(bounds)
+
+
+def _read_bound(file: YamlFile, row: Skill, given: Mapping[str, Any]) -> SkillBound:
+    names = [parameter.name for parameter in row.parameters]
+    known = [*names, AT_MOST, *([IN] if has_place(row) else [])]
+    for key, value in given.items():
+        where = "skills", row.name, key
+        if key not in known:
+            raise file.wrong(f'{row.name} has no "{key}"; write {", ".join(known)}', *where)
+        if isinstance(value, int) is not (key == AT_MOST) or value == 0:
+            must = "a whole number above 0" if key == AT_MOST else "any, or a list of texts"
+            raise file.wrong(f'"{key}" must be {must}', *where)
+    missing = [name for name in known if name not in given and name != AT_MOST]
+    if missing:
+        sentence = f'{row.name} lacks "{missing[0]}"; write a list of texts, or any'
+        raise file.wrong(sentence, "skills", row.name)
+    texts = tuple((name, _templates(file, row, name, given[name])) for name in names)
+    places = None if IN not in given or given[IN] == ANY else tuple(given[IN])
+    return SkillBound(texts, places, given.get(AT_MOST))
+
+
+def _templates(file: YamlFile, row: Skill, name: str, given: str | list[str]) -> Templates | None:
+    if isinstance(given, str):
+        return None
+    found = []
+    for number, text in enumerate(given):
+        try:
+            found.append(TextTemplate.parse(text))
+        except ValueError as error:
+            raise file.wrong(str(error), "skills", row.name, name, number) from None
+    return tuple(found)
+
+
+def contract_data(contract: Contract, skills: SkillTable = SKILLS) -> dict[str, Any]:
+    """Return a contract as plain data, for YAML and JSON."""
+    return {
+        "version": 1,
+        "skills": {name: _bound_data(skills[name], bound) for name, bound in contract.skills.items()},
+    }
+
+
+def _bound_data(row: Skill, bound: SkillBound) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        name: ANY if templates is None else [*map(str, templates)] for name, templates in bound.texts
+    }
+    if has_place(row):
+        data[IN] = ANY if bound.places is None else [*bound.places]
+    return data if bound.at_most is None else data | {AT_MOST: bound.at_most}
+
+
+def contract_yaml(contract: Contract, skills: SkillTable = SKILLS) -> str:
+    """Write a contract as YAML."""
+    data = contract_data(contract, skills)
+    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=WIDTH)

@@ -1,0 +1,94 @@
+"""Describe contracts in words: a sentence or two for people, and a row per skill for tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+from codebotler.core.phrases import verb
+from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE, SAY
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.words import brief, counted, listed
+from codebotler.simulator.contract import Contract, SkillBound, is_goal
+
+NEVER = {
+    GOTO: "drives nowhere",
+    PICK: "picks up nothing",
+    PLACE: "puts down nothing",
+    ASK: "asks nobody",
+    SAY: "says nothing",
+}
+"""What a program never does whose contract lacks the skill that records such events."""
+
+ANYBODY = "anybody"  # a question to "" is for whoever is there
+MAX_VALUES, MAX_LONG_TEXTS = 6, 3  # shown names, and shown texts with spaces
+
+
+@dataclass(frozen=True)
+class ContractRow:
+    """What a program may do with one skill, in words.
+
+    Args:
+        what: the verb of the skill, such as `pick up`.
+        texts: the allowed texts of its arguments.
+        places: the rooms in which it may happen, or an empty string for all.
+        at_most: how often it may happen, such as `at most 3 times`, or an empty string.
+    """
+
+    what: str
+    texts: str
+    places: str
+    at_most: str
+
+
+def contract_rows(
+    contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief
+) -> Iterator[ContractRow]:
+    """Yield a row for each skill of a contract, except for those that only tell rooms."""
+    for name in sorted(contract.skills, key=lambda name: not skills[name].is_drive):
+        row, bound = skills[name], contract.skills[name]
+        if row.recording is None and row.is_idle:
+            continue
+        what = name if row.recording is None else verb(row.recording.kind).base
+        places = "" if not bound.places else f"in {_any_of(map(show, bound.places), MAX_VALUES)}"
+        often = "" if not bound.at_most else f"at most {counted(bound.at_most, 'time')}"
+        yield ContractRow(what, _texts_of(row, bound, show), places, often)
+
+
+def contract_sentence(contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief) -> str:
+    """Say in a sentence or two what a program may do at most, and what it never does."""
+    may = contract_clauses(contract, skills, show)
+    known = {row.recording.kind: row.name for row in skills.rows if row.recording is not None}
+    never = [what for kind, what in NEVER.items() if known.get(kind, "") not in {"", *contract.skills}]
+    parts = [f"It may {'; '.join(may)}" if may else "", f"It {listed(never)}" if never else ""]
+    return " ".join(f"{part}." for part in parts if part)
+
+
+def contract_clauses(contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief) -> list[str]:
+    """Say of each skill what a program may do with it, such as `go to "kitchen" or "lab"`."""
+    rows = contract_rows(contract, skills, show)
+    rows = contract_rows(contract, skills, show)
+    return [" ".join(filter(None, (row.what, row.texts, row.places))) for row in rows]
+
+
+def _texts_of(row: Skill, bound: SkillBound, show: Callable[[str], str]) -> str:
+    words = []
+    for (name, templates), parameter in zip(bound.texts, row.parameters, strict=True):
+        if templates is None or any(one.is_any for one in templates):
+            words.append("any room" if is_goal(row, name) else f"any {name.replace('_', ' ')}")
+        elif templates:
+            texts = [show("…".join(one.parts)) for one in templates]
+            most = (
+                MAX_LONG_TEXTS
+                if any(" " in text for text in texts) and not is_goal(row, name)
+                else MAX_VALUES
+            )
+            any_of = _any_of((f'"{text}"' if text else ANYBODY for text in texts), most)
+            words.append(f"with {any_of}" if parameter.is_options else any_of)
+    return " ".join(words)
+
+
+def _any_of(texts: Iterable[str], most: int) -> str:
+    shown = list(texts)
+    more = len(shown) - most
+    return listed([*shown[:most], *([f"{more:,} more"] if more > 0 else [])], "or")

@@ -1,0 +1,195 @@
+"""Explore the worlds that a program can tell apart, with one run for each combination of facts."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from codebotler.checking.problems import Sample
+from codebotler.checking.sampled import CheckSettings, SampledRuns
+from codebotler.core.errors import RobotError
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill
+from codebotler.core.trace import Event, Status
+from codebotler.simulator.contract import RequestedCall
+from codebotler.simulator.fact_sampler import Draw, FactSampler
+from codebotler.simulator.house_rule import Rule, RuleViolationError
+from codebotler.simulator.robot import Argument
+from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.rule_guard import RuleGuard
+from codebotler.simulator.worker import Worker
+
+MAX_RUNS, MAX_LONE_RUNS = 2_000, 100
+"""The budget of an exploration: all its runs, and those that need a process of their own."""
+
+RUNS_AT_ONCE = 32
+MAX_FAILURES = 30  # runs in which the robot fails once
+CATCHES_ERRORS = re.compile(r"\b(?:except|suppress)\b")
+
+
+@dataclass(frozen=True)
+class Exploration:
+    """What a program does in the worlds that it can tell apart.
+
+    Args:
+        cases: the number of these worlds that were explored.
+        calls: the different skill calls in all of them.
+        most_calls: the highest number of calls of each skill in a run; empty if a run is endless.
+        violations: for each rule that is broken, the first world in which it is.
+        is_complete: whether no other world of these rooms can let the program do anything else.
+    """
+
+    cases: int
+    calls: frozenset[RequestedCall]
+    most_calls: Mapping[str, int]
+    violations: Mapping[str, FactSampler]
+    is_complete: bool
+
+
+class ExploringGuard(RuleGuard):
+    """A guard that prevents nothing, but keeps each call, and which rules are broken.
+
+    Args:
+        rules: the house rules.
+        room_map: the rooms.
+        fails_at: the call, from 0, in which the robot fails; None if it never does.
+    """
+
+    def __init__(self, rules: Sequence[Rule], room_map: RoomMap, fails_at: int | None = None) -> None:
+        super().__init__(rules, room_map.plan)
+        self.may_refuse = fails_at is not None
+        self.fails_at = fails_at
+        self.calls: list[RequestedCall] = []
+        self.violations: set[str] = set()  # names of rules
+
+    def judge_call(self, row: Skill, arguments: Sequence[Argument], goals: Sequence[str], place: str) -> None:
+        """Keep the next call, or raise RobotError if the robot fails in it."""
+        self.calls.append(RequestedCall.of(row, arguments, goals, place))
+        if len(self.calls) - 1 == self.fails_at:
+            raise RobotError("SkillFailed", f"the robot failed in {row.name}")
+
+    def judge(self, *attempts: Event, is_drive: bool = False) -> None:
+        """Keep the rules that any of the possible next events would break."""
+        self._keep(self.find_violations(attempts, is_drive=is_drive))
+
+    def happened(self, event: Event) -> None:
+        """Add an event to the history, and keep the rules that its result broke."""
+        self._keep(self.add_event(event))
+
+    def at_end(self) -> None:
+        """Keep the rules that are broken if the mission ends now."""
+        self._keep(self.find_unkept())
+
+    def _keep(self, found: Iterable[RuleViolationError]) -> None:
+        self.violations |= {broken.rule.name for broken in found}
+
+
+def explore(worker: Worker, program: str, room_map: RoomMap, settings: CheckSettings) -> Exploration:
+    """Run a program in all worlds that it can tell apart, or in as many of them as the budget allows.
+
+    If it takes facts for granted, there are two kinds of worlds: where these hold, as in a check, and where
+    each may be false. If it catches errors, the robot also fails once in each call of a run.
+    """
+    calls: set[RequestedCall] = set()
+    most: Counter[str] = Counter()
+    violations: dict[str, FactSampler] = {}
+    cases, is_complete, is_endless = 0, True, False
+    for strict in (False, True):
+        tree = _Tree(worker, program, room_map, replace(settings, strict=strict))
+        for sample, guard in tree.runs():
+            calls.update(guard.calls)
+            most |= Counter(call.skill for call in guard.calls)
+            is_endless |= sample.outcome.status is Status.TIMEOUT
+            for name in guard.violations:
+                violations.setdefault(name, FactSampler(settings.seed, strict=strict, forced=sample.draws))
+            cases += 1
+        is_complete &= tree.is_complete
+        if not tree.has_assumed:
+            break
+    for guard in _failing_runs(worker, program, room_map, settings):
+        calls.update(guard.calls)
+        most |= Counter(call.skill for call in guard.calls)
+    refused = (rule for rule in settings.house_rules if rule.refuse and rule.name in violations)
+    if any(refused) or any(_is_open(settings.skills[call.skill]) for call in calls):
+        is_complete = False  # a program may do something else after a refusal, or after another result
+    return Exploration(cases, frozenset(calls), {} if is_endless else most, violations, is_complete)
+
+
+class _Tree:
+    """The runs of a program, as a tree that branches at each fact."""
+
+    def __init__(self, worker: Worker, program: str, room_map: RoomMap, settings: CheckSettings) -> None:
+        self._worker, self._program, self._room_map, self._settings = worker, program, room_map, settings
+        self._waiting: list[tuple[Draw, ...]] = [()]  # the facts with which the branches begin
+        self._runs_left, self._lone_runs_left = MAX_RUNS, MAX_LONE_RUNS
+        self.has_assumed = False  # whether a run took facts for granted
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether each branch was run to its end."""
+        return not self._waiting
+
+    def runs(self) -> Iterator[tuple[Sample, ExploringGuard]]:
+        """Run one branch after another, until the budget is spent."""
+        with self._worker.one_child():
+            while self._waiting and min(self._runs_left, self._lone_runs_left) > 0:
+                count = min(RUNS_AT_ONCE, self._runs_left)
+                some, self._waiting = self._waiting[-count:], self._waiting[:-count]
+                yield from self._run_some(some)
+
+    def _run_some(self, some: Sequence[tuple[Draw, ...]]) -> Iterator[tuple[Sample, ExploringGuard]]:
+        seed, strict = self._settings.seed, self._settings.strict
+        samplers = [FactSampler(seed, strict=strict, forced=forced) for forced in some]
+        runs = _ExploringRuns(self._program, self._room_map, samplers, self._settings)
+        known = {run: outcome for (_, run), outcome in self._worker.run_tame([runs.job]).items()}
+        self._runs_left -= len(some)
+        self._lone_runs_left -= len(some) - len(known)
+        for number, (forced, sample) in enumerate(
+            zip(some, runs.samples_on(self._worker, known), strict=True)
+        ):
+            robot = runs.robots[number]
+            assert isinstance(robot.guard, ExploringGuard), "made for these runs"
+            self.has_assumed |= robot.has_assumed
+            self._waiting += _branches(forced, sample.draws)
+            yield sample, robot.guard
+
+
+class _ExploringRuns(SampledRuns):
+    fails_at: int | None = None
+
+    def new_guard(self) -> ExploringGuard:
+        """Return a guard for one run."""
+        return ExploringGuard(self.settings.house_rules, self.room_map, self.fails_at)
+
+
+def _failing_runs(
+    worker: Worker, program: str, room_map: RoomMap, settings: CheckSettings
+) -> Iterator[ExploringGuard]:
+    """Run a program that catches errors once for each of its calls, in which the robot then fails."""
+    runs = _ExploringRuns(program, room_map, [FactSampler(settings.seed)], settings)
+    runs.fails_at = 0
+    while CATCHES_ERRORS.search(program) and runs.fails_at < MAX_FAILURES:
+        runs.samples_on(worker, {})
+        guard = runs.robots[0].guard
+        assert isinstance(guard, ExploringGuard), "made for these runs"
+        yield guard
+        if len(guard.calls) <= runs.fails_at:  # there is no such call
+            return
+        runs.fails_at += 1
+
+
+def _branches(forced: Sequence[Draw], draws: Sequence[Draw]) -> Iterator[tuple[Draw, ...]]:
+    """Yield the facts of the worlds that differ from those of a run in one fact that it met freely."""
+    met = {(draw.method, draw.arguments) for draw in forced}
+    for number, draw in enumerate(draws):
+        if (draw.method, draw.arguments) not in met:
+            met.add((draw.method, draw.arguments))
+            yield from ((*draws[:number], other) for other in draw.alternatives)
+
+
+def _is_open(row: Skill) -> bool:
+    """Return whether a skill may return other values than those that were tried."""
+    is_closed = not row.returns.is_list and (row.returns.base in {None, "bool"} or row.returns.choices)
+    return SKILLS.get(row.name) is not row and not is_closed

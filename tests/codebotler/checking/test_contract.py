@@ -1,0 +1,221 @@
+"""A contract allows all that a program does in any world, and no more than its text and the rooms need."""
+
+import unicodedata
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from codebotler.checking.check import check
+from codebotler.checking.contract_file import contract_yaml, read_contract
+from codebotler.checking.contract_text import contract_sentence
+from codebotler.checking.problems import CheckResult
+from codebotler.checking.proof import hold_within
+from codebotler.core.errors import UserError
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.text_template import TextTemplate
+from codebotler.rtl import parse
+from codebotler.simulator.contract import Contract, RequestedCall, SkillBound
+from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.pool import WorkerPool
+from codebotler.simulator.room_map import RoomMap
+
+ROOMS = RoomMap(("start_loc", "printer room 1", "printer room 2", "café", "lab"), "start_loc", plain=True)
+PRINTERS = """
+def task_program():
+    missing = []
+    for room in get_all_rooms():
+        if "printer" in room:
+            go_to(room)
+            if not is_in_room("stapler"):
+                missing.append(room)
+    go_to("start_loc")
+    say(f"There is no stapler in {', '.join(missing)}")
+"""
+BRING = """
+def task_program():
+    go_to("lab")
+    if ask("Ann", "Coffee?", ["yes", "no"]) == "yes":
+        go_to("café")
+        pick("coffee")
+        go_to("lab")
+        place("coffee")
+"""
+
+
+@pytest.fixture(scope="module")
+def pool() -> Iterator[WorkerPool]:
+    with WorkerPool(1) as started:
+        yield started
+
+
+@pytest.fixture
+def contracts(pool: WorkerPool) -> "Contracts":
+    return Contracts(pool)
+
+
+class Contracts:
+    """Derives contracts of programs."""
+
+    def __init__(self, pool: WorkerPool) -> None:
+        self.pool = pool
+
+    def checked(self, program: str, *rules: Rule) -> CheckResult:
+        return check(program, room_map=ROOMS, pool=self.pool, house_rules=rules, explores=True)
+
+    def __call__(self, program: str) -> Contract:
+        contract = self.checked(program).contract
+        assert contract is not None
+        return contract
+
+
+def allowed(contract: Contract, skill: str) -> dict[str, list[str] | None]:
+    """Return the texts that a contract allows for each argument of a skill."""
+    texts = contract.skills[skill].texts
+    return {name: None if some is None else [*map(str, some)] for name, some in texts}
+
+
+def test_rooms_are_those_that_the_program_may_enter(contracts: Contracts) -> None:
+    contract = contracts(PRINTERS)
+    assert set(allowed(contract, "go_to")["location"] or ()) == {
+        "printer room 1",
+        "printer room 2",
+        "start_loc",
+    }
+    assert allowed(contract, "say") == {"message": ["There is no stapler in {}"]}
+    assert allowed(contract, "is_in_room") == {"entity": ["stapler"]}
+    assert contract.skills["go_to"].at_most == 3
+    assert set(contract.skills) == {"get_all_rooms", "go_to", "is_in_room", "say"}
+
+
+def test_things_are_picked_up_and_put_down_in_known_rooms(contracts: Contracts) -> None:
+    contract = contracts(BRING)
+    assert contract.skills["pick"].places == ("café",)
+    assert contract.skills["place"].places == ("lab",)
+    assert allowed(contract, "ask") == {"person": ["Ann"], "question": ["Coffee?"], "options": ["no", "yes"]}
+
+
+def test_what_cannot_be_bounded_is_anything(contracts: Contracts, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("codebotler.checking.exploration.MAX_RUNS", 1)
+    contract = contracts(PRINTERS)
+    assert allowed(contract, "go_to") == {"location": None}
+    assert allowed(contract, "is_in_room") == {"entity": ["stapler"]}
+    assert contract.skills["go_to"].at_most is None
+    assert "any room" in contract_sentence(contract, SKILLS)
+
+
+def test_texts_that_depend_on_the_clock_are_anything(contracts: Contracts) -> None:
+    contract = contracts("import datetime\ndef task_program():\n    say(str(datetime.datetime.now()))\n")
+    assert allowed(contract, "say") == {"message": None}
+
+
+def test_a_branch_that_only_a_changing_world_reaches_is_allowed(contracts: Contracts) -> None:
+    program = """
+def task_program():
+    if is_in_room("mug") != is_in_room("mug"):
+        go_to("lab")
+"""
+    assert allowed(contracts(program), "go_to") == {"location": ["lab"]}
+
+
+@pytest.mark.parametrize(
+    ("skill", "texts", "place"),
+    [
+        ("go_to", [["lab"], ["Lab"], [" lab "], ["café"], [unicodedata.normalize("NFD", "café")]], ""),
+        ("pick", [["coffee"], ["COFFEE"]], "café"),
+        ("ask", [["Ann"]], ""),
+    ],
+)
+def test_calls_within_the_contract(
+    contracts: Contracts, skill: str, texts: list[list[str]], place: str
+) -> None:
+    contract = contracts(BRING)
+    rest = (("Coffee?",), ("yes", "no")) if skill == "ask" else ()
+    for text in texts:
+        assert not contract.objection(RequestedCall(skill, (tuple(text), *rest), place))
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        RequestedCall("go_to", (("printer room 1",),)),
+        RequestedCall("go_to", (("lab", "printer room 1"),)),
+        RequestedCall("pick", (("coffee",),), "lab"),
+        RequestedCall("pick", (("coffee",),), ""),
+        RequestedCall("pick", (("coffee cup",),), "café"),
+        RequestedCall("say", (("hello",),)),
+        RequestedCall("ask", (("Bob",), ("Coffee?",), ("yes", "no"))),
+        RequestedCall("ask", (("Ann",), ("Tea?",), ("yes", "no"))),
+        RequestedCall("ask", (("Ann",), ("Coffee?",), ("yes", "never"))),
+        RequestedCall("open_door", ((),)),
+    ],
+)
+def test_calls_outside_the_contract(contracts: Contracts, call: RequestedCall) -> None:
+    assert contracts(BRING).objection(call)
+
+
+def test_calls_are_counted(contracts: Contracts) -> None:
+    contract, call = contracts(BRING), RequestedCall("pick", (("coffee",),), "café")
+    assert not contract.objection(call, 0)
+    assert contract.objection(call, 1)
+
+
+def test_what_a_changed_program_may_do_beyond_the_approved_one(contracts: Contracts) -> None:
+    before, after = contracts(BRING), contracts(BRING.replace('place("coffee")', 'say("Here you are")'))
+    assert not before.beyond(before).skills
+    assert set(after.beyond(before).skills) == {"say"}
+    assert set(before.beyond(after).skills) == {"place"}
+    wider = contracts(BRING.replace('["yes", "no"]', '["yes", "no", "later"]')).beyond(before)
+    assert allowed(wider, "ask") == {"person": [], "question": [], "options": ["later"]}
+
+
+def test_a_contract_is_read_as_it_was_written(contracts: Contracts, tmp_path: Path) -> None:
+    (file := tmp_path / "contract.yaml").write_text(contract_yaml(contracts(BRING)))
+    assert read_contract(file) == contracts(BRING)
+    hard = Contract({"say": SkillBound((("message", (TextTemplate(("{a}: ", " %")),)),))})
+    file.write_text(contract_yaml(hard))
+    assert read_contract(file) == hard
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("version: 2\nskills: {}", 1),
+        ("version: 1\nskills:\n  fly: {}", 3),
+        ("version: 1\nskills:\n  say: {text: any}", 3),
+        ("version: 1\nskills:\n  say: {}", 3),
+        ("version: 1\nskills:\n  say:\n    message: ['{x}']", 4),
+        ("version: 1\nskills:\n  say:\n    message: any\n    at most: 0", 5),
+        ("version: 1\nskills:\n  say:\n    message: all", 4),
+        ("version: 1\nskills:\n  pick: {obj: any}", 3),
+    ],
+)
+def test_a_wrong_file_is_refused_with_its_line(tmp_path: Path, text: str, line: int) -> None:
+    (file := tmp_path / "contract.yaml").write_text(text)
+    with pytest.raises(UserError) as error:
+        read_contract(file)
+    assert error.value.line == line
+
+
+def test_a_program_beyond_a_contract_has_a_problem(contracts: Contracts) -> None:
+    found = contracts.checked(BRING)
+    assert not hold_within(found, contracts(BRING), SKILLS).problems
+    problems = hold_within(found, contracts(PRINTERS), SKILLS).problems
+    assert {problem.kind for problem in problems} == {"OutsideContract"}
+
+
+def test_rules_are_proved_or_broken_in_a_world_that_is_shown(contracts: Contracts) -> None:
+    rules = [
+        Rule(name, name, parse(f'not tr.Exists(goto("{room}"))'))
+        for name, room in (("cafe", "café"), ("printer", "printer room 1"))
+    ]
+    found = contracts.checked(BRING, *rules)
+    assert [proof.verdict for proof in found.proofs] == ["possible", "never"]
+    number = found.proofs[0].sample
+    assert number is not None
+    assert found.samples[number].outcome.error is not None
+    assert [problem.rule for problem in found.problems] == ["cafe"]
+
+
+def test_a_program_that_does_not_compile_has_no_contract(contracts: Contracts) -> None:
+    assert contracts.checked("def task_program(:").contract is None

@@ -1,0 +1,85 @@
+"""What the text of a program gives to its skills, without running it."""
+
+import pytest
+
+from codebotler.checking.written_arguments import WrittenArguments, read_arguments
+from codebotler.core.skills.paper import SKILLS
+
+
+def read(*lines: str) -> WrittenArguments:
+    return read_arguments("def task_program():\n    " + "\n    ".join(lines) + "\n", SKILLS)
+
+
+def said(*lines: str) -> tuple[set[str], bool]:
+    """Return the texts of `say`, and whether there are no others."""
+    found = read(*lines).skills["say"]["message"]
+    return set(map(str, found.templates)), found.is_bounded
+
+
+@pytest.mark.parametrize(
+    ("lines", "texts"),
+    [
+        (["say('a')", "say(message='b')"], {"a", "b"}),
+        (["x = 'a'", "x = 'b'", "say(x)"], {"a", "b"}),
+        (["say('a' if is_in_room('x') else 'b')"], {"a", "b"}),
+        (["say(f'{len([])} mugs')"], {"{} mugs"}),
+        (["for n in ('1', '2'):", "    say('room ' + n)"], {"room 1", "room 2"}),
+        (["say('There is none in ' + ', '.join([]))"], {"There is none in {}"}),
+        (["x = 'a'", "x += 'b'", "say(x)"], {"a", "{}b"}),
+        (["def f(a, b='z'):", "    say(a + b)", "f('x')"], {"xz"}),
+        (["def f():", "    return 'x'", "say(f())"], {"x"}),
+        (["a, b = 'x', 'y'", "say(b)"], {"y"}),
+        (["say((x := 'a').strip())"], {"a"}),
+    ],
+)
+def test_known_texts(lines: list[str], texts: set[str]) -> None:
+    assert said(*lines) == (texts, True)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["say(get_current_location())"],
+        ["for room in get_all_rooms():", "    say(room)"],
+        ["with open('x') as f:", "    say(f)"],
+        ["say(*['a'])"],
+        ["say(**{'message': 'a'})"],
+        ["talk = say", "talk('a')"],
+        ["list(map(say, ['a']))"],
+        ["def f(a):", "    say(a)", "g = f", "g('a')"],
+        ["exec('say(1)')", "say('a')"],
+        ["x = 'a'", "for _ in range(3):", "    x = x + x", "say(x)"],
+    ],
+)
+def test_texts_that_may_be_anything(lines: list[str]) -> None:
+    assert not said(*lines)[1]
+
+
+def test_lists_of_options_are_read() -> None:
+    found = read("ask('Ann', 'Tea?', ['yes', 'no'])").skills["ask"]["options"]
+    assert (set(map(str, found.templates)), found.is_bounded) == ({"yes", "no"}, True)
+
+
+def test_a_name_that_the_program_binds_is_no_skill() -> None:
+    assert "say" not in read("def say(x):", "    pass", "say('a')").skills
+
+
+@pytest.mark.parametrize(
+    ("line", "reads"),
+    [
+        ("time.sleep(3)", False),
+        ("say('datetime')", False),
+        ("x = time.time()", True),
+        ("import datetime; datetime.datetime.now()", True),
+        ("from random import choice; choice([1])", True),
+        ("from time import sleep; sleep(1)", False),
+        ("from time import time; time()", True),
+    ],
+)
+def test_clocks_and_random_numbers(line: str, *, reads: bool) -> None:
+    assert read(line).reads_clock is reads
+
+
+def test_a_text_that_cannot_be_parsed_tells_nothing() -> None:
+    found = read_arguments("(" * 5_000 + ")" * 5_000, SKILLS)
+    assert not any(one.is_bounded for texts in found.skills.values() for one in texts.values())
