@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from playwright.sync_api import Page, expect
+from playwright.sync_api import expect
 
 from pageserver import PageServer
-from viewing import PHONE, OpenPage
+from viewing import PHONE, OpenPage, write
 
 RULES = """
 rules:
@@ -28,14 +28,6 @@ SLY = """def task_program():
         except BaseException:
             say("again")
 """
-
-
-def write(page: Page, program: str) -> None:
-    """Type a program in the place of what is there."""
-    expect(page.locator("[data-started] .cm-content")).to_be_visible()
-    page.locator(".cm-content").click()
-    page.keyboard.press("Control+a")
-    page.keyboard.insert_text(program)
 
 
 def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path, opened: OpenPage) -> None:

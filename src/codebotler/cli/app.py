@@ -88,6 +88,13 @@ def check(
         ),
     ] = False,
     shows_all: options.AllOption = False,
+    contract: Annotated[
+        bool, typer.Option("--contract", help="Show what the program may do at most, in any world.")
+    ] = False,
+    save_contract: Annotated[
+        Path | None, typer.Option(help="Write the contract to a file, for --within.", metavar="FILE")
+    ] = None,
+    within: options.WithinOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
     workers: Annotated[int, typer.Option(min=1, help="The number of programs to run in parallel.")] = 1,
     rules: options.RulesOption = None,
@@ -98,7 +105,9 @@ def check(
     The check runs the program in imagined worlds. The exit status is 1 if there are problems.
     """
     from codebotler.checking import check
+    from codebotler.checking.proof import hold_within
     from codebotler.cli.check import check_view, read_program
+    from codebotler.cli.contract import contract_view, write_contract
     from codebotler.cli.rules import rules_for
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
@@ -111,6 +120,7 @@ def check(
     house_rules = rules_for(known, rules, table)
     source = read_program(program)
     room_map = None if known is None else (RoomMap.of_places if world is None else RoomMap.of)(known)
+    allowed = options.read_within(within, table)
     with busy("checking"):
         found = check.check(
             source,
@@ -121,12 +131,19 @@ def check(
             workers=workers,
             skills=table,
             house_rules=house_rules,
+            explores=contract or bool(house_rules) or save_contract is not None or within is not None,
         )
+    if allowed is not None:
+        found = hold_within(found, allowed, table)
+    if save_contract is not None:
+        write_contract(save_contract, found.contract, table)
     if json:
         print_json(found.data(table))
     else:
         name = "the program" if program == "-" else program
         print_rich(check_view(found, source, name, shows_all=shows_all))
+        if contract and found.contract is not None:
+            print_rich(contract_view(found.contract, table))
     raise typer.Exit(1 if found.problems else 0)
 
 

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from codebotler.checking.problems import CheckResult, Problem, Sample
 from codebotler.checking.storyboard import steps_of, storyboard
+from codebotler.cli.contract import proof_lines
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_FILE_BYTES, decode_text, read_text
 from codebotler.core.terminal import shortened, visible
@@ -45,7 +46,7 @@ def check_view(found: CheckResult, program: str, name: str, *, shows_all: bool =
     lines = program.rstrip("\n").split("\n")
     for problem in found.problems:
         parts += [Text(), *_problem(problem, lines)]
-    parts += [Text(), _rooms(found), *_vain_searches(found)]
+    parts += [Text(), _rooms(found), *_vain_searches(found), *proof_lines(found)]
     kinds = _distinct_samples(found)
     for sample in kinds if shows_all else kinds[:1]:
         parts += [Text(), *_sample(sample)]

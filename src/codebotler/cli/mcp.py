@@ -57,19 +57,19 @@ def serve_agents(
     asks = not http if ask_client is None else ask_client
     if http and not page:
         raise UserError("--http uses the page's port; leave out --no-page")
-    if not page and not asks:
-        raise UserError("nobody could approve a mission; leave out --no-page or --page-only")
+    if not page and not asks and shared.get("within") is None:
+        raise UserError("nobody could approve a mission; leave out --no-page or --page-only, or add --within")
     if agent_token is not None and not http:
         raise UserError("--agent-token is for --http; leave it out")
     streams = None if http else server.take_streams()
-    kind, settings, rules = options.robot_settings(**options_for(options.robot_settings, shared))
+    kind, settings, rules, within = options.robot_settings(**options_for(options.robot_settings, shared))
     options.note_office(kind, shared["world"])
     default = choose_model().name
     models = tuple(model or dict.fromkeys((default, "recorded:careful", "recorded:hasty")))
     opened = make_opener(models, base_url, model_settings(**options_for(model_settings, shared)))
     body = open_robot(kind, settings)
     tell_missing(body)
-    console = Console(body, home(), opened, models=models, world=settings.world, rules=rules)
+    console = Console(body, home(), opened, models=models, world=settings.world, rules=rules, within=within)
     writes = bool(model) or not is_recorded(default)
     gatekeeper = Gatekeeper(console, asks_client=asks, writes=writes)
     agents = server.make_server(gatekeeper)

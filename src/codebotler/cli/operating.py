@@ -42,8 +42,8 @@ def run(
     from codebotler.robots.open import open_robot
 
     chosen = choose_model(model, base_url)
-    kind, settings, rules = options.robot_settings(**options_for(options.robot_settings, shared))
-    request = Request(program, chosen.name, yes, despite_problems, shows_all, rules)
+    kind, settings, rules, allowed = options.robot_settings(**options_for(options.robot_settings, shared))
+    request = Request(program, chosen.name, yes, despite_problems, shows_all, rules, allowed)
     asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
     options.note_office(kind, shared["world"])
     body = open_robot(kind, settings)
@@ -174,7 +174,7 @@ def serve_page(
     from codebotler.web.proxy import proxies_in_front
     from codebotler.web.server import serve
 
-    kind, settings, rules = options.robot_settings(**options_for(options.robot_settings, shared))
+    kind, settings, rules, allowed = options.robot_settings(**options_for(options.robot_settings, shared))
     place = PageAddress(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
     access = Access.from_options(token, face_token, open_to_all=no_token, is_private=place.is_private)
     options.note_office(kind, shared["world"])
@@ -183,7 +183,9 @@ def serve_page(
     shown = Face(face_timeout) if face else None
     body = open_robot(kind, settings) if shown is None else open_with_face(kind, settings, shown)
     tell_missing(body)
-    console = Console(body, home(), opened, models=models, world=settings.world, face=shown, rules=rules)
+    console = Console(
+        body, home(), opened, models=models, world=settings.world, face=shown, rules=rules, within=allowed
+    )
     serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
 
 

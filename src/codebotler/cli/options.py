@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from codebotler.core.world import World
     from codebotler.robots.base import Options
     from codebotler.robots.ros.connection import Connection
+    from codebotler.simulator.contract import Contract
     from codebotler.simulator.house_rule import Rule
 
 
@@ -48,6 +49,10 @@ WorldOption = Annotated[Path | None, typer.Option(help="The world file that defi
 RulesOption = Annotated[
     Path | None,
     typer.Option(envvar="CODEBOTLER_RULES", help="A file of house rules for all programs.", metavar="FILE"),
+]
+WithinOption = Annotated[
+    Path | None,
+    typer.Option(help="A contract: the file that says what a program may do at most.", metavar="FILE"),
 ]
 SkillsOption = Annotated[
     list[Path] | None,
@@ -124,11 +129,12 @@ NoTokenOption = Annotated[
 
 
 class RobotSettings(NamedTuple):
-    """The robot and the house rules that the options of a command describe."""
+    """The robot, the house rules and the contract that the options of a command describe."""
 
     kind: str
     options: Options
     rules: tuple[Rule, ...]
+    within: Contract | None
 
 
 def robot_settings(
@@ -140,6 +146,7 @@ def robot_settings(
     address: AddressOption = "",
     ros_python: RosPythonOption = DEFAULT_ROS_PYTHON,
     rules: RulesOption = None,
+    within: WithinOption = None,
     skills: SkillsOption = None,
 ) -> RobotSettings:
     """Read the files that the options name, or raise UserError if a file is invalid."""
@@ -153,7 +160,7 @@ def robot_settings(
     rooms = [] if known is None else [room.name for room in known.rooms]
     house_rules = () if rules is None else read_rules(rules, table, rooms)
     opened = Options(known, speed or None, address, ros_python, table, connection)
-    return RobotSettings(kind, opened, house_rules)
+    return RobotSettings(kind, opened, house_rules, read_within(within, table))
 
 
 def read_connect_option(
@@ -181,6 +188,13 @@ def read_world(
         return None if connection.places is None else connection.places.world()
     file = OFFICE if file is None and robot == "sim" else file
     return None if file is None else world_file.read_world(file, skills)
+
+
+def read_within(file: Path | None, skills: SkillTable) -> Contract | None:
+    """Read the contract that programs must stay within, or return None without a file."""
+    from codebotler.checking.contract_file import read_contract
+
+    return None if file is None else read_contract(file, skills)
 
 
 def note_office(robot: str, file: Path | None) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from codebotler.checking.check import check
 from codebotler.checking.problems import CheckResult
 from codebotler.cli.check import check_view, read_program
+from codebotler.cli.contract import contract_view
 from codebotler.cli.generate import note_programless
 from codebotler.cli.views import EventPrinter, ending_view, source_view
 from codebotler.core.errors import UserError
@@ -26,6 +27,7 @@ from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.base import Model
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
 from codebotler.robots.base import Robot
+from codebotler.simulator.contract import Contract
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.room_map import RoomMap
 
@@ -55,6 +57,7 @@ class Request:
     despite_problems: bool = False  # whether to run the program even if the check finds problems
     shows_all: bool = False  # whether to show all different outcomes in imagined worlds, not just one
     rules: tuple[Rule, ...] = ()  # the house rules
+    within: Contract | None = None  # what the program may do at most
 
     def __post_init__(self) -> None:
         if not self.what.strip():
@@ -98,7 +101,14 @@ def run(
     order = MissionOrder(program=program) if program else MissionOrder(request.what, request.model)
     checked = checker(robot.skills)
     session = MissionSession(
-        robot, home, order, open_model=open_model, check=checked, rules=request.rules, world=world
+        robot,
+        home,
+        order,
+        open_model=open_model,
+        check=checked,
+        rules=request.rules,
+        world=world,
+        within=request.within,
     )
     session.start()
     try:
@@ -126,7 +136,7 @@ def checker(skills: SkillTable) -> Callable[[str, RoomMap | None, tuple[Rule, ..
     """Return a function that checks programs for a robot with the given skills."""
 
     def checked(program: str, room_map: RoomMap | None, rules: tuple[Rule, ...]) -> CheckResult:
-        return check(program, room_map=room_map, house_rules=rules, skills=skills)
+        return check(program, room_map=room_map, house_rules=rules, skills=skills, explores=True)
 
     return checked
 
@@ -160,6 +170,8 @@ def _show_check(view: SessionView, request: Request) -> None:
 def _is_approved(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> bool:
     """Show the result of the check, and return whether the user approves the program."""
     _show_check(view, request)
+    if view.contract is not None:
+        print_rich(contract_view(view.contract, robot.skills))
     if view.problems and not (request.despite_problems and view.can_run):
         session.reject(f"the check found {'a problem' if len(view.problems) == 1 else 'problems'}")
         anyway = "; --despite-problems runs it anyway" if view.can_run else ""

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import chain
 from typing import TypeAlias
 
 from codebotler.checking.room_names import ROOM_SKILL
@@ -20,6 +21,7 @@ from codebotler.missions.progress import POSITION_FEEDBACK
 from codebotler.missions.stop import StopButton
 from codebotler.robots import base
 from codebotler.robots.base import CameraPicture, CancelledError, RobotLostError
+from codebotler.simulator.contract import has_place, is_goal
 from codebotler.simulator.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, RuleViolationError
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.room_map import RoomMap
@@ -114,14 +116,14 @@ class LiveRobot:
         if is_drive:  # rules must judge exactly the text that the robot receives
             arguments = [one.strip() if isinstance(one, str) else one for one in arguments]
         event = attempted_event(row, arguments, place=self._place, time=self.now, holding=self._held)
+        self._judge_call(row, arguments)
         room = "" if event is None else self._judge(event, is_drive=is_drive)
         if event and row.recording and row.recording.when_tried:
             self._events.append(event)
         try:
             result = self._perform_logged(row, [_plain_argument(argument) for argument in arguments], event)
         except RobotError:
-            if event and row.recording and row.recording.judged_when_tried:
-                self._report(event, room, is_drive=is_drive, failed=True)
+            self._report_failure(row, event, room)
             raise
         if event is None or row.recording is None:
             return result
@@ -142,6 +144,18 @@ class LiveRobot:
 
     # --- rules
 
+    def _judge_call(self, row: Skill, arguments: Sequence[Argument]) -> None:
+        """Raise an error if the contract does not allow a call."""
+        guard = self._guard
+        if guard is None or guard.contract is None:
+            return
+        if self._room is None and has_place(row):
+            self._room = self._ask_room()
+        given = zip(row.parameters, arguments, strict=True)
+        goals = (self._rooms_meant(str(one)) for parameter, one in given if is_goal(row, parameter.name))
+        with self._enforcing():
+            guard.judge_call(row, arguments, [*chain.from_iterable(goals)], self._room or "")
+
     def _judge(self, event: Event, *, is_drive: bool) -> str:
         """Return the robot's room, or raise an error if a rule forbids an event that is about to happen."""
         guard = self._guard
@@ -160,6 +174,13 @@ class LiveRobot:
         with self._enforcing():
             guard.judge(*(replace(event, text=text, place=room) for text in texts), is_drive=is_drive)
         return room
+
+    def _report_failure(self, row: Skill, event: Event | None, room: str) -> None:
+        """Report a failed call to the guard."""
+        if self._guard is not None:
+            self._guard.uncount_call(row)
+        if event and row.recording and row.recording.judged_when_tried:
+            self._report(event, room, is_drive=row.is_drive, failed=True)
 
     def _report(self, event: Event, room: str, *, is_drive: bool, failed: bool = False) -> None:
         """Report an executed event to the guard, because its result may break a rule."""

@@ -24,6 +24,7 @@ from codebotler.missions.stop import StopButton
 from codebotler.missions.wording import stop_text
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
+from codebotler.simulator.contract import Contract
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import RuleGuard
@@ -189,6 +190,7 @@ class Mission:
         *,
         rules: Sequence[Rule] = (),
         room_map: RoomMap | None = None,
+        contract: Contract | None = None,
         drive: Driver | None = None,
     ) -> MissionState:
         """Run the program on a robot, and return the final state: done, failed or stopped.
@@ -200,6 +202,7 @@ class Mission:
             place: the robot's current room, or "" if unknown.
             rules: the house rules. Breaking one of them stops the mission.
             room_map: the rooms that the robot knows.
+            contract: what the program may do. A call that it does not allow stops the mission.
             drive: calls the skills in place of the program.
 
         Raises:
@@ -207,7 +210,8 @@ class Mission:
             NotReadyError: the reservation is in use or has been used before.
             OSError: an event could not be logged or printed, so the robot was stopped.
         """
-        guard = RuleGuard(rules, () if room_map is None else room_map.plan) if rules else None
+        plan = () if room_map is None else room_map.plan
+        guard = RuleGuard(rules, plan, contract) if rules or contract is not None else None
         live = LiveRobot(
             reserved.robot, self._write, place=place, guard=guard, room_map=room_map, button=self.stop_button
         )

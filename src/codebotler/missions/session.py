@@ -16,6 +16,7 @@ from pathlib import Path
 
 from codebotler.checking.evasions import find_evasions
 from codebotler.checking.problems import CheckResult
+from codebotler.checking.proof import hold_within
 from codebotler.checking.rule_rooms import expect_rooms
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
@@ -37,6 +38,7 @@ from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import UnknownInstructionError
 from codebotler.robots.base import CancelledError, NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
+from codebotler.simulator.contract import Contract
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.worker import EngineError
@@ -50,6 +52,7 @@ class MissionSession:
 
     `check` takes a program, the robot's rooms and the rules in force. `changed` is called whenever the view
     changes, and must return at once. `before` is a session that must end first. `world` is the map, if any.
+    `within` is what every program may do, if a person has said so.
     """
 
     def __init__(
@@ -65,12 +68,14 @@ class MissionSession:
         number: int = 1,
         before: MissionSession | None = None,
         world: World | None = None,
+        within: Contract | None = None,
     ) -> None:
         self._robot, self._home, self._order = robot, home, order
         self._check, self._changed, self._before, self._world = check, changed, before, world
         self._author = ModelAuthor(open_model, order.model)
         self._stop_button = StopButton()
         self._lock = threading.Condition()  # held briefly, never while calling the mission
+        self._checked: Contract | None = None  # of the last checked program
         self._editing = threading.Lock()  # held while the program is replaced or approved
         self._view = SessionView(
             number,
@@ -80,6 +85,7 @@ class MissionSession:
             author=order.author,
             busy="waiting",
             rules=rules,
+            within=within,
             is_over=False,
         )
         self._events: list[LogLine] = []
@@ -250,8 +256,10 @@ class MissionSession:
         with suppress(MissionError, CancelledError):  # the mission was stopped before it could run
             if keep_out is not None:
                 keep_out(rules)
+            view = self._view
             drive = self._order.drive if mission.summary.program == self._order.program else None
-            mission.run(reserved, place, rules=rules, room_map=room_map, drive=drive)
+            contract = view.contract if drive else view.within or view.contract
+            mission.run(reserved, place, rules=rules, room_map=room_map, contract=contract, drive=drive)
 
     @property
     def _is_stopped(self) -> bool:
@@ -302,10 +310,15 @@ class MissionSession:
         try:
             mission.draft(program, view.author)
             check = self._check(program, view.room_map, view.rules_in_force)
+            if self._order.drive is not None and program == self._order.program:
+                check = replace(check, contract=self._order.contract, proofs=(), samples=())
+            if view.within is not None:
+                check = hold_within(check, view.within, self._robot.skills)
             missing = tuple(missing_skills(program, self._robot))
             known = None if check.problems else view.room_map
             unknown = tuple(unknown_rooms(program, known, self._robot.skills)) if known else ()
             found = {"check": check, "missing_skills": missing, "unknown_rooms": unknown, "busy": ""}
+            found["earlier"], self._checked = self._checked, check.contract
             mission.check(replace(view, **found).problems)  # type: ignore[arg-type]  # values of its fields
         except MissionError:
             if not mission.has_ended:

@@ -13,6 +13,7 @@ from codebotler.missions.log import MissionState
 from codebotler.missions.mission import Driver
 from codebotler.missions.progress import Progress
 from codebotler.prompts import clean_instruction
+from codebotler.simulator.contract import Contract
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.room_map import RoomMap
 
@@ -33,6 +34,7 @@ class MissionOrder:
     program: str = ""
     author: str = ""  # the model or the agent that wrote the program, if any
     drive: Driver | None = None  # controls the robot in place of exactly this program
+    contract: Contract | None = None  # what `drive` may do at most
 
     def __post_init__(self) -> None:
         if not self.has_program:
@@ -70,6 +72,8 @@ class SessionView:
     remarks: tuple[str, ...] = ()  # sentences about likely mistakes in the robot's setup
     rules: tuple[Rule, ...] = ()
     disabled_rules: tuple[str, ...] = ()  # the names of rules switched off for this program
+    within: Contract | None = None  # what every program of the session may do
+    earlier: Contract | None = None  # the contract of the session's last checked program but this one
     progress: Progress = field(default_factory=Progress)
     is_over: bool = True
 
@@ -78,6 +82,11 @@ class SessionView:
         """Sentences about problems in the program."""
         found = () if self.check is None else self.check.problems
         return (*(problem.sentence for problem in found), *self.missing_skills)
+
+    @property
+    def contract(self) -> Contract | None:
+        """What the program may do at most; None if it was not checked."""
+        return None if self.check is None else self.check.contract
 
     @property
     def rules_in_force(self) -> tuple[Rule, ...]:

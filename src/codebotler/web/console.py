@@ -23,6 +23,7 @@ from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
+from codebotler.simulator.contract import Contract
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.room_map import RoomMap
@@ -50,9 +51,10 @@ class Console:
         world: World | None = None,
         face: Face | None = None,
         rules: tuple[Rule, ...] = (),
+        within: Contract | None = None,
     ) -> None:
         self.robot, self.home, self.models, self.world = robot, home, tuple(models), world
-        self.notifier, self.face, self.rules = Notifier(), face, rules
+        self.notifier, self.face, self.rules, self.within = Notifier(), face, rules, within
         if face is not None:
             face.changed = self.notifier.change
         self.interrupted: tuple[MissionSummary, ...] = ()
@@ -108,6 +110,7 @@ class Console:
                 number=before.view.number + 1 if before else 1,
                 before=before,
                 world=self.world,
+                within=self.within,
             )
         if before is not None:
             before.stop_soon("another instruction")
@@ -149,7 +152,14 @@ class Console:
             if self._pool is None:
                 self._pool = self._held.enter_context(WorkerPool(1))
             table = self.robot.skills
-            return check(program, room_map=room_map, pool=self._pool, house_rules=rules, skills=table)
+            return check(
+                program,
+                room_map=room_map,
+                pool=self._pool,
+                house_rules=rules,
+                skills=table,
+                explores=True,
+            )
 
 
 class Notifier:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 DESK, TABLET, PHONE = (1440, 900), (768, 1024), (390, 844)
 """Width and height of screens, in pixels."""
@@ -48,3 +48,11 @@ def expect_no_grave_fault(page: Page) -> None:
     found = Axe().run(page, options=ONLY_FAULTS).response["violations"]
     grave = [fault for fault in found if fault["impact"] in GRAVE]
     assert [(fault["id"], [node["html"] for node in fault["nodes"]]) for fault in grave] == []
+
+
+def write(page: Page, program: str) -> None:
+    """Type a program in the place of what is there."""
+    expect(page.locator("[data-started] .cm-content")).to_be_visible()
+    page.locator(".cm-content").click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text(program)

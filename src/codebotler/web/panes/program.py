@@ -21,6 +21,7 @@ from codebotler.missions.view import SessionView
 from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.frame import Button, PlainText, script, scroll_up, warn
+from codebotler.web.panes.contract import ContractPane
 from codebotler.web.panes.reply import ReplyPane
 from codebotler.web.panes.rules import RulesPane
 from codebotler.web.storyboard import RouteProgress, draw_strips
@@ -51,6 +52,7 @@ class ProgramPane:
             self._editor.on("update:value", js_handler="() => programEditor.typed()")
             self._verdict = PlainText("p", "", "verdict").props("role=status")
             self._problems = ui.element("ul").classes("problems")
+            self._contract = ContractPane(console.robot.skills)
             self._rules = RulesPane(console)
             self._instruction = PlainText("p", "")
             self._approval = ui.element("div").classes("word")
@@ -74,6 +76,7 @@ class ProgramPane:
         self._writer.say(_author_text(view) if view.program and not view.is_written else "")
         self._show_verdict(view)
         self._instruction.say(_instruction_text(view) if view.program else "")
+        self._contract.show(view)
         self._rules.show(view)
         self._show_approval(view)
         reached = route_progress(view)

@@ -27,7 +27,8 @@ class RulesPane:
 
     def show(self, view: SessionView) -> None:
         """Show which rules are in force."""
-        drawn = (view.disabled_rules, view.may_be_approved)
+        proofs = () if view.check is None else view.check.proofs
+        drawn = (view.disabled_rules, view.may_be_approved, proofs)
         if self._console.rules and drawn != self._drawn:
             self._drawn = drawn
             self._box.clear()
@@ -36,11 +37,15 @@ class RulesPane:
 
     def _draw(self, view: SessionView) -> None:
         PlainText("h3", "House rules")
+        proofs = {} if view.check is None else {proof.rule: proof for proof in view.check.proofs}
         with ui.element("ul"):
             for rule in self._console.rules[:_MAX_RULES]:
                 is_off = rule.name in view.disabled_rules
                 with ui.element("li").classes("off" if is_off else ""):
-                    PlainText("span", shortened(rule.says, _MAX_RULE_CHARACTERS))
+                    with ui.element("div"):
+                        PlainText("span", shortened(rule.says, _MAX_RULE_CHARACTERS))
+                        if rule.name in proofs:
+                            PlainText("small", f"It {proofs[rule.name].words}.", "quiet")
                     if is_off:
                         PlainText("small", "switched off for this program", "quiet")
                     elif view.may_be_approved:

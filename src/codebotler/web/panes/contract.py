@@ -1,0 +1,58 @@
+"""The pane with the contract: what the program may do at most."""
+
+from __future__ import annotations
+
+from nicegui import ui
+
+from codebotler.checking.contract_text import contract_rows, contract_sentence
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.terminal import shortened
+from codebotler.missions.view import SessionView
+from codebotler.simulator.contract import Contract
+from codebotler.web.frame import PlainText
+
+_MAX_CHARACTERS = 1_500
+
+
+class ContractPane:
+    """Shows the contract of the checked program, or only what the last program's contract did not allow."""
+
+    def __init__(self, skills: SkillTable) -> None:
+        self._skills = skills
+        self._drawn: tuple[object, ...] = ()
+        self._box = ui.element("div").classes("contract")
+        self._box.set_visibility(False)
+
+    def show(self, view: SessionView) -> None:
+        """Update the pane for a view."""
+        contract = view.contract
+        self._box.set_visibility(contract is not None)
+        if contract is not None and (contract, view.earlier) != self._drawn:
+            self._drawn = contract, view.earlier
+            self._box.clear()
+            with self._box:
+                self._draw(contract, view.earlier)
+
+    def _draw(self, contract: Contract, earlier: Contract | None) -> None:
+        PlainText("h3", "What it may do at most")
+        new = contract if earlier is None else contract.beyond(earlier)
+        if earlier is not None:
+            is_narrower = bool(earlier.beyond(contract).skills)
+            same = "Less than the last program." if is_narrower else "The same as the last program."
+            PlainText("p", "More than the last program:" if new.skills else same)
+        sentence = contract_sentence(new, self._skills, shortened) if earlier is None else ""
+        if sentence:
+            PlainText("p", shortened(sentence, _MAX_CHARACTERS))
+        if earlier is not None and new.skills:
+            self._table(new)
+        with ui.element("details"):
+            PlainText("summary", "The whole contract")
+            self._table(contract)
+
+    def _table(self, contract: Contract) -> None:
+        with ui.element("table"), ui.element("tbody"):
+            for row in contract_rows(contract, self._skills, shortened):
+                with ui.element("tr"):
+                    PlainText("th", row.what).props("scope=row")
+                    PlainText("td", shortened(f"{row.texts} {row.places}".strip(), _MAX_CHARACTERS))
+                    PlainText("td", row.at_most, "quiet")

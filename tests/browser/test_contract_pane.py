@@ -1,0 +1,28 @@
+"""The contract on the page: what a person sees of it before an approval, and after an edit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from playwright.sync_api import expect
+
+from pageserver import PageServer
+from viewing import OpenPage, write
+
+GREET = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
+
+
+def test_a_contract_is_shown_and_an_edit_shows_only_what_is_new(tmp_path: Path, opened: OpenPage) -> None:
+    with PageServer(tmp_path, "--speed", "40") as server:
+        page = opened(server)
+        pane = page.locator(".contract")
+        expect(pane).to_be_hidden()
+        write(page, GREET)
+        expect(pane).to_contain_text('It may go to "kitchen"; say "hello". It picks up nothing')
+        write(page, GREET.replace("hello", "good morning"))
+        expect(pane).to_contain_text("More than the last program:")
+        expect(pane.locator("table").first.locator("tr")).to_have_text(['say"good morning"'])
+        write(page, "def task_program():\n    go_to('kitchen')\n")
+        expect(pane).to_contain_text("Less than the last program.")
+        pane.get_by_text("The whole contract").click()
+        expect(pane.locator("tr")).to_have_text(['go to"kitchen"at most 1 time'])

@@ -1,0 +1,214 @@
+"""A contract while a robot moves: the robot is told no call that the contract does not allow."""
+
+from __future__ import annotations
+
+import json
+import unicodedata
+from pathlib import Path
+
+import pytest
+
+from codebotler.cli.run import checker
+from codebotler.core.errors import RobotError
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.text_template import TextTemplate
+from codebotler.core.world import Room, World
+from codebotler.missions.log import EVENTS_FILE, LogLine, MissionState
+from codebotler.missions.mission import Mission, MissionError
+from codebotler.missions.session import MissionSession
+from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.models.recorded import open_recorded
+from codebotler.robots.base import Robot, RobotResult
+from codebotler.robots.reservation import Reservation
+from codebotler.robots.simulated import Simulated
+from codebotler.simulator.contract import Contract, SkillBound
+from codebotler.simulator.house_rule import UNKNOWN_ROOM
+from codebotler.simulator.room_map import RoomMap
+from doubles import Answering
+
+ROOMS = RoomMap(("hall", "kitchen", "the vault", "café"), "hall", plain=True)
+HOUSE = World((Room("hall"), Room("kitchen", ("mug", "plate")), Room("vault")), "hall")
+STUBBORN = """
+def task_program():
+    go_to("kitchen")
+    while True:
+        try:
+            {}
+        except BaseException:
+            pass
+        finally:
+            say("I go on")
+"""
+FETCH = "def task_program():\n    go_to('kitchen')\n    pick('mug')\n    go_to('hall')\n    place('mug')\n"
+
+
+def bound(**texts: list[str] | None) -> SkillBound:
+    templates = {
+        name: None if some is None else tuple(map(TextTemplate.parse, some)) for name, some in texts.items()
+    }
+    return SkillBound(tuple(templates.items()))
+
+
+ALLOWED = Contract(
+    {
+        "go_to": bound(location=["hall", "kitchen", "café"]),
+        "say": bound(message=["I go on", "there are {} mugs"]),
+        "ask": bound(person=["Ann"], question=["Tea?"], options=["yes", "no"]),
+        "pick": SkillBound(bound(obj=["mug"]).texts, places=("kitchen",), at_most=1),
+    }
+)
+
+
+def ran(
+    folder: Path, robot: Robot, program: str, contract: Contract = ALLOWED, *, place: str = "hall"
+) -> tuple[Mission, list[LogLine]]:
+    mission = Mission(folder, robot.name)
+    mission.draft(program)
+    mission.check([])
+    mission.approve()
+    with Reservation(robot, folder) as reserved, mission:
+        mission.run(reserved, place, room_map=ROOMS, contract=contract)
+    lines = (mission.folder / EVENTS_FILE).read_text().splitlines()
+    return mission, [json.loads(line) for line in lines]
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "go_to('the vault')",
+        "go_to('VAULT')",
+        "go_to('  the  vault ')",
+        "go_to('kitchen and the vault')",
+        f"go_to({unicodedata.normalize('NFD', 'café')!r} + ' or the vault')",
+        "go_to('.*')",
+        "pick('plate')",
+        "pick('mug.*')",
+        "place('mug')",
+        "say('there are two cups')",
+        "say('I go on forever')",
+        "ask('Bob', 'Tea?', ['yes', 'no'])",
+        "ask('Ann', 'Tea?', ['yes', 'no', 'later'])",
+        "ask('Ann', 'Coffee?', ['yes'])",
+        "is_in_room('mug')",
+    ],
+)
+def test_the_robot_is_not_told_what_the_contract_does_not_allow(tmp_path: Path, call: str) -> None:
+    robot = Answering()
+    mission, lines = ran(tmp_path, robot, STUBBORN.format(call))
+    assert (mission.state, mission.summary.reason) == (MissionState.STOPPED, "stopped by rule contract")
+    assert robot.done == ["kitchen"]
+    assert robot.cancels
+    (told,) = [line for line in lines if line["event"] == "rule"]
+    assert (told["rule"], told["prevented"], told["line"]) == ("contract", True, 6)
+    assert told["why"]
+
+
+def test_calls_within_the_contract_reach_the_robot(tmp_path: Path) -> None:
+    program = f"""
+def task_program():
+    go_to("Kitchen ")
+    pick("MUG")
+    go_to({unicodedata.normalize("NFD", "café")!r})
+    say("there are 2 mugs")
+    ask("Ann", "Tea?", ["no"])
+"""
+    robot = Answering(lambda skill, _: "no" if skill == "ask" else None)
+    mission, _ = ran(tmp_path, robot, program)
+    assert mission.state is MissionState.DONE
+
+
+def test_a_call_too_many_stops_the_mission(tmp_path: Path) -> None:
+    robot = Answering()
+    mission, _ = ran(
+        tmp_path, robot, "def task_program():\n    go_to('kitchen')\n    pick('mug')\n    pick('mug')\n"
+    )
+    assert mission.state is MissionState.STOPPED
+    assert robot.done == ["kitchen", "mug"]
+
+
+def test_a_failed_call_is_not_counted(tmp_path: Path) -> None:
+    failures = iter([RobotError("PickFailed", "it slipped")])
+
+    def answer(skill: str, _text: str) -> RobotResult:
+        if skill == "pick" and (error := next(failures, None)) is not None:
+            raise error
+        return None
+
+    program = """
+def task_program():
+    go_to("kitchen")
+    try:
+        pick("mug")
+    except Exception:
+        pick("mug")
+"""
+    mission, _ = ran(tmp_path, Answering(answer), program)
+    assert mission.state is MissionState.DONE
+
+
+def test_a_robot_that_does_not_say_where_it_is_picks_up_nothing(tmp_path: Path) -> None:
+    def answer(skill: str, _text: str) -> RobotResult:
+        if skill == "get_current_location":
+            raise RobotError("Unknown", "the robot has not found its place yet")
+        return None
+
+    robot = Answering(answer)
+    _, lines = ran(tmp_path, robot, "def task_program():\n    pick('mug')\n", place="")
+    (told,) = [line for line in lines if line["event"] == "rule"]
+    assert told["why"] == UNKNOWN_ROOM
+    assert robot.done == []
+
+
+def led(
+    tmp_path: Path, program: str, *edits: str, within: Contract | None = None
+) -> tuple[MissionSession, SessionView]:
+    session = MissionSession(
+        Simulated(HOUSE, speed=None),
+        tmp_path,
+        MissionOrder(program=program),
+        open_model=open_recorded,
+        check=checker(SKILLS),
+        world=HOUSE,
+        within=within,
+    )
+    session.start()
+    view = session.wait_until(lambda view: view.may_be_approved)
+    for edit in edits:
+        session.edit(edit)
+        view = session.wait_until(lambda view, edit=edit: view.program == edit and view.may_be_approved)  # type: ignore[misc]
+    return session, view
+
+
+def test_a_session_runs_the_program_within_its_own_contract(tmp_path: Path) -> None:
+    session, view = led(tmp_path, FETCH)
+    session.approve(view.digest)
+    assert session.wait_until(lambda _: False).state is MissionState.DONE
+    assert view.contract is not None
+    assert set(view.contract.skills) == {"go_to", "pick", "place"}
+
+
+def test_a_session_compares_an_edited_program_with_the_last_one(tmp_path: Path) -> None:
+    session, view = led(tmp_path, FETCH, FETCH.replace("place('mug')", "say('here')"))
+    session.stop("the test")
+    assert view.contract is not None
+    assert view.earlier is not None
+    assert set(view.contract.beyond(view.earlier).skills) == {"say"}
+
+
+def test_a_session_refuses_a_program_beyond_the_contract_of_its_start(tmp_path: Path) -> None:
+    session, view = led(tmp_path, FETCH, within=ALLOWED)
+    assert [problem.split(":")[0] for problem in view.problems] == ["OutsideContract"]
+    with pytest.raises(MissionError):
+        session.approve(view.digest)
+    session.approve(view.digest, despite_problems=True)
+    assert session.wait_until(lambda _: False).state is MissionState.STOPPED
+
+
+def test_the_answers_of_a_robot_do_not_leave_the_contract(tmp_path: Path) -> None:
+    told: dict[str, RobotResult] = {"get_all_rooms": ["hall", "the vault"], "get_current_location": "hall"}
+    robot = Answering(lambda skill, _: told.get(skill))
+    program = "def task_program():\n    for room in get_all_rooms():\n        go_to(room)\n"
+    allowed = Contract({**ALLOWED.skills, "get_all_rooms": SkillBound()})
+    mission, _ = ran(tmp_path, robot, program, allowed)
+    assert mission.state is MissionState.STOPPED
+    assert "the vault" not in robot.done
