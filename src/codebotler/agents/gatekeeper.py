@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from secrets import compare_digest
+from typing import Any
 
 from codebotler.agents.reports import CheckReport, MissionReport, RobotReport, report_check
 from codebotler.agents.steps import NOT_RUNNING, Steps
+from codebotler.checking.contract_file import contract_from
+from codebotler.checking.contract_text import contract_sentence
 from codebotler.core.errors import UserError
 from codebotler.core.words import listed
 from codebotler.missions.log import MissionState
@@ -31,16 +34,12 @@ class Gatekeeper:
         console: the robot and its current mission.
         asks_client: whether a client may ask its person, in a dialog that its agent cannot answer.
         writes: whether a model is configured that can write programs.
-        approves: whether a contract, given at the start, approves a program without asking a person.
-        contract_text: describes what a checked program can do at most, or returns "" if this is unknown.
         page: the address of the page, without its token; empty without a page.
     """
 
     console: Console
     asks_client: bool = False
     writes: bool = False
-    approves: Callable[[SessionView], bool] = lambda _: False
-    contract_text: Callable[[SessionView], str] = lambda _: ""
     page: str = ""
     _session: MissionSession | None = field(default=None, init=False)  # the latest one of an agent
     _steps: Steps | None = field(default=None, init=False)  # of that session, if it is step by step
@@ -56,13 +55,15 @@ class Gatekeeper:
         self._session, self._steps = session, steps
         return session
 
-    def propose_steps(self, purpose: str, skills: list[str], author: str) -> tuple[MissionSession, Steps]:
-        """Propose a mission in which the agent calls skills one at a time. An empty list means all skills."""
+    def propose_steps(
+        self, purpose: str, bounds: Mapping[str, Any], author: str
+    ) -> tuple[MissionSession, Steps]:
+        """Propose a mission in which the agent calls skills one at a time, within these bounds."""
         known = self.console.robot.skills.without(self.console.robot.missing)
-        if unknown := [name for name in skills if name not in known]:
-            raise UserError(f"this robot has no skill {listed(unknown, 'or')}; it has {listed(list(known))}")
-        steps = Steps(purpose, known.without(known.keys() - set(skills)) if skills else known)
-        order = MissionOrder(purpose, program=steps.program, author=author, drive=steps.drive)
+        steps = Steps(purpose, contract_from(bounds, known), known)
+        order = MissionOrder(
+            purpose, program=steps.program, author=author, drive=steps.drive, contract=steps.contract
+        )
         return self.propose(order, steps), steps
 
     def find_session(self, digest: str) -> MissionSession:
@@ -86,17 +87,19 @@ class Gatekeeper:
 
     def takes_steps(self, session: MissionSession) -> bool:
         """Whether a session runs step by step now, and not a program that a person wrote in its place."""
-        return self._is_stepwise(session) and session.view.state is MissionState.RUNNING
+        steps, view = self._steps, session.view
+        is_ours = steps is not None and session is self._session and view.program == steps.program
+        return is_ours and view.state is MissionState.RUNNING
 
-    def approves_alone(self, session: MissionSession) -> bool:
-        """Whether the contract given at the start approves a session's program. Steps need a person."""
-        view = session.view
-        is_sound = view.may_be_approved and not view.problems and not self._is_stepwise(session)
-        return is_sound and self.approves(view)
+    @staticmethod
+    def approves_alone(view: SessionView) -> bool:
+        """Whether the contract given at the start allows all that a program or steps may do."""
+        is_within = view.within is not None and view.contract is not None
+        return is_within and view.may_be_approved and not view.problems
 
-    def _is_stepwise(self, session: MissionSession) -> bool:
-        steps = self._steps
-        return steps is not None and session is self._session and session.view.program == steps.program
+    def contract_text(self, view: SessionView) -> str:
+        """Describe what a program can do at most, or return "" if this is unknown."""
+        return "" if view.contract is None else contract_sentence(view.contract, self.console.robot.skills)
 
     def may_ask_client(self, view: SessionView) -> bool:
         """Whether a client may ask its person to approve a program, which must fit into a dialog."""
@@ -123,7 +126,7 @@ class Gatekeeper:
             state=view.phase,
             reason=view.reason or view.error,
             digest=view.digest,
-            check=report_check(view, self.contract_text(view) if view.check else ""),
+            check=report_check(view, self.contract_text(view)),
             remarks=[*view.unknown_rooms, *view.remarks],
             events=[text for text in map(event_text, events[after:]) if text],
             event_count=len(events),

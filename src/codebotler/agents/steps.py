@@ -12,6 +12,7 @@ from threading import Lock
 from typing import TypeAlias
 
 from codebotler.agents.reports import SkillOutcome
+from codebotler.checking.contract_file import contract_yaml
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.terminal import visible
@@ -20,6 +21,7 @@ from codebotler.core.unicode import compose
 from codebotler.core.words import listed
 from codebotler.missions.live import LiveRobot
 from codebotler.missions.mission import MissionError
+from codebotler.simulator.contract import Contract
 from codebotler.simulator.ledger import Ledger
 from codebotler.simulator.process.errors import ProtocolError
 from codebotler.simulator.robot import Argument
@@ -30,9 +32,9 @@ IDLE_POLL_SECONDS = 0.1
 
 NOT_RUNNING = "this mission is not running; call run_mission first, or begin_steps for a new one"
 _PROGRAM = """# Step by step: an agent chooses each call after it has seen the result of the last one.
-# The check cannot foresee the calls; house rules apply to each.
-# It may call only: {skills}
 # It says: {purpose}
+# The check cannot foresee the calls, but each is compared with this contract and with the house rules:
+{contract}
 def task_program():
     pass
 """
@@ -44,7 +46,8 @@ class Steps:
     """Hands an agent's calls to the thread of its mission, one at a time."""
 
     purpose: str  # in the agent's words
-    skills: SkillTable  # those that the agent may call
+    contract: Contract  # what it may call
+    skills: SkillTable
     key: str = field(default_factory=lambda: secrets.token_urlsafe(12))  # so that agents are not mixed up
     _calls: Queue[_Call | None] = field(default_factory=Queue)  # None ends the mission
     _is_over: bool = False
@@ -53,12 +56,14 @@ class Steps:
     @property
     def program(self) -> str:
         """The text that a person approves in place of a program."""
-        return _PROGRAM.format(skills=", ".join(self.skills), purpose=visible(" ".join(self.purpose.split())))
+        contract = contract_yaml(self.contract, self.skills).splitlines()
+        purpose = visible(" ".join(self.purpose.split()))
+        return _PROGRAM.format(purpose=purpose, contract="\n".join(f"#   {line}" for line in contract))
 
     def call(self, name: str, arguments: Mapping[str, object]) -> Future[SkillOutcome]:
         """Call a skill of the running mission. Raise UserError for a wrong call."""
-        if name not in self.skills:
-            raise UserError(f"this mission may call only {listed(list(self.skills))}")
+        if name not in self.contract.skills:
+            raise UserError(f"this mission may call only {listed(list(self.contract.skills))}")
         call = self.skills[name], _arguments(self.skills[name], arguments), Future[SkillOutcome]()
         with self._lock:
             if self._is_over:

@@ -122,9 +122,15 @@ async def begin_steps(
     purpose: Annotated[
         str, Field(min_length=1, max_length=500, description="What you want to do, for people.")
     ],
-    skills: Annotated[
-        Sequence[str], Field(description="The skills that you need; by default all. Ask only for these.")
-    ] = (),
+    contract: Annotated[
+        dict[str, dict[str, Any]],
+        Field(
+            description="What you may call at most; ask only for what you need. For each skill, give the "
+            'allowed texts of each argument, or "any", such as {"go_to": {"location": ["kitchen"]}, "say": '
+            '{"message": ["I found {}"]}}. "at most" limits the number of calls; "in" names the rooms for '
+            "pick and place."
+        ),
+    ],
 ) -> MissionReport:
     """Propose a mission in which you call skills one at a time, instead of writing a program.
 
@@ -133,7 +139,7 @@ async def begin_steps(
     """
     gatekeeper = _gatekeeper(ctx)
     with _as_tool_errors():
-        session, steps = gatekeeper.propose_steps(purpose, list(skills), _name(ctx))
+        session, steps = gatekeeper.propose_steps(purpose, contract, _name(ctx))
     report = await _prepared(gatekeeper, session)
     return report.model_copy(update={"steps": steps.key})
 
@@ -149,7 +155,7 @@ def _ask_person(
     """Have the client ask its person, unless the program is already approved or the client cannot ask."""
     gatekeeper, view = _gatekeeper(ctx), session.view
     may_ask = view.may_be_approved and gatekeeper.may_ask_client(view) and _has_dialogs(ctx)
-    if not may_ask or gatekeeper.approves_alone(session):
+    if not may_ask or gatekeeper.approves_alone(session.view):
         return NotAsked()
     return Elicit(question(view, gatekeeper.console.robot.name, gatekeeper.contract_text(view)), Consent)
 
@@ -263,7 +269,7 @@ def _take_answer(
     """Approve the program if a person or a contract accepts it. End the mission if a person declines."""
     view, person = session.view, f"a person, asked by {client}"
     if isinstance(answer, AcceptedElicitation) and isinstance(answer.data, NotAsked):
-        if gatekeeper.approves_alone(session):
+        if gatekeeper.approves_alone(session.view):
             session.approve(digest, by="the contract given at the start")
     elif isinstance(answer, AcceptedElicitation) and answer.data.approve:
         if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile

@@ -17,7 +17,9 @@ from mcp_types import ElicitRequestParams, ElicitResult
 from codebotler.agents.gatekeeper import Gatekeeper
 from codebotler.agents.reports import SkillOutcome
 from codebotler.agents.server import make_server
+from codebotler.checking.contract_file import contract_from
 from codebotler.checking.rules import read_rules
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.log import MissionState
 from codebotler.missions.preflight import known_instructions
@@ -326,7 +328,7 @@ def test_a_program_too_long_for_a_dialog_is_approved_on_the_page_only(gatekeeper
 
 
 def test_problems_are_shown_to_the_person_and_a_contract_never_approves_them(gatekeeper: Gatekeeper) -> None:
-    gatekeeper.approves = lambda _: True
+    gatekeeper.console.within = contract_from(anything(), SKILLS)
     answer, asked = answering("cancel")
 
     async def act(agent: Agent) -> None:
@@ -347,7 +349,8 @@ def test_problems_are_shown_to_the_person_and_a_contract_never_approves_them(gat
 
 @pytest.mark.slow
 def test_a_contract_given_at_the_start_approves(gatekeeper: Gatekeeper) -> None:
-    gatekeeper.approves = lambda view: "hello" in view.program
+    allowed = anything("say") | {"go_to": {"location": ["kitchen"]}}
+    gatekeeper.console.within = contract_from(allowed, SKILLS)
 
     async def act(agent: Agent) -> None:
         proposed = await agent.call("propose_mission", program=HELLO)
@@ -463,6 +466,7 @@ async def read(agent: Agent, uri: str) -> str:
 
 # --- step by step
 
+PLACES = {"pick": {"in": "any"}, "place": {"in": "any"}}
 ANSWERS: dict[str, RobotResult] = {
     "get_all_rooms": ["hall"],
     "get_current_location": "hall",
@@ -470,10 +474,20 @@ ANSWERS: dict[str, RobotResult] = {
 }
 
 
-async def began(agent: Agent, gatekeeper: Gatekeeper, *skills: str) -> tuple[str, dict[str, Any]]:
+def anything(*skills: str) -> dict[str, dict[str, str]]:
+    """A contract that allows all calls of some skills, by default of all."""
+    rows = [SKILLS[name] for name in skills or SKILLS]
+    return {row.name: {one.name: "any" for one in row.parameters} | PLACES.get(row.name, {}) for row in rows}
+
+
+async def began(
+    agent: Agent, gatekeeper: Gatekeeper, *skills: str, contract: dict[str, Any] | None = None
+) -> tuple[str, dict[str, Any]]:
     """The key of an approved step-by-step mission, and what run_mission answers."""
     proposed = await agent.call(
-        "begin_steps", purpose="look around\n# It may call: nothing", skills=list(skills)
+        "begin_steps",
+        purpose="look around\n# It may call: nothing",
+        contract=contract or anything(*skills),
     )
     running = asyncio.create_task(agent.call("run_mission", digest=proposed["digest"]))
     approve(gatekeeper)
@@ -513,7 +527,8 @@ def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
         assert "no step-by-step" in await agent.fails(
             "call_skill", steps="x", name="go_to", arguments=arguments
         )
-        assert "no skill fly" in await agent.fails("begin_steps", purpose="fly", skills=["fly"])
+        assert 'no skill "fly"' in await agent.fails("begin_steps", purpose="fly", contract={"fly": {}})
+        assert 'no "text"' in await agent.fails("begin_steps", purpose="a", contract={"say": {"text": "any"}})
         session = gatekeeper.console.session
         assert session is not None
         assert [line for line in session.events() if line["event"] == "skill"] == []
@@ -557,18 +572,45 @@ def test_a_robot_that_is_lost_ends_the_steps(tmp_path: Path) -> None:
         use(gatekeeper, act)
 
 
-def test_steps_need_a_person_whatever_the_contract_says(gatekeeper: Gatekeeper) -> None:
-    gatekeeper.approves, gatekeeper.asks_client = lambda _: True, True
+def test_steps_beyond_the_contract_of_the_start_need_a_person(gatekeeper: Gatekeeper) -> None:
+    gatekeeper.console.within, gatekeeper.asks_client = contract_from(anything("say"), SKILLS), True
     answer, asked = answering("cancel")
 
     async def act(agent: Agent) -> None:
-        proposed = await agent.call("begin_steps", purpose="look around", skills=["say"])
+        proposed = await agent.call("begin_steps", purpose="look around", contract=anything("say", "go_to"))
         waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
         assert (waiting["state"], len(asked)) == ("checked", 1)
-        assert "It may call only: say" in asked[0]
+        assert "OutsideContract" in asked[0]
         assert "For example" not in asked[0]
+        proposed = await agent.call(
+            "begin_steps", purpose="talk", contract={"say": {"message": ["hello {}"]}}
+        )
+        running = await agent.call("run_mission", digest=proposed["digest"])
+        assert (running["state"], len(asked)) == ("running", 1)
+        await agent.call(
+            "call_skill", steps=proposed["steps"], name="say", arguments={"message": "hello Ann"}
+        )
+        await agent.fails("call_skill", steps=proposed["steps"], name="say", arguments={"message": "bye"})
+        ended = await agent.call("follow_mission")
+        assert (ended["state"], ended["reason"]) == ("stopped", "stopped by rule contract")
 
     use(gatekeeper, act, answer=answer)
+
+
+def test_each_step_is_compared_with_the_contract(gatekeeper: Gatekeeper) -> None:
+    contract = {"go_to": {"location": ["kitchen"], "at most": 1}, "get_current_location": {}}
+
+    async def act(agent: Agent) -> None:
+        key, begun = await began(agent, gatekeeper, contract=contract)
+        assert 'go to "kitchen"' in begun["check"]["contract"]
+        assert "kitchen" in begun["check"]["program"]
+        arguments = {"location": "Kitchen"}
+        await agent.call("call_skill", steps=key, name="go_to", arguments=arguments)
+        assert (await agent.call("call_skill", steps=key, name="get_current_location"))["result"] == "kitchen"
+        await agent.fails("call_skill", steps=key, name="go_to", arguments=arguments)
+        assert (await agent.call("follow_mission"))["reason"] == "stopped by rule contract"
+
+    use(gatekeeper, act)
 
 
 @pytest.mark.slow
@@ -576,7 +618,7 @@ def test_a_step_waits_for_approval_and_stop_ends_all(tmp_path: Path) -> None:
     gatekeeper = gatekeeper_at(tmp_path, speed=1.0)
 
     async def act(agent: Agent) -> None:
-        proposed = await agent.call("begin_steps", purpose="look around")
+        proposed = await agent.call("begin_steps", purpose="look around", contract=anything())
         arguments = {"steps": proposed["steps"], "name": "go_to", "arguments": {"location": "kitchen"}}
         assert "not running" in await agent.fails("call_skill", **arguments)
         key, _ = await began(agent, gatekeeper)
@@ -618,7 +660,7 @@ def test_a_program_that_a_person_put_in_place_of_the_steps_runs_instead(tmp_path
     gatekeeper = gatekeeper_at(tmp_path, speed=1.0)
 
     async def act(agent: Agent) -> None:
-        proposed = await agent.call("begin_steps", purpose="look around")
+        proposed = await agent.call("begin_steps", purpose="look around", contract=anything())
         gatekeeper.console.edit(FAR)
         await until(gatekeeper, lambda view: view.may_be_approved)
         approve(gatekeeper)

@@ -34,6 +34,7 @@ HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
 FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('hall')\n"
 SERVE = ("codebotler", "mcp", "--http", "--world", "world.yaml")
 SOON = 60.0
+DRIVES = {"go_to": {"location": "any"}, "get_all_rooms": {}, "get_current_location": {}}
 
 
 async def call(client: Client, tool: str, **arguments: Any) -> Any:  # noqa: ANN401 - any tool's result
@@ -111,7 +112,7 @@ def test_all_tools_work_over_http(server: AgentServer, mode: str) -> None:
             assert done is not None
             assert (done["state"], done["mission"]) == ("done", proposed["mission"])
             assert 'drives to "kitchen"' in said
-            stepwise = await call(client, "begin_steps", purpose="look", skills=["go_to"])
+            stepwise = await call(client, "begin_steps", purpose="look", contract=DRIVES)
             starting = asyncio.create_task(call(client, "run_mission", digest=stepwise["digest"]))
             await asyncio.to_thread(server.approve)
             assert (await starting)["state"] == "running"
@@ -273,7 +274,12 @@ def test_all_tools_work_over_stdio(folder: Path, mode: str, page: str) -> None:
             assert ("http://localhost:" in proposed["next"]) == (page == "--page")
             done = await call(client, "run_mission", digest=proposed["digest"])
             assert (done["state"], len(questions)) == ("done", 1)
-            stepwise = await call(client, "begin_steps", purpose="look")
+            stepwise = await call(
+                client,
+                "begin_steps",
+                purpose="look",
+                contract=DRIVES,
+            )
             await call(client, "run_mission", digest=stepwise["digest"])
             key = stepwise["steps"]
             assert (await call(client, "call_skill", steps=key, name="get_all_rooms"))["result"]
