@@ -82,6 +82,7 @@ def test_interrupt_that_a_library_swallows_counts_all_the_same(
     def swallowing() -> None:
         with suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
+            time.sleep(0.2)  # the main thread handles the signal, and stops this one
         if fault is not None:
             raise fault
 
