@@ -107,6 +107,7 @@ def test_calls_within_the_contract_reach_the_robot(tmp_path: Path) -> None:
     program = f"""
 def task_program():
     go_to("Kitchen ")
+    go_to("to the kitchen")
     pick("MUG")
     go_to({unicodedata.normalize("NFD", "café")!r})
     say("there are 2 mugs")
