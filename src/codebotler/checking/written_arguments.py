@@ -24,6 +24,9 @@ TRICKS = frozenset(
 UNCHANGED = frozenset({"strip", "lower", "upper", "title", "capitalize", "casefold", "lstrip", "rstrip"})
 """Methods whose result is the same text for a template, which ignores case and surrounding whitespace."""
 
+CHANGES = frozenset({"extend", "insert", "update", "setdefault", "appendleft"})
+"""Methods that may give a list any other elements."""
+
 Templates: TypeAlias = frozenset[TextTemplate]
 UNKNOWN: Templates = frozenset({ANY_TEXT})
 NOTHING: Templates = frozenset()
@@ -156,6 +159,8 @@ class _Texts:
                 found = _joined([self.texts(part) for part in parts])
             case ast.FormattedValue(value, conversion, None) if conversion in {-1, ord("s")}:
                 found = self.texts(value)
+            case ast.BinOp(left, ast.Add(), right) if self._is_list(left) or self._is_list(right):
+                found = self.texts(left) | self.texts(right)
             case ast.BinOp(left, ast.Add(), right):
                 found = _joined([self.texts(left), self.texts(right)])
             case ast.Call(ast.Name(name)) if name in self._functions:
@@ -166,6 +171,10 @@ class _Texts:
             case _ if parts := _parts(node):
                 found = NOTHING.union(*map(self.texts, parts))
         return found
+
+    def _is_list(self, node: ast.expr) -> bool:
+        values = self._values[node.id] if isinstance(node, ast.Name) and node.id in self._values else [node]
+        return any(isinstance(value, ast.List | ast.Tuple | ast.ListComp) for value in values)
 
     def _of_name(self, name: str, values: Iterable[ast.expr | None]) -> Templates:
         if name in self._reading:  # a text that grows in a loop
@@ -226,8 +235,13 @@ def _bindings(node: ast.AST) -> Iterator[tuple[ast.expr, ast.expr | None]]:
         case ast.AugAssign(target, operator, value):
             yield target, ast.BinOp(target, operator, value)
         case ast.For(target, over) | ast.comprehension(target, over):
-            values = over.elts if isinstance(over, ast.List | ast.Tuple | ast.Set) else [None]
+            known = [over if isinstance(over, ast.Name) else None]
+            values = over.elts if isinstance(over, ast.List | ast.Tuple | ast.Set) else known
             yield from ((target, value) for value in values)
+        case ast.Call(ast.Attribute(ast.Name() as target, "append" | "add"), [value]):
+            yield target, value
+        case ast.Call(ast.Attribute(ast.Name() as target, method)) if method in CHANGES:
+            yield target, None
         case ast.withitem(optional_vars=ast.expr() as target):
             yield target, None
         case ast.arguments(kwonlyargs=only):

@@ -30,6 +30,7 @@ def said(*lines: str) -> tuple[set[str], bool]:
         (["def f():", "    return 'x'", "say(f())"], {"x"}),
         (["a, b = 'x', 'y'", "say(b)"], {"y"}),
         (["say((x := 'a').strip())"], {"a"}),
+        (["rooms = ['a', 'b']", "rooms.append('c')", "for room in rooms:", "    say(room)"], {"a", "b", "c"}),
     ],
 )
 def test_known_texts(lines: list[str], texts: set[str]) -> None:
@@ -48,6 +49,10 @@ def test_known_texts(lines: list[str], texts: set[str]) -> None:
         ["list(map(say, ['a']))"],
         ["def f(a):", "    say(a)", "g = f", "g('a')"],
         ["exec('say(1)')", "say('a')"],
+        ["rooms = ['a']", "rooms.extend(get_all_rooms())", "for room in rooms:", "    say(room)"],
+        ["rooms = []", "rooms.append(get_current_location())", "for room in rooms:", "    say(room)"],
+        ["rooms = ['a'] + get_all_rooms()", "for room in rooms:", "    say(room)"],
+        ["for letter in 'ab':", "    say(letter)"],
         ["x = 'a'", "for _ in range(3):", "    x = x + x", "say(x)"],
     ],
 )
