@@ -41,6 +41,8 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
             problems += group_failures(samples[number:], found.room_map)
         verdict: RuleVerdict = "possible" if number is not None else "never" if is_complete else "unknown"
         proofs.append(RuleProof(rule.name, verdict, explored.cases, number))
+    if any(not problem.rule for problem in problems):  # a robot may get further than these runs
+        explored = replace(explored, is_complete=False)
     contract = derive_contract(explored, written, found.room_map, settings.skills)
     problems.sort(key=lambda problem: problem.line or 0)
     return replace(

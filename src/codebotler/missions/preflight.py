@@ -55,7 +55,12 @@ def ask_rooms(
     place = here if isinstance(here, str) else ""
     if not isinstance(rooms, list) or not rooms:
         return None, place
-    known = RoomMap((), "") if world is None or not robot.rooms_are_regexes else RoomMap.of(world)
+    known = RoomMap((), "")
+    if world is not None and robot.rooms_are_regexes:
+        known = RoomMap.of(world)
+    elif world is not None:
+        inside = ((room.name, room.within) for room in world.rooms if room.within in rooms)
+        known = RoomMap((), "", places=tuple(inside))
     if place and place not in (*rooms, *known.goals):
         remark(shortened(f'the robot says it is in "{place}", which is not in its list of rooms'))
     listed = list(map(str, rooms))

@@ -22,10 +22,12 @@ WORDS_FOR_PEOPLE = (
     *("person", "people", "human", "someone", "somebody", "anyone", "anybody", "everyone", "everybody"),
     *("visitor", "guest", "employee", "colleague", "coworker", "occupant"),
 )
+WORDS_FOR_THINGS = ("thing", "object", "item")
 _FILLERS = frozenset(
     {
         *("a", "an", "the", "any", "some", "all", "another", "other", "being", "there", "here"),
         *("who", "that", "is", "are", "in", "with", "wearing", "and"),
+        *("named", "called", "of", "piece", "pieces"),
     }
 )
 """Words of a description that tell nothing about a person or thing."""
@@ -79,14 +81,27 @@ def meant_by(request: str, labels: Iterable[str], *, plain: bool = False) -> lis
     return [*_meant_by(request, labels, tuple(map(_escaped, labels)) if plain else labels)]
 
 
-def prefer_places(rooms: Sequence[str], around: Mapping[str, str]) -> list[str]:
-    """Drop a room if a place in it is meant as well, as in "the desk in the office".
+def goals_meant(
+    request: str, goals: Sequence[str], around: Mapping[str, str], *, plain: bool = False
+) -> list[str]:
+    """Return the rooms and places that a request may mean. "The desk in the office" means only the desk.
 
     Args:
-        rooms: the rooms and places that a request may mean.
+        request: the words of a program.
+        goals: the rooms and places.
         around: the room that contains each place.
+        plain: whether they are plain names instead of regexes.
     """
+    if not around:
+        return meant_by(request, goals, plain=plain)
+    regex = _escaped if plain else str
+    inside = {place: _IN.format(regex(place), regex(room)) for place, room in around.items()}
+    named = [place for place, label in inside.items() if _longest_match(request, label)[0]]
+    rooms = named or meant_by(request, goals, plain=plain)
     return [room for room in rooms if all(around.get(place) != room for place in rooms)]
+
+
+_IN = r"(?:{})\s+(?:in|of|at|inside|within|from)\s+(?:the\s+|my\s+|our\s+)?(?:{})"
 
 
 @lru_cache(maxsize=4096)

@@ -8,7 +8,7 @@ from codebotler.core.labels import plain_names
 from codebotler.core.unicode import compose_fields
 from codebotler.core.words import listed
 from codebotler.core.world import Room, Trait, World, laid_out
-from codebotler.simulator.matching import meant_by, prefer_places
+from codebotler.simulator.matching import goals_meant
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,7 @@ class RoomMap:
         return [room for room in self.rooms if room.strip().casefold() in wanted]
 
     def _meant(self, request: str) -> list[str]:
-        meant = meant_by(request, self.goals, plain=self.guessed or self.plain)
-        return prefer_places(meant, dict(self.places))
+        return goals_meant(request, self.goals, dict(self.places), plain=self.guessed or self.plain)
 
     def full_name(self, room: str) -> str:
         """Return a room's name as rules know it, with the room around it if it is a place."""

@@ -21,6 +21,7 @@ from codebotler.simulator.entities import NO_WORDS, Thing
 from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.matching import (
     WORDS_FOR_PEOPLE,
+    WORDS_FOR_THINGS,
     Entity,
     best_fits,
     content_words,
@@ -114,6 +115,11 @@ class SampledRobot(SimulatedRobot):
         return self.room_map.possible_rooms(request)
 
     @property
+    def _around(self) -> str:
+        """The room in which the robot is, also if it is at a place. People at a place are in its room."""
+        return self._room_around(self.room)
+
+    @property
     def here(self) -> ExploredRoom:
         """What the program knows about the robot's current room."""
         return self.explored[self.room]
@@ -140,22 +146,22 @@ class SampledRobot(SimulatedRobot):
 
     def is_here(self, name: str) -> bool | None:
         """Return whether a person or thing is in this room, or None if that is undecided."""
-        things = self.things_here if name != SOMEBODY else []
-        if name in self.here.people or any(thing.is_meant_by(name, "longest-name") for thing in things):
+        things, around = self.things_here if name != SOMEBODY else [], self.explored[self._around]
+        if name in around.people or any(thing.is_meant_by(name, "longest-name") for thing in things):
             return True
-        is_missed = self.here.lacks(name) or self.explored[self._room_around(self.room)].lacks(name)
+        is_missed = self.here.lacks(name) or around.lacks(name)
         return False if is_missed else None
 
-    def settle(self, name: str, *, is_random: bool) -> bool:
-        """Decide whether a person or thing is in this room: at random, or as the program assumes."""
+    def settle(self, name: str, room: str, *, is_random: bool) -> bool:
+        """Decide whether a person or thing is in a room: at random, or as the program assumes."""
         is_there = True
         if is_random:
-            is_there = self.sampler.is_there(self.room, name)
-            self.draws.append(Draw("is_there", (self.room, name), is_there))
+            is_there = self.sampler.is_there(room, name)
+            self.draws.append(Draw("is_there", (room, name), is_there))
         self.has_assumed |= not is_random
-        self.facts.append(Whereabouts(name, self.room, is_there, is_random))
+        self.facts.append(Whereabouts(name, room, is_there, is_random))
         if not is_there:
-            self.here.missed.add(name)
+            self.explored[room].missed.add(name)
         return is_there
 
     def answer(self, options: Sequence[str], *question: str) -> str:
@@ -202,22 +208,24 @@ class SampledRobot(SimulatedRobot):
 
     def _find(self, name: str, *, is_person: bool) -> bool:
         """Return whether a thing or person is in this room. The first time, this is decided at random."""
-        room, found = self.here, self.is_here(name)
+        is_person = is_person or name == SOMEBODY
+        goal = self._around if is_person else self.room
+        room, found = self.explored[goal], self.is_here(name)
         if found is None and (name in room.gone or (is_person and room.lacks(SOMEBODY))):
             found = False
             room.missed.add(name)
         if found is None:
-            found = self.settle(name, is_random=True)
-            if found and (name == SOMEBODY or is_person):
+            found = self.settle(name, goal, is_random=True)
+            if found and is_person:
                 room.people |= {name, SOMEBODY}
             if found and name != SOMEBODY:
-                self._add(name)
+                self._add(name, goal)
         return found
 
-    def _add(self, name: str) -> None:
+    def _add(self, name: str, goal: str) -> None:
         known = (one for one in (*self.room_map.things, *self.room_map.people) if normalized(one) == name)
         traits = self._trait_words.get(next(known, ""), NO_WORDS)
-        self.contents[self.room].append(Thing(name, is_pattern=False, traits=traits))
+        self.contents[goal].append(Thing(name, is_pattern=False, traits=traits))
 
     def _described(self, entity: str) -> list[str]:
         """Return the known things or people that a request describes without naming them."""
@@ -230,18 +238,18 @@ class SampledRobot(SimulatedRobot):
         """Return the names of things that fit a description. Whether each is there is random."""
         return self._all_of(self.room_map.things, where, is_ or "thing", is_person=False)
 
-    def people(self, where: str = "", is_: str = "", **traits: str) -> list[str]:
+    def people(self, where: str = "", is_: str = "", **traits: object) -> list[str]:
         """Return the names of people who fit a description. Whether each is there is random."""
-        wanted = " ".join(text for text in (is_, *traits.values()) if text) or SOMEBODY
+        wanted = " ".join(str(one) for one in (is_, *traits.values()) if one) or SOMEBODY
         return self._all_of(self.room_map.people, where, wanted, is_person=True)
 
     def _all_of(self, known: Sequence[str], where: str, wanted: str, *, is_person: bool) -> list[str]:
-        words = WORDS_FOR_PEOPLE if is_person else ("thing", "object")
+        words = WORDS_FOR_PEOPLE if is_person else WORDS_FOR_THINGS
         fitting = self._fitting(known, wanted, words)
-        names = {normalized(name): name for name in fitting or (wanted, f"another {wanted}")}
+        names = {normalized(name): name for name in fitting or [wanted]}
         goals: Sequence[str] = self._goals_in(where)
-        if is_person:  # who is at a place is in its room
-            goals = [self.goal_of(where)] if where else self.rooms
+        if is_person:
+            goals = [self._room_around(self.goal_of(where))] if where else self.rooms
         before = self.room
         found = []
         described = normalized(wanted)
@@ -249,11 +257,27 @@ class SampledRobot(SimulatedRobot):
             is_known = described in self.here.missed  # an earlier look for this description found nothing
             finds = self.is_here if is_known else partial(self._find, is_person=is_person)
             there = [names[name] for name in names if finds(name)]
+            if there and not fitting and self._has_another(described, is_person=is_person):
+                there.append(f"another {wanted}")
             if not there and not self.is_here(described):
                 self.here.missed.add(described)
             found += there or ([described] if self.is_here(described) else [])
         self.room = before
         return found
+
+    def _has_another(self, name: str, *, is_person: bool) -> bool:
+        """Return whether a second unknown person or thing like one in this room is there as well."""
+        another, here = f"another {name}", self.here
+        if another in here.missed:
+            return False
+        if another in here.people or any(thing.label == another for thing in self.contents[self.room]):
+            return True
+        is_there = self.settle(another, self.room, is_random=True)
+        if is_there and is_person:
+            here.people.add(another)
+        elif is_there:
+            self._add(another, self.room)
+        return is_there
 
     def _fitting(self, known: Sequence[str], wanted: str, words: Sequence[str]) -> list[str]:
         """Return the known names that fit a description."""
@@ -262,7 +286,7 @@ class SampledRobot(SimulatedRobot):
 
     def move_person(self, name: str, room: str) -> None:
         """Move a person to a room or place. Where they were, they are no longer."""
-        goal, who = self.goal_of(room), normalized(name)
+        goal, who = self._room_around(self.goal_of(room)), normalized(name)
         for place, explored in self.explored.items():
             things = self.contents[place]
             if who in explored.people or any(thing.label == who for thing in things):
@@ -292,19 +316,20 @@ class SampledRobot(SimulatedRobot):
 
     def _answers(self, who: str) -> bool:
         is_there = self.is_here(who)
-        if is_there is None and self.here.lacks(SOMEBODY):
+        around = self.explored[self._around]
+        if is_there is None and around.lacks(SOMEBODY):
             is_there = False
         if is_there is None:
-            is_there = self.settle(who, is_random=self.sampler.strict)
+            is_there = self.settle(who, self._around, is_random=self.sampler.strict)
         if is_there:
-            self.here.people |= {who, SOMEBODY}
+            around.people |= {who, SOMEBODY}
         return is_there
 
     def take(self, obj: str) -> None:
         """Pick up an object, which is present unless an earlier look failed to find it."""
         name = normalized(obj)
         if self.held is None and self.is_here(name) is None and self._lies_there(name):
-            self._add(name)
+            self._add(name, self.room)
         search = self.search(name)
         again = self.held is not None and normalized(self.held) == name and len(search.found) > 1
         with self.excused(when=again or search.is_lost):
@@ -317,7 +342,7 @@ class SampledRobot(SimulatedRobot):
         if name in self.here.gone:  # there may have been several of the same kind
             self.has_assumed |= not self.sampler.strict
             return not self.sampler.strict
-        return self.settle(name, is_random=self.sampler.strict)
+        return self.settle(name, self.room, is_random=self.sampler.strict)
 
     def put(self, obj: str) -> None:
         """Put down the held object, using exactly the name it was picked up under."""

@@ -17,10 +17,10 @@ from codebotler.simulator.entities import NO_WORDS, Somebody, Thing
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.matching import (
     WORDS_FOR_PEOPLE,
+    WORDS_FOR_THINGS,
     best_fits,
     finds,
-    meant_by,
-    prefer_places,
+    goals_meant,
     resolve_room,
     trait_words,
 )
@@ -101,7 +101,7 @@ class SimulatedWorld:
         """Return all rooms that a request may refer to; for an exact name, only where it would lead."""
         if self.settings.matching == "longest-name":
             around = {room.name: room.within for room in self.world.rooms if room.within}
-            return prefer_places(meant_by(request, self.goals), around)
+            return goals_meant(request, self.goals, around)
         wanted = request.strip().lower()
         named = [room for room in self.goals if room.lower() == wanted]
         if named:
@@ -143,13 +143,14 @@ class SimulatedWorld:
     def things(self, where: str = "", is_: str = "") -> list[str]:
         """Return the names of the things in a room or at a place, or anywhere, that fit a description."""
         found = [thing for goal in self._goals_in(where) for thing in self.contents[goal]]
-        return [thing.label for thing in found if not is_ or best_fits(is_, [thing.entity])]
+        fitting = (one for one in found if not is_ or best_fits(is_, [one.entity], WORDS_FOR_THINGS))
+        return [thing.label for thing in fitting]
 
-    def people(self, where: str = "", is_: str = "", **traits: str) -> list[str]:
+    def people(self, where: str = "", is_: str = "", **traits: object) -> list[str]:
         """Return the names of the people in a room, around a place, or anywhere, who fit all descriptions."""
         around = self._room_around(self.goal_of(where)) if where else ""
         found = [one for goal in self._goals_in(around) for one in self.occupants[goal] if one.is_here]
-        wanted = [text for text in (is_, *traits.values()) if text]
+        wanted = [str(one) for one in (is_, *traits.values()) if one]
         words = self.settings.words_for_people or WORDS_FOR_PEOPLE
         return [o.person.name for o in found if all(best_fits(text, [o.entity], words) for text in wanted)]
 

@@ -7,7 +7,7 @@ import pytest
 
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.trace import Option
-from codebotler.core.world import World, is_within, laid_out
+from codebotler.core.world import Room, World, is_within, laid_out
 from codebotler.core.world_file import read_world
 from codebotler.missions.map_event import map_data, map_from
 from codebotler.robots.simulated import SIMULATION
@@ -206,7 +206,7 @@ def test_skills_read_rooms_of_a_guessed_map() -> None:
         robot = SampledRobot(RoomMap(("hall",), "hall", guessed=True), FactSampler(sample=number))
         robot.drive("loft")
         counts.add(len(robot.people("loft", is_="person")))
-    assert counts == {0, 1}
+    assert counts == {0, 1, 2}
 
 
 def test_a_person_who_was_moved_is_there(world: World) -> None:
@@ -257,6 +257,23 @@ def test_a_place_is_meant_where_its_room_is_named_as_well(world: World) -> None:
         assert robot.room == "sink"
 
 
+@pytest.mark.parametrize(
+    ("request_", "goal"),
+    [
+        ("sofa in living room", "sofa"),
+        ("the sofa in the living room", "sofa"),
+        ("the living room", "living room"),
+        ("sofa", "sofa"),
+        ("the sofa and the living room", "living room"),
+    ],
+)
+def test_a_place_with_its_room_means_the_place_however_long_the_names_are(request_: str, goal: str) -> None:
+    home = World((Room("hall"), Room("living room"), Room("sofa", within="living room")), "hall")
+    robots = (SimulatedRobot(home, SIMULATION), sampled(home))
+    assert [robot.room_for(request_) for robot in robots] == [goal, goal]
+    assert replace(RoomMap.of(home), plain=True).room(request_) == goal
+
+
 @pytest.mark.parametrize("request_", ["kitchen-hall", "the sink's owner", "hall.2", "hall-"])
 def test_parts_of_compound_words_are_no_names(robot: SimulatedRobot, request_: str) -> None:
     assert (robot.room_for(request_) is not None) == (request_ == "hall-")
@@ -298,3 +315,40 @@ def test_the_map_of_a_mission_knows_which_room_a_place_is_in(world: World) -> No
         "kitchen table": "kitchen",
         "sink": "kitchen",
     }
+
+
+def test_people_are_at_all_places_of_an_imagined_room(world: World) -> None:
+    answers = set()
+    for number in range(20):
+        robot = sampled(world, number)
+        robot.perform("go_to", ["kitchen"])
+        seen = robot.perform("is_in_room", ["Angel"])
+        answers.add(seen)
+        robot.perform("go_to", ["sink"])
+        assert robot.perform("is_in_room", ["Angel"]) is seen
+        assert ("Angel" in robot.people("sink")) is seen
+        robot.move_person("Angel", "sink")
+        assert robot.perform("is_in_room", ["Angel"])
+        robot.perform("go_to", ["kitchen table"])
+        assert robot.perform("is_in_room", ["Angel"])
+    assert answers == {True, False}
+
+
+def test_there_is_another_unknown_thing_only_where_there_is_one(world: World) -> None:
+    found = [sampled(world, number).things("kitchen table", "banana") for number in range(40)]
+    assert {*map(tuple, found)} == {(), ("banana",), ("banana", "another banana")}
+
+
+@pytest.mark.parametrize("words", ["things", "objects", "thing", "item", ""])
+def test_words_for_things_mean_all_things(robot: SimulatedRobot, words: str) -> None:
+    assert robot.things("kitchen table", words) == ["apple", "pear", "mug"]
+
+
+@pytest.mark.parametrize("words", ["pieces of fruit", "piece of red fruit"])
+def test_pieces_are_things(robot: SimulatedRobot, words: str) -> None:
+    assert "apple" in robot.things("kitchen table", words)
+
+
+def test_people_are_meant_by_their_names_however_they_are_introduced(robot: SimulatedRobot) -> None:
+    assert robot.people("kitchen", "the person named Angel") == ["Angel"]
+    assert robot.people("kitchen", "someone called Bo") == ["Bo"]
