@@ -248,3 +248,13 @@ def test_place_of_a_mission_is_in_the_robots_own_words(
     request = Request(str(program), yes=True)
     assert run_mission(Answering(knowing(["hall", LAB], LAB)), request, tmp_path / "home", nobody) == 0
     assert places == [LAB]
+
+
+def test_a_robot_drives_to_the_places_of_the_world_in_the_rooms_that_it_lists() -> None:
+    world = World(
+        (Room("hall"), Room("kitchen"), Room("sink", within="kitchen"), Room("bed", within="bedroom")), "hall"
+    )
+    room_map, _ = ask_rooms(Answering(knowing(["hall", "kitchen"], "hall")), print, world)
+    assert room_map is not None
+    assert room_map.goals == ("hall", "kitchen", "sink")
+    assert room_map.possible_rooms("sink") == ["sink"]
