@@ -77,7 +77,7 @@ def _texts_of(row: Skill, bound: SkillBound, show: Callable[[str], str]) -> str:
         if templates is None or any(one.is_any for one in templates):
             words.append("any room" if is_goal(row, name) else f"any {name.replace('_', ' ')}")
         elif templates:
-            texts = [show("…".join(one.parts)) for one in templates]
+            texts = [show("[...]".join(one.parts)) for one in templates]
             most = (
                 MAX_LONG_TEXTS
                 if any(" " in text for text in texts) and not is_goal(row, name)
