@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from secrets import compare_digest
@@ -22,6 +23,7 @@ from codebotler.missions.wording import event_text
 from codebotler.prompts import prompt_for
 from codebotler.web.console import Console
 
+MAX_CONTRACT_CHARACTERS = 20_000
 MAX_ASKED_CHARACTERS = 4_000
 """The limit for a program in a client's dialog. Longer programs are reviewed on the page."""
 
@@ -59,6 +61,10 @@ class Gatekeeper:
         self, purpose: str, bounds: Mapping[str, Any], author: str
     ) -> tuple[MissionSession, Steps]:
         """Propose a mission in which the agent calls skills one at a time, within these bounds."""
+        if self.console.view.is_running:
+            raise MissionError("a mission is running; wait until it is over, or stop it")
+        if len(json.dumps(bounds)) > MAX_CONTRACT_CHARACTERS:
+            raise UserError(f"the contract is longer than {MAX_CONTRACT_CHARACTERS:,} characters; shorten it")
         known = self.console.robot.skills.without(self.console.robot.missing)
         steps = Steps(purpose, contract_from(bounds, known), known)
         order = MissionOrder(
@@ -91,11 +97,15 @@ class Gatekeeper:
         is_ours = steps is not None and session is self._session and view.program == steps.program
         return is_ours and view.state is MissionState.RUNNING
 
-    @staticmethod
-    def approves_alone(view: SessionView) -> bool:
-        """Whether the contract given at the start allows all that a program or steps may do."""
+    def approves_alone(self, session: MissionSession) -> bool:
+        """Whether the contract given at the start allows all that an agent's own proposal may do.
+
+        If a person has edited the program or switched off a rule, a person must approve it.
+        """
+        view = session.view
+        is_agents = session is self._session and bool(view.author) and not view.disabled_rules
         is_within = view.within is not None and view.contract is not None
-        return is_within and view.may_be_approved and not view.problems
+        return is_agents and is_within and view.may_be_approved and not view.problems
 
     def contract_text(self, view: SessionView) -> str:
         """Describe what a program can do at most, or return "" if this is unknown."""

@@ -33,7 +33,7 @@ from codebotler.web.access import AGENT_PATH
 from codebotler.web.console import Console
 from codebotler.web.server import Companion
 
-MAX_MESSAGE_BYTES = 16_000_000
+MAX_MESSAGE_BYTES = 2_000_000
 """The limit for one message on standard input."""
 
 

@@ -21,7 +21,7 @@ from codebotler.core.unicode import compose
 from codebotler.core.words import listed
 from codebotler.missions.live import LiveRobot
 from codebotler.missions.mission import MissionError
-from codebotler.simulator.contract import Contract
+from codebotler.simulator.contract import TELLING_SKILLS, Contract
 from codebotler.simulator.ledger import Ledger
 from codebotler.simulator.process.errors import ProtocolError
 from codebotler.simulator.robot import Argument
@@ -62,7 +62,7 @@ class Steps:
 
     def call(self, name: str, arguments: Mapping[str, object]) -> Future[SkillOutcome]:
         """Call a skill of the running mission. Raise UserError for a wrong call."""
-        if name not in self.contract.skills:
+        if name not in self.contract.skills.keys() | TELLING_SKILLS:
             raise UserError(f"this mission may call only {listed(list(self.contract.skills))}")
         call = self.skills[name], _arguments(self.skills[name], arguments), Future[SkillOutcome]()
         with self._lock:

@@ -155,7 +155,7 @@ def _ask_person(
     """Have the client ask its person, unless the program is already approved or the client cannot ask."""
     gatekeeper, view = _gatekeeper(ctx), session.view
     may_ask = view.may_be_approved and gatekeeper.may_ask_client(view) and _has_dialogs(ctx)
-    if not may_ask or gatekeeper.approves_alone(session.view):
+    if not may_ask or gatekeeper.approves_alone(session):
         return NotAsked()
     return Elicit(question(view, gatekeeper.console.robot.name, gatekeeper.contract_text(view)), Consent)
 
@@ -269,7 +269,7 @@ def _take_answer(
     """Approve the program if a person or a contract accepts it. End the mission if a person declines."""
     view, person = session.view, f"a person, asked by {client}"
     if isinstance(answer, AcceptedElicitation) and isinstance(answer.data, NotAsked):
-        if gatekeeper.approves_alone(session.view):
+        if gatekeeper.approves_alone(session):
             session.approve(digest, by="the contract given at the start")
     elif isinstance(answer, AcceptedElicitation) and answer.data.approve:
         if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile

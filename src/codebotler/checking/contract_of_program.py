@@ -8,7 +8,15 @@ from codebotler.checking.exploration import Exploration
 from codebotler.checking.written_arguments import ArgumentTexts, WrittenArguments
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.text_template import TextTemplate
-from codebotler.simulator.contract import Contract, RequestedCall, SkillBound, Templates, has_place, is_goal
+from codebotler.simulator.contract import (
+    TELLING_SKILLS,
+    Contract,
+    RequestedCall,
+    SkillBound,
+    Templates,
+    has_place,
+    is_goal,
+)
 from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import name_of
 
@@ -29,7 +37,7 @@ def derive_contract(
         skills: the skills that the program may call.
     """
     bounds = {}
-    for row in skills.rows:
+    for row in skills.without(TELLING_SKILLS).rows:
         calls = [call for call in found.calls if call.skill == row.name]
         if calls or row.name in written.skills:
             bounds[row.name] = _bound(row, calls, found, written, room_map)

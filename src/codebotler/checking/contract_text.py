@@ -9,7 +9,7 @@ from codebotler.core.phrases import verb
 from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.words import brief, counted, listed
-from codebotler.simulator.contract import Contract, SkillBound, is_goal
+from codebotler.simulator.contract import TELLING_SKILLS, Contract, SkillBound, is_goal
 
 NEVER = {
     GOTO: "drives nowhere",
@@ -45,11 +45,10 @@ def contract_rows(
     contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief
 ) -> Iterator[ContractRow]:
     """Yield a row for each skill of a contract, except for those that only tell rooms."""
-    for name in sorted(contract.skills, key=lambda name: not skills[name].is_drive):
-        row, bound = skills[name], contract.skills[name]
-        if row.recording is None and row.is_idle:
-            continue
-        what = name if row.recording is None else verb(row.recording.kind).base
+    named = contract.skills.keys() - TELLING_SKILLS
+    for row in sorted((row for row in skills.rows if row.name in named), key=lambda row: not row.is_drive):
+        bound = contract.skills[row.name]
+        what = row.name if row.recording is None else verb(row.recording.kind).base
         places = "" if not bound.places else f"in {_any_of(map(show, bound.places), MAX_VALUES)}"
         often = "" if not bound.at_most else f"at most {counted(bound.at_most, 'time')}"
         yield ContractRow(what, _texts_of(row, bound, show), places, often)
@@ -67,7 +66,6 @@ def contract_sentence(contract: Contract, skills: SkillTable, show: Callable[[st
 def contract_clauses(contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief) -> list[str]:
     """Say of each skill what a program may do with it, such as `go to "kitchen" or "lab"`."""
     rows = contract_rows(contract, skills, show)
-    rows = contract_rows(contract, skills, show)
     return [" ".join(filter(None, (row.what, row.texts, row.places))) for row in rows]
 
 
@@ -77,7 +75,8 @@ def _texts_of(row: Skill, bound: SkillBound, show: Callable[[str], str]) -> str:
         if templates is None or any(one.is_any for one in templates):
             words.append("any room" if is_goal(row, name) else f"any {name.replace('_', ' ')}")
         elif templates:
-            texts = [show("[...]".join(one.parts)) for one in templates]
+            first = sorted(templates, key=lambda one: len(one.parts) == 1)  # those with gaps
+            texts = ["[...]".join(map(show, one.parts)) for one in first]
             most = (
                 MAX_LONG_TEXTS
                 if any(" " in text for text in texts) and not is_goal(row, name)

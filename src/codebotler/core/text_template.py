@@ -40,7 +40,7 @@ class TextTemplate:
     @property
     def is_any(self) -> bool:
         """Whether every text matches."""
-        return self.parts == ("", "")
+        return len(self.parts) > 1 and not any(map(str.strip, self._pieces))
 
     @cached_property
     def _pieces(self) -> list[str]:

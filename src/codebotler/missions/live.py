@@ -147,7 +147,7 @@ class LiveRobot:
     def _judge_call(self, row: Skill, arguments: Sequence[Argument]) -> None:
         """Raise an error if the contract does not allow a call."""
         guard = self._guard
-        if guard is None or guard.contract is None:
+        if guard is None or not guard.contracts:
             return
         if self._room is None and has_place(row):
             self._room = self._ask_room()

@@ -190,7 +190,7 @@ class Mission:
         *,
         rules: Sequence[Rule] = (),
         room_map: RoomMap | None = None,
-        contract: Contract | None = None,
+        contracts: Sequence[Contract] = (),
         drive: Driver | None = None,
     ) -> MissionState:
         """Run the program on a robot, and return the final state: done, failed or stopped.
@@ -202,7 +202,7 @@ class Mission:
             place: the robot's current room, or "" if unknown.
             rules: the house rules. Breaking one of them stops the mission.
             room_map: the rooms that the robot knows.
-            contract: what the program may do. A call that it does not allow stops the mission.
+            contracts: what the program may do. A call that one of them does not allow stops the mission.
             drive: calls the skills in place of the program.
 
         Raises:
@@ -211,7 +211,7 @@ class Mission:
             OSError: an event could not be logged or printed, so the robot was stopped.
         """
         plan = () if room_map is None else room_map.plan
-        guard = RuleGuard(rules, plan, contract) if rules or contract is not None else None
+        guard = RuleGuard(rules, plan, contracts) if rules or contracts else None
         live = LiveRobot(
             reserved.robot, self._write, place=place, guard=guard, room_map=room_map, button=self.stop_button
         )

@@ -258,8 +258,8 @@ class MissionSession:
                 keep_out(rules)
             view = self._view
             drive = self._order.drive if mission.summary.program == self._order.program else None
-            contract = view.contract if drive else view.within or view.contract
-            mission.run(reserved, place, rules=rules, room_map=room_map, contract=contract, drive=drive)
+            contracts = [one for one in (view.contract, view.within) if one is not None]
+            mission.run(reserved, place, rules=rules, room_map=room_map, contracts=contracts, drive=drive)
 
     @property
     def _is_stopped(self) -> bool:

@@ -153,5 +153,5 @@ class SessionView:
 
 
 def program_digest(program: str) -> str:
-    """Return a short hash of a program."""
-    return hashlib.sha256(program.encode(errors="surrogatepass")).hexdigest()[:16]
+    """Return a hash of a program."""
+    return hashlib.sha256(program.encode(errors="surrogatepass")).hexdigest()

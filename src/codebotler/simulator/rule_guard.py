@@ -65,13 +65,13 @@ class RuleGuard:
     Args:
         rules: the rules in force.
         rooms: the known rooms and their footprints.
-        contract: the bound of what the program may do, or None for no bound.
+        contracts: bounds of what the program may do, all of which count.
     """
 
     def __init__(
-        self, rules: Sequence[Rule], rooms: Sequence[Room] = (), contract: Contract | None = None
+        self, rules: Sequence[Rule], rooms: Sequence[Room] = (), contracts: Sequence[Contract] = ()
     ) -> None:
-        self.rules, self._rooms, self.contract = tuple(rules), rooms, contract
+        self.rules, self._rooms, self.contracts = tuple(rules), rooms, tuple(contracts)
         self._calls: Counter[str] = Counter()  # by skill
         self._stops = {room.full_name: room.stand_at for room in rooms}
         self._around = {
@@ -145,7 +145,7 @@ class RuleGuard:
             raise
 
     def judge_call(self, row: Skill, arguments: Sequence[Argument], goals: Sequence[str], place: str) -> None:
-        """Count the next call, or raise RuleViolationError if the contract does not allow it.
+        """Count the next call, or raise RuleViolationError if a contract does not allow it.
 
         Args:
             row: the skill.
@@ -153,11 +153,10 @@ class RuleGuard:
             goals: the rooms that the goal of a drive may mean, as rules name them.
             place: the robot's room, or "" if it is unknown.
         """
-        if self.contract is None:
-            return
-        call = RequestedCall.of(row, arguments, goals, place)
-        if why := self.contract.objection(call, self._calls[row.name]):
-            raise contract_violation(row, arguments, place, why)
+        for contract in self.contracts:
+            call = RequestedCall.of(row, arguments, goals, place)
+            if why := contract.objection(call, self._calls[row.name]):
+                raise contract_violation(row, arguments, place, why)
         self._calls[row.name] += 1
 
     def uncount_call(self, row: Skill) -> None:

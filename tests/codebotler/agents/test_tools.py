@@ -517,6 +517,8 @@ def test_skills_are_called_one_at_a_time_and_logged_as_a_mission(gatekeeper: Gat
 
 def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
     async def act(agent: Agent) -> None:
+        assert 'no skill "fly"' in await agent.fails("begin_steps", purpose="fly", contract={"fly": {}})
+        assert 'no "text"' in await agent.fails("begin_steps", purpose="a", contract={"say": {"text": "any"}})
         key, _ = await began(agent, gatekeeper, "go_to", "ask")
         for wrong in ({}, {"location": 3}, {"location": ["kitchen"]}, {"location": "kitchen", "more": 1}):
             assert "go_to" in await agent.fails("call_skill", steps=key, name="go_to", arguments=wrong)
@@ -527,8 +529,6 @@ def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
         assert "no step-by-step" in await agent.fails(
             "call_skill", steps="x", name="go_to", arguments=arguments
         )
-        assert 'no skill "fly"' in await agent.fails("begin_steps", purpose="fly", contract={"fly": {}})
-        assert 'no "text"' in await agent.fails("begin_steps", purpose="a", contract={"say": {"text": "any"}})
         session = gatekeeper.console.session
         assert session is not None
         assert [line for line in session.events() if line["event"] == "skill"] == []
@@ -595,6 +595,52 @@ def test_steps_beyond_the_contract_of_the_start_need_a_person(gatekeeper: Gateke
         assert (ended["state"], ended["reason"]) == ("stopped", "stopped by rule contract")
 
     use(gatekeeper, act, answer=answer)
+
+
+@pytest.mark.parametrize("change", ["edit", "rule"])
+def test_a_contract_approves_nothing_that_a_person_has_changed(tmp_path: Path, change: str) -> None:
+    (tmp_path / "house.yaml").write_text(
+        "rules: [{name: vault, says: Stay out of the vault., always: 'not tr.Exists(goto(\"vault\"))'}]\n"
+    )
+    gatekeeper = gatekeeper_at(tmp_path, rules=tuple(read_rules(tmp_path / "house.yaml")))
+    gatekeeper.console.within = contract_from(anything(), SKILLS)
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=HELLO)
+        session = gatekeeper.console.session
+        assert session is not None
+        if change == "edit":
+            session.edit(HELLO.replace("hello", "bye"))
+        else:
+            session.switch_off("vault", "for the test")
+        await until(gatekeeper, lambda view: view.may_be_approved)
+        digest = (await agent.call("follow_mission", seconds=0.05))["digest"]
+        assert (digest == proposed["digest"]) == (change == "rule")
+        waiting = await agent.call("run_mission", digest=digest, seconds=0.05)
+        assert waiting["state"] == "checked"
+
+    with gatekeeper.console:
+        use(gatekeeper, act)
+
+
+def test_a_contract_does_not_approve_the_program_of_a_person(gatekeeper: Gatekeeper) -> None:
+    gatekeeper.console.within = contract_from(anything(), SKILLS)
+
+    async def act(agent: Agent) -> None:
+        session = gatekeeper.console.begin(MissionOrder(program=HELLO, author="a person"))
+        await until(gatekeeper, lambda view: view.may_be_approved)
+        waiting = await agent.call("run_mission", digest=session.view.digest, seconds=0.05)
+        assert waiting["state"] == "checked"
+
+    use(gatekeeper, act)
+
+
+def test_a_huge_contract_is_refused_at_once(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        contract = {"say": {"message": ["x"] * 20_000}}
+        assert "shorten it" in await agent.fails("begin_steps", purpose="talk", contract=contract)
+
+    use(gatekeeper, act)
 
 
 def test_each_step_is_compared_with_the_contract(gatekeeper: Gatekeeper) -> None:

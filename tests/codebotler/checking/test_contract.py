@@ -2,6 +2,7 @@
 
 import unicodedata
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,8 @@ from codebotler.checking.problems import CheckResult
 from codebotler.checking.proof import hold_within
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill
+from codebotler.core.skills.values import ValueType
 from codebotler.core.text_template import TextTemplate
 from codebotler.rtl import parse
 from codebotler.simulator.contract import Contract, RequestedCall, SkillBound
@@ -85,7 +88,8 @@ def test_rooms_are_those_that_the_program_may_enter(contracts: Contracts) -> Non
     assert allowed(contract, "say") == {"message": ["There is no stapler in {}"]}
     assert allowed(contract, "is_in_room") == {"entity": ["stapler"]}
     assert contract.skills["go_to"].at_most == 3
-    assert set(contract.skills) == {"get_all_rooms", "go_to", "is_in_room", "say"}
+    assert set(contract.skills) == {"go_to", "is_in_room", "say"}
+    assert not contract.objection(RequestedCall("get_all_rooms", ()))
 
 
 def test_things_are_picked_up_and_put_down_in_known_rooms(contracts: Contracts) -> None:
@@ -226,3 +230,18 @@ def test_after_a_problem_a_robot_may_get_further_than_the_check(contracts: Contr
     assert found.contract is not None
     assert found.contract.skills["go_to"].at_most is None
     assert allowed(found.contract, "say") == {"message": ["a"]}
+
+
+def test_gaps_are_shown_first_and_never_shortened_away() -> None:
+    many = [TextTemplate((letter,)) for letter in "abcdefgh"]
+    long = TextTemplate(("x" * 200, "y"))
+    hidden = Contract({"say": SkillBound((("message", (*many, long)),))})
+    assert "[...]" in contract_sentence(hidden, SKILLS)
+    anything = Contract({"go_to": SkillBound((("location", (*many, TextTemplate((" ", "")))),))})
+    assert "any room" in contract_sentence(anything, SKILLS)
+
+
+def test_a_skill_without_an_event_is_beyond_a_contract_as_well(contracts: Contracts) -> None:
+    silent = Skill("take_photo", (), ValueType(None), "Take a photo.", is_idle=True)
+    found = replace(contracts.checked(BRING), contract=Contract({"take_photo": SkillBound()}))
+    assert hold_within(found, Contract({}), SKILLS.with_skill(silent)).problems

@@ -67,7 +67,7 @@ def ran(
     mission.check([])
     mission.approve()
     with Reservation(robot, folder) as reserved, mission:
-        mission.run(reserved, place, room_map=ROOMS, contract=contract)
+        mission.run(reserved, place, room_map=ROOMS, contracts=[contract])
     lines = (mission.folder / EVENTS_FILE).read_text().splitlines()
     return mission, [json.loads(line) for line in lines]
 
@@ -116,6 +116,19 @@ def task_program():
     robot = Answering(lambda skill, _: "no" if skill == "ask" else None)
     mission, _ = ran(tmp_path, robot, program)
     assert mission.state is MissionState.DONE
+
+
+def test_all_contracts_count(tmp_path: Path) -> None:
+    robot = Answering()
+    mission = Mission(tmp_path, robot.name)
+    mission.draft("def task_program():\n    go_to('kitchen')\n    go_to('hall')\n")
+    mission.check([])
+    mission.approve()
+    with Reservation(robot, tmp_path) as reserved, mission:
+        only_kitchen = Contract({"go_to": bound(location=["kitchen"])})
+        mission.run(reserved, "hall", room_map=ROOMS, contracts=[ALLOWED, only_kitchen])
+    assert mission.state is MissionState.STOPPED
+    assert robot.done == ["kitchen"]
 
 
 def test_a_call_too_many_stops_the_mission(tmp_path: Path) -> None:
@@ -209,7 +222,6 @@ def test_the_answers_of_a_robot_do_not_leave_the_contract(tmp_path: Path) -> Non
     told: dict[str, RobotResult] = {"get_all_rooms": ["hall", "the vault"], "get_current_location": "hall"}
     robot = Answering(lambda skill, _: told.get(skill))
     program = "def task_program():\n    for room in get_all_rooms():\n        go_to(room)\n"
-    allowed = Contract({**ALLOWED.skills, "get_all_rooms": SkillBound()})
-    mission, _ = ran(tmp_path, robot, program, allowed)
+    mission, _ = ran(tmp_path, robot, program)
     assert mission.state is MissionState.STOPPED
     assert "the vault" not in robot.done
