@@ -13,7 +13,6 @@ from pydantic import BaseModel, ConfigDict
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.text_template import TextTemplate
-from codebotler.core.world_file import YamlText
 from codebotler.core.yaml_files import YamlFile
 from codebotler.simulator.contract import Contract, SkillBound, Templates, has_place
 
@@ -27,7 +26,7 @@ class ContractFile(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     version: Literal[1]
-    skills: Mapping[str, Mapping[str, int | Literal["any"] | list[YamlText]]]
+    skills: Mapping[str, Mapping[str, Any]]
 
 
 def read_contract(path: Path, skills: SkillTable = SKILLS) -> Contract:
@@ -67,9 +66,11 @@ def _read_bound(file: YamlFile, row: Skill, given: Mapping[str, Any]) -> SkillBo
         where = "skills", row.name, key
         if key not in known:
             raise file.wrong(f'{row.name} has no "{key}"; write {", ".join(known)}', *where)
-        if isinstance(value, int) is not (key == AT_MOST) or value == 0:
-            must = "a whole number above 0" if key == AT_MOST else "any, or a list of texts"
-            raise file.wrong(f'"{key}" must be {must}', *where)
+        if key == AT_MOST and not (type(value) is int and value > 0):
+            raise file.wrong(f'"{key}" must be a whole number above 0', *where)
+        is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
+        if key != AT_MOST and value != ANY and not is_list:
+            raise file.wrong(f'"{key}" must be any, or a list of texts in quotes', *where)
     missing = [name for name in known if name not in given and name != AT_MOST]
     if missing:
         sentence = f'{row.name} lacks "{missing[0]}"; write a list of texts, or any'

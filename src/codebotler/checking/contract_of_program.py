@@ -64,11 +64,12 @@ def _bound(
         texts.append(
             (parameter.name, (*allowed, *(TextTemplate((text,)) for text in met)) if is_known else None)
         )
-    places = {call.place for call in calls} if has_place(row) and knows_all else None
+    is_fixed = knows_all and found.is_steady
+    places = {call.place for call in calls} if has_place(row) and is_fixed else None
     return SkillBound(
         tuple(texts),
         tuple(sorted(places)) if places else None,
-        found.most_calls.get(row.name) if knows_all else None,
+        found.most_calls.get(row.name) if is_fixed else None,
     )
 
 

@@ -21,7 +21,9 @@ NEVER = {
 """What a program never does whose contract lacks the skill that records such events."""
 
 ANYBODY = "anybody"  # a question to "" is for whoever is there
-MAX_VALUES, MAX_LONG_TEXTS = 6, 3  # shown names, and shown texts with spaces
+GAP = "[...]"
+MAX_VALUES, MAX_LONG_TEXTS, MAX_IN_TABLE = 6, 3, 60  # shown texts
+LONG_TEXT = 30  # characters
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class ContractRow:
         what: the verb of the skill, such as `pick up`.
         texts: the allowed texts of its arguments.
         places: the rooms in which it may happen, or an empty string for all.
-        at_most: how often it may happen, such as `at most 3 times`, or an empty string.
+        at_most: how often it may succeed, such as `at most 3 times`, or an empty string.
     """
 
     what: str
@@ -42,21 +44,23 @@ class ContractRow:
 
 
 def contract_rows(
-    contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief
+    contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief, *, is_short: bool = False
 ) -> Iterator[ContractRow]:
-    """Yield a row for each skill of a contract, except for those that only tell rooms."""
+    """Yield a row for each skill of a contract, with all that it allows or, if it is short, with a part."""
     named = contract.skills.keys() - TELLING_SKILLS
     for row in sorted((row for row in skills.rows if row.name in named), key=lambda row: not row.is_drive):
         bound = contract.skills[row.name]
         what = row.name if row.recording is None else verb(row.recording.kind).base
-        places = "" if not bound.places else f"in {_any_of(map(show, bound.places), MAX_VALUES)}"
+        places = _any_of(map(show, bound.places or ()), is_short=is_short)
         often = "" if not bound.at_most else f"at most {counted(bound.at_most, 'time')}"
-        yield ContractRow(what, _texts_of(row, bound, show), places, often)
+        texts = _texts_of(row, bound, show, is_short=is_short)
+        yield ContractRow(what, texts, f"in {places}" if places else "", often)
 
 
 def contract_sentence(contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief) -> str:
     """Say in a sentence or two what a program may do at most, and what it never does."""
-    may = contract_clauses(contract, skills, show)
+    rows = contract_rows(contract, skills, show, is_short=True)
+    may = [" ".join(filter(None, (row.what, row.texts, row.places))) for row in rows]
     known = {row.recording.kind: row.name for row in skills.rows if row.recording is not None}
     never = [what for kind, what in NEVER.items() if known.get(kind, "") not in {"", *contract.skills}]
     parts = [f"It may {'; '.join(may)}" if may else "", f"It {listed(never)}" if never else ""]
@@ -64,30 +68,26 @@ def contract_sentence(contract: Contract, skills: SkillTable, show: Callable[[st
 
 
 def contract_clauses(contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief) -> list[str]:
-    """Say of each skill what a program may do with it, such as `go to "kitchen" or "lab"`."""
+    """Say of each skill what a program may do with it, such as `go to "kitchen" or "lab" at most 3 times`."""
     rows = contract_rows(contract, skills, show)
-    return [" ".join(filter(None, (row.what, row.texts, row.places))) for row in rows]
+    return [" ".join(filter(None, (row.what, row.texts, row.places, row.at_most))) for row in rows]
 
 
-def _texts_of(row: Skill, bound: SkillBound, show: Callable[[str], str]) -> str:
+def _texts_of(row: Skill, bound: SkillBound, show: Callable[[str], str], *, is_short: bool) -> str:
     words = []
     for (name, templates), parameter in zip(bound.texts, row.parameters, strict=True):
         if templates is None or any(one.is_any for one in templates):
             words.append("any room" if is_goal(row, name) else f"any {name.replace('_', ' ')}")
         elif templates:
             first = sorted(templates, key=lambda one: len(one.parts) == 1)  # those with gaps
-            texts = ["[...]".join(map(show, one.parts)) for one in first]
-            most = (
-                MAX_LONG_TEXTS
-                if any(" " in text for text in texts) and not is_goal(row, name)
-                else MAX_VALUES
-            )
-            any_of = _any_of((f'"{text}"' if text else ANYBODY for text in texts), most)
+            any_of = _any_of((GAP.join(map(show, one.parts)) for one in first), is_short=is_short)
             words.append(f"with {any_of}" if parameter.is_options else any_of)
     return " ".join(words)
 
 
-def _any_of(texts: Iterable[str], most: int) -> str:
-    shown = list(texts)
+def _any_of(texts: Iterable[str], *, is_short: bool) -> str:
+    shown = [f'"{text}"' if text else ANYBODY for text in texts]
+    few = MAX_LONG_TEXTS if any(len(text) > LONG_TEXT for text in shown) else MAX_VALUES
+    most = few if is_short else MAX_IN_TABLE
     more = len(shown) - most
     return listed([*shown[:most], *([f"{more:,} more"] if more > 0 else [])], "or")

@@ -13,7 +13,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Status
-from codebotler.simulator.contract import RequestedCall
+from codebotler.simulator.contract import TELLING_SKILLS, RequestedCall
 from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.robot import Argument
@@ -21,8 +21,8 @@ from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.worker import Worker
 
-MAX_RUNS, MAX_LONE_RUNS = 2_000, 100
-"""The budget of an exploration: all its runs, and those that need a process of their own."""
+MAX_RUNS, MAX_LONE_RUNS, MAX_CALLS = 2_000, 100, 40_000
+"""The budget for each kind of world: all runs, those that need a process of their own, and skill calls."""
 
 RUNS_AT_ONCE = 32
 MAX_FAILURES = 30  # runs in which the robot fails once
@@ -39,6 +39,7 @@ class Exploration:
         most_calls: the highest number of calls of each skill in a run; empty if a run is endless.
         violations: for each rule that is broken, the first world in which it is.
         is_complete: whether no other world of these rooms can let the program do anything else.
+        is_steady: whether this is so even if facts change during a run, or if the robot fails.
     """
 
     cases: int
@@ -46,6 +47,7 @@ class Exploration:
     most_calls: Mapping[str, int]
     violations: Mapping[str, FactSampler]
     is_complete: bool
+    is_steady: bool
 
 
 class ExploringGuard(RuleGuard):
@@ -62,11 +64,15 @@ class ExploringGuard(RuleGuard):
         self.may_refuse = fails_at is not None
         self.fails_at = fails_at
         self.calls: list[RequestedCall] = []
+        self.asks_again = False  # whether a call asks for a fact that is known, but may have changed
         self.violations: set[str] = set()  # names of rules
 
     def judge_call(self, row: Skill, arguments: Sequence[Argument], goals: Sequence[str], place: str) -> None:
         """Keep the next call, or raise RobotError if the robot fails in it."""
-        self.calls.append(RequestedCall.of(row, arguments, goals, place))
+        call = RequestedCall.of(row, arguments, goals, place)
+        tells = row.returns.base is not None and row.name not in TELLING_SKILLS
+        self.asks_again |= tells and call in self.calls
+        self.calls.append(call)
         if len(self.calls) - 1 == self.fails_at:
             raise RobotError("SkillFailed", f"the robot failed in {row.name}")
 
@@ -95,26 +101,28 @@ def explore(worker: Worker, program: str, room_map: RoomMap, settings: CheckSett
     calls: set[RequestedCall] = set()
     most: Counter[str] = Counter()
     violations: dict[str, FactSampler] = {}
-    cases, is_complete, is_endless = 0, True, False
+    cases, is_complete, is_endless, is_steady = 0, True, False, True
     for strict in (False, True):
         tree = _Tree(worker, program, room_map, replace(settings, strict=strict))
         for sample, guard in tree.runs():
             calls.update(guard.calls)
             most |= Counter(call.skill for call in guard.calls)
             is_endless |= sample.outcome.status is Status.TIMEOUT
+            is_steady &= not guard.asks_again
             for name in guard.violations:
                 violations.setdefault(name, FactSampler(settings.seed, strict=strict, forced=sample.draws))
             cases += 1
         is_complete &= tree.is_complete
-        if not tree.has_assumed:
+        if not tree.has_assumed or not tree.is_complete:
             break
     for guard in _failing_runs(worker, program, room_map, settings):
+        is_steady &= calls.issuperset(guard.calls) and guard.violations <= violations.keys()
         calls.update(guard.calls)
-        most |= Counter(call.skill for call in guard.calls)
     refused = (rule for rule in settings.house_rules if rule.refuse and rule.name in violations)
     if any(refused) or any(_is_open(settings.skills[call.skill]) for call in calls):
         is_complete = False  # a program may do something else after a refusal, or after another result
-    return Exploration(cases, frozenset(calls), {} if is_endless else most, violations, is_complete)
+    most_calls = {} if is_endless else most
+    return Exploration(cases, frozenset(calls), most_calls, violations, is_complete, is_steady)
 
 
 class _Tree:
@@ -123,7 +131,7 @@ class _Tree:
     def __init__(self, worker: Worker, program: str, room_map: RoomMap, settings: CheckSettings) -> None:
         self._worker, self._program, self._room_map, self._settings = worker, program, room_map, settings
         self._waiting: list[tuple[Draw, ...]] = [()]  # the facts with which the branches begin
-        self._runs_left, self._lone_runs_left = MAX_RUNS, MAX_LONE_RUNS
+        self._runs_left, self._lone_runs_left, self._calls_left = MAX_RUNS, MAX_LONE_RUNS, MAX_CALLS
         self.has_assumed = False  # whether a run took facts for granted
 
     @property
@@ -134,7 +142,7 @@ class _Tree:
     def runs(self) -> Iterator[tuple[Sample, ExploringGuard]]:
         """Run one branch after another, until the budget is spent."""
         with self._worker.one_child():
-            while self._waiting and min(self._runs_left, self._lone_runs_left) > 0:
+            while self._waiting and min(self._runs_left, self._lone_runs_left, self._calls_left) > 0:
                 count = min(RUNS_AT_ONCE, self._runs_left)
                 some, self._waiting = self._waiting[-count:], self._waiting[:-count]
                 yield from self._run_some(some)
@@ -152,6 +160,7 @@ class _Tree:
             robot = runs.robots[number]
             assert isinstance(robot.guard, ExploringGuard), "made for these runs"
             self.has_assumed |= robot.has_assumed
+            self._calls_left -= len(robot.guard.calls)
             self._waiting += _branches(forced, sample.draws)
             yield sample, robot.guard
 

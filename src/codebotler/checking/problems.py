@@ -61,7 +61,7 @@ class RuleProof:
     Args:
         rule: its name.
         verdict: whether no world of these rooms lets the program break it, or a possible one does; unknown if
-            there are more worlds than were explored.
+            there are more worlds than were explored, or if facts may change while the program runs.
         cases: the number of explored worlds.
         sample: the number of the world in which the program breaks it; None if there is none.
     """
@@ -79,7 +79,7 @@ class RuleProof:
             return f"cannot be broken, whatever the program meets ({worlds})"
         if self.verdict == "possible":
             return "can be broken"
-        return f"was kept in {worlds}, but there are more"
+        return f"was kept in {worlds}, but others are possible"
 
     @property
     def sentence(self) -> str:

@@ -28,7 +28,7 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
         return found
     explored = explore(worker, program, found.room_map, settings)
     written = read_arguments(program, settings.skills)
-    is_complete = explored.is_complete and not written.reads_clock
+    is_complete = explored.is_complete and explored.is_steady and not written.reads_clock
     samples, problems, proofs = list(found.samples), list(found.problems), []
     for rule in settings.house_rules:
         sampler = explored.violations.get(rule.name)

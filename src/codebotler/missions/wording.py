@@ -14,6 +14,7 @@ from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import attempted_event, to_options, trace_from
 from codebotler.core.words import brief
 from codebotler.missions.log import LogLine, MissionSummary
+from codebotler.simulator.contract import CONTRACT
 
 BY_PAGE = "the page"  # the source of a stop from the page, as it appears in the log
 _TITLE_CALLS = 2
@@ -103,7 +104,8 @@ def _rule(line: LogLine) -> str:
         return f"{rule} was broken at the end: {says}"
     what = visible(phrase(trace_from([line["what"]])[0], "ing"))
     if line.get("why"):
-        return f"{rule} cannot judge {what}, {visible(str(line['why']))}: {says}"
+        objection = "forbids" if line["rule"] == CONTRACT.name else "cannot judge"
+        return f"{rule} {objection} {what}, {visible(str(line['why']))}: {says}"
     return f"{rule} prevented {what}: {says}" if line.get("prevented") else f"{what} broke {rule}: {says}"
 
 

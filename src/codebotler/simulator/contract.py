@@ -11,13 +11,13 @@ from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import as_text
 from codebotler.core.text_template import TextTemplate
 from codebotler.core.trace import Event, Option, attempted_event
-from codebotler.core.words import brief, listed
+from codebotler.core.words import brief, counted, listed
 from codebotler.rtl import And
 from codebotler.simulator.house_rule import UNKNOWN_ROOM, Rule, RuleViolationError
 from codebotler.simulator.robot import Argument
 
-CONTRACT = Rule("contract", "Do only what the approved contract allows", And(()))
-"""The rule that names the contract in messages and logs."""
+CONTRACT = Rule("approved contract", "Do only what the contract allows", And(()))
+"""The rule that names the contract in messages and logs. The name of a house rule has no spaces."""
 
 TELLING_SKILLS = frozenset({"get_all_rooms", "get_current_location"})
 """Skills that only tell rooms, which every contract allows."""
@@ -35,7 +35,7 @@ class RequestedCall:
     Args:
         skill: its name.
         texts: the texts of each argument; for the goal of a drive, the names of the rooms that it may mean.
-        place: the robot's room; "" if it is unknown, or does not matter for the skill.
+        place: the robot's room; "" if it is unknown.
     """
 
     skill: str
@@ -55,7 +55,7 @@ class RequestedCall:
                 )
             else:
                 texts.append((as_text(value),))
-        return cls(row.name, tuple(texts), place if has_place(row) else "")
+        return cls(row.name, tuple(texts), place)
 
 
 def is_goal(row: Skill, parameter: str) -> bool:
@@ -138,7 +138,7 @@ class Contract:
         if bound is None:
             return f"since {call.skill} may not be called"
         if bound.at_most is not None and earlier >= bound.at_most:
-            return f"since {call.skill} may be called at most {bound.at_most:,} times"
+            return f"since {call.skill} may succeed at most {counted(bound.at_most, 'time')}"
         return bound.objection(call)
 
     def beyond(self, other: Contract) -> Contract:

@@ -592,7 +592,7 @@ def test_steps_beyond_the_contract_of_the_start_need_a_person(gatekeeper: Gateke
         )
         await agent.fails("call_skill", steps=proposed["steps"], name="say", arguments={"message": "bye"})
         ended = await agent.call("follow_mission")
-        assert (ended["state"], ended["reason"]) == ("stopped", "stopped by rule contract")
+        assert (ended["state"], ended["reason"]) == ("stopped", "stopped by rule approved contract")
 
     use(gatekeeper, act, answer=answer)
 
@@ -654,7 +654,7 @@ def test_each_step_is_compared_with_the_contract(gatekeeper: Gatekeeper) -> None
         await agent.call("call_skill", steps=key, name="go_to", arguments=arguments)
         assert (await agent.call("call_skill", steps=key, name="get_current_location"))["result"] == "kitchen"
         await agent.fails("call_skill", steps=key, name="go_to", arguments=arguments)
-        assert (await agent.call("follow_mission"))["reason"] == "stopped by rule contract"
+        assert (await agent.call("follow_mission"))["reason"] == "stopped by rule approved contract"
 
     use(gatekeeper, act)
 

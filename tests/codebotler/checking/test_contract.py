@@ -191,6 +191,8 @@ def test_a_contract_is_read_as_it_was_written(contracts: Contracts, tmp_path: Pa
         ("version: 1\nskills:\n  say:\n    message: ['{x}']", 4),
         ("version: 1\nskills:\n  say:\n    message: any\n    at most: 0", 5),
         ("version: 1\nskills:\n  say:\n    message: all", 4),
+        ("version: 1\nskills:\n  say:\n    message: any\n    at most: -3", 5),
+        ("version: 1\nskills:\n  say:\n    message: [3]", 4),
         ("version: 1\nskills:\n  pick: {obj: any}", 3),
     ],
 )
@@ -223,6 +225,27 @@ def test_rules_are_proved_or_broken_in_a_world_that_is_shown(contracts: Contract
 
 def test_a_program_that_does_not_compile_has_no_contract(contracts: Contracts) -> None:
     assert contracts.checked("def task_program(:").contract is None
+
+
+def test_what_a_changing_world_allows_has_no_number_and_no_place(contracts: Contracts) -> None:
+    program = """
+def task_program():
+    for _ in range(3):
+        go_to("lab")
+        if is_in_room("mug"):
+            pick("mug")
+            return
+"""
+    pick = contracts(program).skills["pick"]
+    assert (pick.places, pick.at_most) == (None, None)
+
+
+def test_a_tighter_number_is_said(contracts: Contracts) -> None:
+    found = contracts.checked(BRING)
+    bound = contracts(BRING).skills["go_to"]
+    tighter = Contract({**contracts(BRING).skills, "go_to": replace(bound, at_most=1)})
+    (problem,) = hold_within(found, tighter, SKILLS).problems
+    assert "at most 3 times" in problem.message
 
 
 def test_after_a_problem_a_robot_may_get_further_than_the_check(contracts: Contracts) -> None:

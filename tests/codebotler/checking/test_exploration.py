@@ -168,3 +168,38 @@ def task_program():
     calls = explored(worker, program).calls
     assert {call.texts[0] for call in calls if call.skill == "go_to"} == {("lab",), ("start",)}
     assert ("no way to the lab",) in {call.texts[0] for call in calls if call.skill == "say"}
+
+
+LATE = """
+def task_program():
+    tries = 0
+    while not is_in_room("Ann") and tries < 3:
+        time.sleep(60)
+        tries += 1
+    if is_in_room("Ann") and tries > 0:
+        go_to("lab")
+"""
+
+
+def test_facts_that_may_change_meanwhile_leave_rules_and_numbers_open(worker: Worker) -> None:
+    found = explored(worker, LATE, NO_LAB)
+    assert (found.is_complete, found.is_steady) == (True, False)
+    assert explored(worker, SEARCH).is_steady
+
+
+def test_failures_with_other_calls_leave_rules_and_numbers_open(worker: Worker) -> None:
+    program = """
+def task_program():
+    try:
+        go_to('kitchen')
+    except Exception:
+        go_to('lab')
+"""
+    assert not explored(worker, program, NO_LAB).is_steady
+    assert explored(worker, program.replace("go_to('lab')", "pass"), NO_LAB).is_steady
+
+
+def test_an_exploration_ends_at_its_budget_of_calls(worker: Worker, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exploration, "MAX_CALLS", 10)
+    monkeypatch.setattr(exploration, "RUNS_AT_ONCE", 1)
+    assert not explored(worker, SEARCH).is_complete

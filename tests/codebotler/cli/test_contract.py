@@ -56,7 +56,7 @@ def test_a_mission_stays_within_a_contract(folder: Path) -> None:
     assert command(*run, cwd=folder, environment=environment).status == 1
     stopped = command(*run, "--despite-problems", cwd=folder, environment=environment)
     assert stopped.status == 1
-    assert "stopped by rule contract" in stopped.out
+    assert "stopped by rule approved contract" in stopped.out
     run = (*run[:2], "greet.py", *run[3:])
     assert command(*run, cwd=folder, environment=environment).status == 0
 

@@ -95,11 +95,14 @@ def ran(
 def test_the_robot_is_not_told_what_the_contract_does_not_allow(tmp_path: Path, call: str) -> None:
     robot = Answering()
     mission, lines = ran(tmp_path, robot, STUBBORN.format(call))
-    assert (mission.state, mission.summary.reason) == (MissionState.STOPPED, "stopped by rule contract")
+    assert (mission.state, mission.summary.reason) == (
+        MissionState.STOPPED,
+        "stopped by rule approved contract",
+    )
     assert robot.done == ["kitchen"]
     assert robot.cancels
     (told,) = [line for line in lines if line["event"] == "rule"]
-    assert (told["rule"], told["prevented"], told["line"]) == ("contract", True, 6)
+    assert (told["rule"], told["prevented"], told["line"]) == ("approved contract", True, 6)
     assert told["why"]
 
 
