@@ -39,8 +39,10 @@ def derive_contract(
     bounds = {}
     for row in skills.without(TELLING_SKILLS).rows:
         calls = [call for call in found.calls if call.skill == row.name]
-        if calls or row.name in written.skills:
-            bounds[row.name] = _bound(row, calls, found, written, room_map)
+        bound = _bound(row, calls, found, written, room_map)
+        is_named = row.name in written.skills and all(texts != () for _, texts in bound.texts)
+        if calls or is_named:
+            bounds[row.name] = bound
     return Contract(bounds)
 
 

@@ -64,14 +64,16 @@ class ExploringGuard(RuleGuard):
         self.may_refuse = fails_at is not None
         self.fails_at = fails_at
         self.calls: list[RequestedCall] = []
+        self._asked: set[RequestedCall] = set()
         self.asks_again = False  # whether a call asks for a fact that is known, but may have changed
         self.violations: set[str] = set()  # names of rules
 
     def judge_call(self, row: Skill, arguments: Sequence[Argument], goals: Sequence[str], place: str) -> None:
         """Keep the next call, or raise RobotError if the robot fails in it."""
         call = RequestedCall.of(row, arguments, goals, place)
-        tells = row.returns.base is not None and row.name not in TELLING_SKILLS
-        self.asks_again |= tells and call in self.calls
+        if row.returns.base is not None and row.name not in TELLING_SKILLS:
+            self.asks_again |= call in self._asked
+            self._asked.add(call)
         self.calls.append(call)
         if len(self.calls) - 1 == self.fails_at:
             raise RobotError("SkillFailed", f"the robot failed in {row.name}")

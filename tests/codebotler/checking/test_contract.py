@@ -158,6 +158,11 @@ def test_calls_outside_the_contract(contracts: Contracts, call: RequestedCall) -
     assert contracts(BRING).objection(call)
 
 
+def test_a_program_with_tricks_may_do_what_its_runs_do(contracts: Contracts) -> None:
+    contract = contracts("def task_program():\n    getattr('a', 'lower')()\n    say('hello')\n")
+    assert set(contract.skills) == {"say"}
+
+
 def test_calls_are_counted(contracts: Contracts) -> None:
     contract, call = contracts(BRING), RequestedCall("pick", (("coffee",),), "café")
     assert not contract.objection(call, 0)
