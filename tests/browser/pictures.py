@@ -21,7 +21,7 @@ CHOSEN = {
 }
 """Each picture, and what it is made from."""
 
-WIDEST, TALLEST, COLOURS = 1200, 850, 208
+WIDEST, TALLEST, COLOURS = 1200, 850, 128
 """Pixels of a picture; those of a tablet are half as wide and not cut off."""
 
 
@@ -35,7 +35,9 @@ def main() -> None:
             (WIDEST if shot.width > WIDEST else WIDEST // 2, 10 * TALLEST), Image.Resampling.LANCZOS
         )
         shot = shot.crop((0, 0, shot.width, min(shot.height, TALLEST)))
-        shot.quantize(COLOURS, dither=Image.Dither.NONE).save(pictures / f"{name}.png", optimize=True)
+        shot.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
+            pictures / f"{name}.png", optimize=True
+        )
 
 
 if __name__ == "__main__":

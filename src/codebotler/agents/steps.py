@@ -56,7 +56,7 @@ class Steps:
     @property
     def program(self) -> str:
         """The text that a person approves in place of a program."""
-        contract = contract_yaml(self.contract, self.skills).splitlines()
+        contract = contract_yaml(self.contract).splitlines()
         purpose = visible(" ".join(self.purpose.split()))
         return _PROGRAM.format(purpose=purpose, contract="\n".join(f"#   {line}" for line in contract))
 

@@ -71,7 +71,7 @@ def _read_bound(file: YamlFile, row: Skill, given: Mapping[str, Any]) -> SkillBo
         is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
         if key != AT_MOST and value != ANY and not is_list:
             raise file.wrong(f'"{key}" must be any, or a list of texts in quotes', *where)
-    missing = [name for name in known if name not in given and name != AT_MOST]
+    missing = [name for name in names if name not in given]
     if missing:
         sentence = f'{row.name} lacks "{missing[0]}"; write a list of texts, or any'
         raise file.wrong(sentence, "skills", row.name)
@@ -92,24 +92,20 @@ def _templates(file: YamlFile, row: Skill, name: str, given: str | list[str]) ->
     return tuple(found)
 
 
-def contract_data(contract: Contract, skills: SkillTable = SKILLS) -> dict[str, Any]:
+def contract_data(contract: Contract) -> dict[str, Any]:
     """Return a contract as plain data, for YAML and JSON."""
-    return {
-        "version": 1,
-        "skills": {name: _bound_data(skills[name], bound) for name, bound in contract.skills.items()},
-    }
+    return {"version": 1, "skills": {name: _bound_data(bound) for name, bound in contract.skills.items()}}
 
 
-def _bound_data(row: Skill, bound: SkillBound) -> dict[str, Any]:
+def _bound_data(bound: SkillBound) -> dict[str, Any]:
     data: dict[str, Any] = {
         name: ANY if templates is None else [*map(str, templates)] for name, templates in bound.texts
     }
-    if has_place(row):
-        data[IN] = ANY if bound.places is None else [*bound.places]
+    if bound.places is not None:
+        data[IN] = [*bound.places]
     return data if bound.at_most is None else data | {AT_MOST: bound.at_most}
 
 
-def contract_yaml(contract: Contract, skills: SkillTable = SKILLS) -> str:
+def contract_yaml(contract: Contract) -> str:
     """Write a contract as YAML."""
-    data = contract_data(contract, skills)
-    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=WIDTH)
+    return yaml.safe_dump(contract_data(contract), sort_keys=False, allow_unicode=True, width=WIDTH)

@@ -183,7 +183,7 @@ class CheckResult:
             "rooms_are_guessed": self.rooms_are_guessed,
             "seed": self.seed,
             "strict": self.strict,
-            "contract": None if self.contract is None else contract_data(self.contract, skills),
+            "contract": None if self.contract is None else contract_data(self.contract),
             "proofs": [asdict(proof) for proof in self.proofs],
             "samples": [
                 {

@@ -136,7 +136,7 @@ def check(
     if allowed is not None:
         found = hold_within(found, allowed, table)
     if save_contract is not None:
-        write_contract(save_contract, found.contract, table)
+        write_contract(save_contract, found.contract)
     if json:
         print_json(found.data(table))
     else:

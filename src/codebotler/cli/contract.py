@@ -35,11 +35,11 @@ def contract_table(contract: Contract, skills: SkillTable) -> Table:
     return table
 
 
-def write_contract(file: Path, contract: Contract | None, skills: SkillTable) -> None:
+def write_contract(file: Path, contract: Contract | None) -> None:
     """Write a contract to a new file. Raise UserError if there is none, or if the file exists."""
     if contract is None:
         raise UserError("the program has no contract, since it cannot run")
-    write_new(file, contract_yaml(contract, skills))
+    write_new(file, contract_yaml(contract))
     note(f"wrote {file}")
 
 
