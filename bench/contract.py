@@ -46,7 +46,7 @@ ANYTHING = 1_000  # entries that an argument without a bound counts for
 
 @dataclass(frozen=True)
 class Measured:
-    """What one program did in the worlds of its task.
+    """The results of one program in the worlds of its task.
 
     Args:
         source: the task and the program.

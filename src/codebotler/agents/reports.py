@@ -1,4 +1,4 @@
-"""What agents and people read about a robot, a check and a mission."""
+"""Reports about a robot, a check and a mission, for agents and people."""
 
 from __future__ import annotations
 

@@ -18,9 +18,9 @@ NEVER = {
     ASK: "asks nobody",
     SAY: "says nothing",
 }
-"""What a program never does whose contract lacks the skill that records such events."""
+"""Phrases for a contract that lacks the skill which records such events."""
 
-ANYBODY = "anybody"  # a question to "" is for whoever is there
+ANYBODY = "anybody"  # a question to "" may be answered by any person in the room
 GAP = "[...]"
 MAX_VALUES, MAX_LONG_TEXTS, MAX_IN_TABLE = 6, 3, 60  # shown texts
 LONG_TEXT = 30  # characters
@@ -28,7 +28,7 @@ LONG_TEXT = 30  # characters
 
 @dataclass(frozen=True)
 class ContractRow:
-    """What a program may do with one skill, in words.
+    """The bound of one skill, in words.
 
     Args:
         what: the verb of the skill, such as `pick up`.

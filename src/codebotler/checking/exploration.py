@@ -31,7 +31,7 @@ CATCHES_ERRORS = re.compile(r"\b(?:except|suppress)\b")
 
 @dataclass(frozen=True)
 class Exploration:
-    """What a program does in the worlds that it can tell apart.
+    """The result of running a program in the worlds that it can tell apart.
 
     Args:
         cases: the number of these worlds that were explored.

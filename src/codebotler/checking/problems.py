@@ -56,7 +56,7 @@ RuleVerdict: TypeAlias = Literal["never", "possible", "unknown"]
 
 @dataclass(frozen=True)
 class RuleProof:
-    """What an exploration shows about a house rule.
+    """The verdict of an exploration on a house rule.
 
     Args:
         rule: its name.

@@ -76,24 +76,12 @@ def check(
     ],
     world: options.WorldOption = None,
     connect: options.ConnectOption = None,
-    samples: Annotated[
-        int, typer.Option(min=1, max=10_000, help="The number of imagined worlds for the check.")
-    ] = 5,
+    samples: options.SamplesOption = 5,
     seed: Annotated[int, typer.Option(help="The random seed of the imagined worlds.")] = 0,
-    strict: Annotated[
-        bool,
-        typer.Option(
-            "--strict",
-            help="Do not assume that people and objects are present unless the program looked for them.",
-        ),
-    ] = False,
+    strict: options.StrictOption = False,
     shows_all: options.AllOption = False,
-    contract: Annotated[
-        bool, typer.Option("--contract", help="Show what the program may do at most, in any world.")
-    ] = False,
-    save_contract: Annotated[
-        Path | None, typer.Option(help="Write the contract to a file, for --within.", metavar="FILE")
-    ] = None,
+    contract: options.ContractOption = False,
+    save_contract: options.SaveContractOption = None,
     within: options.WithinOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
     workers: Annotated[int, typer.Option(min=1, help="The number of programs to run in parallel.")] = 1,
@@ -118,9 +106,8 @@ def check(
     table = table if connection is None else connection.skills(table)
     known = options.read_world("", world, table, connection)
     house_rules = rules_for(known, rules, table)
-    source = read_program(program)
+    source, allowed = read_program(program), options.read_within(within, table)
     room_map = None if known is None else (RoomMap.of_places if world is None else RoomMap.of)(known)
-    allowed = options.read_within(within, table)
     with busy("checking"):
         found = check.check(
             source,
@@ -133,17 +120,15 @@ def check(
             house_rules=house_rules,
             explores=contract or bool(house_rules) or save_contract is not None or within is not None,
         )
-    if allowed is not None:
-        found = hold_within(found, allowed, table)
-    if save_contract is not None:
-        write_contract(save_contract, found.contract)
+    found = found if allowed is None else hold_within(found, allowed, table)
+    write_contract(save_contract, found.contract)
     if json:
         print_json(found.data(table))
     else:
         name = "the program" if program == "-" else program
         print_rich(check_view(found, source, name, shows_all=shows_all))
-        if contract and found.contract is not None:
-            print_rich(contract_view(found.contract, table))
+    if contract and found.contract is not None and not json:
+        print_rich(contract_view(found.contract, table))
     raise typer.Exit(1 if found.problems else 0)
 
 

@@ -35,8 +35,10 @@ def contract_table(contract: Contract, skills: SkillTable) -> Table:
     return table
 
 
-def write_contract(file: Path, contract: Contract | None) -> None:
-    """Write a contract to a new file. Raise UserError if there is none, or if the file exists."""
+def write_contract(file: Path | None, contract: Contract | None) -> None:
+    """Write a contract to a new file, if one is named. Raise UserError if there is none, or if it exists."""
+    if file is None:
+        return
     if contract is None:
         raise UserError("the program has no contract, since it cannot run")
     write_new(file, contract_yaml(contract))

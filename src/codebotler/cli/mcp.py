@@ -8,31 +8,42 @@ import typer
 
 from codebotler.cli import options
 from codebotler.cli.model_options import inherit_options, model_settings, options_for
+from codebotler.core.errors import UserError
+
+HttpOption = Annotated[
+    bool, typer.Option("--http", help="Serve agents over HTTP on the page's port, not over standard input.")
+]
+PageOption = Annotated[
+    bool, typer.Option("--page/--no-page", help="Also serve the page, on which a person approves missions.")
+]
+AskClientOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--ask-client/--page-only",
+        help="Whether the agent's client may ask its person for approval; by default not with --http.",
+    ),
+]
+AgentTokenOption = Annotated[
+    str | None, typer.Option(help="The access token for agents with --http; a new one by default.")
+]
+
+
+def _expect_approval(*, http: bool, page: bool, can_approve: bool) -> None:
+    if http and not page:
+        raise UserError("--http uses the page's port; leave out --no-page")
+    if not can_approve:
+        raise UserError("nobody could approve a mission; leave out --no-page or --page-only, or add --within")
 
 
 @inherit_options(options.robot_settings)
 @inherit_options(model_settings)
 def serve_agents(
-    http: Annotated[
-        bool,
-        typer.Option("--http", help="Serve agents over HTTP on the page's port, not over standard input."),
-    ] = False,
-    page: Annotated[
-        bool,
-        typer.Option("--page/--no-page", help="Also serve the page, on which a person approves missions."),
-    ] = True,
-    ask_client: Annotated[
-        bool | None,
-        typer.Option(
-            "--ask-client/--page-only",
-            help="Whether the agent's client may ask its person for approval; by default not with --http.",
-        ),
-    ] = None,
+    http: HttpOption = False,
+    page: PageOption = True,
+    ask_client: AskClientOption = None,
     port: options.PortOption = None,
     token: options.TokenOption = None,
-    agent_token: Annotated[
-        str | None, typer.Option(help="The access token for agents with --http; a new one by default.")
-    ] = None,
+    agent_token: AgentTokenOption = None,
     model: options.ModelsOption = None,
     base_url: options.BaseUrlOption = None,
     **shared: Any,  # noqa: ANN401 - of several kinds
@@ -44,7 +55,6 @@ def serve_agents(
     from codebotler.agents import server
     from codebotler.agents.gatekeeper import Gatekeeper
     from codebotler.cli.run import tell_missing
-    from codebotler.core.errors import UserError
     from codebotler.core.files import home
     from codebotler.core.terminal import note
     from codebotler.models.chosen import choose_model, make_opener
@@ -55,10 +65,7 @@ def serve_agents(
     from codebotler.web.server import serve
 
     asks = not http if ask_client is None else ask_client
-    if http and not page:
-        raise UserError("--http uses the page's port; leave out --no-page")
-    if not page and not asks and shared.get("within") is None:
-        raise UserError("nobody could approve a mission; leave out --no-page or --page-only, or add --within")
+    _expect_approval(http=http, page=page, can_approve=page or asks or shared.get("within") is not None)
     if agent_token is not None and not http:
         raise UserError("--agent-token is for --http; leave it out")
     streams = None if http else server.take_streams()

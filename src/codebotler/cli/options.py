@@ -50,6 +50,22 @@ RulesOption = Annotated[
     Path | None,
     typer.Option(envvar="CODEBOTLER_RULES", help="A file of house rules for all programs.", metavar="FILE"),
 ]
+SamplesOption = Annotated[
+    int, typer.Option(min=1, max=10_000, help="The number of imagined worlds for the check.")
+]
+StrictOption = Annotated[
+    bool,
+    typer.Option(
+        "--strict",
+        help="Do not assume that people and objects are present unless the program looked for them.",
+    ),
+]
+ContractOption = Annotated[
+    bool, typer.Option("--contract", help="Show what the program may do at most, in any world.")
+]
+SaveContractOption = Annotated[
+    Path | None, typer.Option(help="Write the contract to a file, for --within.", metavar="FILE")
+]
 WithinOption = Annotated[
     Path | None,
     typer.Option(help="A contract: the file that says what a program may do at most.", metavar="FILE"),

@@ -85,7 +85,7 @@ class SessionView:
 
     @property
     def contract(self) -> Contract | None:
-        """What the program may do at most; None if it was not checked."""
+        """The contract of the program; None if it was not checked."""
         return None if self.check is None else self.check.contract
 
     @property

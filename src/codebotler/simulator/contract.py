@@ -70,7 +70,7 @@ def has_place(row: Skill) -> bool:
 
 @dataclass(frozen=True)
 class SkillBound:
-    """What a program may do with one skill.
+    """The upper bound of a program's calls of one skill.
 
     Args:
         texts: the allowed texts of each argument, by the parameter's name; None for any.

@@ -184,7 +184,7 @@ INITIALIZE = {
         "clientInfo": {"name": "plain", "version": "1"},
     },
 }
-"""What clients of last year's protocol send first."""
+"""The first request of clients that use last year's protocol."""
 
 
 class PlainClient:
