@@ -53,7 +53,7 @@ def _bound(
     written: WrittenArguments,
     room_map: RoomMap,
 ) -> SkillBound:
-    knows_all = found.is_complete and not written.reads_clock
+    knows_all = found.is_complete and found.is_steady and not written.reads_clock
     texts: list[tuple[str, Templates | None]] = []
     for number, parameter in enumerate(row.parameters):
         given = written.skills.get(row.name, {}).get(parameter.name, ArgumentTexts())
@@ -66,12 +66,11 @@ def _bound(
         texts.append(
             (parameter.name, (*allowed, *(TextTemplate((text,)) for text in met)) if is_known else None)
         )
-    is_fixed = knows_all and found.is_steady
-    places = {call.place for call in calls} if has_place(row) and is_fixed else None
+    places = {call.place for call in calls} if has_place(row) and knows_all else None
     return SkillBound(
         tuple(texts),
         tuple(sorted(places)) if places else None,
-        found.most_calls.get(row.name) if is_fixed else None,
+        found.most_calls.get(row.name) if knows_all else None,
     )
 
 

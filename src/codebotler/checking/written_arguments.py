@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +18,10 @@ from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 
 ANY_TEXT = TextTemplate(("", ""))
 MAX_TEMPLATES, MAX_COMBINATIONS = 50, 8  # more become any text
+FIELD = re.compile(r"%[-+ #0]*\d*(?:\.\d+)?[a-zA-Z]|\{[^{}]*\}")
+"""A gap in a text that is formatted with `%` or `format`, where any text may be."""
+
+ESCAPED = re.compile(r"%%|\{\{|\}\}|%\(|%[^a-zA-Z]*\*")
 CLOCKS = frozenset({"datetime", "random", "secrets", "uuid"})
 TRICKS = frozenset(
     {"eval", "exec", "globals", "locals", "vars", "getattr", "__builtins__", "__import__", "sys"}
@@ -159,6 +164,10 @@ class _Texts:
                 found = _joined([self.texts(part) for part in parts])
             case ast.FormattedValue(value, conversion, None) if conversion in {-1, ord("s")}:
                 found = self.texts(value)
+            case ast.BinOp(ast.Constant(str(text)), ast.Mod(), _) | ast.Call(
+                ast.Attribute(ast.Constant(str(text)), "format")
+            ) if not ESCAPED.search(text):
+                found = frozenset({TextTemplate(tuple(FIELD.split(text)))})
             case ast.BinOp(left, ast.Add(), right) if self._is_list(left) or self._is_list(right):
                 found = self.texts(left) | self.texts(right)
             case ast.BinOp(left, ast.Add(), right):

@@ -273,3 +273,14 @@ def test_a_skill_without_an_event_is_beyond_a_contract_as_well(contracts: Contra
     silent = Skill("take_photo", (), ValueType(None), "Take a photo.", is_idle=True)
     found = replace(contracts.checked(BRING), contract=Contract({"take_photo": SkillBound()}))
     assert hold_within(found, Contract({}), SKILLS.with_skill(silent)).problems
+
+
+def test_a_computed_text_is_open_if_a_question_is_asked_twice(contracts: Contracts) -> None:
+    poll = """
+def task_program():
+    votes = [ask("", "Hot?", ["yes", "no"]) for _ in range({count})]
+    say(str(100 * votes.count("yes") // len(votes)).zfill(3))
+"""
+    once, twice = (dict(contracts(poll.format(count=n)).skills["say"].texts)["message"] for n in (1, 2))
+    assert {str(one) for one in once or ()} == {"000", "100"}
+    assert twice is None  # "050", since another person may answer
