@@ -157,7 +157,7 @@ class Approved:
 def send(approved: Approved, calls: Sequence[Call]) -> bool:
     """Send calls to a robot, and return whether the last one reached it."""
     robot = CountingRobot()
-    guard = RuleGuard((), (), [approved.contract])
+    guard = RuleGuard((), contracts=[approved.contract])
     room_map = approved.room_map
     live = LiveRobot(robot, lambda *_, **__: None, place=room_map.start, guard=guard, room_map=room_map)
     with suppress(RuleViolationError, StoppedError):
@@ -183,7 +183,7 @@ def milliseconds(approved: Sequence[Approved]) -> float:
     rules = read_rules(RULES)[:COUNT_OF_RULES]
     times = []
     for one in approved:
-        guard = RuleGuard(rules, one.room_map.plan, [one.contract])
+        guard = RuleGuard(rules, one.room_map, [one.contract])
         for room in one.allowed("go_to", "location"):
             row, arguments = SKILLS["go_to"], [room]
             began = time.perf_counter()

@@ -60,7 +60,7 @@ class ExploringGuard(RuleGuard):
     """
 
     def __init__(self, rules: Sequence[Rule], room_map: RoomMap, fails_at: int | None = None) -> None:
-        super().__init__(rules, room_map.plan)
+        super().__init__(rules, room_map)
         self.may_refuse = fails_at is not None
         self.fails_at = fails_at
         self.calls: list[RequestedCall] = []

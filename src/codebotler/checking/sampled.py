@@ -74,7 +74,7 @@ class SampledRuns:
     def new_guard(self) -> RuleGuard | None:
         """Return a guard for one run, or None if it needs none."""
         rules = self.settings.house_rules
-        return RuleGuard(rules, self.room_map.plan) if rules else None
+        return RuleGuard(rules, self.room_map) if rules else None
 
     def _new_robot(self, number: int) -> SampledRobot:
         how, sampler, guard = self.settings, self.samplers[number], self.new_guard()

@@ -11,7 +11,15 @@ from codebotler.cli import options
 from codebotler.cli.ending import obey
 from codebotler.cli.mcp import serve_agents
 from codebotler.cli.model_options import inherit_options, model_settings
-from codebotler.cli.operating import connect, missions, robots, run, serve_page, virtual_robot
+from codebotler.cli.operating import (
+    connect,
+    continue_mission,
+    missions,
+    robots,
+    run,
+    serve_page,
+    virtual_robot,
+)
 from codebotler.core.terminal import note, report_problems
 
 
@@ -262,6 +270,7 @@ app = options.command_line(
 )
 for command in (generate, check, rules, replay, skills, run, missions, models, robots, connect):
     app.command()(command)
+app.command("continue")(continue_mission)
 app.command("serve")(serve_page)
 app.command("virtual-robot")(virtual_robot)
 app.command("mcp")(serve_agents)

@@ -1,4 +1,4 @@
-"""The commands for operating a robot: run, missions, robots, connect, serve and virtual-robot."""
+"""The commands for operating a robot: run, continue, missions, robots, connect, serve and virtual-robot."""
 
 from __future__ import annotations
 
@@ -23,11 +23,10 @@ def run(
     ],
     model: options.ModelOption = None,
     base_url: options.BaseUrlOption = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Run the program without asking.")] = False,
-    despite_problems: Annotated[
-        bool, typer.Option("--despite-problems", help="Run the program even if the check finds problems.")
-    ] = False,
+    yes: options.YesOption = False,
+    despite_problems: options.DespiteProblemsOption = False,
     shows_all: options.AllOption = False,
+    recover: options.RecoverOption = 0,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Check a program, ask for approval, and run it on a robot.
@@ -43,10 +42,68 @@ def run(
 
     chosen = choose_model(model, base_url)
     kind, settings, rules, allowed = options.robot_settings(**options_for(options.robot_settings, shared))
-    request = Request(program, chosen.name, yes, despite_problems, shows_all, rules, allowed)
+    request = Request(
+        program, chosen.name, yes, despite_problems, shows_all, rules, allowed, recoveries=recover
+    )
     asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
     options.note_office(kind, shared["world"])
     body = open_robot(kind, settings)
+    raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked), settings.world))
+
+
+@inherit_options(options.robot_settings)
+@inherit_options(model_settings)
+def continue_mission(
+    mission: Annotated[
+        str, typer.Argument(metavar="[ID]", help="The mission; by default the most recent one.")
+    ] = "last",
+    program: Annotated[
+        str, typer.Argument(metavar="[PROGRAM]", help="A program for the rest; by default a model writes it.")
+    ] = "",
+    happened: Annotated[
+        bool | None,
+        typer.Option(
+            "--happened/--not-happened",
+            help="Whether the last step happened, if the log does not say so; by default you are asked.",
+        ),
+    ] = None,
+    model: options.ModelOption = None,
+    base_url: options.BaseUrlOption = None,
+    yes: options.YesOption = False,
+    despite_problems: options.DespiteProblemsOption = False,
+    shows_all: options.AllOption = False,
+    recover: options.RecoverOption = 0,
+    **shared: Any,  # noqa: ANN401 - of several kinds
+) -> None:
+    """Do the rest of a mission that ended early.
+
+    A model is shown what the robot did and saw, and writes a program for the rest.
+    """
+    from codebotler.cli import run
+    from codebotler.cli.continuing import choose_past
+    from codebotler.cli.run import Request
+    from codebotler.core.files import home
+    from codebotler.models.chosen import choose_model
+    from codebotler.models.open import open_model
+    from codebotler.robots.open import open_robot
+
+    chosen = choose_model(model, base_url)
+    kind, settings, rules, allowed = options.robot_settings(**options_for(options.robot_settings, shared))
+    asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
+    body = open_robot(kind, settings)
+    past = choose_past(body, home(), mission, happened=happened)
+    request = Request(
+        program or past.instruction,
+        chosen.name,
+        yes,
+        despite_problems,
+        shows_all,
+        rules,
+        allowed,
+        past,
+        recover,
+    )
+    options.note_office(kind, shared["world"])
     raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked), settings.world))
 
 

@@ -37,6 +37,13 @@ RobotOption = Annotated[
 AllOption = Annotated[
     bool, typer.Option("--all", help="Show all different outcomes in imagined worlds, not just one.")
 ]
+YesOption = Annotated[bool, typer.Option("--yes", help="Run the program without asking.")]
+DespiteProblemsOption = Annotated[
+    bool, typer.Option("--despite-problems", help="Run the program even if the check finds problems.")
+]
+RecoverOption = Annotated[
+    int, typer.Option(min=0, help="How often a model may write the rest if a skill fails.", metavar="N")
+]
 ModelOption = Annotated[
     str | None,
     typer.Option(

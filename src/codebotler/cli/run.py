@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from codebotler.checking.check import check
@@ -21,8 +21,10 @@ from codebotler.core.words import listed
 from codebotler.core.world import World
 from codebotler.missions.log import MissionState
 from codebotler.missions.mission import STOP_GRACE_SECONDS, MissionError
+from codebotler.missions.past import MissionPast, read_past
+from codebotler.missions.recovery import PriorApproval, is_recoverable
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import recover_missions
+from codebotler.missions.store import find_mission, recover_missions
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.base import Model
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
@@ -58,14 +60,28 @@ class Request:
     shows_all: bool = False  # whether to show all different outcomes in imagined worlds, not just one
     rules: tuple[Rule, ...] = ()  # the house rules
     within: Contract | None = None  # what the program may do at most
+    past: MissionPast | None = None  # of the mission whose rest is requested
+    recoveries: int = 0  # how many times a model may write the rest if a skill fails
+    approval: PriorApproval | None = None  # by which the rest needs no further approval
 
     def __post_init__(self) -> None:
+        if not self.what.strip() and self.past is not None:
+            raise UserError(f"mission {self.past.mission} has no instruction; name a program for the rest")
         if not self.what.strip():
             raise UserError("the argument is empty; name a program, or say what the robot should do")
         if self.what.endswith(".py") and not self.is_program:
             raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
         if self.what == "-" and not self.yes:
             raise UserError("the program uses standard input, so approval cannot be read; add --yes")
+
+    @property
+    def order(self) -> MissionOrder:
+        """The order for a mission."""
+        program = read_program(self.what) if self.is_program else ""
+        if self.past is not None:
+            model = "" if program else self.model
+            return MissionOrder(self.past.instruction, model, program, past=self.past)
+        return MissionOrder(program=program) if program else MissionOrder(self.what, self.model)
 
     @property
     def is_program(self) -> bool:
@@ -95,10 +111,9 @@ def run(
     Returns:
         the exit status: 0 if the mission is done, 128 plus the number of a signal that stopped it, or else 1.
     """
-    program = read_program(request.what) if request.is_program else ""
+    order = request.order
     tell_missing(robot)
     recover_missions(home)
-    order = MissionOrder(program=program) if program else MissionOrder(request.what, request.model)
     checked = checker(robot.skills)
     session = MissionSession(
         robot,
@@ -117,7 +132,9 @@ def run(
             note_programless(view.programless)
             session.reject(view.programless.sentence)
         elif _is_approved(session, view, robot, request):
-            return _watched(session, view, robot, request)
+            status = _watched(session, view, robot, request)
+            rest = _recovery(session, robot, request, home) if status else None
+            return status if rest is None else run(robot, rest, home, open_model, world)
     except BaseException as error:
         session.stop(SIGNALS[signal.SIGINT] if isinstance(error, KeyboardInterrupt) else "an error")
         session.join(CLEANUP_SECONDS)
@@ -177,7 +194,10 @@ def _is_approved(session: MissionSession, view: SessionView, robot: Robot, reque
         anyway = "; --despite-problems runs it anyway" if view.can_run else ""
         note(f"not run because of problems{anyway}")
         return False
-    if not request.yes and not confirm(f"run the program on the robot {robot.name}?"):
+    approval, past = request.approval, request.past
+    if approval is not None and past is not None and approval.allows(view, past):
+        note("the rest stays within what was approved before")
+    elif not request.yes and not confirm(f"run the program on the robot {robot.name}?"):
         session.stop("the person at the terminal")
         note("not run; the robot has not moved")
         return False
@@ -197,6 +217,24 @@ def _watched(session: MissionSession, view: SessionView, robot: Robot, request: 
     if view.state is MissionState.STOPPED and got:
         return SIGNAL_EXIT_BASE + got[0]
     return 0 if view.state is MissionState.DONE else 1
+
+
+def _recovery(session: MissionSession, robot: Robot, request: Request, home: Path) -> Request | None:
+    """Return the request for the rest of a mission that failed, or None if a person must decide."""
+    view = session.view
+    if not request.recoveries or not is_recoverable(view, session.events()):
+        return None
+    session.join()
+    past = read_past(find_mission(home, view.id), robot.skills)
+    approval = request.approval or PriorApproval.of(view)
+    note(f"recovering: asking {request.model} for the rest")
+    return replace(
+        request,
+        what=past.instruction,
+        past=past,
+        recoveries=request.recoveries - 1,
+        approval=approval,
+    )
 
 
 @contextmanager

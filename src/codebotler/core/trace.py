@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, NamedTuple, TypeAlias
 
 from codebotler.core.errors import UserError
+from codebotler.core.skills.kinds import PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.skills.values import Scalar, as_text
@@ -101,6 +102,19 @@ def attempted_event(
     return Event(row.kind, text, options, place=place, time=time, holding=holding, to=to, more=more)  # type: ignore[arg-type]  # options
 
 
+def arguments_of_event(skill: Skill, event: Event) -> list[Scalar | tuple[str, ...]]:
+    """Return the arguments with which a skill records an event. Others are empty."""
+    row, given = skill.recording, dict[str | None, Scalar | tuple[str, ...]]()
+    if row is not None:
+        given = dict(zip(row.more, event.more, strict=False))
+        given |= {
+            row.text: event.text,
+            row.options: tuple(option.text for option in event.options),
+            row.to: event.to or "",
+        }
+    return [given.get(parameter.name, "") for parameter in skill.parameters]
+
+
 Trace: TypeAlias = tuple[Event, ...]
 """The events of one run, in order."""
 
@@ -140,6 +154,12 @@ class Outcome:
     line: int | None = None
 
 
+def held_after(trace: Iterable[Event]) -> str:
+    """Return what the robot holds after a trace, or an empty string for nothing."""
+    moves = [event for event in trace if event.kind in {PICK, PLACE}]
+    return moves[-1].text if moves and moves[-1].kind == PICK else ""
+
+
 # --- conversion to plain data
 
 
@@ -156,6 +176,26 @@ def trace_data(trace: Trace, skills: SkillTable = SKILLS) -> list[list[Any]]:
 def trace_from(data: Iterable[object]) -> Trace:
     """Convert the data of `trace_data` back to a trace, or raise UserError for other data."""
     return tuple(map(_event_from, data))
+
+
+def placed_trace_data(trace: Trace) -> list[dict[str, Any]]:
+    """Convert a trace to plain data that also tells where each event happened, and with whom."""
+    return [
+        {
+            "what": trace_data((event,))[0],
+            "place": event.place,
+            "holding": event.holding,
+            "to": event.to,
+            "destination": event.destination,
+        }
+        for event in trace
+    ]
+
+
+def placed_trace_from(data: Iterable[Mapping[str, Any]]) -> Trace:
+    """Convert the data of `placed_trace_data` back to a trace, or raise UserError for other data."""
+    rows = [dict(row) for row in data]
+    return tuple(replace(trace_from([row.pop("what")])[0], **row) for row in rows)
 
 
 def outcome_data(outcome: Outcome, skills: SkillTable = SKILLS) -> dict[str, Any]:

@@ -54,12 +54,16 @@ class ModelAuthor:
 
 def prompt_of(view: SessionView, robot: Robot, *, repair: bool) -> Prompt:
     """Return the prompt for a mission's instruction. A repair prompt also says what was wrong."""
+    past, room_map = view.past, view.room_map
     prompt = prompt_for(
         view.instruction,
-        rooms=() if view.room_map is None else view.room_map.described,
+        rooms=() if room_map is None else room_map.described,
         rules=[rule.says for rule in view.rules_in_force],
         skills=robot.skills.without(robot.missing),
     )
+    if past is not None:
+        place = past.place if room_map is None else room_map.start
+        prompt = prompt.to_continue(past.program, past.steps, past.why, past.here(place))
     if repair and view.problems:
         return prompt.after(view.program, view.problems)
     if repair and view.programless is not None:

@@ -15,7 +15,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills import kinds
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
-from codebotler.core.trace import Event, Option, Trace, attempted_event, trace_data
+from codebotler.core.trace import Event, Option, Trace, attempted_event, held_after, trace_data
 from codebotler.core.world import Point
 from codebotler.missions.progress import POSITION_FEEDBACK
 from codebotler.missions.stop import StopButton
@@ -63,7 +63,8 @@ class LiveRobot:
         starts = clock_starts or datetime.now().astimezone().replace(tzinfo=UTC)
         self.settings = SimulationSettings(literals="as-written", limits=ENDLESS, clock_starts=starts)
         self.line: int | None = None  # the line of the program that calls the current skill
-        self._place, self._held = place, ""
+        self._place = place
+        self._held = "" if room_map is None else held_after(room_map.past)
         self._room = place or None  # the current room, as rules name it; None if unknown
         self._has_asked = False
         self._at: Point | None = None  # the last reported position

@@ -20,7 +20,10 @@ EVENTS_FILE, SUMMARY_FILE = "events.jsonl", "mission.json"
 LogLine: TypeAlias = dict[str, Any]
 """An event: `time` (seconds since 1970), `clock` (seconds on the robot's clock), `event` (kind), and data."""
 
-_TEXT_FIELDS = ("id", "robot", "instruction", "model", "program", "reason", "if_tool_dies")
+_TEXT_FIELDS = (
+    *("id", "robot", "instruction", "model", "program", "reason", "if_tool_dies"),
+    *("place", "continues"),
+)
 _REQUIRED_KEYS: Mapping[str, frozenset[str]] = {
     "state": frozenset({"state"}),
     "skill": frozenset({"number", "skill", "arguments"}),
@@ -33,6 +36,7 @@ _REQUIRED_KEYS: Mapping[str, frozenset[str]] = {
     "rule": frozenset({"rule", "says", "formula"}),
     "log": frozenset({"text"}),
     "map": frozenset({"rooms", "robot"}),
+    "past": frozenset({"continues", "trace"}),
 }
 """The keys that each kind of event must have."""
 
@@ -95,6 +99,8 @@ class MissionSummary:
     line: int | None = None  # the program's line at which the mission ended
     ended: float | None = None  # seconds since 1970
     if_tool_dies: str = ""  # what the robot does if CodeBotler ends unexpectedly
+    place: str = ""  # where the robot was when the program began; empty if unknown
+    continues: str = ""  # the ID of the mission whose rest this one does
 
     @property
     def has_ended(self) -> bool:

@@ -19,6 +19,7 @@ from codebotler.core.world import World
 from codebotler.missions.live import LiveRobot, StoppedError
 from codebotler.missions.log import NEXT_STATES, LogLine, MissionState, MissionSummary, add_event, open_log
 from codebotler.missions.map_event import map_data
+from codebotler.missions.past import MissionPast
 from codebotler.missions.pictures import PictureStore
 from codebotler.missions.stop import StopButton
 from codebotler.missions.wording import stop_text
@@ -26,7 +27,7 @@ from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.contract import Contract
 from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.room_map import NO_ROOMS, RoomMap
 from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.worker import EngineError, Worker
 
@@ -183,6 +184,11 @@ class Mission:
         if had_ended or self.state not in {MissionState.STOPPING, MissionState.STOPPED}:
             raise MissionError(f"mission {self.id} is {self.state}; there is nothing to stop")
 
+    def continue_from(self, past: MissionPast) -> None:
+        """Add what an earlier mission did to the log, before this one does the rest."""
+        self.summary.continues = past.mission
+        self._write("past", **past.data())
+
     def run(
         self,
         reserved: Reservation,
@@ -210,8 +216,7 @@ class Mission:
             NotReadyError: the reservation is in use or has been used before.
             OSError: an event could not be logged or printed, so the robot was stopped.
         """
-        plan = () if room_map is None else room_map.plan
-        guard = RuleGuard(rules, plan, contracts) if rules or contracts else None
+        guard = RuleGuard(rules, room_map or NO_ROOMS, contracts) if rules or contracts else None
         live = LiveRobot(
             reserved.robot, self._write, place=place, guard=guard, room_map=room_map, button=self.stop_button
         )
@@ -219,7 +224,8 @@ class Mission:
             if self.state is MissionState.APPROVED:
                 reserved.use()
                 self._live, self.stop_button.robot = live, reserved.robot
-            self._step(MissionState.RUNNING, "run", if_tool_dies=reserved.robot.if_tool_dies)
+            will = reserved.robot.if_tool_dies
+            self._step(MissionState.RUNNING, "run", if_tool_dies=will, place=place)
         threading.Thread(target=self._execute, args=(live, drive), name=self.id, daemon=True).start()
         try:
             self.stop_button.ended.wait()

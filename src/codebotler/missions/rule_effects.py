@@ -12,18 +12,18 @@ from codebotler.checking.rooms import room_map_for
 from codebotler.checking.sampled import CheckSettings, first_samplers
 from codebotler.core.errors import VIOLATION, RobotError, UserError
 from codebotler.core.phrases import phrase
-from codebotler.core.skills.kinds import PICK, PLACE
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.trace import Outcome, attempted_event, to_options, trace_from
+from codebotler.core.trace import Outcome, trace_from
 from codebotler.core.world import World
 from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState, read_log
 from codebotler.missions.map_event import map_from
+from codebotler.missions.past import LoggedRobot, arguments_in
 from codebotler.robots.simulated import SIMULATION
 from codebotler.simulator.engine import digest
 from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.pool import WorkerPool, cores
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.room_map import NO_ROOMS, RoomMap
 from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.settings import Limits
@@ -55,7 +55,7 @@ class NotingGuard(RuleGuard):
     """A guard that keeps the violations that it raises."""
 
     def __init__(self, rules: Sequence[Rule], world: World | None) -> None:
-        super().__init__(rules, () if world is None else RoomMap.of(world).plan)
+        super().__init__(rules, NO_ROOMS if world is None else RoomMap.of(world))
         self.violations: list[RuleViolationError] = []
 
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
@@ -110,34 +110,6 @@ def _effect(outcome: Outcome, violations: Sequence[RuleViolationError]) -> RuleE
 # --- logs
 
 
-class LoggedRobot(SimulatedRobot):
-    """A robot whose skills end as in the log of a mission."""
-
-    def __init__(self, world: World | None, skills: SkillTable) -> None:
-        super().__init__(world or World((), ""), SIMULATION, skills)
-        self.end: LogLine = {}  # the event that ends the current skill
-
-    def thing_meant(self, request: str) -> None:
-        """Return None, since a log does not list the things in a room."""
-
-    def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Repeat the end of a skill, and record its event."""
-        if self.end["event"] not in {"result", "late"}:
-            raise RobotError(self.end["event"], "the skill failed or was cancelled")
-        row, result = self.skills[skill], self.end.get("result")
-        event = attempted_event(row, arguments, place=self.place, time=self.now, holding=self.held or "")
-        if event is None:
-            return result
-        if row.is_drive:
-            self.room = self.room_for(event.text) or event.text
-            event = replace(event, destination=self.place)
-        elif event.kind in {PICK, PLACE}:
-            self.held = event.text if event.kind == PICK else None
-        found = result if isinstance(result, bool) else None
-        self.events.append(replace(event, answer=str(result) if event.options else None, found=found))
-        return result
-
-
 def find_log_effect(path: Path, rules: Sequence[Rule], world: World | None, skills: SkillTable) -> RuleEffect:
     """Return the first effect that rules would have had on a logged mission.
 
@@ -160,7 +132,7 @@ def _log_effect(events: Sequence[LogLine], guard: RuleGuard, robot: LoggedRobot)
             if line["event"] == "skill":
                 ends = (later for later in events[number:] if later["event"] in SKILL_END_EVENTS)
                 robot.end = next(ends, {"event": "cancelled"})
-                guard.perform(robot, line["skill"], _arguments(line, robot.skills))
+                guard.perform(robot, line["skill"], arguments_in(line, robot.skills))
             elif line["event"] == "rule" and line.get("prevented"):  # the log has no skill for this step
                 step = trace_from([line["what"]])[0]
                 attempt = replace(step, place=robot.place, holding=robot.held or "")
@@ -176,9 +148,3 @@ def _log_effect(events: Sequence[LogLine], guard: RuleGuard, robot: LoggedRobot)
         return RuleEffect(str(state["state"]), line=state.get("line"), error=str(state.get("reason", "")))
     unkept = guard.at_end()
     return RuleEffect("finished") if unkept is None else RuleEffect.of(unkept, "finished")
-
-
-def _arguments(line: LogLine, skills: SkillTable) -> list[Argument]:
-    given = zip(skills[line["skill"]].parameters, line["arguments"].values(), strict=True)
-    listed = [to_options(value) if parameter.is_options else value for parameter, value in given]
-    return [tuple(value) if isinstance(value, list) else value for value in listed]

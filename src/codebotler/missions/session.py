@@ -17,6 +17,7 @@ from pathlib import Path
 from codebotler.checking.evasions import find_evasions
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.proof import hold_within
+from codebotler.checking.repetition import hold_to_past
 from codebotler.checking.rule_rooms import expect_rooms
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
@@ -86,6 +87,7 @@ class MissionSession:
             busy="waiting",
             rules=rules,
             within=within,
+            past=order.past,
             is_over=False,
         )
         self._events: list[LogLine] = []
@@ -220,6 +222,11 @@ class MissionSession:
                 self._show(id=mission.id)
                 if self._world is not None:
                     mission.show_map(self._world)
+                if (past := self._order.past) is not None:
+                    mission.continue_from(past)
+                    resume = getattr(self._robot, "resume", None)  # an optional method of simulated robots
+                    if resume is not None:
+                        resume(past.trace)
                 room_map, place = self._prepare_rooms()
                 self._await_approval(mission)
                 if mission.state is MissionState.APPROVED:
@@ -228,6 +235,8 @@ class MissionSession:
     def _prepare_rooms(self) -> tuple[RoomMap | None, str]:
         """Ask the robot for its rooms and its current room. Refuse rules that cannot be enforced."""
         room_map, place = ask_rooms(self._robot, self._add_remark, self._world)
+        if (past := self._order.past) is not None:
+            room_map, place = past.add_to(room_map, place)
         self._show(room_map=limit_rooms(room_map, self._add_remark))
         rules, rooms = self._view.rules, () if room_map is None else room_map.goals
         regexes = () if room_map is None or room_map.plain else rooms
@@ -310,6 +319,8 @@ class MissionSession:
         try:
             mission.draft(program, view.author)
             check = self._check(program, view.room_map, view.rules_in_force)
+            if view.past is not None:
+                check = hold_to_past(check, view.past.program)
             if self._order.drive is not None and program == self._order.program:
                 check = replace(check, contract=self._order.contract, proofs=(), samples=())
             if view.within is not None:

@@ -11,6 +11,7 @@ from codebotler.generation.no_program import ProgramlessReply
 from codebotler.generation.partial_reply import PartialReply, split_partial
 from codebotler.missions.log import MissionState
 from codebotler.missions.mission import Driver
+from codebotler.missions.past import MissionPast
 from codebotler.missions.progress import Progress
 from codebotler.prompts import clean_instruction
 from codebotler.simulator.contract import Contract
@@ -35,6 +36,7 @@ class MissionOrder:
     author: str = ""  # the model or the agent that wrote the program, if any
     drive: Driver | None = None  # controls the robot in place of exactly this program
     contract: Contract | None = None  # what `drive` may do at most
+    past: MissionPast | None = None  # of the mission whose rest is requested
 
     def __post_init__(self) -> None:
         if not self.has_program:
@@ -73,6 +75,7 @@ class SessionView:
     rules: tuple[Rule, ...] = ()
     disabled_rules: tuple[str, ...] = ()  # the names of rules switched off for this program
     within: Contract | None = None  # what every program of the session may do
+    past: MissionPast | None = None  # of the mission whose rest the session does
     earlier: Contract | None = None  # the contract of the session's last checked program but this one
     progress: Progress = field(default_factory=Progress)
     is_over: bool = True

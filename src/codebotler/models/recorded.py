@@ -41,6 +41,17 @@ class Solution(BaseModel):
     right: bool = False  # whether it is correct although it fails because the checks are too strict
 
 
+class Continuation(BaseModel):
+    """A hand-written program for the rest of a mission, deliberately right or wrong."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    about: str  # its special feature or its mistake, in a few words
+    after: tuple[str, ...]  # the last step before the mission ended, in words; each of these fits
+    program: str
+    right: bool  # whether it is a reply of the careful model, not of the hasty one
+
+
 class InstructionSolutions(BaseModel):
     """The replies of the recorded models to one instruction."""
 
@@ -49,6 +60,7 @@ class InstructionSolutions(BaseModel):
     instruction: str
     careful: Annotated[tuple[Solution, ...], Field(min_length=1)]
     hasty: Annotated[tuple[Solution, ...], Field(min_length=1)]
+    continuations: tuple[Continuation, ...] = ()
 
     def replies_of(self, model: str) -> tuple[Solution, ...]:
         """Return the replies of one of the models."""
@@ -82,6 +94,9 @@ class RecordedModel:
 
     name: str  # such as `recorded:careful`
     replies: Mapping[str, tuple[Solution, ...]] = field(repr=False)  # by instruction, at least one for each
+    rests: Mapping[tuple[str, str], str] = field(default_factory=dict, repr=False)
+    """The programs for the rest of a mission, by the instruction and the last step."""
+
     suggestions: tuple[str, ...] = field(default=(), repr=False)  # instructions that need no context
     settings: SamplingSettings = field(default_factory=partial(SamplingSettings, None, None))
 
@@ -98,9 +113,18 @@ class RecordedModel:
             raise UnknownInstructionError(
                 self.name, prompt.instruction, find_closest(prompt.instruction, self.suggestions)
             )
-        program = self.solution(instruction, number).program
+        program = self._program(instruction, number, prompt.last_step)
         on_text(program)
         return Reply(program, program, Usage(), 0.0, "stop")
+
+    def _program(self, instruction: str, number: int, last_step: str) -> str:
+        if not last_step:
+            return self.solution(instruction, number).program
+        program = self.rests.get((instruction, last_step))
+        if program is None:
+            what = f'{self.name} has no program for the rest of this mission after the step "{last_step}"'
+            raise ModelError(f"{what}; choose a language model, or write the rest", may_pass=False)
+        return program
 
     async def close(self) -> None:
         """Do nothing, because there is nothing to close."""
@@ -136,14 +160,22 @@ def open_recorded(name: str, folder: Path | None = None) -> RecordedModel:
     if short not in RECORDED_NAMES and Path(short).is_dir():
         own = _read(Path(short))
         replies = {one.instruction: one.careful for one in own}
-        return RecordedModel(f"recorded:{short}", replies, tuple(replies))
+        return RecordedModel(f"recorded:{short}", replies, suggestions=tuple(replies))
     if short not in RECORDED_NAMES:
         known = " or ".join(f"recorded:{known}" for known in RECORDED_NAMES)
         raise UserError(f'unknown recorded model "{name}"; use {known}')
     paper, rules = (_read_suite(suite) for suite in ("paper", "rules"))
     further = () if folder is None else _read(folder)
-    replies = {one.instruction: one.replies_of(short) for one in (*paper, *rules, *further)}
-    return RecordedModel(f"recorded:{short}", replies, tuple(one.instruction for one in paper))
+    solved = (*paper, *rules, *further)
+    replies = {one.instruction: one.replies_of(short) for one in solved}
+    rests = {
+        (one.instruction, step): rest.program
+        for one in solved
+        for rest in one.continuations
+        for step in rest.after
+        if rest.right == (short == "careful")
+    }
+    return RecordedModel(f"recorded:{short}", replies, rests, tuple(one.instruction for one in paper))
 
 
 @cache

@@ -59,18 +59,44 @@ class Prompt:
     text: str = field(repr=False)  # for base models; ends with `opening`
     stop: tuple[str, ...]  # texts before which base models stop
     opening: str  # the start of the program that base models continue
+    last_step: str = ""  # of the mission whose rest is requested, in words; empty for a new mission
 
     def after(self, program: str, problems: Sequence[str]) -> Prompt:
         """Return a request to rewrite a program without these problems, each given in a sentence."""
-        listed = "\n".join(f"- {problem}" for problem in problems)
-        answer = PromptMessage("assistant", _fence(program))
-        repair = PromptMessage("user", _fill("repair", problems=listed))
+        listed = _listed(problems)
+        repair = _fill("repair", problems=listed)
         text = _fill(
             "completion-repair", program=_comment(program), problems=_comment(listed), opening=self.opening
         )
+        return self._followed(program, repair, text)
+
+    def to_continue(self, program: str, steps: Sequence[str], why: str, here: str) -> Prompt:
+        """Return a request to write the rest of a mission that ended early.
+
+        Args:
+            program: the program that the robot ran.
+            steps: what the robot did and saw, each in words.
+            why: why the mission ended, in a sentence.
+            here: where the robot is and what it holds, in a sentence.
+        """
+        listed = _listed(steps or ["nothing"])
+        request = _fill("continue", steps=listed, why=why, here=here)
+        text = _fill(
+            "completion-continue",
+            program=_comment(program),
+            steps=_comment(listed),
+            why=why,
+            here=here,
+            opening=self.opening,
+        )
+        return replace(self._followed(program, request, text), last_step=steps[-1] if steps else "nothing")
+
+    def _followed(self, program: str, request: str, text: str) -> Prompt:
+        """Return this prompt with a program and a further request: `text` is both for base models."""
+        answer = PromptMessage("assistant", _fence(program))
         return replace(
             self,
-            messages=(*self.messages, answer, repair),
+            messages=(*self.messages, answer, PromptMessage("user", request)),
             text=self.text.removesuffix(self.opening) + text + "\n",
         )
 
@@ -192,6 +218,10 @@ def _template(name: str) -> Template:
 
 def _fill(name: str, **values: str) -> str:
     return _template(name).substitute(values).rstrip("\n")
+
+
+def _listed(sentences: Sequence[str]) -> str:
+    return "\n".join(f"- {sentence}" for sentence in sentences)
 
 
 def _fence(program: str) -> str:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.trace import Option
+from codebotler.core.trace import Option, Trace, arguments_of_event
 from codebotler.core.world import World, laid_out
 from codebotler.robots.base import (
     ROS_PYTHON,
@@ -77,6 +78,17 @@ class Simulated:
         self._robot = SimulatedRobot(self._world, SIMULATION, self.skills)
         self._place = self._stands_at[self._world.robot]
         self.clock.restart()
+
+    def resume(self, past: Trace) -> None:
+        """Bring the robot and the world to where they were after the steps of an earlier mission."""
+        for event in past:
+            row = next(
+                (one for one in self.skills.rows if one.recording and one.recording.kind == event.kind), None
+            )
+            if row is not None:
+                with suppress(RobotError):  # the world is another one, or a person said that this happened
+                    perform_at_once(self._robot, row.name, arguments_of_event(row, event))
+        self._place = self._stands_at[self._robot.room]
 
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback

@@ -207,6 +207,16 @@ def means_anybody(request: str, words_for_people: Sequence[str] = WORDS_FOR_PEOP
     )
 
 
+def contains(request: str, name: str) -> bool:
+    """Return whether a request has a plain name in it, as whole words."""
+    return bool(meant_by(request, [name], plain=True))
+
+
+def means_person(request: str) -> bool:
+    """Return whether a request refers to a person: it is capitalized, or has a word for people."""
+    return request.strip()[:1].isupper() or any(map(means_anybody, content_words(request)))
+
+
 def content_words(request: str) -> list[str]:
     """Return the words of a description without articles and the like, in lower case."""
     return [word for word in _WORD.findall(request.casefold()) if word not in _FILLERS]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from codebotler.core.labels import plain_names
+from codebotler.core.trace import Trace
 from codebotler.core.unicode import compose_fields
 from codebotler.core.words import listed
 from codebotler.core.world import Room, Trait, World, laid_out
@@ -24,6 +25,7 @@ class RoomMap:
     people: tuple[str, ...] = ()  # the names of known people, who may be anywhere
     traits: tuple[tuple[str, tuple[Trait, ...]], ...] = ()  # their properties
     places: tuple[tuple[str, str], ...] = ()  # the places, each with the room that contains it
+    past: Trace = ()  # what the robot did and saw before the program begins
 
     def __post_init__(self) -> None:
         compose_fields(self)
@@ -81,3 +83,6 @@ class RoomMap:
         """The rooms for a model, each with its places."""
         places = {room: [place for place, within in self.places if within == room] for room in self.rooms}
         return [f"{room} (with {listed(within)})" if within else room for room, within in places.items()]
+
+
+NO_ROOMS = RoomMap((), "")

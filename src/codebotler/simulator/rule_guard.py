@@ -14,12 +14,13 @@ from codebotler.core.skills.kinds import GOTO, INSIDE, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, attempted_event
-from codebotler.core.world import Point, Room, rooms_along
+from codebotler.core.world import Point, rooms_along
 from codebotler.rtl import Inconclusive, Monitor
 from codebotler.simulator.contract import Contract, RequestedCall, contract_violation, is_goal
 from codebotler.simulator.entities import Thing
 from codebotler.simulator.house_rule import NON_TEXT_OPTION, Objection, Rule, RuleViolationError
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
+from codebotler.simulator.room_map import NO_ROOMS, RoomMap
 
 KINDS_OF_MOVES = {PICK, PLACE}
 
@@ -64,13 +65,14 @@ class RuleGuard:
 
     Args:
         rules: the rules in force.
-        rooms: the known rooms and their footprints.
+        room_map: the known rooms and their footprints, and what happened before the program began.
         contracts: bounds of what the program may do, all of which count.
     """
 
     def __init__(
-        self, rules: Sequence[Rule], rooms: Sequence[Room] = (), contracts: Sequence[Contract] = ()
+        self, rules: Sequence[Rule], room_map: RoomMap = NO_ROOMS, contracts: Sequence[Contract] = ()
     ) -> None:
+        rooms = room_map.plan
         self.rules, self._rooms, self.contracts = tuple(rules), rooms, tuple(contracts)
         self._calls: Counter[str] = Counter()  # by skill
         self._stops = {room.full_name: room.stand_at for room in rooms}
@@ -86,6 +88,19 @@ class RuleGuard:
         self._start = self._seen = 0  # number of events before the call, and of events judged so far
         self._held: Thing | None = None  # what the robot held before the call
         self._prevented: RuleViolationError | None = None  # the skill may have caught it
+        self._recall(room_map)
+
+    def _recall(self, room_map: RoomMap) -> None:
+        """Add what happened before the program began to the history, without an objection."""
+        for event in room_map.past:
+            place = _label(room_map, event.place)
+            named = replace(event, place=name_of(place, event.place))
+            if event.kind == GOTO:
+                goal = _label(room_map, event.text)
+                named = replace(named, text=name_of(goal, event.text), destination=goal)
+                for inside in self._entered(self._way(place, goal), event.holding):
+                    self.add_event(inside)
+            self.add_event(named)
 
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
         """Let a robot execute one skill. Raise RuleViolationError if it would break, or broke, a rule."""
@@ -216,7 +231,8 @@ class RuleGuard:
     def moved(self, start: Point, end: Point, holding: str) -> None:
         """Add a straight drive between two poses. Raise RuleViolationError if it broke a rule."""
         if self.judges_poses:
-            self._enter(rooms_along(self._rooms, start, end), holding)
+            for event in self._entered(rooms_along(self._rooms, start, end), holding):
+                self.happened(event)
 
     def give_up(self, rules: Iterable[Rule], event: Event, objection: Objection, why: str) -> None:
         """Stop judging some rules. Raise RuleViolationError if one of them must always hold."""
@@ -247,7 +263,8 @@ class RuleGuard:
             named = self._named(event, event.text if request is None else request, thing)
             is_leg = event.kind == GOTO or GOTO not in kinds
             if event.destination is not None and is_leg and self.judges_poses:
-                self._enter(self._way(event.place, event.destination), named.holding)
+                for inside in self._entered(self._way(event.place, event.destination), named.holding):
+                    self.happened(inside)
             self.happened(named)
 
     def _named(self, event: Event, request: str, thing: Thing | None = None) -> Event:
@@ -260,17 +277,23 @@ class RuleGuard:
             text = name_of(thing.label, text)
         return replace(event, text=text, place=place, holding=holding)
 
-    def _enter(self, way: Iterable[Sequence[str]], holding: str) -> None:
+    def _entered(self, way: Iterable[Sequence[str]], holding: str) -> Iterator[Event]:
+        """Yield an event for each room that the robot enters on its way."""
         for here in way:
             before, self._history.inside = self._history.inside, here
             for room in here:
                 if room not in before:
-                    self.happened(Event(INSIDE, room, place=room, holding=holding))
+                    yield Event(INSIDE, room, place=room, holding=holding)
 
     def _way(self, start: str, end: str) -> Iterable[Sequence[str]]:
         """Return the rooms that contain each part of a simulated drive, or only its ends without a map."""
         one, other = self._stops.get(start), self._stops.get(end)
         return [(start,), (end,)] if one is None or other is None else rooms_along(self._rooms, one, other)
+
+
+def _label(room_map: RoomMap, request: str) -> str:
+    room = room_map.room(request)
+    return request if room is None else room_map.full_name(room)
 
 
 def _trimmed(event: Event) -> Event:

@@ -1,11 +1,12 @@
-"""The facts of a sampled world, in the words of the messages about them."""
+"""The facts of a sampled world, and what a program has found out about its rooms."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from codebotler.core.words import brief
+from codebotler.simulator.matching import contains
 
 SOMEBODY = "somebody"
 
@@ -60,3 +61,33 @@ class RandomOutcome:
 
 
 SampledFact: TypeAlias = Whereabouts | GivenAnswer | RandomOutcome
+
+
+# --- the program's knowledge, by canonical names
+
+
+@dataclass
+class ExploredRoom:
+    """What a program knows about one room."""
+
+    missed: set[str] = field(default_factory=set)  # looked for and not found
+    gone: set[str] = field(default_factory=set)  # picked up here
+    people: set[str] = field(default_factory=set)
+
+    def lacks(self, name: str) -> bool:
+        """Return whether a name, or a longer name that contains it, is known to be absent."""
+        missed = self.missed
+        return name in missed or (name != SOMEBODY and any(contains(longer, name) for longer in missed))
+
+
+@dataclass
+class RoomSearch:
+    """The rooms in which a program looked for a person or thing."""
+
+    vain: set[str] = field(default_factory=set)
+    found: set[str] = field(default_factory=set)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the program searched several rooms without success."""
+        return len(self.vain) > 1 and not self.found

@@ -6,16 +6,15 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Literal
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills.kinds import ASK, CHECK
+from codebotler.core.skills.kinds import ASK, CHECK, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import as_text
-from codebotler.core.trace import to_options
+from codebotler.core.trace import Event, to_options
 from codebotler.core.world import Room, World
 from codebotler.simulator.entities import NO_WORDS, Thing
 from codebotler.simulator.fact_sampler import Draw, FactSampler
@@ -24,48 +23,27 @@ from codebotler.simulator.matching import (
     WORDS_FOR_THINGS,
     Entity,
     best_fits,
-    content_words,
+    contains,
     means_anybody,
+    means_person,
     meant_by,
 )
 from codebotler.simulator.robot import SimulatedRobot, SkillGuard
 from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_facts import SOMEBODY, GivenAnswer, RandomOutcome, SampledFact, Whereabouts
+from codebotler.simulator.sampled_facts import (
+    SOMEBODY,
+    ExploredRoom,
+    GivenAnswer,
+    RandomOutcome,
+    RoomSearch,
+    SampledFact,
+    Whereabouts,
+)
 from codebotler.simulator.settings import SimulationSettings
 
 AS_WRITTEN = SimulationSettings(literals="as-written", matching="longest-name")  # as on a robot
 AGREEING_TEXT = re.compile(r"\s*(?:yes|yeah|sure|ok)\b", re.IGNORECASE)
 _ARTICLE = re.compile(r"^(?:the|an?|any|some)\s+")
-
-
-# --- the program's knowledge, by canonical names
-
-
-@dataclass
-class ExploredRoom:
-    """What a program knows about one room."""
-
-    missed: set[str] = field(default_factory=set)  # looked for and not found
-    gone: set[str] = field(default_factory=set)  # picked up here
-    people: set[str] = field(default_factory=set)
-
-    def lacks(self, name: str) -> bool:
-        """Return whether a name, or a longer name that contains it, is known to be absent."""
-        missed = self.missed
-        return name in missed or (name != SOMEBODY and any(contains(longer, name) for longer in missed))
-
-
-@dataclass
-class RoomSearch:
-    """The rooms in which a program looked for a person or thing."""
-
-    vain: set[str] = field(default_factory=set)
-    found: set[str] = field(default_factory=set)
-
-    @property
-    def is_lost(self) -> bool:
-        """Whether the program searched several rooms without success."""
-        return len(self.vain) > 1 and not self.found
 
 
 class SampledRobot(SimulatedRobot):
@@ -76,6 +54,8 @@ class SampledRobot(SimulatedRobot):
 
     A program that searches several rooms assumes that the thing is in one of them. If the thing is in none,
     `excuses` holds the resulting errors, which are not the program's fault.
+
+    What the past of the room map says of the world holds as it was last seen.
     """
 
     is_copied = True
@@ -104,6 +84,9 @@ class SampledRobot(SimulatedRobot):
         self.searches: defaultdict[str, RoomSearch] = defaultdict(RoomSearch)
         self.excuses: set[str] = set()  # messages of excused errors
         self.has_assumed = False  # whether a fact holds that strict worlds would draw
+        for event in room_map.past:
+            self._recall(event)
+        self.room = world.robot
 
     @property
     def idle_skills(self) -> frozenset[str]:
@@ -144,10 +127,55 @@ class SampledRobot(SimulatedRobot):
                 self.excuses.add(str(error))
             raise
 
+    def _recall(self, event: Event) -> None:
+        """Let the world be as the robot left or saw it in an event before the program began."""
+        room, name = self.room_map.room(event.place), normalized(event.text)
+        if room is None:
+            return
+        self.room = room
+        if event.kind == CHECK and event.found is not None:
+            self._see(name, is_person=means_person(event.text), is_there=event.found)
+        elif event.kind == ASK and event.answer is not None:
+            who = normalized(event.to or "")
+            self._see(who, is_person=True, is_there=True)
+            self.answers[room, who, event.text.strip()] = event.answer
+        elif event.kind == PICK:
+            self._see(name, is_person=False, is_there=True)
+            self.held, self.taken = event.text, next(one for one in self.things_here if _is(one, name))
+            self._remove(name)
+            self.here.gone.add(name)
+        elif event.kind == PLACE:
+            self.contents[room].append(self.taken or Thing(name, is_pattern=False))
+            self.held = self.taken = None
+            self.here.missed.discard(name)
+            self.here.gone.discard(name)
+
+    def _see(self, name: str, *, is_person: bool, is_there: bool) -> None:
+        """Let a thing or person be in this room, or not, as the robot saw it last."""
+        is_person = is_person or name == SOMEBODY
+        goal = self._around if is_person else self.room
+        explored, search = self.explored[goal], self.searches[name]
+        (search.found if is_there else search.vain).add(self.room)
+        if not is_there:
+            explored.people -= explored.people if name == SOMEBODY else {name}
+            self._remove(name)
+            explored.missed.add(name)
+            return
+        explored.missed -= {name, *([SOMEBODY] if is_person else [])}
+        explored.gone.discard(name)
+        if is_person:
+            explored.people |= {name, SOMEBODY}
+        elif not any(_is(one, name) for one in self.things_here):
+            self._add(name, goal)
+
+    def _remove(self, name: str) -> None:
+        for goal in self._reach.get(self.room, (self.room,)):
+            self.contents[goal] = [one for one in self.contents[goal] if not _is(one, name)]
+
     def is_here(self, name: str) -> bool | None:
         """Return whether a person or thing is in this room, or None if that is undecided."""
         things, around = self.things_here if name != SOMEBODY else [], self.explored[self._around]
-        if name in around.people or any(thing.is_meant_by(name, "longest-name") for thing in things):
+        if name in around.people or any(_is(thing, name) for thing in things):
             return True
         is_missed = self.here.lacks(name) or around.lacks(name)
         return False if is_missed else None
@@ -350,18 +378,12 @@ class SampledRobot(SimulatedRobot):
             super().put(obj)
 
 
+def _is(thing: Thing, name: str) -> bool:
+    return thing.is_meant_by(name, "longest-name")
+
+
 def normalized(request: str) -> str:
     """Return the canonical form of a requested name: drop articles, and map all words for people to one."""
     name = " ".join(request.casefold().split())
     name = _ARTICLE.sub("", name, count=1)
     return SOMEBODY if means_anybody(name) else name
-
-
-def means_person(request: str) -> bool:
-    """Return whether a request refers to a person: it is capitalized, or has a word for people."""
-    return request.strip()[:1].isupper() or any(map(means_anybody, content_words(request)))
-
-
-def contains(request: str, name: str) -> bool:
-    """Return whether a request has a plain name in it, as whole words."""
-    return bool(meant_by(request, [name], plain=True))

@@ -117,7 +117,7 @@ def test_without_a_map_only_the_ends_of_drives_count() -> None:
 
 
 def driven(formula: str, *rooms: str) -> None:
-    one = SimulatedRobot(WORLD, AS_WRITTEN, guard=RuleGuard([rule(formula)], MAP.plan))
+    one = SimulatedRobot(WORLD, AS_WRITTEN, guard=RuleGuard([rule(formula)], MAP))
     for room in rooms:
         one.perform("go_to", [room])
 
@@ -155,7 +155,7 @@ def test_formulas_may_count_and_order_rooms(formula: str, *, is_broken: bool) ->
 )
 def test_rules_about_other_events_do_not_see_poses(formula: str) -> None:
     watched = [rule('not tr.Exists(inside("nowhere"))'), rule(formula)]
-    one = SimulatedRobot(WORLD, AS_WRITTEN, guard=RuleGuard(watched, MAP.plan))
+    one = SimulatedRobot(WORLD, AS_WRITTEN, guard=RuleGuard(watched, MAP))
     for room in ("printer room 1", "printer room 3"):
         one.perform("go_to", [room])
     assert [event.kind for event in one.trace] == ["goto", "goto"]
@@ -168,11 +168,11 @@ def test_a_skill_of_a_user_drives_through_rooms_too(tmp_path: Path) -> None:
         "    sim.drive('start_loc')\n    sim.look('mug')\n"
     )
     skills = skills_from(tmp_path / "own.py")
-    one = SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([NEVER], MAP.plan))
+    one = SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([NEVER], MAP))
     with pytest.raises(RuleViolationError):
         one.perform("tour", [])
     all_rooms = rule('not tr.Exists(check("mug")) or tr.Count(inside(".*"), 6)')  # judged before and after
-    SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([all_rooms], MAP.plan)).perform("tour", [])
+    SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([all_rooms], MAP)).perform("tour", [])
 
 
 def test_skill_that_drives_around_a_room_has_not_been_inside(tmp_path: Path) -> None:
@@ -182,7 +182,7 @@ def test_skill_that_drives_around_a_room_has_not_been_inside(tmp_path: Path) -> 
         "    'Circle.'\n    sim.drive('supply room')\n    sim.drive(room)\n"
     )
     skills = skills_from(tmp_path / "own.py")
-    one = SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([NEVER], MAP.plan))
+    one = SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([NEVER], MAP))
     one.perform("go_to", ["printer room 1"])
     one.perform("circle", ["printer room 3"])
     assert one.room == "printer room 3"
@@ -416,7 +416,7 @@ def test_other_rules_have_no_keepout_mask(formula: str) -> None:
 
 
 def test_a_pose_is_no_event_of_a_trace() -> None:
-    guard = RuleGuard([NEVER], MAP.plan)
+    guard = RuleGuard([NEVER], MAP)
     guard.moved((2, 3), (4.5, 3), "")
     with pytest.raises(RuleViolationError) as caught:
         guard.moved((4.5, 3), (7, 3), "mug")

@@ -222,8 +222,8 @@ def test_a_person_who_was_moved_is_there(world: World) -> None:
 
 def guarded(world: World, *rules: Rule) -> list[SimulatedRobot]:
     room_map = RoomMap.of(world)
-    simulated = SimulatedRobot(world, SIMULATION, guard=RuleGuard(rules, room_map.plan))
-    return [simulated, SampledRobot(room_map, FactSampler(), guard=RuleGuard(rules, room_map.plan))]
+    simulated = SimulatedRobot(world, SIMULATION, guard=RuleGuard(rules, room_map))
+    return [simulated, SampledRobot(room_map, FactSampler(), guard=RuleGuard(rules, room_map))]
 
 
 def test_who_is_at_a_place_is_in_its_room(world: World) -> None:

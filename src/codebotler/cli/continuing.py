@@ -1,0 +1,56 @@
+"""`codebotler continue`: do the rest of a mission that failed or was stopped."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from rich.console import Group
+from rich.text import Text
+
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import confirm, note, print_rich, shortened
+from codebotler.missions.past import MissionPast, read_past
+from codebotler.missions.preflight import ask_rooms
+from codebotler.missions.store import find_mission, recover_missions
+from codebotler.robots.base import Robot
+from codebotler.robots.reservation import Reservation
+
+
+def choose_past(robot: Robot, home: Path, name: str, *, happened: bool | None) -> MissionPast:
+    """Read the past of a mission, show it, and ask whether an unsure step happened.
+
+    Args:
+        robot: the robot, which is asked where it is if a step is unsure.
+        home: the folder that contains the missions.
+        name: the ID of the mission, or `last`.
+        happened: whether the unsure step happened, or None to ask.
+
+    Raises:
+        UserError: there is no such mission, it cannot be continued, or nobody can answer.
+        NotReadyError: the robot cannot be used.
+    """
+    recover_missions(home)
+    past = read_past(find_mission(home, name), robot.skills)
+    print_rich(past_view(past))
+    if past.unsure is None:
+        return past
+    if happened is None:
+        if not sys.stdin.isatty():
+            raise UserError(f"{past.question}; add --happened or --not-happened")
+        place = _ask_place(robot, home)
+        note(f"{past.question}{f'; the robot says that it is in {place}' if place else ''}")
+        happened = confirm("did this happen?")
+    return past.resolve(happened=happened)
+
+
+def _ask_place(robot: Robot, home: Path) -> str:
+    with Reservation(robot, home):
+        return ask_rooms(robot, note)[1]
+
+
+def past_view(past: MissionPast) -> Group:
+    """Show what a mission did and saw before it ended."""
+    head = Text.assemble((f"mission {past.mission}", "bold"), f" ended early: {shortened(past.why)}")
+    steps = [Text(f"  {step}", "dim") for step in past.steps] or [Text("  the robot did nothing", "dim")]
+    return Group(head, Text("done so far:"), *steps)

@@ -1,0 +1,197 @@
+"""Find out from the log of a mission what it did and saw, so that another mission can do the rest."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from codebotler.core.errors import RobotError, UserError
+from codebotler.core.phrases import phrase
+from codebotler.core.skills.kinds import PICK, PLACE
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.terminal import shortened
+from codebotler.core.trace import (
+    Event,
+    Trace,
+    attempted_event,
+    held_after,
+    placed_trace_data,
+    placed_trace_from,
+    to_options,
+)
+from codebotler.core.world import World
+from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState, MissionSummary, read_events
+from codebotler.robots.simulated import SIMULATION
+from codebotler.simulator.robot import Argument, Result, SimulatedRobot
+from codebotler.simulator.room_map import RoomMap
+
+DONE_EVENTS = frozenset({"result", "late"})
+"""The kinds of log events that end a skill which the robot has executed."""
+
+
+@dataclass(frozen=True)
+class MissionPast:
+    """What a mission, and those that it continued, did and saw before it ended.
+
+    Args:
+        mission: its ID.
+        instruction: the instruction; empty if there was only a program.
+        model: the model that wrote its program; empty if a person did.
+        program: its program.
+        why: why it ended, in a sentence.
+        trace: what the robot did and saw, with the names that programs used.
+        place: where the robot was last; empty if unknown.
+        unsure: a step that may have happened or not; None if there is none.
+    """
+
+    mission: str
+    instruction: str
+    model: str
+    program: str
+    why: str
+    trace: Trace
+    place: str = ""
+    unsure: Event | None = None
+
+    @property
+    def held(self) -> str:
+        """What the robot holds; empty for nothing."""
+        return held_after(self.trace)
+
+    @property
+    def steps(self) -> list[str]:
+        """What the robot did and saw, in words."""
+        return [
+            f'in "{shortened(event.place)}": {phrase(event, "past", show=shortened)}'
+            if event.place
+            else phrase(event, "past", show=shortened)
+            for event in self.trace
+        ]
+
+    def here(self, place: str) -> str:
+        """Say that the robot is at a place, and what it holds."""
+        holds = f'holds "{shortened(self.held)}"' if self.held else "holds nothing"
+        return f'The robot is in "{shortened(place)}" and {holds}.'
+
+    @property
+    def question(self) -> str:
+        """The question to a person whether the unsure step happened; empty if there is none."""
+        if self.unsure is None:
+            return ""
+        where = f' in "{shortened(self.unsure.place)}"' if self.unsure.place else ""
+        return f"the log does not say whether the robot {phrase(self.unsure, 'past', show=shortened)}{where}"
+
+    def resolve(self, *, happened: bool) -> MissionPast:
+        """Return the past with a person's word on the unsure step."""
+        if self.unsure is None:
+            return self
+        trace = (*self.trace, self.unsure) if happened else self.trace
+        return replace(self, trace=trace, unsure=None)
+
+    def add_to(self, room_map: RoomMap | None, place: str) -> tuple[RoomMap, str]:
+        """Return the rooms with this past, and the robot's place, which is the last one if it is unknown."""
+        place = place or self.place
+        known = RoomMap((place,), place, guessed=True) if room_map is None else room_map
+        return replace(known, start=known.room(place) or known.start, past=self.trace), place
+
+    def data(self) -> dict[str, object]:
+        """Convert the past to the data of a log event."""
+        return {
+            "continues": self.mission,
+            "program": self.program,
+            "why": self.why,
+            "place": self.place,
+            "trace": placed_trace_data(self.trace),
+        }
+
+
+def read_past(folder: Path, skills: SkillTable) -> MissionPast:
+    """Read what a mission did and saw. Raise UserError if it cannot be continued, or its log is invalid."""
+    summary = MissionSummary.read(folder)
+    if not summary.has_ended:
+        raise UserError(f"mission {summary.id} has not ended; stop it first")
+    if summary.state is MissionState.DONE:
+        raise UserError(f"mission {summary.id} is done; there is nothing to continue")
+    events = read_events(folder)
+    before: LogLine = next((line for line in events if line["event"] == "past"), {})
+    has_run = any(line["event"] == "state" and line["state"] == MissionState.RUNNING for line in events)
+    place = summary.place if has_run else before.get("place", "")
+    try:
+        robot, unsure = _repeat(events, skills, place)
+    except (AttributeError, LookupError, TypeError, ValueError, re.error):
+        sentence = "the log does not fit the skills; name the files of own skills with --skills"
+        raise UserError(sentence, file=folder) from None
+    return MissionPast(
+        summary.id,
+        summary.instruction,
+        summary.model,
+        summary.program if has_run else before.get("program", summary.program),
+        summary.reason if has_run else before.get("why", summary.reason),
+        robot.trace,
+        robot.place,
+        unsure,
+    )
+
+
+def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[LoggedRobot, Event | None]:
+    """Return a robot that did what a log contains, and a step at the end that may have happened or not."""
+    past = next((placed_trace_from(line["trace"]) for line in events if line["event"] == "past"), ())
+    robot = LoggedRobot(World((), place), skills)
+    robot.events, robot.held = [*past], held_after(past) or None
+    unsure: Event | None = None
+    for number, line in enumerate(events, 1):
+        if line["event"] != "skill":
+            continue
+        ends = (later for later in events[number:] if later["event"] in SKILL_END_EVENTS)
+        robot.end = next(ends, {"event": "unknown"})
+        row, arguments = skills[line["skill"]], arguments_in(line, skills)
+        if robot.end["event"] in {"unknown", "cancelled"} and _has_effect(row):
+            unsure = attempted_event(row, arguments, place=robot.place, time=0.0, holding=robot.held or "")
+        try:
+            robot.execute(row.name, arguments)
+        except RobotError:  # it is in the log as well
+            continue
+    return robot, unsure
+
+
+def _has_effect(row: Skill) -> bool:
+    """Return whether a person would notice if a skill were executed twice. A drive may be repeated."""
+    is_spoken = row.recording is not None and row.recording.is_spoken
+    return is_spoken or not (row.is_idle or row.is_drive)
+
+
+class LoggedRobot(SimulatedRobot):
+    """A robot whose skills end as in the log of a mission."""
+
+    def __init__(self, world: World | None, skills: SkillTable) -> None:
+        super().__init__(world or World((), ""), SIMULATION, skills)
+        self.end: LogLine = {}  # the event that ends the current skill
+
+    def thing_meant(self, request: str) -> None:
+        """Return None, since a log does not list the things in a room."""
+
+    def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Repeat the end of a skill, and record its event."""
+        if self.end["event"] not in DONE_EVENTS:
+            raise RobotError(self.end["event"], "the skill failed or was cancelled")
+        row, result = self.skills[skill], self.end.get("result")
+        event = attempted_event(row, arguments, place=self.place, time=self.now, holding=self.held or "")
+        if event is None:
+            return result
+        if row.is_drive:
+            self.room = self.room_for(event.text) or event.text
+            event = replace(event, destination=self.place)
+        elif event.kind in {PICK, PLACE}:
+            self.held = event.text if event.kind == PICK else None
+        found = result if isinstance(result, bool) else None
+        self.events.append(replace(event, answer=str(result) if event.options else None, found=found))
+        return result
+
+
+def arguments_in(line: LogLine, skills: SkillTable) -> list[Argument]:
+    """Return the arguments of a skill call in a log."""
+    given = zip(skills[line["skill"]].parameters, line["arguments"].values(), strict=True)
+    listed = [to_options(value) if parameter.is_options else value for parameter, value in given]
+    return [tuple(value) if isinstance(value, list) else value for value in listed]

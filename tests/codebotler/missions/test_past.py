@@ -1,0 +1,247 @@
+"""What a mission did is read from its log, and another mission does the rest, without doing it again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from codebotler.checking.check import check
+from codebotler.checking.problems import CheckResult
+from codebotler.checking.repetition import has_same_effect, hold_to_past
+from codebotler.core.errors import UserError
+from codebotler.core.skills.kinds import ASK, PICK, PLACE, SAY
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.trace import Event, Option
+from codebotler.core.world import Person, Room, World
+from codebotler.missions.log import EVENTS_FILE, MissionState, MissionSummary
+from codebotler.missions.mission import Mission
+from codebotler.missions.past import read_past
+from codebotler.missions.recovery import PriorApproval
+from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.robots.reservation import Reservation
+from codebotler.robots.simulated import Simulated
+from codebotler.simulator.contract import Contract, SkillBound
+from codebotler.simulator.pool import shared_pool
+from codebotler.simulator.room_map import RoomMap
+
+WORLD = World(
+    (Room("hall"), Room("kitchen", ("mug",)), Room("lab", people=(Person("Anne", ("no",)),))), "hall"
+)
+ROOMS = RoomMap(("hall", "kitchen", "lab"), "kitchen", plain=True)
+BRING = """
+def task_program():
+    go_to("kitchen")
+    pick("mug")
+    go_to("lab")
+    if ask("Anne", "A mug?", ["yes", "no"]) == "no":
+        say("Never mind.")
+    place("mug")
+    go_to("nowhere")
+"""
+YES_NO = (Option("yes"), Option("no"))
+
+
+def failed(home: Path, program: str) -> Path:
+    """The folder of a mission that ended early."""
+    robot = Simulated(WORLD, speed=None)
+    mission = Mission(home, "simulated", "Bring Anne the mug.")
+    mission.draft(program)
+    mission.check([])
+    mission.approve()
+    with Reservation(robot, home) as reserved, mission:
+        mission.run(reserved, "hall")
+    assert mission.state is MissionState.FAILED
+    return mission.folder
+
+
+def cut(folder: Path, lines: int) -> None:
+    """Let the tool have died after so many lines of the log, and the next one have found that."""
+    log = folder / EVENTS_FILE
+    kept = log.read_text().splitlines(keepends=True)[:lines]
+    log.write_text("".join(kept))
+    summary = MissionSummary.read(folder)
+    summary.state, summary.reason = MissionState.INTERRUPTED, "CodeBotler ended unexpectedly"
+    summary.write(folder)
+
+
+def line_of(folder: Path, skill: str, event: str) -> int:
+    """The number of a line in the log, from 1."""
+    lines = [json.loads(line) for line in (folder / EVENTS_FILE).read_text().splitlines()]
+    return next(n for n, line in enumerate(lines, 1) if (line.get("skill"), line["event"]) == (skill, event))
+
+
+def test_a_log_tells_what_was_done_and_where(tmp_path: Path) -> None:
+    past = read_past(failed(tmp_path, BRING), SKILLS)
+    done = [(one.kind, one.text, one.place, one.answer) for one in past.trace]
+    assert done == [
+        ("goto", "kitchen", "hall", None),
+        ("pick", "mug", "kitchen", None),
+        ("goto", "lab", "kitchen", None),
+        ("ask", "A mug?", "lab", "no"),
+        ("say", "Never mind.", "lab", None),
+        ("place", "mug", "lab", None),
+    ]
+    assert (past.place, past.held, past.unsure, past.program) == ("lab", "", None, BRING)
+    assert past.why.startswith("GoToInvalidLocation")
+
+
+@pytest.mark.parametrize(("skill", "held"), [("pick", "mug"), ("say", "mug"), ("place", "")])
+def test_a_step_without_a_result_is_unsure_until_a_person_says(tmp_path: Path, skill: str, held: str) -> None:
+    folder = failed(tmp_path, BRING)
+    cut(folder, line_of(folder, skill, "skill"))
+    past = read_past(folder, SKILLS)
+    assert past.unsure is not None
+    assert (past.unsure.kind, past.unsure.place) == (skill, past.place)
+    assert past.question
+    assert past.resolve(happened=True).trace == (*past.trace, past.unsure)
+    assert past.resolve(happened=True).held == held
+    assert past.resolve(happened=False).trace == past.trace
+    assert past.resolve(happened=False).unsure is None
+
+
+@pytest.mark.parametrize("skill", ["go_to", "pick"])
+def test_a_drive_is_never_unsure_nor_is_a_step_with_a_result(tmp_path: Path, skill: str) -> None:
+    folder = failed(tmp_path, BRING)
+    cut(folder, line_of(folder, skill, "skill" if skill == "go_to" else "result"))
+    assert read_past(folder, SKILLS).unsure is None
+
+
+def test_a_failed_step_was_not_done(tmp_path: Path) -> None:
+    program = 'def task_program():\n    pick("moon")\n'
+    past = read_past(failed(tmp_path, program), SKILLS)
+    assert (past.trace, past.unsure, past.place) == ((), None, "hall")
+
+
+def test_a_mission_that_is_done_has_no_rest(tmp_path: Path) -> None:
+    mission = Mission(tmp_path, "simulated")
+    mission.draft('def task_program():\n    say("a")\n')
+    mission.check([])
+    mission.approve()
+    robot = Simulated(WORLD, speed=None)
+    with Reservation(robot, tmp_path) as reserved, mission:
+        mission.run(reserved, "hall")
+    with pytest.raises(UserError):
+        read_past(mission.folder, SKILLS)
+
+
+def test_a_continuation_that_never_ran_leaves_the_past_as_it_was(tmp_path: Path) -> None:
+    past = read_past(failed(tmp_path, BRING), SKILLS)
+    with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
+        mission.continue_from(past)
+        mission.fail("the model is away")
+    again = read_past(mission.folder, SKILLS)
+    assert (again.trace, again.place, again.program, again.why) == (
+        past.trace,
+        past.place,
+        past.program,
+        past.why,
+    )
+    assert MissionSummary.read(mission.folder).continues == past.mission
+
+
+def test_the_simulated_robot_is_where_it_was(tmp_path: Path) -> None:
+    folder = failed(tmp_path, BRING)
+    cut(folder, line_of(folder, "ask", "result"))
+    robot = Simulated(WORLD, speed=None)
+    robot.connect()
+    robot.resume(read_past(folder, SKILLS).trace)
+    assert robot.perform("get_current_location", ()) == "lab"
+    robot.perform("place", ["mug"])
+    assert robot.perform("is_in_room", ["mug"])
+
+
+# --- what the rest must not do
+
+
+def rest(*lines: str, past: tuple[Event, ...], begun: str = BRING) -> set[str]:
+    """The kinds of problems of a program for the rest."""
+    program = "def task_program():\n    " + "\n    ".join(lines) + "\n"
+    room_map = RoomMap(ROOMS.rooms, "lab", plain=True, past=past)
+    found = check(program, room_map=room_map, pool=shared_pool())
+    return {problem.kind for problem in hold_to_past(found, begun).problems}
+
+
+SAID = Event(SAY, "There is no mug in room 3.", place="lab")
+HELD = Event(PICK, "mug", place="kitchen")
+
+
+@pytest.mark.parametrize(
+    ("lines", "problems"),
+    [
+        (["say('There is no mug in room 3.')"], {"RepeatedStep"}),
+        (["say('Sorry, there is no mug in room 3!')"], {"RepeatedStep"}),
+        (["say('There is no mug in room 4.')"], set()),
+        (["say('There is a mug in room 3.')"], set()),
+        (["go_to('hall')", "say('There is no mug in room 3.')"], set()),
+    ],
+)
+def test_what_was_said_is_not_said_again(lines: list[str], problems: set[str]) -> None:
+    assert rest(*lines, past=(SAID,)) == problems
+
+
+@pytest.mark.parametrize(
+    ("lines", "problems"),
+    [
+        (["place('mug')"], set()),
+        (["say('Here.')"], {"KeepsThing"}),
+        (["pick('plate')"], {"PickWhileHolding"}),
+    ],
+)
+def test_what_is_held_is_not_forgotten(lines: list[str], problems: set[str]) -> None:
+    assert rest(*lines, past=(HELD,)) == problems
+
+
+def test_a_thing_may_stay_in_hand_if_the_program_never_put_it_down() -> None:
+    assert rest("say('Here.')", past=(HELD,), begun='def task_program():\n    pick("mug")\n') == set()
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "is_same"),
+    [
+        (Event(ASK, "Tea?", YES_NO, place="lab"), Event(ASK, "Tea?", place="lab"), True),
+        (Event(ASK, "Tea?", YES_NO, place="lab"), Event(ASK, "Coffee?", YES_NO, place="lab"), False),
+        (Event(ASK, "Tea?", place="lab", to="A"), Event(ASK, "Tea?", place="lab", to="B"), False),
+        (Event(PLACE, "mug", place="lab"), Event(PLACE, "the mug", place="the lab"), True),
+        (Event(PLACE, "mug", place="lab"), Event(PLACE, "big mug", place="lab"), False),
+        (Event(PICK, "mug", place="lab"), Event(PICK, "mug", place="lab"), False),
+    ],
+)
+def test_equal_effects(one: Event, other: Event, is_same: bool) -> None:  # noqa: FBT001
+    assert has_same_effect(one, other, ROOMS) is is_same
+
+
+# --- recovering without a person
+
+
+def view(*, say: int | None = 1, skill: str = "say") -> SessionView:
+    bound = SkillBound((("message", None),), None, say)
+    found = CheckResult((), (), ROOMS, contract=Contract({skill: bound}))
+    return SessionView(check=found)
+
+
+@pytest.mark.parametrize(
+    ("approved", "done", "wanted", "allows"),
+    [(2, 1, 1, True), (1, 1, 1, False), (None, 5, None, True), (2, 0, None, False)],
+)
+def test_an_approval_covers_the_rest_of_its_contract(
+    tmp_path: Path,
+    approved: int | None,
+    done: int,
+    wanted: int | None,
+    allows: bool,  # noqa: FBT001
+) -> None:
+    past = read_past(failed(tmp_path, BRING), SKILLS)
+    object.__setattr__(past, "trace", (Event(SAY, "a", place="lab"),) * done)
+    approval = PriorApproval.of(view(say=approved))
+    assert approval is not None
+    assert approval.allows(view(say=wanted), past) is allows
+    assert not approval.allows(view(skill="pick"), past)
+
+
+def test_an_order_for_the_rest_needs_an_instruction_or_a_program(tmp_path: Path) -> None:
+    past = read_past(failed(tmp_path, BRING), SKILLS)
+    with pytest.raises(UserError):
+        MissionOrder(past=past)
+    assert MissionOrder(past.instruction, past=past).past is past

@@ -1,0 +1,112 @@
+"""A world is as a robot left or saw it before the program began, and rules count what was done before."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import pytest
+
+from codebotler.core.errors import RobotError
+from codebotler.core.skills.declaration import POSE_IN_ROOM
+from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.trace import Event, Option
+from codebotler.core.world import Room
+from codebotler.rtl import parse
+from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.house_rule import Rule, RuleViolationError
+from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.rule_guard import RuleGuard
+from codebotler.simulator.sampled_robot import SampledRobot
+
+ROOMS = RoomMap(("hall", "kitchen", "lab"), "kitchen")
+YES_NO = (Option("yes"), Option("no"))
+WORLDS = range(12)
+
+
+def event(kind: str, text: str, place: str = "kitchen", **more: object) -> Event:
+    return replace(Event(kind, text, place=place), **more)  # type: ignore[arg-type]
+
+
+def robots(*past: Event, rules: tuple[Rule, ...] = ()) -> list[SampledRobot]:
+    """The robot in several worlds that are as these events left them."""
+    room_map = replace(ROOMS, past=past)
+    guards = [RuleGuard(rules, room_map) if rules else None for _ in WORLDS]
+    return [SampledRobot(room_map, FactSampler(0, n), guard=guards[n]) for n in WORLDS]
+
+
+@pytest.mark.parametrize("found", [True, False])
+@pytest.mark.parametrize("what", ["mug", "the mug", "person", "Anne"])
+def test_a_look_finds_what_was_seen_last(what: str, found: bool) -> None:  # noqa: FBT001
+    before = event(CHECK, what, found=not found)
+    for robot in robots(before, event(CHECK, what, found=found)):
+        assert robot.perform("is_in_room", [what]) is found
+    elsewhere = {one.perform("is_in_room", [what]) for one in robots(event(CHECK, what, "lab", found=found))}
+    assert elsewhere == {True, False}, "another room is still imagined"
+
+
+def test_an_answer_stays_the_same() -> None:
+    asked = event(ASK, "Tea?", options=YES_NO, answer="no", to="Anne")
+    for robot in robots(asked):
+        assert robot.perform("ask", ["Anne", "Tea?", YES_NO]) == 1
+        assert robot.perform("is_in_room", ["Anne"])
+    assert len({robot.perform("ask", ["Anne", "Coffee?", YES_NO]) for robot in robots(asked)}) == 2
+
+
+def test_the_robot_holds_what_it_picked_up() -> None:
+    for robot in robots(event(PICK, "mug", "lab")):
+        assert (robot.held, robot.room) == ("mug", "kitchen")
+        with pytest.raises(RobotError, match="holds"):
+            robot.perform("pick", ["plate"])
+        robot.perform("place", ["mug"])
+        assert robot.perform("is_in_room", ["mug"])
+        robot.perform("go_to", ["lab"])
+
+
+def test_a_thing_is_where_it_was_put_down() -> None:
+    for robot in robots(event(PICK, "mug", "lab"), event(PLACE, "mug", holding="mug")):
+        assert robot.held is None
+        assert robot.perform("is_in_room", ["mug"])
+        robot.perform("pick", ["mug"])
+
+
+def test_rules_count_what_was_done_before() -> None:
+    once = Rule("once", "Ask once.", parse('not tr.AtLeast(ask(".*", ".*"), 2)'))
+    asked = event(ASK, "Tea?", options=YES_NO, answer="no", to="Anne")
+    for robot in robots(asked, rules=(once,)):
+        with pytest.raises(RuleViolationError):
+            robot.perform("ask", ["Anne", "Coffee?", YES_NO])
+    for robot in robots(event(SAY, "Tea?"), rules=(once,)):
+        robot.perform("ask", ["Anne", "Coffee?", YES_NO])
+
+
+def test_rules_know_rooms_by_their_names_after_earlier_drives() -> None:
+    never_back = Rule(
+        "never-back",
+        "N.",
+        parse('not (tr.Exists(goto("lab")) and tr.AfterFirst(goto("lab")).Exists(goto("kitchen")))'),
+    )
+    drive = event(GOTO, "the Lab please", "hall", destination="lab")
+    for robot in robots(drive, rules=(never_back,)):
+        with pytest.raises(RuleViolationError):
+            robot.perform("go_to", ["kitchen"])
+
+
+def test_poses_before_count() -> None:
+    plan = tuple(
+        Room(name, (), (), ((x, 0.0), (x + 1, 0.0), (x + 1, 1.0), (x, 1.0)), (x + 0.5, 0.5))
+        for x, name in enumerate(ROOMS.rooms)
+    )
+    skills = SKILLS.with_skill(POSE_IN_ROOM)
+    rule = Rule("inside-twice", "N.", parse('not tr.AtLeast(inside("lab"), 2)', skills=skills))
+    room_map = replace(ROOMS, plan=plan, past=(event(GOTO, "lab"), event(GOTO, "kitchen", "lab")))
+    robot = SampledRobot(room_map, FactSampler(), guard=RuleGuard((rule,), room_map))
+    with pytest.raises(RuleViolationError):
+        robot.perform("go_to", ["lab"])
+
+
+def test_a_past_travels_to_the_child() -> None:
+    room_map = replace(ROOMS, past=(event(PICK, "mug"),))
+    assert pickle.loads(pickle.dumps(room_map)) == room_map
+    assert hash(room_map) == hash(replace(room_map))
