@@ -1,0 +1,160 @@
+"""`codebotler continue` and `run --recover`: the rest of a mission, by a model or by a person."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from codebotler.missions.log import EVENTS_FILE, SUMMARY_FILE
+from command_line import Ended, command
+from server import Request, Server
+
+WORLD = """
+robot: hall
+rooms: [hall, kitchen, lab]
+objects: {kitchen: [mug]}
+people: {lab: [{name: Anne, answers: ["no"]}]}
+"""
+BEGUN = """def task_program():
+    go_to("kitchen")
+    pick("mug")
+    go_to("lab")
+    ask("Bob", "A mug?", ["yes", "no"])
+    place("mug")
+    say("done")
+"""
+REST = """def task_program():
+    if ask("Anne", "A mug?", ["yes", "no"]) == "no":
+        place("mug")
+    say("done")
+"""
+AGAIN = """def task_program():
+    go_to("kitchen")
+    pick("mug")
+"""
+WIDER = REST.replace('"done"', '"All is well, and somebody else got it."')
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name, text in (("begun.py", BEGUN), ("rest.py", REST), ("again.py", AGAIN), ("world.yaml", WORLD)):
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def ended(folder: Path, name: str, *arguments: str | Path, given: str = "") -> Ended:
+    environment = {
+        **os.environ,
+        "CODEBOTLER_HOME": str(folder / "home"),
+        "COLUMNS": "100",
+        "NO_COLOR": "1",
+        "OPENAI_API_KEY": "key",
+    }
+    sim = () if name == "missions" else ("--world", "world.yaml", "--speed", "0")
+    return command("codebotler", name, *arguments, *sim, cwd=folder, environment=environment, given=given)
+
+
+def missions(folder: Path) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = json.loads(ended(folder, "missions", "--json").out)
+    return found
+
+
+def calls(folder: Path, mission: str) -> list[str]:
+    """The skills that a mission called, with their first argument."""
+    log = (folder / "home" / "missions" / mission / EVENTS_FILE).read_text().splitlines()
+    rows = [line for line in map(json.loads, log) if line["event"] == "skill"]
+    return [f"{row['skill']} {next(iter(row['arguments'].values()), '')}".strip() for row in rows]
+
+
+def server(*programs: str) -> Server:
+    """A server that replies with one program after another."""
+    one = Server()
+    one.answer = lambda _: f"```python\n{programs[len(one.requests) - 1]}```\n"
+    return one
+
+
+def asked(request: Request) -> str:
+    return str(request.body["messages"][-1]["content"])
+
+
+def at(one: Server) -> tuple[str, ...]:
+    return "--model", "openai-chat:tiny", "--base-url", one.url
+
+
+def test_a_program_of_a_person_does_the_rest(folder: Path) -> None:
+    assert ended(folder, "run", "begun.py", "--yes").status == 1
+    done = ended(folder, "continue", "last", "rest.py", "--yes")
+    assert (done.status, done.err) == (0, "")
+    before, after = missions(folder)
+    assert (before["state"], after["state"], after["continues"]) == ("failed", "done", before["id"])
+    assert calls(folder, after["id"]) == ["ask Anne", "place mug", "say done"]
+
+
+def test_a_program_that_forgets_what_is_held_is_not_run(folder: Path) -> None:
+    ended(folder, "run", "begun.py", "--yes")
+    refused = ended(folder, "continue", "last", "again.py", "--yes")
+    assert refused.status == 1
+    assert "PickWhileHolding" in refused.out
+    assert missions(folder)[-1]["state"] == "failed"
+
+
+def test_a_model_is_shown_what_happened_and_writes_the_rest(folder: Path) -> None:
+    with server(BEGUN, REST) as model:
+        assert ended(folder, "run", "Bring Anne a mug.", *at(model), "--yes").status == 1
+        assert ended(folder, "continue", *at(model), "--yes").status == 0
+    request = asked(model.requests[-1])
+    for words in ("AskNoPerson", 'in "kitchen": picked up "mug"', 'in "lab" and holds "mug"'):
+        assert words in request
+    assert "Bring Anne a mug." in str(model.requests[-1].body["messages"])
+    assert missions(folder)[-1]["state"] == "done"
+
+
+def test_recover_continues_by_itself_within_the_approved_contract(folder: Path) -> None:
+    begun = BEGUN.replace('"Bob"', '"Anne" if is_in_room("mug") else "Bob"')
+    with server(begun, REST) as model:
+        done = ended(folder, "run", "Bring Anne a mug.", *at(model), "--recover", "1", given="y\n")
+    assert done.status == 0, done.err
+    assert [one["state"] for one in missions(folder)] == ["failed", "done"]
+    assert len(model.requests) == 2
+
+
+@pytest.mark.parametrize("times", [0, 1])
+def test_recover_gives_up_after_so_many_times(folder: Path, times: int) -> None:
+    fails = 'def task_program():\n    go_to("lab")\n    ask("Bob", "Tea?", ["yes"])\n'
+    with server(*[fails] * (times + 1)) as model:
+        gave_up = ended(folder, "run", "Ask Bob.", *at(model), "--yes", "--recover", str(times))
+    assert gave_up.status == 1
+    assert len(missions(folder)) == times + 1
+
+
+def test_recover_asks_for_approval_of_what_was_not_approved(folder: Path) -> None:
+    with server(BEGUN, WIDER) as model:
+        done = ended(folder, "run", "Bring Anne a mug.", *at(model), "--recover", "1", given="y\nn\n")
+    assert done.status == 1
+    assert done.err.count("[y/N]") == 2
+    assert [one["state"] for one in missions(folder)] == ["failed", "stopped"]
+
+
+def test_the_rest_of_a_typed_program_must_be_typed(folder: Path) -> None:
+    ended(folder, "run", "begun.py", "--yes")
+    assert ended(folder, "continue", "--yes").status == 2
+
+
+def test_an_unsure_step_needs_a_persons_word(folder: Path) -> None:
+    ended(folder, "run", "begun.py", "--yes")
+    (mission,) = missions(folder)
+    home = folder / "home" / "missions" / mission["id"]
+    log = (home / EVENTS_FILE).read_text().splitlines(keepends=True)
+    picks = next(n for n, line in enumerate(log, 1) if '"pick"' in line)
+    (home / EVENTS_FILE).write_text("".join(log[:picks]))
+    (home / SUMMARY_FILE).write_text(json.dumps({**mission, "state": "running", "ended": None}))
+    program = folder / "place.py"
+    program.write_text('def task_program():\n    place("mug")\n')
+    assert ended(folder, "continue", "last", program, "--yes").status == 2
+    assert ended(folder, "continue", "last", program, "--yes", "--not-happened").status == 1
+    assert ended(folder, "continue", mission["id"], program, "--yes", "--happened").status == 0
+    assert [one["state"] for one in missions(folder)][-1] == "done"
