@@ -37,6 +37,7 @@ _REQUIRED_KEYS: Mapping[str, frozenset[str]] = {
     "log": frozenset({"text"}),
     "map": frozenset({"rooms", "robot"}),
     "past": frozenset({"continues", "trace"}),
+    "contract": frozenset({"contracts"}),
 }
 """The keys that each kind of event must have."""
 

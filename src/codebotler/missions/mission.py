@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeAlias
 
+from codebotler.checking.contract_file import contract_data
 from codebotler.core.files import Appender, make_folder
 from codebotler.core.terminal import visible
 from codebotler.core.trace import Outcome, RunError, Status, Trace
@@ -226,6 +227,8 @@ class Mission:
                 self._live, self.stop_button.robot = live, reserved.robot
             will = reserved.robot.if_tool_dies
             self._step(MissionState.RUNNING, "run", if_tool_dies=will, place=place)
+        if contracts:
+            self._write("contract", contracts=[contract_data(contract) for contract in contracts])
         threading.Thread(target=self._execute, args=(live, drive), name=self.id, daemon=True).start()
         try:
             self.stop_button.ended.wait()

@@ -123,6 +123,7 @@ _EVENT_WORDERS: Mapping[str, Callable[[LogLine], str]] = {
     "late": lambda _: "finished after the stop; nothing more will run",
     "log": lambda line: shortened(line["text"]),
     "map": lambda _: "",
+    "contract": lambda _: "",
     "past": lambda line: f"continues mission {visible(str(line['continues']))}",
 }
 """The functions that describe each kind of event."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.checking.contract_file import contract_data
 from codebotler.cli.run import checker
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
@@ -104,6 +105,8 @@ def test_the_robot_is_not_told_what_the_contract_does_not_allow(tmp_path: Path, 
     (told,) = [line for line in lines if line["event"] == "rule"]
     assert (told["rule"], told["prevented"], told["line"]) == ("approved contract", True, 6)
     assert told["why"]
+    (approved,) = [line["contracts"] for line in lines if line["event"] == "contract"]
+    assert approved == [contract_data(ALLOWED)]
 
 
 def test_calls_within_the_contract_reach_the_robot(tmp_path: Path) -> None:
