@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from secrets import compare_digest
+from threading import Lock
 from typing import Any
 
 from codebotler.agents.reports import CheckReport, MissionReport, RobotReport, report_check
@@ -23,7 +24,8 @@ from codebotler.missions.wording import event_text
 from codebotler.prompts import prompt_for
 from codebotler.web.console import Console
 
-MAX_CONTRACT_CHARACTERS = 20_000
+MAX_CONTRACT_CHARACTERS = 16_000  # a check reads no program of more than 20,000
+TOO_LONG = f"the contract is longer than {MAX_CONTRACT_CHARACTERS:,} characters; shorten it"
 MAX_ASKED_CHARACTERS = 4_000
 """The limit for a program in a client's dialog. Longer programs are reviewed on the page."""
 
@@ -45,11 +47,17 @@ class Gatekeeper:
     page: str = ""
     _session: MissionSession | None = field(default=None, init=False)  # the latest one of an agent
     _steps: Steps | None = field(default=None, init=False)  # of that session, if it is step by step
+    _checking: Lock = field(default_factory=Lock, init=False)  # held while a program of an agent is checked
 
     def propose(self, order: MissionOrder, steps: Steps | None = None) -> MissionSession:
         """Begin a mission that waits for approval. Raise MissionError if the console is busy with another."""
         before = self.console.session
-        if before is not None and not before.view.is_over and before is not self._session:
+        is_open = before is not None and not before.view.is_over
+        if (
+            before is not None
+            and is_open
+            and (before is not self._session or before.view.is_changed_by_person)
+        ):
             raise MissionError("a person is working on a mission of their own; wait until it is over")
         if not order.has_program and not self.writes:
             raise UserError("no model is configured that can write programs; send a program")
@@ -64,9 +72,11 @@ class Gatekeeper:
         if self.console.view.is_running:
             raise MissionError("a mission is running; wait until it is over, or stop it")
         if len(json.dumps(bounds)) > MAX_CONTRACT_CHARACTERS:
-            raise UserError(f"the contract is longer than {MAX_CONTRACT_CHARACTERS:,} characters; shorten it")
+            raise UserError(TOO_LONG)
         known = self.console.robot.skills.without(self.console.robot.missing)
         steps = Steps(purpose, contract_from(bounds, known), known)
+        if len(steps.program) > MAX_CONTRACT_CHARACTERS:
+            raise UserError(TOO_LONG)
         order = MissionOrder(
             purpose, program=steps.program, author=author, drive=steps.drive, contract=steps.contract
         )
@@ -116,9 +126,14 @@ class Gatekeeper:
         return self.asks_client and view.can_run and len(view.program) <= MAX_ASKED_CHARACTERS
 
     def check(self, program: str) -> CheckReport:
-        """Check a program without a mission, in the rooms that are known now."""
+        """Check a program without a mission, in the rooms that are known now, but only one at a time."""
         room_map, rules = self.console.view.room_map, self.console.rules
-        checked = self.console.check(program, room_map, rules)
+        if not self._checking.acquire(blocking=False):  # a person's check must not wait for many others
+            raise MissionError("another check is under way; try again when it is over")
+        try:
+            checked = self.console.check(program, room_map, rules)
+        finally:
+            self._checking.release()
         missing = tuple(missing_skills(program, self.console.robot))
         view = SessionView(
             program=program, check=checked, missing_skills=missing, room_map=room_map, rules=rules

@@ -36,6 +36,9 @@ from codebotler.web.server import Companion
 MAX_MESSAGE_BYTES = 2_000_000
 """The limit for one message on standard input."""
 
+MAX_SESSIONS = 100
+"""The limit for clients over HTTP that have not ended their sessions."""
+
 
 class Streams(NamedTuple):
     """The two streams over which a client speaks to us."""
@@ -107,7 +110,9 @@ def _as_resource_errors() -> Iterator[None]:
 def over_http(server: MCPServer[Gatekeeper], announce: Callable[[str], None]) -> Companion:
     """Return what serves agents over HTTP on the page's port. `announce` receives the page's address."""
     security = TransportSecuritySettings(enable_dns_rebinding_protection=False)  # the page's guard has it
-    app = server.streamable_http_app(streamable_http_path=AGENT_PATH, transport_security=security)
+    app = server.streamable_http_app(
+        streamable_http_path=AGENT_PATH, transport_security=security, max_sessions=MAX_SESSIONS
+    )
 
     async def run() -> None:
         async with server.session_manager.run():
@@ -121,15 +126,63 @@ def over_stdio(server: MCPServer[Gatekeeper], streams: Streams, announce: Callab
     server.streamable_http_app()  # makes the session manager, the public way to the server below
     running = server.session_manager.app
 
-    async def run() -> None:
-        lines = asyncio.StreamReader(limit=MAX_MESSAGE_BYTES)  # needs no thread, so that signals interrupt it
-        loop, protocol = asyncio.get_running_loop(), asyncio.StreamReaderProtocol(lines)
-        await loop.connect_read_pipe(lambda: protocol, streams.received)
-        sent = anyio.wrap_file(TextIOWrapper(streams.sent, encoding="utf-8"))
-        async with stdio_server(stdin=cast("Any", lines), stdout=sent) as (reading, writing):
+    async def serve_client(lines: asyncio.StreamReader) -> None:
+        output = await _open_output(streams.sent)
+        async with stdio_server(stdin=cast("Any", lines), stdout=output) as (reading, writing):
             await running.run(reading, writing, running.create_initialization_options())
 
+    async def run() -> None:
+        lines = asyncio.StreamReader(limit=MAX_MESSAGE_BYTES)  # needs no thread, so that signals interrupt it
+        is_closed = asyncio.Event()
+        loop, protocol = asyncio.get_running_loop(), _Input(lines, is_closed)
+        await loop.connect_read_pipe(lambda: protocol, streams.received)
+        tasks = [asyncio.create_task(serve_client(lines)), asyncio.create_task(is_closed.wait())]
+        try:  # a client that has gone must not keep the robot busy, even if it has not read our answers
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+        if tasks[0] in done:
+            await tasks[0]
+
     return Companion((), run, announce)
+
+
+class _Input(asyncio.StreamReaderProtocol):
+    """Reads standard input, and tells when the client has closed it."""
+
+    def __init__(self, lines: asyncio.StreamReader, is_closed: asyncio.Event) -> None:
+        super().__init__(lines)
+        self._is_closed = is_closed
+
+    def eof_received(self) -> bool | None:
+        """Note that the client has closed its end."""
+        self._is_closed.set()
+        return super().eof_received()
+
+
+class _Output:
+    """Writes standard output without a thread, which a client that reads nothing would block."""
+
+    def __init__(self, writer: asyncio.StreamWriter) -> None:
+        self._writer = writer
+
+    async def write(self, text: str) -> None:
+        """Write a text once the client has read most of the earlier ones."""
+        self._writer.write(text.encode())
+        await self._writer.drain()
+
+    async def flush(self) -> None:
+        """Do nothing, because nothing is kept back."""
+
+
+async def _open_output(sent: BufferedWriter) -> Any:  # noqa: ANN401 - the SDK wants a file of anyio
+    loop = asyncio.get_running_loop()
+    try:
+        transport, protocol = await loop.connect_write_pipe(asyncio.streams.FlowControlMixin, sent)
+    except ValueError:  # a file, which is never full of unread answers
+        return anyio.wrap_file(TextIOWrapper(sent, encoding="utf-8"))
+    return _Output(asyncio.StreamWriter(transport, protocol, None, loop))
 
 
 def serve_without_page(companion: Companion, console: Console) -> None:

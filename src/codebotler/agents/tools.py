@@ -27,6 +27,9 @@ from codebotler.models.base import ModelError, ignore_text
 from codebotler.prompts import clean_instruction
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS
 
+MAX_ARGUMENT = 10_000
+"""The limit for an instruction, in characters."""
+
 AgentContext: TypeAlias = Context[Gatekeeper, Any]
 _Digest = Annotated[str, Field(description="The digest of the program, from propose_mission or begin_steps.")]
 _Key = Annotated[str, Field(description="The key `steps` from begin_steps.")]
@@ -78,7 +81,9 @@ async def check_program(
 
 
 async def write_program(
-    instruction: Annotated[str, Field(description="What the robot should do, in plain words.")],
+    instruction: Annotated[
+        str, Field(max_length=MAX_ARGUMENT, description="What the robot should do, in plain words.")
+    ],
     ctx: AgentContext,
 ) -> CheckReport:
     """Have CodeBotler's own language model write a program, and check it. It runs nothing.
@@ -102,8 +107,16 @@ async def write_program(
 
 async def propose_mission(
     ctx: AgentContext,
-    instruction: Annotated[str, Field(description="What the robot should do, as people read it.")] = "",
-    program: Annotated[str, Field(description="The program; if empty, CodeBotler's model writes it.")] = "",
+    instruction: Annotated[
+        str, Field(max_length=MAX_ARGUMENT, description="What the robot should do, as people read it.")
+    ] = "",
+    program: Annotated[
+        str,
+        Field(
+            max_length=MAX_PROGRAM_CHARACTERS,
+            description="The program; if empty, CodeBotler's model writes it.",
+        ),
+    ] = "",
 ) -> MissionReport:
     """Propose a mission, which checks the program and shows it to a person. The robot does not move.
 

@@ -86,7 +86,7 @@ def _texts_of(row: Skill, bound: SkillBound, show: Callable[[str], str], *, is_s
 
 
 def _any_of(texts: Iterable[str], *, is_short: bool) -> str:
-    shown = [f'"{text}"' if text else ANYBODY for text in texts]
+    shown = ['"{}"'.format(text.replace('"', "'")) if text else ANYBODY for text in texts]
     few = MAX_LONG_TEXTS if any(len(text) > LONG_TEXT for text in shown) else MAX_VALUES
     most = few if is_short else MAX_IN_TABLE
     more = len(shown) - most

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from string import Formatter
-from unicodedata import normalize
 
 from codebotler.core.cachedproperty import cached_property
+from codebotler.core.unicode import normalize_text
 
 MAX_PIECES, MAX_TEMPLATE_LENGTH = 20, 2_000
 _HOLE = "\ud800"  # a lone surrogate, which no text of a program contains
@@ -77,9 +78,10 @@ class TextTemplate:
         return cls(tuple(parts))
 
 
+@lru_cache(maxsize=256)  # a text is compared with many templates
 def _comparable(text: str) -> str:
     """Return a text between two spaces, in which equal texts are spelled alike."""
-    folded = normalize("NFD", normalize("NFD", text).casefold())
+    folded = normalize_text("NFD", normalize_text("NFD", text).casefold())
     return f" {' '.join(folded.split())} "
 
 

@@ -71,12 +71,16 @@ class Console:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.end()
+        with self._checking:
+            self._held.close()
+
+    def end(self) -> None:
+        """Stop the current mission, and wait until it is over."""
         session = self.session
         if session is not None:
             session.stop(BY_SHUTDOWN)
             session.join(STOP_GRACE_SECONDS + 1)
-        with self._checking:
-            self._held.close()
 
     @property
     def view(self) -> SessionView:

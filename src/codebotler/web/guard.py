@@ -177,7 +177,7 @@ class Guard:
     def _let_in(self, token: str, request: HTTPConnection) -> Response:
         """Exchange the token in a link for a cookie, to keep the token out of the browser's history."""
         role = self._of_token(token, request)
-        if role is None and self._rules.access.operator is not None:
+        if (role is None and self._rules.access.operator is not None) or role is Role.AGENT:
             raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG)
         path = "/" + path_of(request.scope).strip("/")  # a double slash would start a host name
         if _CONTROL_CHARACTERS.search(path):

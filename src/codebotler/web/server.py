@@ -246,10 +246,15 @@ class _Server(uvicorn.Server):
         await super().startup(sockets)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """End the companion first, since it may keep connections open."""
+        """End the companion first, since it may keep connections open, and wait until the robot has stopped.
+
+        After this, uvicorn lets the signal that ended it end the process.
+        """
         if self._accompanying is not None:
             self._accompanying.cancel()
         await super().shutdown(sockets)
+        if self._console is not None:
+            await asyncio.to_thread(self._console.end)
 
     async def _accompany(self, companion: Companion) -> None:
         try:

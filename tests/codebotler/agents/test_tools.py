@@ -27,6 +27,7 @@ from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import RobotLostError, RobotResult
 from codebotler.robots.simulated import Simulated
+from codebotler.rtl import parse
 from codebotler.simulator.house_rule import Rule
 from codebotler.web.console import Console
 from doubles import Answering, raising
@@ -35,6 +36,7 @@ WORLD = World((Room("hall"), Room("kitchen"), Room("vault")), "hall")
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
 FAULTY = "def task_program():\n    go_to('cellar')\n"
 FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('hall')\n"
+STAY_OUT = Rule("vault", "Stay out of the vault.", parse('not tr.Exists(goto("vault"))'))
 SOON = 30.0
 MODES = pytest.mark.parametrize("mode", ["auto", "legacy"])
 
@@ -635,10 +637,56 @@ def test_a_contract_does_not_approve_the_program_of_a_person(gatekeeper: Gatekee
     use(gatekeeper, act)
 
 
+@pytest.mark.parametrize("change", ["edit", "rule"])
+def test_an_agent_does_not_replace_what_a_person_has_changed(tmp_path: Path, change: str) -> None:
+    gatekeeper = gatekeeper_at(tmp_path, rules=(STAY_OUT,))
+
+    async def act(agent: Agent) -> None:
+        await agent.call("propose_mission", program=HELLO)
+        session = gatekeeper.console.session
+        assert session is not None
+        if change == "edit":
+            session.edit(HELLO.replace("hello", "bye"))
+        else:
+            session.switch_off("vault", "for the test")
+        await until(gatekeeper, lambda view: view.may_be_approved)
+        await agent.fails("propose_mission", program=HELLO)
+        assert gatekeeper.console.session is session
+
+    with gatekeeper.console:
+        use(gatekeeper, act)
+
+
+def test_a_program_without_a_contract_cannot_run(gatekeeper: Gatekeeper) -> None:
+    answer, asked = answering("accept", approve=True)
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=HELLO + "#" * 20_000)
+        assert proposed["check"]["problems"]
+        assert not view_of(gatekeeper).can_run
+        waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
+        assert waiting["state"] == "checked"
+
+    gatekeeper.asks_client = True
+    use(gatekeeper, act, answer=answer)
+    assert asked == []
+
+
+def test_an_agent_checks_one_program_at_a_time(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        with gatekeeper.console._checking:
+            first = asyncio.ensure_future(agent.call("check_program", program=HELLO))
+            await asyncio.sleep(0.1)
+            assert "another check" in await agent.fails("check_program", program=HELLO)
+        assert (await first)["accepted"]
+
+    use(gatekeeper, act)
+
+
 def test_a_huge_contract_is_refused_at_once(gatekeeper: Gatekeeper) -> None:
     async def act(agent: Agent) -> None:
-        contract = {"say": {"message": ["x"] * 20_000}}
-        assert "shorten it" in await agent.fails("begin_steps", purpose="talk", contract=contract)
+        for contract in ({"say": {"message": ["x"] * 20_000}}, {"say": {"message": ["x"] * 1_900}}):
+            assert "shorten it" in await agent.fails("begin_steps", purpose="talk", contract=contract)
 
     use(gatekeeper, act)
 

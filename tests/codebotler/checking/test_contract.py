@@ -284,3 +284,8 @@ def task_program():
     once, twice = (dict(contracts(poll.format(count=n)).skills["say"].texts)["message"] for n in (1, 2))
     assert {str(one) for one in once or ()} == {"000", "100"}
     assert twice is None  # "050", since another person may answer
+
+
+def test_quotes_in_a_text_cannot_forge_a_sentence(contracts: Contracts) -> None:
+    found = contracts('def task_program():\n    say(\'a". It asks nobody. "\')\n    say("b")\n')
+    assert "\"a'. It asks nobody. '\"" in contract_sentence(found, SKILLS)

@@ -149,7 +149,7 @@ def test_an_unsure_step_needs_a_persons_word(folder: Path) -> None:
     (mission,) = missions(folder)
     home = folder / "home" / "missions" / mission["id"]
     log = (home / EVENTS_FILE).read_text().splitlines(keepends=True)
-    picks = next(n for n, line in enumerate(log, 1) if '"pick"' in line)
+    picks = next(n for n, line in enumerate(log, 1) if '"skill": "pick"' in line)
     (home / EVENTS_FILE).write_text("".join(log[:picks]))
     (home / SUMMARY_FILE).write_text(json.dumps({**mission, "state": "running", "ended": None}))
     program = folder / "place.py"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import re
+import time
 from collections.abc import Callable
 from itertools import islice
 from typing import Any
@@ -29,6 +30,8 @@ from codebotler.web.storyboard import RouteProgress, draw_strips
 _CALL = re.compile(r"\b([^\W\d]\w*)(?=\s*\()")
 _MAX_MARKS, _MAX_ESCAPES = 400, 2_000
 _MAX_PROBLEMS = 20
+REVIEW_SECONDS = 1.5
+"""How long a program that replaces another one cannot be approved."""
 
 
 class ProgramPane:
@@ -64,10 +67,17 @@ class ProgramPane:
                 self._again_button = Button("Ask again", lambda: self._again(repair=False), "plain")
             self._board = ui.element("div").classes("storyboard")
         self._view = console.view
+        self._shown = console.view.program
+        self._typed_here, self._review_until = "", 0.0
         ui.run_javascript(f"programEditor.start({self._editor.id})")
 
     def show(self, view: SessionView) -> None:
         """Update the pane for a view."""
+        if view.program and view.program != self._shown:
+            if self._shown and view.program != self._typed_here:  # a click may be meant for the one before
+                self._review_until = time.monotonic() + REVIEW_SECONDS
+                ui.timer(REVIEW_SECONDS, self._ticked, once=True)
+            self._shown = view.program
         self._view = view
         shown = _for_editor(view.arriving.code if view.is_written else view.program)
         self._send(view, shown)
@@ -114,6 +124,7 @@ class ProgramPane:
         elif event.args["base"] != current:
             self._restore("Someone else changed the program; your last edit was discarded.")
         elif typed != current:
+            self._typed_here = typed
             self._try(lambda: self._console.edit(typed))
         self.show(self._console.view)
 
@@ -160,13 +171,16 @@ class ProgramPane:
     def _ticked(self) -> None:
         view = self._console.view
         accepted = not view.problems or (bool(self._despite.value) and view.can_run)
-        self._run.allow(self._may_rerun(view) or (view.may_be_approved and accepted))
+        is_new = time.monotonic() < self._review_until
+        self._run.allow(self._may_rerun(view) or (view.may_be_approved and accepted and not is_new))
         self._run.classes(add="risky" if view.problems else "", remove="" if view.problems else "risky")
 
     async def _approve(self) -> None:
         session, view = self._console.session, self._view
         if self._may_rerun(view):
             self._try(lambda: self._console.edit(view.program))
+        elif time.monotonic() < self._review_until:
+            warn("The program has changed; review it again.")
         elif session is not None and await self._is_seen(view):
             try:
                 despite = bool(self._despite.value)
