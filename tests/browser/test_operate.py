@@ -554,3 +554,20 @@ def test_what_became_of_a_mission_is_said_after_the_tool_died(tmp_path: Path, op
 def test_without_the_token_there_is_a_sentence(server: PageServer) -> None:
     answer = server.ask("GET", "/", accept="text/html")
     assert "open the printed link" in answer.text
+
+
+def test_a_program_that_replaces_another_needs_a_moment(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    button = page.get_by_role("button", name="Run it on the robot")
+    for program, is_first in ((TEA, True), (TEA.replace("tea", "milk").replace("Tea", "Milk"), False)):
+        server.call("POST", "/api/missions", {"program": program})
+        expect(page.locator(".cm-content")).to_contain_text("like tea" if is_first else "like milk")
+        expect(page.get_by_text("Checked: no problems.")).to_be_visible()
+        if not is_first:
+            button.evaluate("button => { button.disabled = false; button.click(); }")
+            expect(page.get_by_text("review it again")).to_be_visible()
+            expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
+            page.wait_for_timeout(2_000)
+        expect(button).to_be_enabled()
+    button.click()
+    expect(page.locator(".headline")).to_have_text("Running")
