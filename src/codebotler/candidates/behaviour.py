@@ -119,7 +119,8 @@ def claims_of(text: str, names: re.Pattern[str]) -> Claims:
     parts = [clause for sentence in sentences(text) for clause in clauses(sentence, lists=True)]
     for clause in complete_clauses(parts):
         found |= _claims_of_clause(clause, names)
-    return frozenset(found)
+    in_times = {("number", part) for kind, time in found if kind == "time" for part in time.split(":")}
+    return frozenset(found - in_times)
 
 
 def _clock_claim(minutes: int) -> tuple[str, str]:
