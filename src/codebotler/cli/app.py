@@ -22,6 +22,11 @@ def generate(
     world: options.WorldOption = None,
     retries: options.RetriesOption = None,
     repair: options.RepairOption = False,
+    candidates: options.CandidatesOption = None,
+    yes: Annotated[
+        bool,
+        typer.Option("--yes", help="With --candidates: take the most frequent behaviour without asking."),
+    ] = False,
     record: options.RecordOption = None,
     show_prompt: options.ShowPromptOption = False,
     base_url: options.BaseUrlOption = None,
@@ -33,11 +38,16 @@ def generate(
 
     The exit status is 1 if the check finds problems.
     """
+    from functools import partial
+
+    from codebotler.checking.sampled import CheckSettings
     from codebotler.cli.generate import print_prompt, write
     from codebotler.cli.rules import rules_for
+    from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
     from codebotler.core.world_file import read_world
     from codebotler.models.chosen import choose_model
+    from codebotler.models.open import open_model
     from codebotler.prompts import prompt_for
     from codebotler.simulator.room_map import RoomMap
 
@@ -46,18 +56,29 @@ def generate(
     table = skills_from(*(skills or ()))
     known = None if world is None else read_world(world, table)
     house_rules = rules_for(known, rules, table)
-    prompt = prompt_for(
-        instruction,
+    room_map = None if known is None else RoomMap.of(known)
+    make_prompt = partial(
+        prompt_for,
         skills=table,
-        rooms=() if known is None else RoomMap.of(known).described,
+        rooms=() if room_map is None else room_map.described,
         rules=[rule.says for rule in house_rules],
     )
     if show_prompt:
-        print_prompt(prompt, chosen.name)
+        print_prompt(make_prompt(instruction), chosen.name)
         return
+    if candidates is not None:
+        from codebotler.cli.candidates import CandidateSearch, line_reader, requests_to, write_chosen
+
+        if repair or retries is not None:
+            raise UserError("--candidates cannot be combined with --retries or --repair")
+        opener = partial(open_model, chosen.name, settings)
+        request = requests_to(opener, make_prompt, candidates, room_map, record)
+        how = CheckSettings(skills=table, house_rules=house_rules)
+        search = CandidateSearch(request, how, room_map, line_reader(is_allowed=not yes))
+        raise typer.Exit(0 if write_chosen(search, instruction) else 1)
     tries = int(repair) if retries is None else retries
     accepted = write(
-        prompt,
+        make_prompt(instruction),
         chosen.name,
         settings,
         world=known,

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from codebotler.cli import options
 from codebotler.cli.model_options import inherit_options, model_settings, options_for
 from codebotler.core.terminal import note, print_text
+
+if TYPE_CHECKING:
+    from codebotler.models.base import Model
 
 
 @inherit_options(options.robot_settings)
@@ -28,14 +32,18 @@ def run(
         bool, typer.Option("--despite-problems", help="Run the program even if the check finds problems.")
     ] = False,
     shows_all: options.AllOption = False,
+    candidates: options.CandidatesOption = None,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Check a program, ask for approval, and run it on a robot.
 
     Ctrl-C stops the robot, and the exit status is then 130.
     """
+    from functools import partial
+
     from codebotler.cli import run
     from codebotler.cli.run import Request
+    from codebotler.core.errors import UserError
     from codebotler.core.files import home
     from codebotler.models.chosen import choose_model
     from codebotler.models.open import open_model
@@ -44,10 +52,20 @@ def run(
     chosen = choose_model(model, base_url)
     kind, settings, rules, allowed = options.robot_settings(**options_for(options.robot_settings, shared))
     request = Request(program, chosen.name, yes, despite_problems, shows_all, rules, allowed)
+    if candidates is not None and request.is_program:
+        raise UserError("--candidates needs an instruction, but this is a program")
     asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
     options.note_office(kind, shared["world"])
     body = open_robot(kind, settings)
-    raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked), settings.world))
+    opener: Callable[[str], Model] = partial(open_model, settings=asked)
+    if candidates is not None:
+        from codebotler.cli.candidates import choose_for_robot
+
+        found = choose_for_robot(body, request, candidates, opener, settings.world)
+        if found is None:
+            raise typer.Exit(1)
+        request, opener = found
+    raise typer.Exit(run.run(body, request, home(), opener, settings.world))
 
 
 def missions(

@@ -45,6 +45,15 @@ ModelOption = Annotated[
         "`codebotler models` lists the usable models."
     ),
 ]
+CandidatesOption = Annotated[
+    int | None,
+    typer.Option(
+        min=2,
+        max=20,
+        help="Ask the model for this many programs; if they behave differently, ask which one you mean.",
+        metavar="K",
+    ),
+]
 WorldOption = Annotated[Path | None, typer.Option(help="The world file that defines the rooms.")]
 RulesOption = Annotated[
     Path | None,

@@ -1,0 +1,231 @@
+"""`--candidates`: get several programs from a model, and ask a person which behaviour they meant."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import TypeAlias
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.text import Text
+
+from codebotler.candidates.clusters import CandidateGroups, group_candidates
+from codebotler.candidates.question import CandidateOption, ClarifyingQuestion, question_about
+from codebotler.checking.check import check
+from codebotler.checking.sampled import CheckSettings
+from codebotler.checking.storyboard import storyboard
+from codebotler.cli.generate import note_programless, open_recorder
+from codebotler.cli.run import Request
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import busy, console, note, print_source, read_line, shortened, visible
+from codebotler.core.words import counted, listed
+from codebotler.core.world import World
+from codebotler.generation.candidates import request_candidates
+from codebotler.generation.generate import Attempt
+from codebotler.missions.preflight import limit_rooms, with_closest_here
+from codebotler.models.base import Model, Reply, TextListener, ignore_text
+from codebotler.models.recorded import UnknownInstructionError
+from codebotler.models.sampling import SamplingSettings
+from codebotler.prompts import Prompt, prompt_for
+from codebotler.robots.base import Robot
+from codebotler.simulator.pool import WorkerPool
+from codebotler.simulator.room_map import RoomMap
+
+ReadLine: TypeAlias = Callable[[str], str]
+"""Asks a person for a line of text. The result is empty at the end of the input."""
+
+
+@dataclass(frozen=True)
+class CandidateSearch:
+    """The way to get candidates and answers.
+
+    Args:
+        request: requests candidates for an instruction.
+        settings: the settings for runs in imagined worlds.
+        room_map: the rooms; by default those that the programs name.
+        read_line: asks the person, or None if nobody can answer.
+    """
+
+    request: Callable[[str], Sequence[Attempt]]
+    settings: CheckSettings
+    room_map: RoomMap | None
+    read_line: ReadLine | None
+
+
+@dataclass(frozen=True)
+class ChosenModel:
+    """A model that gives a chosen reply, for a mission that asks it for a program.
+
+    Args:
+        model: the model that wrote the reply.
+        chosen: the reply.
+    """
+
+    model: Model
+    chosen: Reply = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        """The name of the model."""
+        return self.model.name
+
+    @property
+    def settings(self) -> SamplingSettings:
+        """The settings of the model."""
+        return self.model.settings
+
+    async def reply(self, _prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:  # noqa: ARG002 - there is one reply
+        """Return the chosen reply."""
+        on_text(self.chosen.text)
+        return self.chosen
+
+    async def close(self) -> None:
+        """Close the model."""
+        await self.model.close()
+
+
+def line_reader(*, is_allowed: bool) -> ReadLine | None:
+    """Return a function that asks on the terminal, or None if that is not allowed or there is no terminal."""
+    return read_line if is_allowed and sys.stdin.isatty() and sys.stderr.isatty() else None
+
+
+def requests_to(
+    open_model: Callable[[], Model],
+    make_prompt: Callable[[str], Prompt],
+    count: int,
+    room_map: RoomMap | None,
+    record: Path | None = None,
+) -> Callable[[str], list[Attempt]]:
+    """Return a function that requests `count` candidates for an instruction, and records them in a file."""
+
+    def request(instruction: str) -> list[Attempt]:
+        opened = open_model()
+        with busy(f"asking {opened.name}"), open_recorder(record, opened.name) as add:
+            try:
+                return request_candidates(opened, make_prompt(instruction), count, on_attempt=add)
+            except UnknownInstructionError as error:
+                raise with_closest_here(error, room_map) from None
+
+    return request
+
+
+def write_chosen(search: CandidateSearch, instruction: str) -> bool:
+    """Print the candidate that a person means, and return whether the check accepts it."""
+    found = choose_candidate(search, instruction)
+    if found is None:
+        return False
+    _, attempt = found
+    if attempt.programless is not None:
+        note_programless(attempt.programless)
+        return False
+    print_source(attempt.reply.program)
+    how = search.settings
+    problems = check(
+        attempt.reply.program, room_map=search.room_map, skills=how.skills, house_rules=how.house_rules
+    ).problems
+    for problem in problems:
+        note(visible(problem.sentence))
+    return not problems
+
+
+def choose_for_robot(
+    robot: Robot,
+    request: Request,
+    count: int,
+    open_model: Callable[[str], Model],
+    world: World | None,
+) -> tuple[Request, Callable[[str], Model]] | None:
+    """Return what to run on a robot: the request, and a function that opens the model with the chosen reply.
+
+    The result is None if the person wants none of the candidates.
+    """
+    known = None if world is None else (RoomMap.of if robot.rooms_are_regexes else RoomMap.of_places)(world)
+    room_map = limit_rooms(known, note)
+    make_prompt = partial(
+        prompt_for,
+        rooms=() if room_map is None else room_map.described,
+        rules=[rule.says for rule in request.rules],
+        skills=robot.skills.without(robot.missing),
+    )
+    search = CandidateSearch(
+        requests_to(partial(open_model, request.model), make_prompt, count, room_map),
+        CheckSettings(skills=robot.skills, house_rules=request.rules),
+        room_map,
+        line_reader(is_allowed=not request.yes),
+    )
+    found = choose_candidate(search, request.what)
+    if found is None:
+        return None
+    instruction, attempt = found
+    return replace(request, what=instruction), lambda name: ChosenModel(open_model(name), attempt.reply)
+
+
+def choose_candidate(search: CandidateSearch, instruction: str) -> tuple[str, Attempt] | None:
+    """Return the instruction and the candidate that the person means, or None if they want none of them.
+
+    After the first "none of these", they may add a sentence to the instruction for a second round.
+    """
+    for is_last in (False, True):
+        attempts = search.request(instruction)
+        usable = {one.reply.program: one for one in reversed(attempts) if one.programless is None}
+        programs = [one.reply.program for one in attempts if one.programless is None]
+        if not programs:
+            return instruction, attempts[0]
+        groups = _group(programs, search)
+        question = question_about(groups)
+        if question is None or search.read_line is None:
+            note(_summary(groups))
+            return instruction, usable[groups.clusters[0].program]
+        chosen = _ask(question, search.read_line)
+        if chosen is not None:
+            return instruction, usable[chosen.program]
+        more = "" if is_last else search.read_line("What should be different? (Enter to give up) ").strip()
+        if not more:
+            break
+        instruction = f"{instruction.rstrip()} {more}"
+    note("no program chosen")
+    return None
+
+
+def _group(programs: Sequence[str], search: CandidateSearch) -> CandidateGroups:
+    with busy("comparing the programs"), WorkerPool(1) as pool:
+        return pool.call(lambda: group_candidates(pool.here(), programs, search.settings, search.room_map))
+
+
+def question_view(question: ClarifyingQuestion) -> RenderableType:
+    """Show a question: the facts of the imagined world, and the storyboard of each option."""
+    facts = f"Suppose that {listed([*map(shortened, question.facts)])}." if question.facts else ""
+    parts: list[RenderableType] = [Text("Which did you mean?", "bold"), *([Text(facts)] if facts else [])]
+    for number, option in enumerate(question.options, 1):
+        head = f"{number}: {visible(option.difference)}"
+        like = f"{option.size} of {counted(question.total, 'program')}"
+        parts += [Text(), Text.assemble((head, "bold"), (f"  ({like})", "dim"))]
+        parts.append(Padding(storyboard(option.steps, set()), (0, 0, 0, 2)))
+    return Group(*parts, Text())
+
+
+def _ask(question: ClarifyingQuestion, read_line: ReadLine) -> CandidateOption | None:
+    console(stderr=True).print(question_view(question))
+    numbers = ", ".join(str(number) for number in range(1, len(question.options) + 1))
+    while True:
+        line = read_line(f"Answer {numbers}, none, or you decide: ")
+        if not line:
+            raise UserError("no answer; --yes takes the most frequent behaviour without a question")
+        try:
+            return question.chosen(question.parse(line))
+        except UserError as error:
+            note(error.sentence)
+
+
+def _summary(groups: CandidateGroups) -> str:
+    largest, total = groups.clusters[0], counted(groups.total, "program")
+    rejected = f"; the check rejected {groups.rejected}" if groups.rejected else ""
+    if not largest.samples:
+        return (
+            f"the check rejected all of {counted(groups.total + groups.rejected, 'program')}; took the first"
+        )
+    return f"took the most frequent behaviour: {largest.size} of {total}{rejected}"
