@@ -70,6 +70,11 @@ def test_words_for_anybody_yes_and_no_are_no_names() -> None:
     ]
 
 
+def test_plural_of_a_room_is_no_name_but_that_of_a_thing_is() -> None:
+    names = names_in(["lab", "lab 2"], [(Event("pick", "a mug"),)])
+    assert [match[0] for match in names.finditer("the labs: lab, Lab 2; mugs")] == ["lab", "Lab 2", "mugs"]
+
+
 def test_runs_without_names_find_none() -> None:
     assert not names_in([], []).findall("a mug in the hall")
 

@@ -80,6 +80,13 @@ def test_an_answer_does_not_depend_on_the_words_of_the_question(worker: Worker) 
     assert len(said) == 2, "both answers are tried"
 
 
+def test_further_worlds_try_facts_that_no_random_world_has(worker: Worker) -> None:
+    options = [f"{number} cups" for number in range(12)]
+    asks = f'def task_program():\n    say(ask("", "How many cups?", {options}))\n'
+    (found,) = grouped(worker, asks).clusters
+    assert len({one.said for one in found.behaviours}) == len(options)
+
+
 def test_rejected_candidates_are_dropped(worker: Worker) -> None:
     found = grouped(worker, LOST, LOOKS, LOST)
     assert [one.programs for one in found.clusters] == [(LOOKS,)]

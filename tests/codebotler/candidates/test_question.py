@@ -11,6 +11,7 @@ from codebotler.core.trace import Event, Outcome, Status, Trace
 from codebotler.simulator.sampled_facts import Whereabouts
 
 MUG, NO_MUG = (Whereabouts("mug", "lab", is_there=there) for there in (True, False))
+CUP = Whereabouts("cup", "lab", is_there=True)
 
 
 def say(text: str, room: str = "hall") -> Event:
@@ -22,11 +23,10 @@ def drive(start: str, end: str) -> Event:
 
 
 def cluster(size: int, name: str, *traces: Trace) -> Cluster:
-    """Make a cluster from its run in each world; there is a mug in the first world only."""
+    """Make a cluster from its run in each world. Each has a cup, and only the first one a mug."""
     outcomes = [Outcome(Status.FINISHED, trace) for trace in traces]
-    facts = [MUG if number == 0 else NO_MUG for number in range(len(traces))]
     samples = tuple(
-        Sample(n, one, (fact,)) for n, (one, fact) in enumerate(zip(outcomes, facts, strict=True))
+        Sample(number, one, (CUP, NO_MUG if number else MUG)) for number, one in enumerate(outcomes)
     )
     return Cluster((name,), size, tuple(behaviour_of(one, "hall") for one in outcomes), samples)
 
@@ -78,7 +78,7 @@ def test_only_facts_that_matter_are_shown() -> None:
     one, other = cluster(1, "a", ONE, ONE), cluster(1, "b", TWO, ONE)
     assert asked(one, other).facts == (MUG.sentence,)
     always = [cluster(1, name, run, run) for name, run in (("a", ONE), ("b", TWO))]
-    assert asked(*always).facts == (MUG.sentence,), "all facts if the options differ everywhere"
+    assert asked(*always).facts == (CUP.sentence, MUG.sentence), "all facts if the options differ everywhere"
 
 
 def test_options_show_their_steps_in_the_world() -> None:
@@ -101,7 +101,9 @@ def test_sentences_say_only_what_differs() -> None:
 
 
 def test_sentences_of_three_options_tell_all_of_them_apart() -> None:
-    many = tuple(say("a greeting", f"room {number}") for number in range(5))
+    rooms = ["hall", *(f"room {number}" for number in range(5))]
+    drives = map(drive, rooms, [*rooms[1:], "hall"])
+    many = tuple(event for one in drives for event in (say("Hi", one.place), one))
     sentences = described(many, (), (drive("hall", "lab"),))
     assert len({*sentences}) == 3
 
