@@ -20,7 +20,7 @@ from codebotler.simulator.sampled_facts import SOMEBODY
 from codebotler.simulator.sampled_robot import AGREEING_TEXT, normalized
 
 PAPER_KINDS = frozenset({GOTO, SAY, CHECK, ASK, PICK, PLACE})
-WAITS = "waits"  # the ending of a run that reached a limit
+ENDLESS_RUN = "waits"  # the ending of a run that reached a limit
 NO_NAME = re.compile(r"(?!)")  # matches nothing
 MAX_NAMES, MAX_NAME_LENGTH = 200, 60
 HALF_DAY, ZERO = 12 * 60, (0,)  # minutes, and the time of day that "eggs: 0" might give
@@ -78,7 +78,7 @@ def behaviour_of(outcome: Outcome, start: str, names: re.Pattern[str] = NO_NAME)
             if one.kind == ASK
         ),
         done=tuple(sorted((one.kind, one.text, *one.more) for one in trace if one.kind not in PAPER_KINDS)),
-        ending="" if is_done else WAITS if outcome.status is Status.TIMEOUT else _error_kind(outcome),
+        ending="" if is_done else ENDLESS_RUN if outcome.status is Status.TIMEOUT else _error_kind(outcome),
         room=_last_room(trace, start) if is_done else "",
     )
 

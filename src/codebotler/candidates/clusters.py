@@ -1,4 +1,4 @@
-"""Group candidate programs by their behaviour in the same imagined worlds."""
+"""Cluster candidate programs by their behaviour in the same imagined worlds."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.sampled_robot import contains, normalized
 from codebotler.simulator.worker import Worker
 
-FIRST_WORLDS, MAX_WORLDS = 8, 24  # random worlds, and worlds with those that try further facts
+RANDOM_WORLDS, MAX_SHARED_WORLDS = 8, 24  # random worlds, and worlds with those that try further facts
 ROOM_NUMBER = re.compile(r"\s*\d+$")
 
 
 @dataclass(frozen=True)
-class Cluster:
+class CandidateCluster:
     """Candidates that do the same in all worlds.
 
     Args:
@@ -44,7 +44,7 @@ class Cluster:
 
 
 @dataclass(frozen=True)
-class CandidateGroups:
+class CandidateClusters:
     """The clusters of the candidates that the check accepts, with the largest one first.
 
     Args:
@@ -52,7 +52,7 @@ class CandidateGroups:
         rejected: the number of candidates that the check rejects.
     """
 
-    clusters: tuple[Cluster, ...]
+    clusters: tuple[CandidateCluster, ...]
     rejected: int = 0
 
     @property
@@ -61,9 +61,9 @@ class CandidateGroups:
         return sum(one.size for one in self.clusters)
 
 
-def group_candidates(
+def cluster_candidates(
     worker: Worker, programs: Sequence[str], settings: CheckSettings, room_map: RoomMap | None = None
-) -> CandidateGroups:
+) -> CandidateClusters:
     """Check candidates, and group the accepted ones by behaviour in imagined worlds.
 
     Args:
@@ -76,7 +76,7 @@ def group_candidates(
     checks = {program: check_on(worker, program, room_map, settings) for program in counts}
     accepted = [program for program, found in checks.items() if not found.problems]
     if not accepted:
-        return CandidateGroups((Cluster((programs[0],), 1, (), ()),), len(programs) - 1)
+        return CandidateClusters((CandidateCluster((programs[0],), 1, (), ()),), len(programs) - 1)
     rooms = room_map or shared_rooms(accepted, [checks[one].room_map for one in accepted], settings)
     runs = run_in_shared_worlds(worker, accepted, rooms, settings)
     traces = [sample.outcome.trace for samples in runs for sample in samples]
@@ -89,7 +89,7 @@ def group_candidates(
         together.setdefault(seen, []).append(number)
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
     rejected = len(programs) - sum(counts[one] for one in accepted)
-    return CandidateGroups(tuple(sorted(clusters, key=lambda one: -one.size)), rejected)
+    return CandidateClusters(tuple(sorted(clusters, key=lambda one: -one.size)), rejected)
 
 
 def _cluster(
@@ -98,11 +98,11 @@ def _cluster(
     counts: Counter[str],
     behaviours: tuple[Behaviour, ...],
     runs: Sequence[Sequence[Sample]],
-) -> Cluster:
+) -> CandidateCluster:
     ordered = sorted(some, key=lambda number: -counts[programs[number]])
     size = sum(counts[programs[number]] for number in some)
     samples = tuple(runs[ordered[0]])
-    return Cluster(tuple(programs[number] for number in ordered), size, behaviours, samples)
+    return CandidateCluster(tuple(programs[number] for number in ordered), size, behaviours, samples)
 
 
 def shared_rooms(programs: Iterable[str], maps: Sequence[RoomMap], settings: CheckSettings) -> RoomMap:
@@ -130,7 +130,7 @@ def run_in_shared_worlds(
 
     The first worlds are random. Further ones try both values of each fact that a program meets.
     """
-    first = first_samplers(replace(settings, samples=FIRST_WORLDS))
+    first = first_samplers(replace(settings, samples=RANDOM_WORLDS))
     new = [replace(sampler, by_options=True) for sampler in first]
     samplers: list[FactSampler] = []
     runs: list[list[Sample]] = [[] for _ in programs]
@@ -139,7 +139,7 @@ def run_in_shared_worlds(
         runs = [[*before, *added] for before, added in zip(runs, more, strict=True)]
         samplers += new
         found = (one for samples in runs for one in unexplored_samplers(samples, samplers))
-        new = list(dict.fromkeys(found))[: MAX_WORLDS - len(samplers)]
+        new = list(dict.fromkeys(found))[: MAX_SHARED_WORLDS - len(samplers)]
     return [[replace(sample, number=number) for number, sample in enumerate(samples)] for samples in runs]
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
 from codebotler.candidates.behaviour import PAPER_KINDS, Behaviour, statements
-from codebotler.candidates.clusters import CandidateGroups, Cluster
+from codebotler.candidates.clusters import CandidateCluster, CandidateClusters
 from codebotler.checking.problems import Sample
 from codebotler.checking.storyboard import steps_of
 from codebotler.core.errors import UserError
@@ -21,7 +21,7 @@ from codebotler.simulator.sampled_robot import normalized
 DOMINANT_SHARE = 0.75
 """The share of the candidates from which the largest cluster is taken without a question."""
 
-MAX_OPTIONS, MAX_QUESTION_FACTS, MAX_SHOWN_DIFFERENCES = 3, 4, 3
+MAX_CANDIDATE_OPTIONS, MAX_QUESTION_FACTS, MAX_SHOWN_DIFFERENCES = 3, 4, 3
 NOTICED_FIRST = frozenset({"said", "moved", "asked", "room"})
 """The differences that a person cares about most."""
 
@@ -88,7 +88,7 @@ class ClarifyingQuestion:
         raise UserError(f'"{brief(line)}" is not an answer; write {numbers}, none, or you decide')
 
 
-def question_about(groups: CandidateGroups) -> ClarifyingQuestion | None:
+def question_about(groups: CandidateClusters) -> ClarifyingQuestion | None:
     """Return a question, or None if one behaviour dominates or all candidates do the same."""
     largest = groups.clusters[0]
     if len(groups.clusters) == 1 or largest.size >= DOMINANT_SHARE * groups.total:
@@ -105,15 +105,15 @@ def question_about(groups: CandidateGroups) -> ClarifyingQuestion | None:
     return ClarifyingQuestion(tuple(options), _facts_that_matter(shown, number), groups.total, number)
 
 
-def _told_apart(clusters: Sequence[Cluster], number: int) -> list[Cluster]:
+def _told_apart(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:
     """Return the largest clusters with different behaviours in a world, at most three."""
-    different: dict[Behaviour, Cluster] = {}
+    different: dict[Behaviour, CandidateCluster] = {}
     for one in clusters:
         different.setdefault(one.behaviours[number], one)
-    return [*different.values()][:MAX_OPTIONS]
+    return [*different.values()][:MAX_CANDIDATE_OPTIONS]
 
 
-def _rank(shown: Sequence[Cluster], number: int) -> tuple[int, int, int, int]:
+def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, int, int, int]:
     """Rank a world: by the number of options, their candidates, what a person cares about, and brevity."""
     first, *others = (one.behaviours[number] for one in shown)
     cares = sum(bool(first.differences(other) & NOTICED_FIRST) for other in others)
@@ -121,7 +121,7 @@ def _rank(shown: Sequence[Cluster], number: int) -> tuple[int, int, int, int]:
     return len(shown), sum(one.size for one in shown), cares, -length
 
 
-def _facts_that_matter(shown: Sequence[Cluster], number: int) -> tuple[str, ...]:
+def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[str, ...]:
     """Return the facts of a world that do not hold in all worlds where the options look the same."""
 
     def facts(world: int) -> list[str]:

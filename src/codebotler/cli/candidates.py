@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TypeAlias
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from codebotler.candidates.clusters import CandidateGroups, group_candidates
+from codebotler.candidates.clusters import CandidateClusters, cluster_candidates
 from codebotler.candidates.question import CandidateOption, ClarifyingQuestion, question_about
 from codebotler.checking.check import check
 from codebotler.checking.sampled import CheckSettings
@@ -27,16 +26,12 @@ from codebotler.core.world import World
 from codebotler.generation.candidates import request_candidates
 from codebotler.generation.generate import Attempt
 from codebotler.missions.preflight import limit_rooms, with_closest_here
-from codebotler.models.base import Model, Reply, TextListener, ignore_text
+from codebotler.models.base import Model
 from codebotler.models.recorded import UnknownInstructionError
-from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.robots.base import Robot
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.room_map import RoomMap
-
-ReadLine: TypeAlias = Callable[[str], str]
-"""Asks a person for a line of text. The result is empty at the end of the input."""
 
 
 @dataclass(frozen=True)
@@ -47,48 +42,16 @@ class CandidateSearch:
         request: requests candidates for an instruction.
         settings: the settings for runs in imagined worlds.
         room_map: the rooms; by default those that the programs name.
-        read_line: asks the person, or None if nobody can answer.
+        read_line: asks the person for a line, which is empty at the end; None if nobody can answer.
     """
 
     request: Callable[[str], Sequence[Attempt]]
     settings: CheckSettings
     room_map: RoomMap | None
-    read_line: ReadLine | None
+    read_line: Callable[[str], str] | None
 
 
-@dataclass(frozen=True)
-class ChosenModel:
-    """A model that gives a chosen reply, for a mission that asks it for a program.
-
-    Args:
-        model: the model that wrote the reply.
-        chosen: the reply.
-    """
-
-    model: Model
-    chosen: Reply = field(repr=False)
-
-    @property
-    def name(self) -> str:
-        """The name of the model."""
-        return self.model.name
-
-    @property
-    def settings(self) -> SamplingSettings:
-        """The settings of the model."""
-        return self.model.settings
-
-    async def reply(self, _prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:  # noqa: ARG002 - there is one reply
-        """Return the chosen reply."""
-        on_text(self.chosen.text)
-        return self.chosen
-
-    async def close(self) -> None:
-        """Close the model."""
-        await self.model.close()
-
-
-def line_reader(*, is_allowed: bool) -> ReadLine | None:
+def line_reader(*, is_allowed: bool) -> Callable[[str], str] | None:
     """Return a function that asks on the terminal, or None if that is not allowed or there is no terminal."""
     return read_line if is_allowed and sys.stdin.isatty() and sys.stderr.isatty() else None
 
@@ -114,18 +77,14 @@ def requests_to(
 
 
 def write_chosen(search: CandidateSearch, instruction: str) -> bool:
-    """Print the candidate that a person means, and return whether the check accepts it."""
+    """Print the program that a person means, and return whether the check accepts it."""
     found = choose_candidate(search, instruction)
     if found is None:
         return False
-    _, attempt = found
-    if attempt.programless is not None:
-        note_programless(attempt.programless)
-        return False
-    print_source(attempt.reply.program)
+    print_source(found[1])
     how = search.settings
     problems = check(
-        attempt.reply.program, room_map=search.room_map, skills=how.skills, house_rules=how.house_rules
+        found[1], room_map=search.room_map, skills=how.skills, house_rules=how.house_rules
     ).problems
     for problem in problems:
         note(visible(problem.sentence))
@@ -133,16 +92,9 @@ def write_chosen(search: CandidateSearch, instruction: str) -> bool:
 
 
 def choose_for_robot(
-    robot: Robot,
-    request: Request,
-    count: int,
-    open_model: Callable[[str], Model],
-    world: World | None,
-) -> tuple[Request, Callable[[str], Model]] | None:
-    """Return what to run on a robot: the request, and a function that opens the model with the chosen reply.
-
-    The result is None if the person wants none of the candidates.
-    """
+    robot: Robot, request: Request, count: int, open_model: Callable[[str], Model], world: World | None
+) -> Request | None:
+    """Return a request with the program that a person means, or None if they want none of the candidates."""
     known = None if world is None else (RoomMap.of if robot.rooms_are_regexes else RoomMap.of_places)(world)
     room_map = limit_rooms(known, note)
     make_prompt = partial(
@@ -151,38 +103,33 @@ def choose_for_robot(
         rules=[rule.says for rule in request.rules],
         skills=robot.skills.without(robot.missing),
     )
-    search = CandidateSearch(
-        requests_to(partial(open_model, request.model), make_prompt, count, room_map),
-        CheckSettings(skills=robot.skills, house_rules=request.rules),
-        room_map,
-        line_reader(is_allowed=not request.yes),
-    )
+    asking = requests_to(partial(open_model, request.model), make_prompt, count, room_map)
+    how = CheckSettings(skills=robot.skills, house_rules=request.rules)
+    search = CandidateSearch(asking, how, room_map, line_reader(is_allowed=not request.yes))
     found = choose_candidate(search, request.what)
-    if found is None:
-        return None
-    instruction, attempt = found
-    return replace(request, what=instruction), lambda name: ChosenModel(open_model(name), attempt.reply)
+    return None if found is None else replace(request, what=found[0], chosen=found[1])
 
 
-def choose_candidate(search: CandidateSearch, instruction: str) -> tuple[str, Attempt] | None:
-    """Return the instruction and the candidate that the person means, or None if they want none of them.
+def choose_candidate(search: CandidateSearch, instruction: str) -> tuple[str, str] | None:
+    """Return the instruction and the program that a person means, or None if they want none of them.
 
     After the first "none of these", they may add a sentence to the instruction for a second round.
     """
     for is_last in (False, True):
         attempts = search.request(instruction)
-        usable = {one.reply.program: one for one in reversed(attempts) if one.programless is None}
         programs = [one.reply.program for one in attempts if one.programless is None]
         if not programs:
-            return instruction, attempts[0]
+            assert attempts[0].programless is not None
+            note_programless(attempts[0].programless)
+            return None
         groups = _group(programs, search)
         question = question_about(groups)
         if question is None or search.read_line is None:
             note(_summary(groups))
-            return instruction, usable[groups.clusters[0].program]
+            return instruction, groups.clusters[0].program
         chosen = _ask(question, search.read_line)
         if chosen is not None:
-            return instruction, usable[chosen.program]
+            return instruction, chosen.program
         more = "" if is_last else search.read_line("What should be different? (Enter to give up) ").strip()
         if not more:
             break
@@ -191,9 +138,9 @@ def choose_candidate(search: CandidateSearch, instruction: str) -> tuple[str, At
     return None
 
 
-def _group(programs: Sequence[str], search: CandidateSearch) -> CandidateGroups:
+def _group(programs: Sequence[str], search: CandidateSearch) -> CandidateClusters:
     with busy("comparing the programs"), WorkerPool(1) as pool:
-        return pool.call(lambda: group_candidates(pool.here(), programs, search.settings, search.room_map))
+        return pool.call(lambda: cluster_candidates(pool.here(), programs, search.settings, search.room_map))
 
 
 def question_view(question: ClarifyingQuestion) -> RenderableType:
@@ -208,7 +155,7 @@ def question_view(question: ClarifyingQuestion) -> RenderableType:
     return Group(*parts, Text())
 
 
-def _ask(question: ClarifyingQuestion, read_line: ReadLine) -> CandidateOption | None:
+def _ask(question: ClarifyingQuestion, read_line: Callable[[str], str]) -> CandidateOption | None:
     console(stderr=True).print(question_view(question))
     numbers = ", ".join(str(number) for number in range(1, len(question.options) + 1))
     while True:
@@ -221,7 +168,7 @@ def _ask(question: ClarifyingQuestion, read_line: ReadLine) -> CandidateOption |
             note(error.sentence)
 
 
-def _summary(groups: CandidateGroups) -> str:
+def _summary(groups: CandidateClusters) -> str:
     largest, total = groups.clusters[0], counted(groups.total, "program")
     rejected = f"; the check rejected {groups.rejected}" if groups.rejected else ""
     if not largest.samples:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from codebotler.cli import options
 from codebotler.cli.model_options import inherit_options, model_settings, options_for
 from codebotler.core.terminal import note, print_text
-
-if TYPE_CHECKING:
-    from codebotler.models.base import Model
 
 
 @inherit_options(options.robot_settings)
@@ -57,14 +53,13 @@ def run(
     asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
     options.note_office(kind, shared["world"])
     body = open_robot(kind, settings)
-    opener: Callable[[str], Model] = partial(open_model, settings=asked)
+    opener = partial(open_model, settings=asked)
     if candidates is not None:
         from codebotler.cli.candidates import choose_for_robot
 
-        found = choose_for_robot(body, request, candidates, opener, settings.world)
-        if found is None:
+        if (with_program := choose_for_robot(body, request, candidates, opener, settings.world)) is None:
             raise typer.Exit(1)
-        request, opener = found
+        request = with_program
     raise typer.Exit(run.run(body, request, home(), opener, settings.world))
 
 

@@ -58,6 +58,7 @@ class Request:
     shows_all: bool = False  # whether to show all different outcomes in imagined worlds, not just one
     rules: tuple[Rule, ...] = ()  # the house rules
     within: Contract | None = None  # what the program may do at most
+    chosen: str = ""  # the program for the instruction, if the user has chosen one of several candidates
 
     def __post_init__(self) -> None:
         if not self.what.strip():
@@ -95,10 +96,9 @@ def run(
     Returns:
         the exit status: 0 if the mission is done, 128 plus the number of a signal that stopped it, or else 1.
     """
-    program = read_program(request.what) if request.is_program else ""
+    order = _order(request)
     tell_missing(robot)
     recover_missions(home)
-    order = MissionOrder(program=program) if program else MissionOrder(request.what, request.model)
     checked = checker(robot.skills)
     session = MissionSession(
         robot,
@@ -124,6 +124,14 @@ def run(
         raise
     session.join(STOP_GRACE_SECONDS)
     return 1
+
+
+def _order(request: Request) -> MissionOrder:
+    if request.chosen:
+        return MissionOrder(request.what, program=request.chosen, author=request.model)
+    if request.is_program:
+        return MissionOrder(program=read_program(request.what))
+    return MissionOrder(request.what, request.model)
 
 
 def tell_missing(robot: Robot) -> None:

@@ -9,7 +9,7 @@ from random import Random
 from statistics import fmean
 from typing import Any
 
-from codebotler.candidates.clusters import group_candidates
+from codebotler.candidates.clusters import cluster_candidates
 from codebotler.candidates.question import question_about
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.errors import UserError
@@ -39,19 +39,6 @@ class ClarifySettings:
     candidates: int = 10
     noise: float = 0.0
     seed: int = 0
-
-
-@dataclass(frozen=True)
-class Offer:
-    """What the tool does with a group of candidates, before anybody answers.
-
-    Args:
-        largest: the program that represents the largest cluster.
-        options: the programs of the question; empty if there is no question.
-    """
-
-    largest: str = field(repr=False)
-    options: tuple[str, ...] = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -121,29 +108,29 @@ def _draw_groups(
     return [random.sample(some, settings.candidates) for _ in range(DRAWS_PER_PROMPT)]
 
 
-def _offer(pool: WorkerPool, settings: CheckSettings, programs: Sequence[str]) -> Offer:
-    groups = group_candidates(pool.here(), programs, settings)
+def _offer(pool: WorkerPool, settings: CheckSettings, programs: Sequence[str]) -> list[str]:
+    """Return the program of the largest cluster, followed by those of the question, if there is one."""
+    groups = cluster_candidates(pool.here(), programs, settings)
     question = question_about(groups)
-    options = () if question is None else tuple(one.program for one in question.options)
-    return Offer(groups.clusters[0].program, options)
+    options = () if question is None else question.options
+    return [groups.clusters[0].program, *(one.program for one in options)]
 
 
 def _trial(
     group: Sequence[Completion],
-    offer: Offer,
+    offer: Sequence[str],
     passed: Mapping[CompletionKey, bool],
     random: Random,
     noise: float,
 ) -> ClarifyTrial:
     passes = {one.program: passed.get(one.key, False) for one in group}  # no verdict if judging took too long
-    one, majority = fmean(passes[each.program] for each in group), passes[offer.largest]
-    if not offer.options:
+    one = fmean(passes[each.program] for each in group)
+    majority, *answers = (passes[program] for program in offer)
+    if not answers:
         return ClarifyTrial(one, majority, majority, asked=False)
-    answers = [passes[option] for option in offer.options]
-    choices = [*range(len(answers)), None]
     chosen = answers.index(True) if any(answers) else None
     if random.random() < noise:
-        chosen = random.choice([choice for choice in choices if choice != chosen])
+        chosen = random.choice([choice for choice in (*range(len(answers)), None) if choice != chosen])
     return ClarifyTrial(one, majority, chosen is not None and answers[chosen], asked=True)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from codebotler.candidates.clusters import CandidateGroups, group_candidates, shared_rooms
+from codebotler.candidates.clusters import CandidateClusters, cluster_candidates, shared_rooms
 from codebotler.checking.sampled import CheckSettings
 from codebotler.rtl import parse
 from codebotler.simulator.house_rule import Rule
@@ -48,15 +48,15 @@ COFFEE = ASKS.format(who="person", question="Coffee or tea?", options='["Coffee"
 @pytest.fixture(scope="module")
 def worker() -> Iterator[Worker]:
     started = Worker()
-    group_candidates(started, [LOOKS], CheckSettings(), ROOMS)  # starts the processes
+    cluster_candidates(started, [LOOKS], CheckSettings(), ROOMS)  # starts the processes
     yield started
     started.close()
 
 
 def grouped(
     worker: Worker, *programs: str, rooms: RoomMap | None = ROOMS, rules: tuple[Rule, ...] = ()
-) -> CandidateGroups:
-    return group_candidates(worker, programs, CheckSettings(house_rules=rules), rooms)
+) -> CandidateClusters:
+    return cluster_candidates(worker, programs, CheckSettings(house_rules=rules), rooms)
 
 
 def test_programs_that_do_the_same_are_together_and_the_largest_cluster_is_first(worker: Worker) -> None:

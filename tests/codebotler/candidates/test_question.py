@@ -3,7 +3,7 @@
 import pytest
 
 from codebotler.candidates.behaviour import behaviour_of
-from codebotler.candidates.clusters import CandidateGroups, Cluster
+from codebotler.candidates.clusters import CandidateCluster, CandidateClusters
 from codebotler.candidates.question import ClarifyingQuestion, describe_differences, question_about
 from codebotler.checking.problems import Sample
 from codebotler.core.errors import UserError
@@ -22,17 +22,17 @@ def drive(start: str, end: str) -> Event:
     return Event("goto", end, place=start, destination=end)
 
 
-def cluster(size: int, name: str, *traces: Trace) -> Cluster:
+def cluster(size: int, name: str, *traces: Trace) -> CandidateCluster:
     """Make a cluster from its run in each world. Each has a cup, and only the first one a mug."""
     outcomes = [Outcome(Status.FINISHED, trace) for trace in traces]
     samples = tuple(
         Sample(number, one, (CUP, NO_MUG if number else MUG)) for number, one in enumerate(outcomes)
     )
-    return Cluster((name,), size, tuple(behaviour_of(one, "hall") for one in outcomes), samples)
+    return CandidateCluster((name,), size, tuple(behaviour_of(one, "hall") for one in outcomes), samples)
 
 
-def asked(*clusters: Cluster) -> ClarifyingQuestion:
-    question = question_about(CandidateGroups(clusters))
+def asked(*clusters: CandidateCluster) -> ClarifyingQuestion:
+    question = question_about(CandidateClusters(clusters))
     assert question is not None
     return question
 
@@ -41,13 +41,13 @@ ONE, TWO, THREE = ((say(f"{number} mugs"),) for number in (1, 2, 3))
 
 
 def test_no_question_about_one_behaviour() -> None:
-    assert question_about(CandidateGroups((cluster(4, "a", ONE),))) is None
+    assert question_about(CandidateClusters((cluster(4, "a", ONE),))) is None
 
 
 def test_no_question_if_one_behaviour_dominates() -> None:
     other = cluster(2, "b", TWO)
-    assert question_about(CandidateGroups((cluster(6, "a", ONE), other))) is None
-    assert question_about(CandidateGroups((cluster(5, "a", ONE), other))) is not None
+    assert question_about(CandidateClusters((cluster(6, "a", ONE), other))) is None
+    assert question_about(CandidateClusters((cluster(5, "a", ONE), other))) is not None
 
 
 def test_the_world_tells_the_most_options_apart() -> None:
