@@ -88,10 +88,12 @@ class ClarifyingQuestion:
         raise UserError(f'"{brief(line)}" is not an answer; write {numbers}, none, or you decide')
 
 
-def question_about(groups: CandidateClusters) -> ClarifyingQuestion | None:
+def question_about(
+    groups: CandidateClusters, dominant_share: float = DOMINANT_SHARE
+) -> ClarifyingQuestion | None:
     """Return a question, or None if one behaviour dominates or all candidates do the same."""
     largest = groups.clusters[0]
-    if len(groups.clusters) == 1 or largest.size >= DOMINANT_SHARE * groups.total:
+    if len(groups.clusters) == 1 or largest.size >= dominant_share * groups.total:
         return None
     worlds = range(len(largest.samples))
     number = max(worlds, key=lambda one: _rank(_told_apart(groups.clusters, one), one))
