@@ -23,10 +23,7 @@ def generate(
     retries: options.RetriesOption = None,
     repair: options.RepairOption = False,
     candidates: options.CandidatesOption = None,
-    yes: Annotated[
-        bool,
-        typer.Option("--yes", help="With --candidates: take the most frequent behaviour without asking."),
-    ] = False,
+    yes: options.TakeLargestOption = False,
     record: options.RecordOption = None,
     show_prompt: options.ShowPromptOption = False,
     base_url: options.BaseUrlOption = None,
@@ -40,10 +37,9 @@ def generate(
     """
     from functools import partial
 
-    from codebotler.checking.sampled import CheckSettings
+    from codebotler.cli.candidates import expect_no_retries, requests_to, write_candidates
     from codebotler.cli.generate import print_prompt, write
     from codebotler.cli.rules import rules_for
-    from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
     from codebotler.core.world_file import read_world
     from codebotler.models.chosen import choose_model
@@ -67,27 +63,22 @@ def generate(
         print_prompt(make_prompt(instruction), chosen.name)
         return
     if candidates is not None:
-        from codebotler.cli.candidates import CandidateSearch, line_reader, requests_to, write_chosen
-
-        if repair or retries is not None:
-            raise UserError("--candidates cannot be combined with --retries or --repair")
+        expect_no_retries(retries, repair=repair)
         opener = partial(open_model, chosen.name, settings)
         request = requests_to(opener, make_prompt, candidates, room_map, record)
-        how = CheckSettings(skills=table, house_rules=house_rules)
-        search = CandidateSearch(request, how, room_map, line_reader(is_allowed=not yes))
-        raise typer.Exit(0 if write_chosen(search, instruction) else 1)
-    tries = int(repair) if retries is None else retries
-    accepted = write(
-        make_prompt(instruction),
-        chosen.name,
-        settings,
-        world=known,
-        house_rules=house_rules,
-        skills=table,
-        retries=tries,
-        repair=repair,
-        record=record,
-    )
+        accepted = write_candidates(request, instruction, house_rules, table, room_map, asks=not yes)
+    else:
+        accepted = write(
+            make_prompt(instruction),
+            chosen.name,
+            settings,
+            world=known,
+            house_rules=house_rules,
+            skills=table,
+            retries=int(repair) if retries is None else retries,
+            repair=repair,
+            record=record,
+        )
     raise typer.Exit(0 if accepted else 1)
 
 

@@ -20,6 +20,7 @@ from codebotler.checking.storyboard import storyboard
 from codebotler.cli.generate import note_programless, open_recorder
 from codebotler.cli.run import Request
 from codebotler.core.errors import UserError
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, console, note, print_source, read_line, shortened, visible
 from codebotler.core.words import counted, listed
 from codebotler.core.world import World
@@ -30,6 +31,7 @@ from codebotler.models.base import Model
 from codebotler.models.recorded import UnknownInstructionError
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.robots.base import Robot
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.room_map import RoomMap
 
@@ -76,16 +78,30 @@ def requests_to(
     return request
 
 
-def write_chosen(search: CandidateSearch, instruction: str) -> bool:
-    """Print the program that a person means, and return whether the check accepts it."""
-    found = choose_candidate(search, instruction)
+def expect_no_retries(retries: int | None, *, repair: bool) -> None:
+    """Raise UserError if a command with candidates also has options for retries."""
+    if repair or retries is not None:
+        raise UserError("--candidates cannot be combined with --retries or --repair")
+
+
+def write_candidates(
+    request: Callable[[str], list[Attempt]],
+    instruction: str,
+    house_rules: tuple[Rule, ...],
+    skills: SkillTable,
+    room_map: RoomMap | None,
+    *,
+    asks: bool,
+) -> bool:
+    """Print the candidate that a person means, and return whether the check accepts it."""
+    how = CheckSettings(skills=skills, house_rules=house_rules)
+    found = choose_candidate(
+        CandidateSearch(request, how, room_map, line_reader(is_allowed=asks)), instruction
+    )
     if found is None:
         return False
     print_source(found[1])
-    how = search.settings
-    problems = check(
-        found[1], room_map=search.room_map, skills=how.skills, house_rules=how.house_rules
-    ).problems
+    problems = check(found[1], room_map=room_map, skills=skills, house_rules=house_rules).problems
     for problem in problems:
         note(visible(problem.sentence))
     return not problems

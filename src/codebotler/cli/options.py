@@ -54,6 +54,9 @@ CandidatesOption = Annotated[
         metavar="K",
     ),
 ]
+TakeLargestOption = Annotated[
+    bool, typer.Option("--yes", help="With --candidates: take the most frequent behaviour without asking.")
+]
 WorldOption = Annotated[Path | None, typer.Option(help="The world file that defines the rooms.")]
 RulesOption = Annotated[
     Path | None,
