@@ -302,6 +302,7 @@ def test_data_can_be_read() -> None:
 
 SHOWN_ELSEWHERE = {  # texts that no command of their page prints, and the tests that compare them
     "architecture.md": ["roboeval\n  cli/"],
+    "check-before-you-run.md": ["Which did you mean?"],  # a terminal shows it, as in test_candidates.py
     "index.md": ["abc argparse", "runs/hasty/"],
     "roboeval-plus.md": ["task   "],
     "ros.md": ["string location"],

@@ -99,10 +99,10 @@ async def write_program(
         )
         author = ModelAuthor(console.open_model, console.models[0])
         prompt = prompt_of(asked, console.robot, repair=False)
-        _, made = await asyncio.to_thread(author.write, prompt, ignore_text)
+        _, (made, *_) = await asyncio.to_thread(author.write, prompt, 1, ignore_text)
         if made.programless is not None:
             raise UserError(made.programless.sentence)
-        return await asyncio.to_thread(gatekeeper.check, made.program)
+        return await asyncio.to_thread(gatekeeper.check, made.reply.program)
 
 
 async def propose_mission(

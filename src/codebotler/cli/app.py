@@ -30,6 +30,8 @@ def generate(
     world: options.WorldOption = None,
     retries: options.RetriesOption = None,
     repair: options.RepairOption = False,
+    candidates: options.CandidatesOption = 1,
+    yes: options.TakeLargestOption = False,
     record: options.RecordOption = None,
     show_prompt: options.ShowPromptOption = False,
     base_url: options.BaseUrlOption = None,
@@ -41,11 +43,15 @@ def generate(
 
     The exit status is 1 if the check finds problems.
     """
+    from functools import partial
+
+    from codebotler.cli.candidates import expect_no_retries, requests_to, write_candidates
     from codebotler.cli.generate import print_prompt, write
     from codebotler.cli.rules import rules_for
     from codebotler.core.skills.files import skills_from
     from codebotler.core.world_file import read_world
     from codebotler.models.chosen import choose_model
+    from codebotler.models.open import open_model
     from codebotler.prompts import prompt_for
     from codebotler.simulator.room_map import RoomMap
 
@@ -54,27 +60,33 @@ def generate(
     table = skills_from(*(skills or ()))
     known = None if world is None else read_world(world, table)
     house_rules = rules_for(known, rules, table)
-    prompt = prompt_for(
-        instruction,
+    room_map = None if known is None else RoomMap.of(known)
+    make_prompt = partial(
+        prompt_for,
         skills=table,
-        rooms=() if known is None else RoomMap.of(known).described,
+        rooms=() if room_map is None else room_map.described,
         rules=[rule.says for rule in house_rules],
     )
     if show_prompt:
-        print_prompt(prompt, chosen.name)
+        print_prompt(make_prompt(instruction), chosen.name)
         return
-    tries = int(repair) if retries is None else retries
-    accepted = write(
-        prompt,
-        chosen.name,
-        settings,
-        world=known,
-        house_rules=house_rules,
-        skills=table,
-        retries=tries,
-        repair=repair,
-        record=record,
-    )
+    if candidates > 1:
+        expect_no_retries(retries, repair=repair)
+        opener = partial(open_model, chosen.name, settings)
+        request = requests_to(opener, make_prompt, candidates, room_map, record)
+        accepted = write_candidates(request, instruction, house_rules, table, room_map, asks=not yes)
+    else:
+        accepted = write(
+            make_prompt(instruction),
+            chosen.name,
+            settings,
+            world=known,
+            house_rules=house_rules,
+            skills=table,
+            retries=int(repair) if retries is None else retries,
+            repair=repair,
+            record=record,
+        )
     raise typer.Exit(0 if accepted else 1)
 
 

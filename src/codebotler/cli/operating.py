@@ -26,6 +26,7 @@ def run(
     yes: options.YesOption = False,
     despite_problems: options.DespiteProblemsOption = False,
     shows_all: options.AllOption = False,
+    candidates: options.CandidatesOption = 1,
     recover: options.RecoverOption = 0,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
@@ -33,6 +34,8 @@ def run(
 
     Ctrl-C stops the robot, and the exit status is then 130.
     """
+    from functools import partial
+
     from codebotler.cli import run
     from codebotler.cli.run import Request
     from codebotler.core.files import home
@@ -43,12 +46,21 @@ def run(
     chosen = choose_model(model, base_url)
     kind, settings, rules, allowed = options.robot_settings(**options_for(options.robot_settings, shared))
     request = Request(
-        program, chosen.name, yes, despite_problems, shows_all, rules, allowed, recoveries=recover
+        program,
+        chosen.name,
+        yes,
+        despite_problems,
+        shows_all,
+        rules,
+        allowed,
+        recoveries=recover,
+        candidates=candidates,
     )
     asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
     options.note_office(kind, shared["world"])
     body = open_robot(kind, settings)
-    raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked), settings.world))
+    opener = partial(open_model, settings=asked)
+    raise typer.Exit(run.run(body, request, home(), opener, settings.world))
 
 
 @inherit_options(options.robot_settings)

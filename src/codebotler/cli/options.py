@@ -52,6 +52,18 @@ ModelOption = Annotated[
         "`codebotler models` lists the usable models."
     ),
 ]
+CandidatesOption = Annotated[
+    int,
+    typer.Option(
+        min=1,
+        max=20,
+        help="Ask the model for this many programs; if they behave differently, ask which one you mean.",
+        metavar="K",
+    ),
+]
+TakeLargestOption = Annotated[
+    bool, typer.Option("--yes", help="With --candidates: take the most frequent behaviour without asking.")
+]
 WorldOption = Annotated[Path | None, typer.Option(help="The world file that defines the rooms.")]
 RulesOption = Annotated[
     Path | None,

@@ -10,13 +10,14 @@ from pathlib import Path
 
 from codebotler.checking.check import check
 from codebotler.checking.problems import CheckResult
+from codebotler.cli.candidates import ADD_SENTENCE, ask_which, line_reader
 from codebotler.cli.check import check_view, read_program
 from codebotler.cli.contract import contract_view
 from codebotler.cli.generate import note_programless
 from codebotler.cli.views import EventPrinter, ending_view, source_view
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.terminal import busy, confirm, note, print_rich, shortened
+from codebotler.core.terminal import busy, confirm, note, print_rich, read_line, shortened
 from codebotler.core.words import listed
 from codebotler.core.world import World
 from codebotler.missions.log import MissionState
@@ -63,6 +64,7 @@ class Request:
     past: MissionPast | None = None  # of the mission whose rest is requested
     recoveries: int = 0  # how many times a model may write the rest if a skill fails
     approval: PriorApproval | None = None  # by which the rest needs no further approval
+    candidates: int = 1  # how many programs to get from the model, of which the user chooses one
 
     def __post_init__(self) -> None:
         if not self.what.strip() and self.past is not None:
@@ -71,6 +73,8 @@ class Request:
             raise UserError("the argument is empty; name a program, or say what the robot should do")
         if self.what.endswith(".py") and not self.is_program:
             raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
+        if self.candidates > 1 and self.is_program:
+            raise UserError("--candidates needs an instruction, but this is a program")
         if self.what == "-" and not self.yes:
             raise UserError("the program uses standard input, so approval cannot be read; add --yes")
 
@@ -81,7 +85,10 @@ class Request:
         if self.past is not None:
             model = "" if program else self.model
             return MissionOrder(self.past.instruction, model, program, past=self.past)
-        return MissionOrder(program=program) if program else MissionOrder(self.what, self.model)
+        if program:
+            return MissionOrder(program=program)
+        asks = line_reader(is_allowed=not self.yes) is not None
+        return MissionOrder(self.what, self.model, candidates=self.candidates, asks=asks)
 
     @property
     def is_program(self) -> bool:
@@ -162,6 +169,10 @@ def _prepared(session: MissionSession) -> SessionView:
     """Wait until the session has a checked program or ends, and show the progress."""
     view = session.view
     while not (view.is_over or view.may_be_approved or view.waits_for_program):
+        if view.question is not None and view.waits_for_answer:
+            answer = ask_which(view.question, read_line)
+            session.answer(answer, read_line(ADD_SENTENCE) if answer == "none" else "")
+            view = session.view
         before = view.busy
         with busy(before or "finishing"):
             view = session.wait_until(lambda now, before=before: now.busy != before)  # type: ignore[misc]  # mypy does not infer such lambdas

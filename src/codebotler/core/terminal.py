@@ -155,8 +155,13 @@ def note(sentence: str) -> None:
 
 def confirm(question: str) -> bool:
     """Ask a question on stderr, and return True only if the answer is yes."""
-    print(f"{visible(question)} [y/N] ", end="", file=sys.stderr, flush=True)
-    return sys.stdin.readline().strip().lower() in {"y", "yes"}
+    return read_line(f"{question} [y/N] ").strip().lower() in {"y", "yes"}
+
+
+def read_line(question: str) -> str:
+    """Ask a question on stderr, and return the answer, which is empty at the end of the input."""
+    print(visible(question), end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline()
 
 
 def system_sentence(error: OSError) -> str:

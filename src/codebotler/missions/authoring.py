@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import Any, TypeVar
 
-from codebotler.generation.generate import Generation, write_program
+from codebotler.generation.candidates import gather_candidates
+from codebotler.generation.generate import Attempt, write_program
 from codebotler.missions.view import SessionView
 from codebotler.models.base import Model, TextListener
 from codebotler.models.open import open_model
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.robots.base import Robot
+
+Written = TypeVar("Written")
 
 
 class ModelAuthor:
@@ -22,17 +26,30 @@ class ModelAuthor:
         self._open_model, self._name = open_model, name
         self._model: Model | None = None  # the model of the latest request
         self.max_tokens: int | None = None  # the token limit chosen by a person; None for the default
-        self._request: tuple[asyncio.AbstractEventLoop, asyncio.Task[Generation]] | None = None
+        self._request: tuple[asyncio.AbstractEventLoop, asyncio.Task[Any]] | None = None
         self._is_cancelled = False
 
-    def write(self, prompt: Prompt, on_text: TextListener) -> tuple[str, Generation]:
-        """Return the model's name and a newly requested program. Raise CancelledError after `cancel`."""
+    def write(self, prompt: Prompt, count: int, on_text: TextListener) -> tuple[str, Sequence[Attempt]]:
+        """Return the model's name and its replies. Raise CancelledError after `cancel`.
+
+        Args:
+            prompt: the request.
+            count: how many replies to request.
+            on_text: receives a single reply as it arrives.
+        """
+        model = self._open()
+        if count > 1:
+            return model.name, asyncio.run(self._await(gather_candidates(model, prompt, count)))
+        written = asyncio.run(self._await(write_program(model, prompt, on_text=on_text)))
+        return model.name, written.attempts
+
+    def _open(self) -> Model:
         if self.max_tokens is None or self._model is None:
             self._model = self._open_model(self._name)
         if self.max_tokens is not None:
             settings = replace(self._model.settings, max_tokens=self.max_tokens)
             self._model = open_model(self._model.name, settings)
-        return self._model.name, asyncio.run(self._write(self._model, prompt, on_text))
+        return self._model
 
     def cancel(self) -> None:
         """Cancel the current request and any later ones."""
@@ -41,8 +58,8 @@ class ModelAuthor:
             with suppress(RuntimeError):  # the event loop has already ended
                 request[0].call_soon_threadsafe(request[1].cancel)
 
-    async def _write(self, model: Model, prompt: Prompt, on_text: TextListener) -> Generation:
-        task = asyncio.create_task(write_program(model, prompt, on_text=on_text))
+    async def _await(self, writing: Coroutine[None, None, Written]) -> Written:
+        task = asyncio.create_task(writing)
         self._request = (asyncio.get_running_loop(), task)
         try:
             if self._is_cancelled:

@@ -163,6 +163,12 @@ class Mission:
                 raise MissionError(f"mission {self.id} is {self.state}; stop it instead")
             self._step(MissionState.FAILED, "fail", reason=reason)
 
+    def extend_instruction(self, sentence: str) -> None:
+        """Add a person's sentence to the instruction."""
+        with self._writing:
+            self.note(f"a person added to the instruction: {visible(sentence)}")
+            self.summary.instruction = f"{self.summary.instruction} {sentence}"
+
     def note(self, text: str) -> None:
         """Add a sentence to the log."""
         self._write("log", text=text)

@@ -8,29 +8,27 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
 from codebotler.checking.evasions import find_evasions
 from codebotler.checking.problems import CheckResult
-from codebotler.checking.proof import hold_within
-from codebotler.checking.repetition import hold_to_past
 from codebotler.checking.rule_rooms import expect_rooms
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.core.world import World
 from codebotler.missions.authoring import ModelAuthor, prompt_of
+from codebotler.missions.drafts import compare_drafts, examine_draft
 from codebotler.missions.log import LogLine, MissionState
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import (
     ask_rooms,
     expect_poses,
     limit_rooms,
-    missing_skills,
-    unknown_rooms,
     with_closest_here,
 )
 from codebotler.missions.stop import StopButton
@@ -78,6 +76,7 @@ class MissionSession:
         self._lock = threading.Condition()  # held briefly, never while calling the mission
         self._checked: Contract | None = None  # of the last checked program
         self._editing = threading.Lock()  # held while the program is replaced or approved
+        self._has_added = False  # whether a person has added a sentence to the instruction
         self._view = SessionView(
             number,
             instruction=order.instruction,
@@ -159,6 +158,25 @@ class MissionSession:
             self._author.max_tokens = max_tokens or self._author.max_tokens
             self._next_task = partial(self._ask, repair=repair)
             self._change(busy=f"asking {self._view.model}", is_written=True, reply="", disabled_rules=())
+
+    def answer(self, answer: ClarifyingAnswer, more: str = "") -> None:
+        """Say which behaviour is meant. With `none`, a sentence is added to the instruction.
+
+        The second answer `none`, or one without a sentence, ends the mission.
+
+        Raises:
+            MissionError: there is no question, or no such option.
+        """
+        with self._editing, self._lock:
+            question = self._view.question
+            if question is None or not self._view.waits_for_answer:
+                raise MissionError("there is no question to answer")
+            if isinstance(answer, int) and not 0 <= answer < len(question.options):
+                raise MissionError(f"there is no option {answer + 1}; there are {len(question.options)}")
+            self._next_task = partial(
+                self._take_answer, question=question, answer=answer, more=" ".join(more.split())
+            )
+            self._change(question=None, busy=CHECKING)
 
     def approve(self, seen: str, *, despite_problems: bool = False, by: str = "") -> None:
         """Approve the program that the person saw, identified by its digest. `by` goes to the log."""
@@ -278,12 +296,13 @@ class MissionSession:
 
     def _ask(self, mission: Mission, *, repair: bool) -> None:
         """Ask the model for a program and check it. Keep the previous program if the reply has none."""
-        before = self._view
-        writing = {"busy": f"asking {before.model}", "is_written": True}
+        before, count = self._view, 1 if repair else self._order.candidates
+        many = f" for {count} programs" if count > 1 else ""
+        writing = {"busy": f"asking {before.model}{many}", "is_written": True}
         self._show(**_UNCHECKED | writing, program="", reply="", error="")
         try:
             prompt = prompt_of(before, self._robot, repair=repair)
-            author, made = self._author.write(prompt, self._add_to_reply)
+            author, attempts = self._author.write(prompt, count, self._add_to_reply)
         except asyncio.CancelledError:
             self._restore(before)
             return
@@ -296,12 +315,42 @@ class MissionSession:
             self._restore(before)
             self._show(error=visible(str(error)))
             return
-        if (none := made.programless) is not None:
+        programs = [one.reply.program for one in attempts if one.programless is None]
+        if not programs and (none := attempts[-1].programless) is not None:
             mission.note(none.sentence)
             self._restore(replace(before, programless=none))
             return
         self._show(is_written=False, author=author)
-        self._take(mission, made.program)
+        if count > 1:
+            self._choose(mission, programs)
+        else:
+            self._take(mission, programs[-1])
+
+    def _choose(self, mission: Mission, programs: Sequence[str]) -> None:
+        """Take one of several programs, or ask the person which one is meant if they differ."""
+        self._show(busy="comparing the programs")
+        groups = compare_drafts(programs, self._view, self._robot)
+        question = question_about(groups)
+        if question is not None and self._order.asks:
+            self._show(question=question, busy="")
+        else:
+            self._add_remark(groups.summary)
+            self._take(mission, groups.clusters[0].program)
+
+    def _take_answer(
+        self, mission: Mission, *, question: ClarifyingQuestion, answer: ClarifyingAnswer, more: str
+    ) -> None:
+        option = question.chosen(answer)
+        if option is not None:
+            mission.note(f"a person chose what the robot should do: {option.difference}")
+            self._take(mission, option.program)
+        elif not more or self._has_added:
+            mission.fail("no program does what was meant")
+        else:
+            self._has_added = True
+            mission.extend_instruction(more)
+            self._show(instruction=mission.summary.instruction)
+            self._ask(mission, repair=False)
 
     def _restore(self, before: SessionView) -> None:
         kept = {name: getattr(before, name) for name in (*_UNCHECKED, "program", "author")}
@@ -321,18 +370,9 @@ class MissionSession:
         try:
             mission.draft(program, view.author)
             check = self._check(program, view.room_map, view.rules_in_force)
-            if view.past is not None:
-                check = hold_to_past(check, view.past.program)
-            if self._order.drive is not None and program == self._order.program:
-                check = replace(check, contract=self._order.contract, proofs=(), samples=())
-            if view.within is not None:
-                check = hold_within(check, view.within, self._robot.skills)
-            missing = tuple(missing_skills(program, self._robot))
-            known = None if check.problems else view.room_map
-            unknown = tuple(unknown_rooms(program, known, self._robot.skills)) if known else ()
-            found = {"check": check, "missing_skills": missing, "unknown_rooms": unknown, "busy": ""}
-            found["earlier"], self._checked = self._checked, check.contract
-            mission.check(replace(view, **found).problems)  # type: ignore[arg-type]  # values of its fields
+            found = examine_draft(check, program, view, self._order, self._robot)
+            found["earlier"], self._checked = self._checked, found["check"].contract
+            mission.check(replace(view, **found).problems)
         except MissionError:
             if not mission.has_ended:
                 raise

@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
+from codebotler.candidates.question import ClarifyingQuestion
 from codebotler.checking.problems import CheckResult
 from codebotler.generation.no_program import ProgramlessReply
 from codebotler.generation.partial_reply import PartialReply, split_partial
@@ -20,7 +21,7 @@ from codebotler.simulator.room_map import RoomMap
 
 CHECKING = "checking"  # a value of `SessionView.busy`
 
-Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking", "no-program"]
+Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking", "no-program", "question"]
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ class MissionOrder:
     drive: Driver | None = None  # controls the robot in place of exactly this program
     contract: Contract | None = None  # what `drive` may do at most
     past: MissionPast | None = None  # of the mission whose rest is requested
+    candidates: int = 1  # how many programs to get from the model
+    asks: bool = True  # whether somebody can say which of several behaviours they mean
 
     def __post_init__(self) -> None:
         if not self.has_program:
@@ -73,6 +76,7 @@ class SessionView:
     disabled_rules: tuple[str, ...] = ()  # the names of rules switched off for this program
     within: Contract | None = None  # what every program of the session may do
     past: MissionPast | None = None  # of the mission whose rest the session does
+    question: ClarifyingQuestion | None = None  # which of several behaviours a person means
     earlier: Contract | None = None  # the contract of the session's last checked program but this one
     progress: Progress = field(default_factory=Progress)
     is_over: bool = True
@@ -124,6 +128,8 @@ class SessionView:
             return "checking"
         if self.waits_for_program:
             return "no-program"
+        if self.waits_for_answer:
+            return "question"
         return "starting" if self.busy or self.state is None else self.state
 
     @property
@@ -141,6 +147,11 @@ class SessionView:
         """Whether a model replied without a program, so that a person must decide."""
         is_open = self.state is MissionState.DRAFTING and not self.is_over and not self.busy
         return is_open and self.programless is not None
+
+    @property
+    def waits_for_answer(self) -> bool:
+        """Whether a person must say which behaviour they mean."""
+        return self.question is not None and not self.is_over and not self.busy
 
     @property
     def may_be_asked_again(self) -> bool:

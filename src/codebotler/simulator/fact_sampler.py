@@ -18,6 +18,7 @@ class FactSampler:
     strict: bool = False  # also draw facts that the program takes for granted; otherwise they hold
     lucky: bool = False  # in seven of eight draws, things and people are present, and people agree
     forced: tuple[Draw, ...] = ()  # facts whose results are given instead of drawn
+    by_options: bool = False  # an answer depends on the room and the options, not on the question
 
     def draw(self, count: int, *fact: str) -> int:
         """Draw a number from 0 to `count - 1` for a fact."""

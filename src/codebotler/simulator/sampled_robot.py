@@ -78,6 +78,7 @@ class SampledRobot(SimulatedRobot):
         self.occupants = defaultdict(list)  # always empty, since no world file names people
         self.explored: defaultdict[str, ExploredRoom] = defaultdict(ExploredRoom)
         self.answers: dict[tuple[str, ...], str] = {}  # answers by room, person and question
+        self.questions = defaultdict[tuple[str, ...], list[tuple[str, ...]]](list)  # by room and options
         self.outcomes: dict[str, int] = {}  # outcomes by statement
         self.facts: list[SampledFact] = []
         self.draws: list[Draw] = []
@@ -194,6 +195,12 @@ class SampledRobot(SimulatedRobot):
 
     def answer(self, options: Sequence[str], *question: str) -> str:
         """Draw the answer to a question from its options."""
+        if self.sampler.by_options:
+            given = {option.strip().casefold(): option for option in options}
+            options, name = [given[text] for text in sorted(given)], (question[0], *sorted(given))
+            if question not in self.questions[name]:
+                self.questions[name].append(question)
+            question = (*name, str(self.questions[name].index(question)))
         agreeing = next((i for i, text in enumerate(options) if AGREEING_TEXT.match(text)), 0)
         drawn = self.sampler.answer(len(options), agreeing, *question)
         self.draws.append(Draw("answer", (len(options), agreeing, *question), drawn))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from codebotler.cli.ending import obey
 from codebotler.cli.options import command_line
 from codebotler.core.terminal import report_problems
+from roboeval.cli.clarify import clarify
 from roboeval.cli.compare import compare, resample
 from roboeval.cli.evaluate import evaluate, import_
 from roboeval.cli.find import find
@@ -15,7 +16,21 @@ from roboeval.cli.show import export, serve, show
 from roboeval.cli.tasks import tasks
 
 app = command_line("roboeval", "Measure how well language models write programs for service robots.")
-commands = generate, evaluate, run, show, find, tasks, resample, report, compare, mutate, serve, export
+commands = (
+    generate,
+    evaluate,
+    run,
+    show,
+    find,
+    tasks,
+    resample,
+    clarify,
+    report,
+    compare,
+    mutate,
+    serve,
+    export,
+)
 for command in commands:
     app.command()(command)
 app.command("import")(import_)

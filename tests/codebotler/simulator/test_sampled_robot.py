@@ -421,3 +421,31 @@ def test_a_draw_knows_in_which_worlds_it_would_be_the_same() -> None:
         same = look(other, "mug") == look(robot, "mug")
         same &= other.perform("ask", ["", "Tea?", YES_NO]) == robot.perform("ask", ["", "Tea?", YES_NO])
         assert all(draw.holds_in(other.sampler) for draw in robot.draws) is same
+
+
+def asked_by_options(question: str, *options: str, person: str = "", sample: int = 0) -> str:
+    robot = SampledRobot(ROOMS, FactSampler(sample=sample, by_options=True))
+    chosen = robot.perform("ask", [person, question, tuple(map(Option, options))])
+    assert isinstance(chosen, int)
+    return options[chosen].lower()
+
+
+def test_answers_by_options_depend_on_no_words_of_the_question() -> None:
+    worlds = range(20)
+    first = [asked_by_options("Tea or coffee?", "tea", "coffee", sample=number) for number in worlds]
+    same = [
+        asked_by_options("What would you like?", "Coffee", "Tea", person="person", sample=number)
+        for number in worlds
+    ]
+    assert first == same
+    assert {*first} == {"tea", "coffee"}
+
+
+def test_answers_by_options_differ_between_several_questions() -> None:
+    robots = [SampledRobot(ROOMS, FactSampler(sample=number, by_options=True)) for number in range(20)]
+    pairs = [
+        tuple(robot.perform("ask", ["", text, YES_NO]) for text in ("Tea?", "Milk?")) for robot in robots
+    ]
+    assert len({*pairs}) == 4
+    again = [robot.perform("ask", ["", "Tea?", YES_NO]) for robot in robots]
+    assert again == [first for first, _ in pairs]

@@ -1,0 +1,164 @@
+"""The behaviour of a run: what a person would notice, whatever the words and the order of visits."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from itertools import groupby
+from typing import TypeAlias
+
+from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
+from codebotler.core.trace import Event, Outcome, Status, Trace
+from codebotler.rtl.text.clauses import clauses, complete_clauses, sentences
+from codebotler.rtl.text.numbers import numerals
+from codebotler.rtl.text.polarity import Polarity, polarity, without_harmless
+from codebotler.rtl.text.times import times_in
+from codebotler.simulator.matching import whole_words
+from codebotler.simulator.sampled_facts import SOMEBODY
+from codebotler.simulator.sampled_robot import AGREEING_TEXT, normalized
+
+PAPER_KINDS = frozenset({GOTO, SAY, CHECK, ASK, PICK, PLACE})
+ENDLESS_RUN = "waits"  # the ending of a run that reached a limit
+NO_NAME = re.compile(r"(?!)")  # matches nothing
+MAX_NAMES, MAX_NAME_LENGTH = 200, 60
+HALF_DAY, ZERO = 12 * 60, (0,)  # minutes, and the time of day that "eggs: 0" might give
+
+Claims: TypeAlias = frozenset[tuple[str, str]]
+"""The claims of a statement, each with its kind, such as `number`, and its value."""
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """What a person would notice of a run. Visits, looks and waiting do not count, nor does any wording.
+
+    Args:
+        said: the room and the claims of the statements between two drives. All statements without claims,
+            such as greetings, are alike.
+        moved: the things that were picked up and put down, with the room, in order of their names.
+        asked: the room and the options of each question; case and order do not matter. Whether the program
+            calls the person in this room by name does not matter either.
+        done: the other skills with their arguments, in order of their names.
+        ending: how the run ended; empty if it finished.
+        room: the room where the robot ended; empty unless the run finished.
+    """
+
+    said: frozenset[tuple[str, Claims]] = frozenset()
+    moved: tuple[tuple[str, str, str], ...] = ()
+    asked: frozenset[tuple[str, tuple[str, ...]]] = frozenset()
+    done: tuple[tuple[str, ...], ...] = ()
+    ending: str = ""
+    room: str = ""
+
+    def differences(self, other: Behaviour) -> frozenset[str]:
+        """Return the names of the fields in which two behaviours differ."""
+        names = (one.name for one in fields(self))
+        return frozenset(name for name in names if getattr(self, name) != getattr(other, name))
+
+
+def behaviour_of(outcome: Outcome, start: str, names: re.Pattern[str] = NO_NAME) -> Behaviour:
+    """Return the behaviour of a run.
+
+    Args:
+        outcome: the run.
+        start: the room where the robot started.
+        names: a pattern from `names_in` that finds the names which statements may make claims about.
+    """
+    trace = outcome.trace
+    is_done = outcome.status is Status.FINISHED
+    return Behaviour(
+        said=frozenset((room, claims_of(text, names)) for room, text in statements(trace)),
+        moved=tuple(
+            sorted((one.kind, normalized(one.text), one.place) for one in trace if one.kind in {PICK, PLACE})
+        ),
+        asked=frozenset(
+            (one.place, tuple(sorted({_plain(option) for option, _ in one.options})))
+            for one in trace
+            if one.kind == ASK
+        ),
+        done=tuple(sorted((one.kind, one.text, *one.more) for one in trace if one.kind not in PAPER_KINDS)),
+        ending="" if is_done else ENDLESS_RUN if outcome.status is Status.TIMEOUT else _error_kind(outcome),
+        room=_last_room(trace, start) if is_done else "",
+    )
+
+
+def statements(trace: Trace) -> Iterator[tuple[str, str]]:
+    """Yield the room and the text of what was said between two drives to different rooms."""
+    spoken = (one for one in trace if one.kind in {GOTO, SAY} and not _stays(one))
+    for is_drive, some in groupby(spoken, key=lambda one: one.kind == GOTO):
+        if not is_drive:
+            said = [*some]
+            yield said[0].place, "\n".join(one.text for one in said)
+
+
+def names_in(rooms: Iterable[str], traces: Iterable[Trace]) -> re.Pattern[str]:
+    """Return a pattern for the names of rooms, and of the things and people that runs are about.
+
+    These are what the programs look for, carry and offer, but not words for anybody, yes and no.
+    """
+    places = {_plain(room) for room in rooms}
+    found = dict.fromkeys(places)
+    for event in (event for trace in traces for event in trace):
+        texts = [event.text] if event.kind != ASK else [event.to or "", *(text for text, _ in event.options)]
+        if event.kind in {ASK, CHECK, PICK, PLACE}:
+            found.update(dict.fromkeys(map(normalized, texts)))
+    names = [one for one in found if _is_name(one)][:MAX_NAMES]
+    longest_first = sorted(names, key=len, reverse=True)
+    # "The printer rooms" names no room, while "staplers" names a thing.
+    regexes = (
+        rf"\b{re.escape(one)}\b" if one in places else whole_words(re.escape(one)) for one in longest_first
+    )
+    return re.compile("|".join(regexes), re.IGNORECASE) if names else NO_NAME
+
+
+@lru_cache(maxsize=16_384)
+def claims_of(text: str, names: re.Pattern[str]) -> Claims:
+    """Return the claims of a statement: numbers, times of day, and the names that it affirms or denies."""
+    found = {_clock_claim(readings[0]) for readings in times_in(text) if readings != ZERO}
+    parts = [clause for sentence in sentences(text) for clause in clauses(sentence, lists=True)]
+    for clause in complete_clauses(parts):
+        found |= _claims_of_clause(clause, names)
+    in_times = {("number", part) for kind, time in found if kind == "time" for part in time.split(":")}
+    return frozenset(found - in_times)
+
+
+def _clock_claim(minutes: int) -> tuple[str, str]:
+    """Return the claim for a time of day. A full hour is a number, since "at 5" may be both."""
+    hour, minute = divmod(minutes % HALF_DAY, 60)
+    return ("time", f"{hour or 12}:{minute}") if minute else ("number", str(hour or 12))
+
+
+def _claims_of_clause(clause: str, names: re.Pattern[str]) -> set[tuple[str, str]]:
+    view = polarity(clause)
+    claims = {(view.value, _plain(match[0]).removesuffix("s")) for match in names.finditer(clause)}
+    rest = without_harmless(names.sub(" it ", clause))
+    numbers = {value for _, _, values in numerals(rest) for value in values}
+    is_about_nothing = bool(claims) and view is Polarity.DENIES  # "no mug" is a denial, and no number
+    claims |= {("number", f"{value:g}") for value in numbers if value or not is_about_nothing}
+    if not claims and view is Polarity.DENIES:
+        claims.add((view.value, ""))
+    return claims
+
+
+def _is_name(text: str) -> bool:
+    is_short = 1 < len(text) <= MAX_NAME_LENGTH
+    is_answer = AGREEING_TEXT.match(text) or polarity(text) is Polarity.DENIES
+    return is_short and text != SOMEBODY and not is_answer and not text.isdigit()
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.casefold().split())
+
+
+def _stays(event: Event) -> bool:
+    return event.kind == GOTO and event.destination == event.place
+
+
+def _last_room(trace: Trace, start: str) -> str:
+    rooms = (one.destination for one in reversed(trace) if one.kind == GOTO and one.destination is not None)
+    return next(rooms, start)
+
+
+def _error_kind(outcome: Outcome) -> str:
+    return outcome.error.kind if outcome.error is not None else outcome.status.value

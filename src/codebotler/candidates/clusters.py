@@ -1,0 +1,173 @@
+"""Cluster candidate programs by their behaviour in the same imagined worlds."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+from codebotler.candidates.behaviour import Behaviour, behaviour_of, names_in
+from codebotler.checking.check import check_on
+from codebotler.checking.problems import Sample
+from codebotler.checking.sampled import CheckSettings, SampledRuns, first_samplers, unexplored_samplers
+from codebotler.checking.static import read_rooms
+from codebotler.core.words import counted
+from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.matching import contains
+from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.sampled_robot import normalized
+from codebotler.simulator.worker import Worker
+
+RANDOM_WORLDS, MAX_SHARED_WORLDS = 8, 24  # random worlds, and worlds with those that try further facts
+ROOM_NUMBER = re.compile(r"\s*\d+$")
+
+
+@dataclass(frozen=True)
+class CandidateCluster:
+    """Candidates that do the same in all worlds.
+
+    Args:
+        programs: the different programs, beginning with the most frequent one.
+        size: the number of candidates.
+        behaviours: the behaviour of the first program in each world.
+        samples: the runs of the first program in each world.
+    """
+
+    programs: tuple[str, ...] = field(repr=False)
+    size: int
+    behaviours: tuple[Behaviour, ...] = field(repr=False)
+    samples: tuple[Sample, ...] = field(repr=False)
+
+    @property
+    def program(self) -> str:
+        """The program that represents the cluster."""
+        return self.programs[0]
+
+
+@dataclass(frozen=True)
+class CandidateClusters:
+    """The clusters of the candidates that the check accepts, with the largest one first.
+
+    Args:
+        clusters: at least one; if the check rejects all candidates, it consists of the first of them.
+        rejected: the number of candidates that the check rejects.
+    """
+
+    clusters: tuple[CandidateCluster, ...]
+    rejected: int = 0
+
+    @property
+    def total(self) -> int:
+        """The number of candidates in all clusters."""
+        return sum(one.size for one in self.clusters)
+
+    @property
+    def summary(self) -> str:
+        """A sentence about the largest cluster, which is taken if nobody is asked."""
+        largest, total = self.clusters[0], counted(self.total, "program")
+        if not largest.samples:
+            every = counted(self.total + self.rejected, "program")
+            return f"the check rejected all of {every}; took the first"
+        rejected = f"; the check rejected {self.rejected}" if self.rejected else ""
+        return f"took the most frequent behaviour: {largest.size} of {total}{rejected}"
+
+
+def cluster_candidates(
+    worker: Worker, programs: Sequence[str], settings: CheckSettings, room_map: RoomMap | None = None
+) -> CandidateClusters:
+    """Check candidates, and group the accepted ones by behaviour in imagined worlds.
+
+    Args:
+        worker: a worker that no other thread uses.
+        programs: the candidates, at least one; equal ones count separately.
+        settings: the settings of the check and of the runs.
+        room_map: the rooms; by default all rooms that the programs name.
+    """
+    counts = Counter(programs)
+    checks = {program: check_on(worker, program, room_map, settings) for program in counts}
+    accepted = [program for program, found in checks.items() if not found.problems]
+    if not accepted:
+        return CandidateClusters((CandidateCluster((programs[0],), 1, (), ()),), len(programs) - 1)
+    rooms = room_map or shared_rooms(accepted, [checks[one].room_map for one in accepted], settings)
+    runs = run_in_shared_worlds(worker, accepted, rooms, settings)
+    traces = [sample.outcome.trace for samples in runs for sample in samples]
+    names = names_in(rooms.rooms, traces)
+    behaviours = [
+        tuple(behaviour_of(sample.outcome, rooms.start, names) for sample in samples) for samples in runs
+    ]
+    together: dict[tuple[Behaviour, ...], list[int]] = {}
+    for number, seen in enumerate(behaviours):
+        together.setdefault(seen, []).append(number)
+    clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
+    rejected = len(programs) - sum(counts[one] for one in accepted)
+    return CandidateClusters(tuple(sorted(clusters, key=lambda one: -one.size)), rejected)
+
+
+def _cluster(
+    some: Sequence[int],
+    programs: Sequence[str],
+    counts: Counter[str],
+    behaviours: tuple[Behaviour, ...],
+    runs: Sequence[Sequence[Sample]],
+) -> CandidateCluster:
+    ordered = sorted(some, key=lambda number: -counts[programs[number]])
+    size = sum(counts[programs[number]] for number in some)
+    samples = tuple(runs[ordered[0]])
+    return CandidateCluster(tuple(programs[number] for number in ordered), size, behaviours, samples)
+
+
+def shared_rooms(programs: Iterable[str], maps: Sequence[RoomMap], settings: CheckSettings) -> RoomMap:
+    """Return a map of the rooms that programs name, where the longest of similar names counts.
+
+    If a program lists the rooms, there are two of each kind, since a loop needs several rooms to go wrong.
+    """
+    start = maps[0].start
+    named = dict.fromkeys(normalized(room) for one in maps for room in one.rooms if room != start)
+    rooms = [room for room in named if not any(contains(other, room) for other in named if other != room)]
+    if any(read_rooms(program, settings.skills)[1] for program in programs):
+        kinds = Counter(ROOM_NUMBER.sub("", room) for room in rooms)
+        rooms += [_second_room(kind, rooms) for kind, count in kinds.items() if count == 1]
+    return replace(maps[0], rooms=(*rooms, start), start=start)
+
+
+def _second_room(kind: str, rooms: Sequence[str]) -> str:
+    return next(name for name in (f"{kind} 2", f"{kind} 1") if name not in rooms)
+
+
+def run_in_shared_worlds(
+    worker: Worker, programs: Sequence[str], room_map: RoomMap, settings: CheckSettings
+) -> list[list[Sample]]:
+    """Run programs in the same worlds, and return the runs of each, one for each world.
+
+    The first worlds are random. Further ones try both values of each fact that a program meets.
+    """
+    first = first_samplers(replace(settings, samples=RANDOM_WORLDS))
+    new = [replace(sampler, by_options=True) for sampler in first]
+    samplers: list[FactSampler] = []
+    runs: list[list[Sample]] = [[] for _ in programs]
+    while new:
+        more = _run_all(worker, programs, room_map, new, settings)
+        runs = [[*before, *added] for before, added in zip(runs, more, strict=True)]
+        samplers += new
+        found = (one for samples in runs for one in unexplored_samplers(samples, samplers))
+        new = list(dict.fromkeys(found))[: MAX_SHARED_WORLDS - len(samplers)]
+    return [[replace(sample, number=number) for number, sample in enumerate(samples)] for samples in runs]
+
+
+def _run_all(
+    worker: Worker,
+    programs: Sequence[str],
+    room_map: RoomMap,
+    samplers: Sequence[FactSampler],
+    settings: CheckSettings,
+) -> list[list[Sample]]:
+    """Run programs, where tame ones share a process, and worlds that repeat a run share its result."""
+    jobs = [SampledRuns(program, room_map, samplers, settings) for program in programs]
+    known = worker.run_tame([one.job for one in jobs])
+    found = []
+    for number, runs in enumerate(jobs):
+        outcomes = {run: outcome for (job, run), outcome in known.items() if job == number}
+        ran = runs.samples_on(worker, outcomes)
+        found.append([next(one for one in ran if one.would_repeat_in(sampler)) for sampler in samplers])
+    return found

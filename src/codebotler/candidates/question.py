@@ -1,0 +1,200 @@
+"""Decide whether to ask a person which behaviour they meant, and hold the question."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias
+
+from codebotler.candidates.behaviour import PAPER_KINDS, Behaviour, statements
+from codebotler.candidates.clusters import CandidateCluster, CandidateClusters
+from codebotler.checking.problems import Sample
+from codebotler.checking.storyboard import steps_of
+from codebotler.core.errors import UserError
+from codebotler.core.phrases import phrase
+from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE
+from codebotler.core.trace import Event
+from codebotler.core.words import brief, listed
+from codebotler.simulator.sampled_robot import normalized
+
+DOMINANT_SHARE = 0.75
+"""The share of the candidates from which the largest cluster is taken without a question."""
+
+MAX_CANDIDATE_OPTIONS, MAX_QUESTION_FACTS, MAX_SHOWN_DIFFERENCES = 3, 4, 3
+NOTICED_FIRST = frozenset({"said", "moved", "asked", "room"})
+"""The differences that a person cares about most."""
+
+ClarifyingAnswer: TypeAlias = int | Literal["none", "decide"]
+"""The position of an option, none of them, or the tool's choice."""
+
+Aspect: TypeAlias = tuple[str, str]
+"""A field of a behaviour, with the room or thing."""
+
+
+@dataclass(frozen=True)
+class CandidateOption:
+    """One possible behaviour.
+
+    Args:
+        program: the program that the robot would run.
+        size: the number of candidates that behave like it.
+        steps: its steps in the world of the question, as of `steps_of`.
+        difference: a sentence that says only how it differs from the other options.
+    """
+
+    program: str = field(repr=False)
+    size: int
+    steps: tuple[Mapping[str, Any], ...] = field(repr=False)
+    difference: str
+
+
+@dataclass(frozen=True)
+class ClarifyingQuestion:
+    """A question about which of a few behaviours a person meant.
+
+    Args:
+        options: two or three options with different behaviours, beginning with the most frequent one.
+        facts: the facts of the imagined world that matter, in words.
+        total: the number of accepted candidates.
+        sample: the number of the world.
+    """
+
+    options: tuple[CandidateOption, ...]
+    facts: tuple[str, ...]
+    total: int
+    sample: int
+
+    def chosen(self, answer: ClarifyingAnswer) -> CandidateOption | None:
+        """Return the option that an answer means, or None for none of them."""
+        if answer == "none":
+            return None
+        return self.options[0 if answer == "decide" else answer]
+
+    def parse(self, line: str) -> ClarifyingAnswer:
+        """Read a person's answer: the number of an option from 1, `none`, or `you decide`.
+
+        Raises:
+            UserError: the line is none of these.
+        """
+        text = " ".join(line.lower().split()).rstrip(".")
+        if text.isdecimal() and 1 <= int(text) <= len(self.options):
+            return int(text) - 1
+        if text in {"none", "none of these"}:
+            return "none"
+        if text in {"you decide", "decide"}:
+            return "decide"
+        numbers = ", ".join(str(number) for number in range(1, len(self.options) + 1))
+        raise UserError(f'"{brief(line)}" is not an answer; write {numbers}, none, or you decide')
+
+
+def question_about(
+    groups: CandidateClusters, dominant_share: float = DOMINANT_SHARE
+) -> ClarifyingQuestion | None:
+    """Return a question, or None if one behaviour dominates or all candidates do the same."""
+    largest = groups.clusters[0]
+    if len(groups.clusters) == 1 or largest.size >= dominant_share * groups.total:
+        return None
+    worlds = range(len(largest.samples))
+    number = max(worlds, key=lambda one: _rank(_told_apart(groups.clusters, one), one))
+    shown = _told_apart(groups.clusters, number)
+    samples = [one.samples[number] for one in shown]
+    behaviours = [one.behaviours[number] for one in shown]
+    options = (
+        CandidateOption(one.program, one.size, tuple(steps_of(sample.outcome.trace, has_places=True)), words)
+        for one, sample, words in zip(shown, samples, describe_differences(samples, behaviours), strict=True)
+    )
+    return ClarifyingQuestion(tuple(options), _facts_that_matter(shown, number), groups.total, number)
+
+
+def _told_apart(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:
+    """Return the largest clusters with different behaviours in a world, at most three."""
+    different: dict[Behaviour, CandidateCluster] = {}
+    for one in clusters:
+        different.setdefault(one.behaviours[number], one)
+    return [*different.values()][:MAX_CANDIDATE_OPTIONS]
+
+
+def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, int, int, int]:
+    """Rank a world: by the number of options, their candidates, what a person cares about, and brevity."""
+    first, *others = (one.behaviours[number] for one in shown)
+    cares = sum(bool(first.differences(other) & NOTICED_FIRST) for other in others)
+    length = sum(len(one.samples[number].outcome.trace) for one in shown)
+    return len(shown), sum(one.size for one in shown), cares, -length
+
+
+def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[str, ...]:
+    """Return the facts of a world that do not hold in all worlds where the options look the same."""
+
+    def facts(world: int) -> list[str]:
+        return list(dict.fromkeys(fact for one in shown for fact in one.samples[world].drawn))
+
+    same = [world for world in range(len(shown[0].samples)) if len({o.behaviours[world] for o in shown}) == 1]
+    alike = [set(facts(world)) for world in same]
+    telling = [fact for fact in facts(number) if not alike or not all(fact in one for one in alike)]
+    return tuple((telling or facts(number))[:MAX_QUESTION_FACTS])
+
+
+def describe_differences(samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> list[str]:
+    """Return a sentence for each run in one world that says only what differs from the other runs."""
+    seen = [_aspects(behaviour) for behaviour in behaviours]
+    differing = _telling_first(seen)
+    sentences = []
+    for sample in samples:
+        parts = [_words(key, sample) for key in differing]
+        left = len(parts) - MAX_SHOWN_DIFFERENCES
+        more = [f"does {left} more things differently"] if left > 0 else []
+        sentences.append(listed([*parts[:MAX_SHOWN_DIFFERENCES], *more]))
+    return sentences
+
+
+def _telling_first(seen: Sequence[Mapping[Aspect, object]]) -> list[Aspect]:
+    """Return the aspects in which options differ, beginning with those that tell all of them apart."""
+
+    def kinds(*keys: Aspect) -> int:
+        return len({tuple(aspects.get(key) for key in keys) for aspects in seen})
+
+    differing = [key for key in dict.fromkeys(key for aspects in seen for key in aspects) if kinds(key) > 1]
+    telling: list[Aspect] = []
+    for key in sorted(differing, key=kinds, reverse=True):
+        if kinds(*telling, key) > kinds(*telling):
+            telling.append(key)
+    return [*dict.fromkeys([*telling, *differing])]
+
+
+def _aspects(behaviour: Behaviour) -> dict[Aspect, object]:
+    """Return the parts of a behaviour that are described separately."""
+    parts: dict[Aspect, list[object]] = {}
+    for room, claims in behaviour.said:
+        parts.setdefault(("said", room), []).append(claims)
+    for kind, thing, room in behaviour.moved:
+        parts.setdefault(("moved", thing), []).append((kind, room))
+    for room, options in behaviour.asked:
+        parts.setdefault(("asked", room), []).append(options)
+    rest = {("done", ""): behaviour.done, ("ending", ""): behaviour.ending, ("room", ""): behaviour.room}
+    return {**{key: frozenset(Counter(values).items()) for key, values in sorted(parts.items())}, **rest}
+
+
+def _words(key: Aspect, sample: Sample) -> str:
+    kind, name = key
+    outcome = sample.outcome
+    if kind == "said":
+        texts = [f'"{brief(text)}"' for room, text in statements(outcome.trace) if room == name]
+        return f"says {listed(texts) or 'nothing'} in {name}"
+    if kind == "moved":
+        moves = (one for one in outcome.trace if one.kind in {PICK, PLACE} and normalized(one.text) == name)
+        return _events(moves, f'leaves "{name}" alone')
+    if kind == "asked":
+        return _events(
+            (one for one in outcome.trace if one.kind == ASK and one.place == name), f"asks nobody in {name}"
+        )
+    if kind == "room":
+        rooms = [one.destination for one in outcome.trace if one.kind == GOTO and one.destination is not None]
+        return f"ends in {rooms[-1]}" if rooms else "stays where it is"
+    if kind == "ending":
+        return "finishes" if outcome.error is None else f"does not finish: {brief(outcome.error.message)}"
+    return _events((one for one in outcome.trace if one.kind not in PAPER_KINDS), "does nothing else")
+
+
+def _events(events: Iterable[Event], nothing: str) -> str:
+    return listed([*dict.fromkeys(f"{phrase(one, 'third')} in {one.place}" for one in events)]) or nothing

@@ -1,0 +1,164 @@
+"""`--candidates`: get several programs from a model, and ask a person which behaviour they meant."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.text import Text
+
+from codebotler.candidates.clusters import CandidateClusters, cluster_candidates
+from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
+from codebotler.checking.check import check
+from codebotler.checking.sampled import CheckSettings
+from codebotler.checking.storyboard import storyboard
+from codebotler.cli.generate import note_programless, open_recorder
+from codebotler.core.errors import UserError
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.terminal import busy, console, note, print_source, read_line, shortened, visible
+from codebotler.core.words import counted, listed
+from codebotler.generation.candidates import request_candidates
+from codebotler.generation.generate import Attempt
+from codebotler.missions.preflight import with_closest_here
+from codebotler.models.base import Model
+from codebotler.models.recorded import UnknownInstructionError
+from codebotler.prompts import Prompt
+from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.pool import WorkerPool
+from codebotler.simulator.room_map import RoomMap
+
+ADD_SENTENCE = "What should be different? (Enter to give up) "
+
+
+@dataclass(frozen=True)
+class CandidateSearch:
+    """The way to get candidates and answers.
+
+    Args:
+        request: requests candidates for an instruction.
+        settings: the settings for runs in imagined worlds.
+        room_map: the rooms; by default those that the programs name.
+        read_line: asks the person for a line, which is empty at the end; None if nobody can answer.
+    """
+
+    request: Callable[[str], Sequence[Attempt]]
+    settings: CheckSettings
+    room_map: RoomMap | None
+    read_line: Callable[[str], str] | None
+
+
+def line_reader(*, is_allowed: bool) -> Callable[[str], str] | None:
+    """Return a function that asks on the terminal, or None if that is not allowed or there is no terminal."""
+    return read_line if is_allowed and sys.stdin.isatty() and sys.stderr.isatty() else None
+
+
+def requests_to(
+    open_model: Callable[[], Model],
+    make_prompt: Callable[[str], Prompt],
+    count: int,
+    room_map: RoomMap | None,
+    record: Path | None = None,
+) -> Callable[[str], list[Attempt]]:
+    """Return a function that requests `count` candidates for an instruction, and records them in a file."""
+
+    def request(instruction: str) -> list[Attempt]:
+        opened = open_model()
+        with busy(f"asking {opened.name}"), open_recorder(record, opened.name) as add:
+            try:
+                return request_candidates(opened, make_prompt(instruction), count, on_attempt=add)
+            except UnknownInstructionError as error:
+                raise with_closest_here(error, room_map) from None
+
+    return request
+
+
+def expect_no_retries(retries: int | None, *, repair: bool) -> None:
+    """Raise UserError if a command with candidates also has options for retries."""
+    if repair or retries is not None:
+        raise UserError("--candidates cannot be combined with --retries or --repair")
+
+
+def write_candidates(
+    request: Callable[[str], list[Attempt]],
+    instruction: str,
+    house_rules: tuple[Rule, ...],
+    skills: SkillTable,
+    room_map: RoomMap | None,
+    *,
+    asks: bool,
+) -> bool:
+    """Print the candidate that a person means, and return whether the check accepts it."""
+    how = CheckSettings(skills=skills, house_rules=house_rules)
+    found = choose_candidate(
+        CandidateSearch(request, how, room_map, line_reader(is_allowed=asks)), instruction
+    )
+    if found is None:
+        return False
+    print_source(found[1])
+    problems = check(found[1], room_map=room_map, skills=skills, house_rules=house_rules).problems
+    for problem in problems:
+        note(visible(problem.sentence))
+    return not problems
+
+
+def choose_candidate(search: CandidateSearch, instruction: str) -> tuple[str, str] | None:
+    """Return the instruction and the program that a person means, or None if they want none of them.
+
+    After the first "none of these", they may add a sentence to the instruction for a second round.
+    """
+    for is_last in (False, True):
+        attempts = search.request(instruction)
+        programs = [one.reply.program for one in attempts if one.programless is None]
+        if not programs:
+            assert attempts[0].programless is not None
+            note_programless(attempts[0].programless)
+            return None
+        groups = _group(programs, search)
+        question = question_about(groups)
+        if question is None or search.read_line is None:
+            note(groups.summary)
+            return instruction, groups.clusters[0].program
+        chosen = question.chosen(ask_which(question, search.read_line))
+        if chosen is not None:
+            return instruction, chosen.program
+        more = "" if is_last else search.read_line(ADD_SENTENCE).strip()
+        if not more:
+            break
+        instruction = f"{instruction.rstrip()} {more}"
+    note("no program chosen")
+    return None
+
+
+def _group(programs: Sequence[str], search: CandidateSearch) -> CandidateClusters:
+    with busy("comparing the programs"), WorkerPool(1) as pool:
+        return pool.call(lambda: cluster_candidates(pool.here(), programs, search.settings, search.room_map))
+
+
+def question_view(question: ClarifyingQuestion) -> RenderableType:
+    """Show a question: the facts of the imagined world, and the storyboard of each option."""
+    facts = f"Suppose that {listed([*map(shortened, question.facts)])}." if question.facts else ""
+    parts: list[RenderableType] = [Text("Which did you mean?", "bold"), *([Text(facts)] if facts else [])]
+    for number, option in enumerate(question.options, 1):
+        head = f"{number}: {visible(option.difference)}"
+        like = f"{option.size} of {counted(question.total, 'program')}"
+        parts += [Text(), Text.assemble((head, "bold"), (f"  ({like})", "dim"))]
+        parts.append(Padding(storyboard(option.steps, set()), (0, 0, 0, 2)))
+    return Group(*parts, Text())
+
+
+def ask_which(question: ClarifyingQuestion, read_line: Callable[[str], str]) -> ClarifyingAnswer:
+    """Show a question, and read lines until one is an answer. Raise UserError at the end of the input."""
+    console(stderr=True).print(question_view(question))
+    numbers = ", ".join(str(number) for number in range(1, len(question.options) + 1))
+    while True:
+        line = read_line(f"Answer {numbers}, none, or you decide: ")
+        if not line:
+            raise UserError("no answer; --yes takes the most frequent behaviour without a question")
+        try:
+            return question.parse(line)
+        except UserError as error:
+            note(error.sentence)

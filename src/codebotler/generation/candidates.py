@@ -1,0 +1,45 @@
+"""Ask a model for several programs for the same prompt."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from functools import partial
+
+from codebotler.generation.generate import Attempt, ignore_attempt
+from codebotler.generation.no_program import describe_programless
+from codebotler.models.base import Model
+from codebotler.models.rate_limit import RateLimited
+from codebotler.prompts import Prompt
+
+CONCURRENT_REQUESTS = 4
+
+
+def request_candidates(
+    model: Model, prompt: Prompt, count: int, *, on_attempt: Callable[[Attempt], None] = ignore_attempt
+) -> list[Attempt]:
+    """Ask a model `count` times for a program, check none of them, and close the model.
+
+    Raises:
+        ModelError: the model sent no complete reply to one of the requests.
+    """
+    return asyncio.run(gather_candidates(model, prompt, count, on_attempt))
+
+
+async def gather_candidates(
+    model: Model, prompt: Prompt, count: int, on_attempt: Callable[[Attempt], None] = ignore_attempt
+) -> list[Attempt]:
+    """Ask a model `count` times for a program, as `request_candidates` does, in an event loop."""
+    limited = RateLimited(model, concurrency=CONCURRENT_REQUESTS)
+    try:
+        replies = await asyncio.gather(*(limited.reply(prompt, number=number) for number in range(count)))
+    finally:
+        await model.close()
+    describe = partial(describe_programless, settings=model.settings)
+    attempts = [
+        Attempt(number, prompt, reply, () if (none := describe(reply)) is None else (none.sentence,), none)
+        for number, reply in enumerate(replies)
+    ]
+    for attempt in attempts:
+        on_attempt(attempt)
+    return attempts

@@ -1,0 +1,50 @@
+"""Examine the drafts of a mission's program: the check, and which of several programs a person means."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from codebotler.candidates.clusters import CandidateClusters, cluster_candidates
+from codebotler.checking.problems import CheckResult
+from codebotler.checking.proof import hold_within
+from codebotler.checking.repetition import hold_to_past
+from codebotler.checking.sampled import CheckSettings
+from codebotler.missions.preflight import missing_skills, unknown_rooms
+from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.robots.base import Robot
+from codebotler.simulator.pool import shared_pool
+
+
+def examine_draft(
+    check: CheckResult, program: str, view: SessionView, order: MissionOrder, robot: Robot
+) -> dict[str, Any]:
+    """Return the fields of a session's view that tell what a check and the robot say of a program.
+
+    Args:
+        check: the check of the program, which knows neither the order nor the robot.
+        program: the program.
+        view: the view of the session.
+        order: the order, which may have a past or drive the robot in place of the program.
+        robot: the connected robot.
+    """
+    if view.past is not None:
+        check = hold_to_past(check, view.past.program)
+    if order.drive is not None and program == order.program:
+        check = replace(check, contract=order.contract, proofs=(), samples=())
+    if view.within is not None:
+        check = hold_within(check, view.within, robot.skills)
+    known = None if check.problems else view.room_map
+    return {
+        "check": check,
+        "missing_skills": tuple(missing_skills(program, robot)),
+        "unknown_rooms": tuple(unknown_rooms(program, known, robot.skills)) if known else (),
+        "busy": "",
+    }
+
+
+def compare_drafts(programs: Sequence[str], view: SessionView, robot: Robot) -> CandidateClusters:
+    """Group several programs for one instruction by what they do in imagined worlds."""
+    settings, pool = CheckSettings(skills=robot.skills, house_rules=view.rules_in_force), shared_pool()
+    return pool.call(lambda: cluster_candidates(pool.here(), programs, settings, view.room_map))

@@ -1,0 +1,54 @@
+"""Defines the command clarify, which measures what one question about candidate programs gains."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from roboeval.cli.inputs import load
+from roboeval.cli.options import (
+    HouseRulesOption,
+    JsonOption,
+    SourceArgument,
+    SuiteOption,
+    WorkersOption,
+)
+from roboeval.cli.output import print_json, print_rich, show_progress
+
+
+def clarify(
+    source: SourceArgument,
+    suite: SuiteOption = "paper",
+    candidates: Annotated[
+        int, typer.Option(min=2, max=20, help="Number of candidates that a model writes for a prompt.")
+    ] = 10,
+    noise: Annotated[
+        float,
+        typer.Option(min=0, max=1, help="Share of questions that the simulated person answers wrongly."),
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(help="Random seed for candidates and answers.")] = 0,
+    rules: HouseRulesOption = None,
+    workers: WorkersOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Measure how much one question about candidate programs helps.
+
+    A simulated person chooses among the behaviours of several programs for the same prompt.
+    """
+    from codebotler.simulator.pool import WorkerPool, cores
+    from roboeval.cli.views.clarify import clarify_view
+    from roboeval.evaluation.clarify import ClarifySettings, clarified_data, clarify
+    from roboeval.evaluation.runs.source import open_source
+
+    known = load(suite, rules)
+    completions = open_source(source, known).of(None)
+    settings = ClarifySettings(candidates, noise, seed)
+    count = len({(one.task, one.prompt) for one in completions})
+    with WorkerPool(workers or cores()) as pool:
+        prompts = [*show_progress(clarify(completions, known, pool, settings), "asking", count)]
+    data = clarified_data(prompts)
+    if json:
+        print_json({"suite": known.name, "candidates": candidates, "noise": noise, "seed": seed, **data})
+    else:
+        print_rich(clarify_view(data, source, candidates))

@@ -1,0 +1,167 @@
+"""Measure what one question about candidate programs gains, with a simulated person who answers it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from random import Random
+from statistics import fmean
+from typing import Any
+
+from codebotler.candidates.clusters import cluster_candidates
+from codebotler.candidates.question import question_about
+from codebotler.checking.sampled import CheckSettings
+from codebotler.core.errors import UserError
+from codebotler.simulator.engine import digest
+from codebotler.simulator.pool import WorkerPool
+from roboeval.evaluation.engines import Local
+from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.requests import add_usage
+from roboeval.evaluation.runs.completions import Completion, CompletionKey
+from roboeval.evaluation.runs.rows import key_of
+from roboeval.suites.load import Suite
+
+DRAWS_PER_PROMPT = 20
+"""The number of groups of candidates that are drawn for each prompt."""
+
+
+@dataclass(frozen=True)
+class ClarifySettings:
+    """The settings of a measurement.
+
+    Args:
+        candidates: the number of candidates in a group, at least 2.
+        noise: the share of questions that the simulated person answers wrongly.
+        seed: the random seed for groups and answers.
+    """
+
+    candidates: int = 10
+    noise: float = 0.0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class ClarifyTrial:
+    """The verdicts on one group of candidates."""
+
+    one: float  # the share of the candidates that pass
+    majority: bool  # whether the largest cluster passes
+    question: bool  # whether the program passes that results from the question, if there is one
+    asked: bool
+
+
+@dataclass(frozen=True)
+class ClarifiedPrompt:
+    """The trials of one prompt, with the mean number of tokens for a group if the run counts tokens."""
+
+    task: str
+    prompt: int
+    trials: tuple[ClarifyTrial, ...] = field(repr=False)
+    tokens: float | None = None
+
+
+def clarify(
+    completions: Iterable[Completion], suite: Suite, pool: WorkerPool, settings: ClarifySettings
+) -> Iterator[ClarifiedPrompt]:
+    """Yield the results of each prompt that has several completions.
+
+    Candidates are compared in imagined worlds only. The worlds of the task are only for the verdicts and for
+    the simulated person, who takes the first option that passes.
+
+    Raises:
+        UserError: no prompt has as many completions as a group has candidates.
+    """
+    by_prompt = _by_prompt(completions, settings.candidates)
+    every = [one for some in by_prompt.values() for one in some]
+    passed = {key_of(row): bool(row["passed"]) for row in evaluate(every, suite, engine=Local(pool))}
+    groups = {key: _draw_groups(key, some, settings) for key, some in by_prompt.items()}
+    house_rules = () if suite.house is None else suite.house.rules
+    how = CheckSettings(seed=settings.seed, skills=suite.skills, house_rules=house_rules)
+    offers = pool.map_distinct(
+        lambda some: [_offer(pool, how, programs) for programs in some],
+        [tuple(one.program for one in group) for some in groups.values() for group in some],
+        name=lambda programs: digest(*sorted(programs)),
+    )
+    for (task, prompt), some in groups.items():
+        random = Random(f"answers {settings.seed} {task} {prompt}")  # noqa: S311 - not for cryptography
+        trials = [_trial(group, next(offers), passed, random, settings.noise) for group in some]
+        yield ClarifiedPrompt(task, prompt, tuple(trials), _tokens(by_prompt[task, prompt], settings))
+
+
+def _by_prompt(completions: Iterable[Completion], least: int) -> dict[tuple[str, int], list[Completion]]:
+    found: dict[tuple[str, int], list[Completion]] = {}
+    for one in completions:
+        found.setdefault((one.task, one.prompt), []).append(one)
+    if not (enough := {key: some for key, some in sorted(found.items()) if len(some) >= least}):
+        most = max(map(len, found.values()), default=0)
+        raise UserError(
+            f"no prompt has {least} completions, but at most {most}; choose a smaller --candidates"
+        )
+    return enough
+
+
+def _draw_groups(
+    key: tuple[str, int], some: Sequence[Completion], settings: ClarifySettings
+) -> list[list[Completion]]:
+    random = Random(f"groups {settings.seed} {key[0]} {key[1]}")  # noqa: S311 - not for cryptography
+    return [random.sample(some, settings.candidates) for _ in range(DRAWS_PER_PROMPT)]
+
+
+def _offer(pool: WorkerPool, settings: CheckSettings, programs: Sequence[str]) -> list[str]:
+    """Return the program of the largest cluster, followed by those of the question, if there is one."""
+    groups = cluster_candidates(pool.here(), programs, settings)
+    question = question_about(groups)
+    options = () if question is None else question.options
+    return [groups.clusters[0].program, *(one.program for one in options)]
+
+
+def _trial(
+    group: Sequence[Completion],
+    offer: Sequence[str],
+    passed: Mapping[CompletionKey, bool],
+    random: Random,
+    noise: float,
+) -> ClarifyTrial:
+    passes = {one.program: passed.get(one.key, False) for one in group}  # no verdict if judging took too long
+    one = fmean(passes[each.program] for each in group)
+    majority, *answers = (passes[program] for program in offer)
+    if not answers:
+        return ClarifyTrial(one, majority, majority, asked=False)
+    chosen = answers.index(True) if any(answers) else None
+    if random.random() < noise:
+        chosen = random.choice([choice for choice in (*range(len(answers)), None) if choice != chosen])
+    return ClarifyTrial(one, majority, chosen is not None and answers[chosen], asked=True)
+
+
+def _tokens(some: Sequence[Completion], settings: ClarifySettings) -> float | None:
+    total = Counter(input_tokens=0, output_tokens=0)
+    for one in some:
+        add_usage(total, one.more.get("usage"))
+    return settings.candidates * total.total() / len(some) if total.total() else None
+
+
+def clarified_data(prompts: Sequence[ClarifiedPrompt]) -> dict[str, Any]:
+    """Return the results overall, where prompts count equally, and for each prompt, as plain data.
+
+    `mattered` is the share of the questions whose answer changed the verdict on the largest cluster. It is
+    null if there was no question.
+    """
+    trials = [trial for one in prompts for trial in one.trials]
+    each = [
+        {"task": one.task, "prompt": one.prompt, **_shares(one.trials), "tokens": one.tokens}
+        for one in prompts
+    ]
+    known = [one.tokens for one in prompts if one.tokens is not None]
+    return {**_shares(trials), "tokens": fmean(known) if known else None, "prompts": each}
+
+
+def _shares(trials: Sequence[ClarifyTrial]) -> dict[str, float | None]:
+    changed = [trial.question != trial.majority for trial in trials if trial.asked]
+    return {
+        "one": fmean(trial.one for trial in trials),
+        "majority": fmean(trial.majority for trial in trials),
+        "question": fmean(trial.question for trial in trials),
+        "asked": fmean(trial.asked for trial in trials),
+        "mattered": fmean(changed) if changed else None,
+    }

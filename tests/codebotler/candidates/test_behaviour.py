@@ -1,0 +1,134 @@
+"""Two runs are the same behaviour if a person would notice no difference, whatever the words."""
+
+import pytest
+
+from codebotler.candidates.behaviour import Behaviour, behaviour_of, claims_of, names_in
+from codebotler.core.trace import Event, Outcome, RunError, Status, to_options
+
+START = "hall"
+NAMES = names_in([START, "office 1", "office 2"], [(Event("check", "the mug"), Event("check", "person"))])
+
+
+def drive(start: str, end: str) -> Event:
+    return Event("goto", end, place=start, destination=end)
+
+
+def say(text: str, room: str = START) -> Event:
+    return Event("say", text, place=room)
+
+
+def ask(*options: str, room: str = START, to: str = "", question: str = "Tea?") -> Event:
+    return Event("ask", question, to_options(options), answer=options[0], place=room, to=to)
+
+
+def seen(*events: Event) -> Behaviour:
+    return behaviour_of(Outcome(Status.FINISHED, events), START, NAMES)
+
+
+def failed(status: Status, kind: str = "PickObjectNotFound") -> Behaviour:
+    return behaviour_of(Outcome(status, (drive(START, "office 1"),), RunError(kind, "no mug")), START, NAMES)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("There is no mug in office 1.", "The mug is not in office 1"),
+        ("2 people want tea", "Two of them want tea."),
+        ("Lunch is at 12:30 pm", "they leave at half past twelve"),
+        ("Lunch is at 5", "5 pm"),
+        ("Hello!", "Good morning to you"),
+        ("I found 3 mugs.", "There are three mugs in total"),
+        ("eggs: 0", "zero eggs"),
+        ("no tea", "0 teas"),
+        ("The offices have a mug", "A mug, yes"),
+    ],
+)
+def test_statements_with_the_same_claims_are_alike(one: str, other: str) -> None:
+    assert claims_of(one, NAMES) == claims_of(other, NAMES)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("There is a mug in office 1.", "There is no mug in office 1."),
+        ("There is a mug in office 1.", "There is a mug in office 2."),
+        ("2 people want tea", "3 people want tea"),
+        ("Lunch is at 12:30", "Lunch is at 12:45"),
+        ("Somebody came", "Nobody came"),
+        ("There is a mug", "Hello!"),
+    ],
+)
+def test_statements_with_different_claims_are_told_apart(one: str, other: str) -> None:
+    assert claims_of(one, NAMES) != claims_of(other, NAMES)
+
+
+def test_words_for_anybody_yes_and_no_are_no_names() -> None:
+    names = names_in([], [(ask("yes", "No", "black tea"), Event("check", "somebody"))])
+    assert [match[0] for match in names.finditer("yes no somebody black tea black teas")] == [
+        "black tea",
+        "black teas",
+    ]
+
+
+def test_plural_of_a_room_is_no_name_but_that_of_a_thing_is() -> None:
+    names = names_in(["lab", "lab 2"], [(Event("pick", "a mug"),)])
+    assert [match[0] for match in names.finditer("the labs: lab, Lab 2; mugs")] == ["lab", "Lab 2", "mugs"]
+
+
+def test_runs_without_names_find_none() -> None:
+    assert not names_in([], []).findall("a mug in the hall")
+
+
+def test_order_of_visits_and_looks_does_not_count() -> None:
+    there, back = drive(START, "office 1"), drive("office 1", START)
+    look = Event("check", "mug", found=True, place="office 1")
+    aside = drive(START, "office 2"), drive("office 2", START)
+    assert seen(there, look, back, *aside, say("2 mugs")) == seen(*aside, there, back, say("two mugs"))
+
+
+def test_statements_between_two_drives_are_merged() -> None:
+    assert seen(say("There is a mug."), say("It has 2 handles.")) == seen(say("A mug\nwith 2 handles"))
+    assert seen(say("a mug"), drive(START, START), say("2")) == seen(say("a mug"), say("2"))
+    apart = seen(say("a mug"), drive(START, "office 1"), drive("office 1", START), say("2"))
+    assert apart != seen(say("a mug"), say("2"))
+
+
+def test_room_of_a_statement_counts() -> None:
+    assert seen(say("a mug")).differences(seen(say("a mug", "office 1"))) == {"said"}
+
+
+def test_a_greeting_differs_from_silence() -> None:
+    assert seen(say("Hello")).differences(seen()) == {"said"}
+
+
+def test_options_count_but_not_their_order_or_case_nor_the_question() -> None:
+    one = seen(ask("Yes", "no", to="person"))
+    assert one == seen(ask("no", "yes", to="", question="Would you like some tea?"))
+    assert one.differences(seen(ask("yes", "no", "maybe"))) == {"asked"}
+    assert one.differences(seen(ask("yes", "no", room="office 1"))) == {"asked"}
+
+
+def test_carried_things_count_with_their_rooms() -> None:
+    one = seen(Event("pick", "the mug", place="office 1"), Event("place", "mug", place=START))
+    assert one == seen(Event("pick", "mug", place="office 1"), Event("place", "the mug", place=START))
+    assert one.differences(seen(Event("pick", "mug", place="office 1"))) == {"moved"}
+
+
+def test_last_room_counts() -> None:
+    assert seen(drive(START, "office 1")).differences(seen()) == {"room"}
+    assert seen(drive(START, "office 1"), drive("office 1", START)) == seen()
+    lost = Event("goto", "attic", place=START)
+    assert seen(lost) == seen()
+
+
+def test_endings_differ_and_have_no_last_room() -> None:
+    assert failed(Status.ROBOT_ERROR).ending == "PickObjectNotFound"
+    assert failed(Status.TIMEOUT) == failed(Status.TIMEOUT, "TimeoutError")
+    assert failed(Status.TIMEOUT).differences(failed(Status.ROBOT_ERROR)) == {"ending"}
+    assert failed(Status.KILLED).room == ""
+
+
+def test_own_skills_count_by_kind_and_text() -> None:
+    one = seen(Event("wave", "left", more=("twice",)), Event("nod", ""))
+    assert one == seen(Event("nod", ""), Event("wave", "left", more=("twice",)))
+    assert one.differences(seen(Event("nod", ""), Event("wave", "left"))) == {"done"}

@@ -1,0 +1,122 @@
+"""Candidates run in the same imagined worlds, and those that do the same are one cluster."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from codebotler.candidates.clusters import CandidateClusters, cluster_candidates, shared_rooms
+from codebotler.checking.sampled import CheckSettings
+from codebotler.rtl import parse
+from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.worker import Worker
+
+ROOMS = RoomMap(("hall", "kitchen", "lab"), "hall")
+NO_LAB = Rule("no-lab", "Never go to the lab.", parse('not tr.Exists(goto("lab"))'))
+
+LOOKS = """
+def task_program():
+    go_to("kitchen")
+    found = is_in_room("mug")
+    go_to("hall")
+    say("There is a mug" if found else "There is no mug")
+"""
+LOOKS_TOO = """
+def task_program():
+    start = get_current_location()
+    go_to("kitchen")
+    if is_in_room("the mug"):
+        text = "I found a mug."
+    else:
+        text = "I did not find a mug."
+    go_to(start)
+    say(text)
+"""
+GUESSES = 'def task_program():\n    go_to("kitchen")\n    go_to("hall")\n    say("There is a mug")\n'
+LOST = 'def task_program():\n    go_to("cellar")\n'
+ASKS = """
+def task_program():
+    go_to("kitchen")
+    likes = ask("{who}", "{question}", {options})
+    go_to("hall")
+    say("They like tea" if likes.lower() == "tea" else "They like coffee")
+"""
+TEA = ASKS.format(who="", question="What do you like?", options='["tea", "coffee"]')
+COFFEE = ASKS.format(who="person", question="Coffee or tea?", options='["Coffee", "Tea"]')
+
+
+@pytest.fixture(scope="module")
+def worker() -> Iterator[Worker]:
+    started = Worker()
+    cluster_candidates(started, [LOOKS], CheckSettings(), ROOMS)  # starts the processes
+    yield started
+    started.close()
+
+
+def grouped(
+    worker: Worker, *programs: str, rooms: RoomMap | None = ROOMS, rules: tuple[Rule, ...] = ()
+) -> CandidateClusters:
+    return cluster_candidates(worker, programs, CheckSettings(house_rules=rules), rooms)
+
+
+def test_programs_that_do_the_same_are_together_and_the_largest_cluster_is_first(worker: Worker) -> None:
+    found = grouped(worker, GUESSES, LOOKS, LOOKS_TOO, LOOKS_TOO)
+    assert [(one.size, one.programs) for one in found.clusters] == [(3, (LOOKS_TOO, LOOKS)), (1, (GUESSES,))]
+    assert (found.total, found.rejected) == (4, 0)
+
+
+def test_each_cluster_has_a_run_for_each_world(worker: Worker) -> None:
+    first, second = grouped(worker, LOOKS, GUESSES).clusters
+    assert len(first.samples) == len(second.samples) == len(first.behaviours) == len(second.behaviours)
+    assert [one.number for one in second.samples] == [*range(len(first.samples))]
+    assert any(one != other for one, other in zip(first.behaviours, second.behaviours, strict=True))
+    assert any(one == other for one, other in zip(first.behaviours, second.behaviours, strict=True))
+
+
+def test_an_answer_does_not_depend_on_the_words_of_the_question(worker: Worker) -> None:
+    found = grouped(worker, TEA, COFFEE)
+    assert [one.size for one in found.clusters] == [2]
+    said = {claims for one in found.clusters[0].behaviours for _, claims in one.said}
+    assert len(said) == 2, "both answers are tried"
+
+
+def test_further_worlds_try_facts_that_no_random_world_has(worker: Worker) -> None:
+    options = [f"{number} cups" for number in range(12)]
+    asks = f'def task_program():\n    say(ask("", "How many cups?", {options}))\n'
+    (found,) = grouped(worker, asks).clusters
+    assert len({one.said for one in found.behaviours}) == len(options)
+
+
+def test_rejected_candidates_are_dropped(worker: Worker) -> None:
+    found = grouped(worker, LOST, LOOKS, LOST)
+    assert [one.programs for one in found.clusters] == [(LOOKS,)]
+    assert found.rejected == 2
+
+
+@pytest.mark.slow
+def test_house_rules_reject_candidates(worker: Worker) -> None:
+    visits = 'def task_program():\n    go_to("lab")\n'
+    assert grouped(worker, visits, LOOKS).rejected == 0
+    assert grouped(worker, visits, LOOKS, rules=(NO_LAB,)).rejected == 1
+
+
+def test_the_first_candidate_is_kept_if_all_are_rejected(worker: Worker) -> None:
+    found = grouped(worker, LOST, "def task_program(:", "")
+    assert [(one.program, one.size) for one in found.clusters] == [(LOST, 1)]
+    assert found.rejected == 2
+
+
+def test_without_a_map_all_programs_share_the_rooms_that_they_name(worker: Worker) -> None:
+    drives = 'def task_program():\n    go_to("{}")\n    go_to(get_current_location())\n'
+    found = grouped(worker, drives.format("attic"), drives.format("the attic"), LOOKS, rooms=None)
+    assert sorted(one.size for one in found.clusters) == [1, 2]
+
+
+def test_a_program_that_lists_rooms_gets_two_of_each_kind() -> None:
+    lists = "def task_program():\n    for room in get_all_rooms():\n        go_to(room)\n"
+    maps = [RoomMap(rooms, "start_loc") for rooms in (("office", "start_loc"), ("the lab 1", "lab"))]
+    alone = shared_rooms(["def task_program():\n    pass"], maps, CheckSettings())
+    assert alone.rooms == ("office", "lab 1", "start_loc")
+    both = shared_rooms([lists], maps, CheckSettings())
+    assert both.rooms == ("office", "lab 1", "office 2", "lab 2", "start_loc")
+    assert both.start == "start_loc"

@@ -1,0 +1,128 @@
+"""The question is asked only if it pays, about the world that shows the difference best."""
+
+import pytest
+
+from codebotler.candidates.behaviour import behaviour_of
+from codebotler.candidates.clusters import CandidateCluster, CandidateClusters
+from codebotler.candidates.question import ClarifyingQuestion, describe_differences, question_about
+from codebotler.checking.problems import Sample
+from codebotler.core.errors import UserError
+from codebotler.core.trace import Event, Outcome, Status, Trace
+from codebotler.simulator.sampled_facts import Whereabouts
+
+MUG, NO_MUG = (Whereabouts("mug", "lab", is_there=there) for there in (True, False))
+CUP = Whereabouts("cup", "lab", is_there=True)
+
+
+def say(text: str, room: str = "hall") -> Event:
+    return Event("say", text, place=room)
+
+
+def drive(start: str, end: str) -> Event:
+    return Event("goto", end, place=start, destination=end)
+
+
+def cluster(size: int, name: str, *traces: Trace) -> CandidateCluster:
+    """Make a cluster from its run in each world. Each has a cup, and only the first one a mug."""
+    outcomes = [Outcome(Status.FINISHED, trace) for trace in traces]
+    samples = tuple(
+        Sample(number, one, (CUP, NO_MUG if number else MUG)) for number, one in enumerate(outcomes)
+    )
+    return CandidateCluster((name,), size, tuple(behaviour_of(one, "hall") for one in outcomes), samples)
+
+
+def asked(*clusters: CandidateCluster) -> ClarifyingQuestion:
+    question = question_about(CandidateClusters(clusters))
+    assert question is not None
+    return question
+
+
+ONE, TWO, THREE = ((say(f"{number} mugs"),) for number in (1, 2, 3))
+
+
+def test_no_question_about_one_behaviour() -> None:
+    assert question_about(CandidateClusters((cluster(4, "a", ONE),))) is None
+
+
+def test_no_question_if_one_behaviour_dominates() -> None:
+    other = cluster(2, "b", TWO)
+    assert question_about(CandidateClusters((cluster(6, "a", ONE), other))) is None
+    assert question_about(CandidateClusters((cluster(5, "a", ONE), other))) is not None
+
+
+def test_the_world_tells_the_most_options_apart() -> None:
+    question = asked(cluster(2, "a", ONE, ONE), cluster(2, "b", TWO, ONE), cluster(1, "c", TWO, TWO))
+    assert (question.sample, [one.program for one in question.options]) == (0, ["a", "b"])
+    question = asked(cluster(2, "a", ONE, ONE), cluster(2, "b", TWO, TWO), cluster(1, "c", TWO, THREE))
+    assert (question.sample, [one.program for one in question.options]) == (1, ["a", "b", "c"])
+
+
+def test_there_are_at_most_three_options_and_the_largest_ones() -> None:
+    four = (say("4 mugs"),)
+    question = asked(*(cluster(4 - n, str(n), run) for n, run in enumerate([ONE, TWO, THREE, four])))
+    assert [(one.program, one.size) for one in question.options] == [("0", 4), ("1", 3), ("2", 2)]
+    assert question.total == 10
+
+
+def test_a_shorter_storyboard_is_preferred() -> None:
+    look = Event("check", "mug", found=True, place="hall")
+    assert asked(cluster(1, "a", (look, *ONE), ONE), cluster(1, "b", TWO, TWO)).sample == 1
+
+
+def test_what_a_person_cares_about_is_preferred() -> None:
+    waves = (Event("wave", "left", place="hall"),)
+    assert asked(cluster(1, "a", waves, (*ONE, *ONE)), cluster(1, "b", (), TWO)).sample == 1
+
+
+def test_only_facts_that_matter_are_shown() -> None:
+    one, other = cluster(1, "a", ONE, ONE), cluster(1, "b", TWO, ONE)
+    assert asked(one, other).facts == (MUG.sentence,)
+    always = [cluster(1, name, run, run) for name, run in (("a", ONE), ("b", TWO))]
+    assert asked(*always).facts == (CUP.sentence, MUG.sentence), "all facts if the options differ everywhere"
+
+
+def test_options_show_their_steps_in_the_world() -> None:
+    first, _ = asked(cluster(1, "a", ONE), cluster(1, "b", TWO)).options
+    assert [(step["kind"], step["text"]) for step in first.steps] == [("say", "1 mugs")]
+
+
+def described(*traces: Trace) -> list[str]:
+    made = [cluster(1, "a", trace) for trace in traces]
+    return describe_differences([one.samples[0] for one in made], [one.behaviours[0] for one in made])
+
+
+def test_sentences_say_only_what_differs() -> None:
+    greets = drive("hall", "lab"), say("Hello", "lab"), drive("lab", "hall")
+    assert described((*greets, *ONE), greets) == [
+        'says "1 mugs" in hall',
+        "says nothing in hall",
+    ]
+    assert described((drive("hall", "lab"),), ()) == ["ends in lab", "stays where it is"]
+
+
+def test_sentences_of_three_options_tell_all_of_them_apart() -> None:
+    rooms = ["hall", *(f"room {number}" for number in range(5))]
+    drives = map(drive, rooms, [*rooms[1:], "hall"])
+    many = tuple(event for one in drives for event in (say("Hi", one.place), one))
+    sentences = described(many, (), (drive("hall", "lab"),))
+    assert len({*sentences}) == 3
+
+
+@pytest.mark.parametrize(
+    ("line", "program"), [("1", "a"), (" 2 \n", "b"), ("none", None), ("None of these.", None)]
+)
+def test_answers_choose_an_option_or_none(line: str, program: str | None) -> None:
+    question = asked(cluster(2, "a", ONE), cluster(1, "b", TWO))
+    chosen = question.chosen(question.parse(line))
+    assert (None if chosen is None else chosen.program) == program
+
+
+def test_you_decide_means_the_most_frequent_behaviour() -> None:
+    question = asked(cluster(2, "a", ONE), cluster(1, "b", TWO))
+    assert question.chosen(question.parse("You decide")) == question.options[0]
+
+
+@pytest.mark.parametrize("line", ["", "0", "3", "-1", "yes", "1 2"])
+def test_other_lines_are_no_answers(line: str) -> None:
+    with pytest.raises(UserError, match="write 1, 2, none, or you decide"):
+        asked(cluster(2, "a", ONE), cluster(1, "b", TWO)).parse(line)

@@ -1,0 +1,143 @@
+"""`--candidates` takes the most frequent behaviour, or asks the person which one is meant."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+import command_line
+from codebotler.checking.sampled import CheckSettings
+from codebotler.cli.candidates import CandidateSearch, choose_candidate, line_reader
+from codebotler.core.errors import UserError
+from codebotler.generation.generate import Attempt
+from codebotler.generation.no_program import describe_programless
+from codebotler.models.base import Reply, Usage
+from codebotler.models.recorded import open_recorded
+from codebotler.models.sampling import SamplingSettings
+from codebotler.prompts import prompt_for
+from command_line import Ended, Refusal, command
+from roboeval.suites.load import Suite
+
+SAYS = 'def task_program():\n    say("{} mugs")\n'
+ONE, TWO = SAYS.format(1), SAYS.format(2)
+STAPLER = next(one for one in open_recorded("recorded").replies if one.startswith("Check every printer"))
+
+
+def attempt(program: str, number: int) -> Attempt:
+    reply = Reply(program, program, Usage(), None, "stop", no_program=None if program else "no-code")
+    none = describe_programless(reply, SamplingSettings())
+    return Attempt(number, prompt_for("Count the mugs."), reply, (), none)
+
+
+class Terminal:
+    """A person who answers with the given lines, and a model that writes the given programs."""
+
+    def __init__(self, programs: Sequence[str], *lines: str) -> None:
+        self.programs, self.lines = programs, list(lines)
+        self.instructions: list[str] = []
+        self.asked: list[str] = []
+
+    def request(self, instruction: str) -> list[Attempt]:
+        self.instructions.append(instruction)
+        return [attempt(program, number) for number, program in enumerate(self.programs)]
+
+    def read(self, question: str) -> str:
+        self.asked.append(question)
+        return self.lines.pop(0)
+
+    def chosen(self, *, asks: bool = True) -> tuple[str, str] | None:
+        search = CandidateSearch(self.request, CheckSettings(), None, self.read if asks else None)
+        return choose_candidate(search, "Count the mugs.")
+
+
+def test_without_a_terminal_the_largest_cluster_is_taken(capsys: pytest.CaptureFixture[str]) -> None:
+    person = Terminal([TWO, ONE, ONE])
+    assert person.chosen(asks=False) == ("Count the mugs.", ONE)
+    assert "2 of 3 programs" in capsys.readouterr().err
+
+
+def test_nothing_is_asked_if_all_do_the_same() -> None:
+    person = Terminal([ONE, ONE])
+    assert person.chosen() == ("Count the mugs.", ONE)
+    assert person.asked == []
+
+
+def test_the_person_chooses_an_option(capsys: pytest.CaptureFixture[str]) -> None:
+    person = Terminal([ONE, ONE, TWO], "5\n", "2\n")
+    assert person.chosen() == ("Count the mugs.", TWO)
+    assert len(person.asked) == 2, "the question is repeated after an unusable line"
+    shown = capsys.readouterr()
+    assert 'says "2 mugs"' in shown.err
+    assert shown.out == "", "standard output is for the program"
+
+
+def test_none_of_these_adds_a_sentence_for_a_second_round() -> None:
+    person = Terminal([ONE, TWO], "none\n", "Only clean ones.\n", "1\n")
+    assert person.chosen() == ("Count the mugs. Only clean ones.", ONE)
+    assert person.instructions == ["Count the mugs.", "Count the mugs. Only clean ones."]
+
+
+def test_there_is_no_third_round() -> None:
+    person = Terminal([ONE, TWO], "none\n", "Only clean ones.\n", "none\n")
+    assert person.chosen() is None
+    assert len(person.instructions) == 2
+
+
+def test_the_person_may_give_up() -> None:
+    person = Terminal([ONE, TWO], "none\n", "\n")
+    assert person.chosen() is None
+    assert len(person.instructions) == 1
+
+
+def test_the_end_of_the_input_is_no_answer() -> None:
+    with pytest.raises(UserError, match="--yes"):
+        Terminal([ONE, TWO], "").chosen()
+
+
+def test_replies_without_a_program_do_not_count() -> None:
+    assert Terminal(["", "", ONE]).chosen() == ("Count the mugs.", ONE)
+    assert Terminal(["", ""]).chosen() is None
+
+
+def test_nobody_is_asked_without_a_terminal() -> None:
+    assert line_reader(is_allowed=True) is None
+
+
+def codebotler(*words: str, cwd: Path) -> Ended:
+    return command("codebotler", *words, cwd=cwd)
+
+
+def refused(*words: str | Path) -> Refusal:
+    return command_line.refused(*words, name="codebotler")
+
+
+@pytest.mark.slow
+def test_generate_prints_the_chosen_program(tmp_path: Path, paper: Suite) -> None:
+    words = "generate", paper.tasks["FindBackpack"].prompts[0], "--model", "recorded:hasty"
+    ended = codebotler(*words, "--candidates", "6", "--record", "all.jsonl", cwd=tmp_path)
+    assert ended.status == 0
+    assert ended.out.startswith("def task_program")
+    assert "the check rejected 4" in ended.err
+    assert len((tmp_path / "all.jsonl").read_text().splitlines()) == 6
+
+
+@pytest.mark.slow
+def test_run_runs_the_chosen_program(tmp_path: Path) -> None:
+    (tmp_path / "world.yaml").write_text(
+        "robot: start_loc\nrooms: [start_loc, printer room 1]\nobjects: {printer room 1: [stapler]}\n"
+    )
+    words = "run", STAPLER, "--model", "recorded:hasty", "--world", "world.yaml", "--speed", "1000"
+    ended = codebotler(*words, "--candidates", "3", "--yes", cwd=tmp_path)
+    assert ended.status == 0
+    assert "3 of 3 programs" in ended.err
+    assert "stapler" in ended.out
+
+
+def test_candidates_of_a_program_make_no_sense(tmp_path: Path) -> None:
+    (tmp_path / "program.py").write_text(ONE)
+    assert "instruction" in refused("run", tmp_path / "program.py", "--candidates", "3").sentence
+
+
+@pytest.mark.parametrize("more", [("--retries", "1"), ("--repair",)])
+def test_candidates_and_repairs_exclude_each_other(more: tuple[str, ...]) -> None:
+    assert "--candidates" in refused("generate", STAPLER, "--candidates", "3", *more).sentence

@@ -1,0 +1,139 @@
+"""A session asks which of several programs a person means, and keeps the answer with the mission."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from codebotler.cli.run import checker
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.world import Room, World
+from codebotler.missions.log import MissionState, MissionSummary, read_events
+from codebotler.missions.mission import MissionError
+from codebotler.missions.session import MissionSession
+from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.models.base import Reply, TextListener, Usage, ignore_text
+from codebotler.models.sampling import SamplingSettings
+from codebotler.prompts import Prompt
+from codebotler.robots.simulated import Simulated
+
+HOUSE = World((Room("hall"), Room("kitchen", ("mug",))), "hall")
+STAY = 'def task_program():\n    say("hello")\n'
+GO = 'def task_program():\n    go_to("kitchen")\n    say("hello")\n'
+FETCH = 'def task_program():\n    go_to("kitchen")\n    pick("mug")\n    go_to("hall")\n    place("mug")\n'
+
+
+class Several:
+    """A model that writes one program after another."""
+
+    name = "several"
+    settings = SamplingSettings()
+
+    def __init__(self, programs: Sequence[str]) -> None:
+        self.programs, self.prompts = programs, list[Prompt]()
+
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
+        self.prompts.append(prompt)
+        program = self.programs[number]
+        on_text(program)
+        return Reply(program, program, Usage(), None, "stop", no_program=None if program else "no-code")
+
+    async def close(self) -> None:
+        """Do nothing."""
+
+
+@contextmanager
+def asking(home: Path, *programs: str, asks: bool = True) -> Iterator[tuple[MissionSession, Several]]:
+    model = Several(programs)
+    session = MissionSession(
+        Simulated(HOUSE, speed=None),
+        home,
+        MissionOrder("Do it.", "several", candidates=len(programs), asks=asks),
+        open_model=lambda _: model,
+        check=checker(SKILLS),
+    )
+    session.start()
+    try:
+        yield session, model
+    finally:
+        session.stop("the test")
+        session.join(10)
+
+
+def waited(session: MissionSession) -> SessionView:
+    return session.wait_until(
+        lambda view: view.waits_for_answer or view.may_be_approved or view.waits_for_program
+    )
+
+
+def notes(home: Path, view: SessionView) -> list[str]:
+    folder = home / "missions" / view.id
+    return [line["text"] for line in read_events(folder) if line["event"] == "log"]
+
+
+@pytest.mark.parametrize(("answer", "program"), [(0, STAY), (1, FETCH), ("decide", STAY)])
+def test_a_person_chooses_and_the_mission_keeps_the_answer(tmp_path: Path, answer: int, program: str) -> None:
+    with asking(tmp_path, STAY, FETCH, STAY) as (session, _):
+        view = waited(session)
+        assert view.phase == "question"
+        assert view.question is not None
+        assert [option.size for option in view.question.options] == [2, 1]
+        difference = view.question.chosen(answer)
+        session.answer(answer)  # type: ignore[arg-type]  # a position or a word
+        view = waited(session)
+        assert (view.program, view.question, view.author) == (program, None, "several")
+        assert view.may_be_approved
+        assert difference is not None
+        assert any(difference.difference in note for note in notes(tmp_path, view))
+
+
+def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_path: Path) -> None:
+    with asking(tmp_path, STAY, FETCH) as (session, model):
+        waited(session)
+        session.answer("none", "But  quietly.")
+        view = session.wait_until(lambda now: now.waits_for_answer)
+        assert view.instruction == "Do it. But quietly."
+        assert model.prompts[-1].instruction == "Do it. But quietly."
+        session.answer("none", "And fast.")
+        view = session.wait_until(lambda now: now.is_over or now.state is MissionState.FAILED)
+        assert view.state is MissionState.FAILED
+        summary = MissionSummary.read(tmp_path / "missions" / view.id)
+        assert summary.instruction == "Do it. But quietly."
+
+
+def test_nobody_is_asked_if_all_do_the_same_or_nobody_can_answer(tmp_path: Path) -> None:
+    with asking(tmp_path, STAY, STAY) as (session, _):
+        assert waited(session).program == STAY
+    with asking(tmp_path, FETCH, STAY, STAY, asks=False) as (session, _):
+        view = waited(session)
+        assert view.program == STAY
+        assert view.remarks
+
+
+def test_wrong_answers_are_refused(tmp_path: Path) -> None:
+    with asking(tmp_path, STAY, FETCH) as (session, _):
+        waited(session)
+        with pytest.raises(MissionError):
+            session.answer(2)
+        with pytest.raises(MissionError):
+            session.answer(-1)
+        session.answer(0)
+        with pytest.raises(MissionError):
+            session.answer(0)
+
+
+def test_a_stop_ends_the_question(tmp_path: Path) -> None:
+    with asking(tmp_path, STAY, FETCH) as (session, _):
+        waited(session)
+        session.stop("the test")
+        assert session.wait_until(lambda _: False).state is MissionState.STOPPED
+
+
+def test_replies_without_a_program_do_not_count(tmp_path: Path) -> None:
+    with asking(tmp_path, "", GO) as (session, _):
+        assert waited(session).program == GO
+    with asking(tmp_path, "", "") as (session, _):
+        assert waited(session).waits_for_program

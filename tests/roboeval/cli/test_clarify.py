@@ -1,0 +1,46 @@
+"""`roboeval clarify` prints a table, or JSON for machines."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from command_line import refused, roboeval
+
+GREETS = 'def task_program():\n    say("good day")\n'
+SILENT = "def task_program():\n    pass\n"
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    rows = [
+        {"task": "SayGoodDay", "prompt": prompt, "index": index, "program": (GREETS, SILENT)[index % 2]}
+        for prompt in (0, 1)
+        for index in range(4)
+    ]
+    path = tmp_path / "completions.jsonl"
+    path.write_text("".join(f"{json.dumps(row)}\n" for row in rows))
+    return path
+
+
+@pytest.mark.slow
+def test_json_has_the_shares_overall_and_for_each_prompt(source: Path) -> None:
+    ended = roboeval("clarify", source, "--candidates", "4", "--workers", "1", "--json")
+    assert ended.status == 0
+    data = json.loads(ended.out)
+    names = {"one", "majority", "question", "asked", "mattered"}
+    assert names <= data.keys()
+    assert [(one["task"], one["prompt"]) for one in data["prompts"]] == [("SayGoodDay", 0), ("SayGoodDay", 1)]
+    assert all(names <= one.keys() for one in data["prompts"])
+    assert (data["asked"], data["candidates"], data["noise"], data["seed"]) == (1.0, 4, 0.0, 0)
+
+
+@pytest.mark.slow
+def test_the_table_has_a_row_for_each_prompt(source: Path) -> None:
+    ended = roboeval("clarify", source, "--candidates", "4", "--workers", "1")
+    assert ended.status == 0
+    assert ended.out.count("SayGoodDay") == 2
+
+
+def test_too_few_completions(source: Path) -> None:
+    assert "--candidates" in refused("clarify", source, "--workers", "1").sentence
