@@ -65,6 +65,11 @@ class ClarifyingQuestion:
     total: int
     sample: int
 
+    @property
+    def rejections(self) -> list[str]:
+        """Sentences for a model about what a person did not mean by any option."""
+        return [f"the person did not mean a robot that {one.difference}" for one in self.options]
+
     def chosen(self, answer: ClarifyingAnswer) -> CandidateOption | None:
         """Return the option that an answer means, or None for none of them."""
         if answer == "none":

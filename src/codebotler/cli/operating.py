@@ -214,6 +214,7 @@ def serve_page(
     no_token: options.NoTokenOption = False,
     model: options.ModelsOption = None,
     base_url: options.BaseUrlOption = None,
+    candidates: options.CandidatesOption = 1,
     face: Annotated[
         bool, typer.Option("--face", help="Let the robot speak and ask questions on a separate page, /face.")
     ] = False,
@@ -253,7 +254,15 @@ def serve_page(
     body = open_robot(kind, settings) if shown is None else open_with_face(kind, settings, shown)
     tell_missing(body)
     console = Console(
-        body, home(), opened, models=models, world=settings.world, face=shown, rules=rules, within=allowed
+        body,
+        home(),
+        opened,
+        models=models,
+        world=settings.world,
+        face=shown,
+        rules=rules,
+        within=allowed,
+        candidates=candidates,
     )
     serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
 

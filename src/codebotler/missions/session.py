@@ -76,7 +76,7 @@ class MissionSession:
         self._lock = threading.Condition()  # held briefly, never while calling the mission
         self._checked: Contract | None = None  # of the last checked program
         self._editing = threading.Lock()  # held while the program is replaced or approved
-        self._has_added = False  # whether a person has added a sentence to the instruction
+        self._rejected: ClarifyingQuestion | None = None  # whose options a person did not mean
         self._view = SessionView(
             number,
             instruction=order.instruction,
@@ -302,6 +302,8 @@ class MissionSession:
         self._show(**_UNCHECKED | writing, program="", reply="", error="")
         try:
             prompt = prompt_of(before, self._robot, repair=repair)
+            if self._rejected is not None and not repair:
+                prompt = prompt.after(self._rejected.options[0].program, self._rejected.rejections)
             author, attempts = self._author.write(prompt, count, self._add_to_reply)
         except asyncio.CancelledError:
             self._restore(before)
@@ -344,10 +346,10 @@ class MissionSession:
         if option is not None:
             mission.note(f"a person chose what the robot should do: {option.difference}")
             self._take(mission, option.program)
-        elif not more or self._has_added:
+        elif not more or self._rejected is not None:
             mission.fail("no program does what was meant")
         else:
-            self._has_added = True
+            self._rejected = question
             mission.extend_instruction(more)
             self._show(instruction=mission.summary.instruction)
             self._ask(mission, repair=False)

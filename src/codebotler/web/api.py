@@ -56,6 +56,17 @@ class Approval(_Form):
     despite_problems: bool = False
 
 
+class AnswerForm(_Form):
+    """An answer to the question which of several behaviours is meant."""
+
+    answer: Annotated[int, Field(ge=1)] | Literal["none", "decide"] = Field(
+        description="The number of an option, from 1; `none` of them; or `decide` to take the most frequent."
+    )
+    more: Annotated[str, Field(max_length=10_000)] = Field(
+        "", description="With `none`: what to add to the instruction."
+    )
+
+
 class AskAgainForm(_Form):
     """A request for another program."""
 
@@ -151,6 +162,14 @@ def _add_changes(api: APIRouter, console: Console) -> None:
         session = _current_session(console, mission)
         with as_http_errors():
             session.ask_again(repair=again.repair, max_tokens=again.max_tokens or None)
+        return view_data(session.view)
+
+    @api.post("/missions/{mission}/answer", status_code=202)
+    def answer(mission: str, given: AnswerForm) -> dict[str, Any]:
+        """Say which of the behaviours in `question` is meant."""
+        session = _current_session(console, mission)
+        with as_http_errors():
+            session.answer(given.answer if isinstance(given.answer, str) else given.answer - 1, given.more)
         return view_data(session.view)
 
     @api.post("/missions/{mission}/approve")
@@ -252,6 +271,7 @@ def view_data(view: SessionView) -> dict[str, Any]:
         "digest": view.digest,
         "is_written": view.is_written,
         "no_program": None if view.programless is None else asdict(view.programless),
+        "question": None if view.question is None else asdict(view.question),
         "problems": list(view.problems),
         "unknown_rooms": list(view.unknown_rooms),
         "remarks": list(view.remarks),

@@ -52,8 +52,10 @@ class Console:
         face: Face | None = None,
         rules: tuple[Rule, ...] = (),
         within: Contract | None = None,
+        candidates: int = 1,
     ) -> None:
         self.robot, self.home, self.models, self.world = robot, home, tuple(models), world
+        self.candidates = candidates
         self.notifier, self.face, self.rules, self.within = Notifier(), face, rules, within
         if face is not None:
             face.changed = self.notifier.change
@@ -96,7 +98,8 @@ class Console:
     def begin(self, order: MissionOrder) -> MissionSession:
         """Begin a mission, by default with the first model. Raise MissionError while another mission runs."""
         model = order.model.strip() or ("" if order.has_program else self.models[0])
-        order = replace(order, instruction=order.instruction.strip(), model=model)
+        count = 1 if order.has_program else self.candidates
+        order = replace(order, instruction=order.instruction.strip(), model=model, candidates=count)
         for text in (order.instruction, order.program):
             _check_length(text)
         with self._lock:

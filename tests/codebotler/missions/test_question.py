@@ -82,7 +82,7 @@ def test_a_person_chooses_and_the_mission_keeps_the_answer(tmp_path: Path, answe
         assert view.question is not None
         assert [option.size for option in view.question.options] == [2, 1]
         difference = view.question.chosen(answer)
-        session.answer(answer)  # type: ignore[arg-type]  # a position or a word
+        session.answer(answer)
         view = waited(session)
         assert (view.program, view.question, view.author) == (program, None, "several")
         assert view.may_be_approved

@@ -22,6 +22,7 @@ from codebotler.missions.view import SessionView
 from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.frame import Button, PlainText, script, scroll_up, warn
+from codebotler.web.panes.candidates import CandidatesPane
 from codebotler.web.panes.contract import ContractPane
 from codebotler.web.panes.reply import ReplyPane
 from codebotler.web.panes.rules import RulesPane
@@ -49,6 +50,7 @@ class ProgramPane:
                 PlainText("h2", "Program").props("id=h-program")
                 self._busy = PlainText("span", "", "busy").props("role=status")
             self._reply = ReplyPane()
+            self._candidates = CandidatesPane(console)
             self._writer = PlainText("p", "", "quiet")
             # Only the script changes the editor: updating a property would overwrite text being typed.
             self._editor = ui.codemirror("", language="Python", line_wrapping=False).classes("editor")
@@ -82,6 +84,8 @@ class ProgramPane:
         shown = _for_editor(view.arriving.code if view.is_written else view.program)
         self._send(view, shown)
         self._reply.show(view)
+        self._candidates.show(view)
+        self._editor.set_visibility(not view.waits_for_answer)
         self._busy.say(f"{view.busy} …" if view.busy and not view.is_over else "")
         self._writer.say(_author_text(view) if view.program and not view.is_written else "")
         self._show_verdict(view)

@@ -24,6 +24,7 @@ _PHASE_HEADLINES: Mapping[Phase, str] = {
     "writing": "Writing the program",
     "checking": "Checking the program",
     "no-program": "No program yet",
+    "question": "Which did you mean?",
     MissionState.CHECKED: "Ready: waiting for your approval",
     MissionState.APPROVED: "Starting",
 }

@@ -1,0 +1,75 @@
+"""The pane that asks which of several behaviours a person means."""
+
+from __future__ import annotations
+
+import asyncio
+
+from nicegui import ui
+
+from codebotler.candidates.question import CandidateOption, ClarifyingAnswer, ClarifyingQuestion
+from codebotler.core.terminal import shortened
+from codebotler.core.words import counted, listed
+from codebotler.missions.mission import MissionError
+from codebotler.missions.view import SessionView
+from codebotler.web.console import Console
+from codebotler.web.frame import Button, PlainText, warn
+from codebotler.web.storyboard import draw_scene, scenes
+
+_MAX_DIFFERENCE, _MAX_SENTENCE = 400, 500
+
+
+class CandidatesPane:
+    """Shows a storyboard for each behaviour, side by side, while a mission waits for an answer."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._drawn: ClarifyingQuestion | None = None
+        self._box = ui.element("div").classes("which")
+        self._box.set_visibility(False)
+
+    def show(self, view: SessionView) -> None:
+        """Update the pane for a view."""
+        question = view.question if view.waits_for_answer else None
+        self._box.set_visibility(question is not None)
+        if question is not self._drawn:
+            self._drawn = question
+            self._box.clear()
+            with self._box:
+                if question is not None:
+                    self._draw(question)
+
+    def _draw(self, question: ClarifyingQuestion) -> None:
+        PlainText("h3", "Which did you mean?")
+        if question.facts:
+            facts = listed([*map(shortened, question.facts)])
+            PlainText("p", f"The programs differ. Suppose that {facts}:", "world")
+        with ui.element("div").classes("cards"):
+            for number, option in enumerate(question.options):
+                with ui.element("article").classes("card"):
+                    self._draw_option(question, option, number)
+        more = ui.input("What should be different?").props(f"outlined maxlength={_MAX_SENTENCE}")
+        with ui.element("div").classes("others"):
+            Button("None of these", lambda: self._answer("none", more.value or ""), "plain")
+            Button("You decide", lambda: self._answer("decide"), "plain")
+
+    def _draw_option(self, question: ClarifyingQuestion, option: CandidateOption, number: int) -> None:
+        PlainText("p", f"{number + 1}. {shortened(option.difference, _MAX_DIFFERENCE)}", "difference")
+        PlainText("small", f"{option.size} of {counted(question.total, 'program')}", "quiet")
+        if option.steps:
+            with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
+                for scene in scenes(option.steps, option.steps[0]["place"]):
+                    draw_scene(scene)
+        else:
+            PlainText("p", "The robot does nothing.")
+        button = Button("This one", lambda: self._answer(number), "go")
+        button.props(f'aria-label="This one: option {number + 1}"')
+
+    async def _answer(self, answer: ClarifyingAnswer, more: str = "") -> None:
+        session = self._console.session
+        if answer == "none" and not more.strip():
+            warn("Say what should be different, or stop the mission.")
+        elif session is not None:
+            try:
+                await asyncio.to_thread(session.answer, answer, more)
+            except MissionError as error:
+                warn(error.sentence)
