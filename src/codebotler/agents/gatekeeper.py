@@ -140,6 +140,7 @@ class Gatekeeper:
             remarks=[*view.unknown_rooms, *view.remarks],
             events=[text for text in map(event_text, events[after:]) if text],
             event_count=len(events),
+            done_before=[] if view.past is None else view.past.steps,
             is_over=view.is_over,
             next=self._next(view),
         )

@@ -52,6 +52,7 @@ class MissionReport(_Report):
     event_count: int = Field(description="Pass this as `after` to see only later events.")
     is_over: bool
     next: str = Field(description="What can be done now.")
+    done_before: list[str] = Field(default=[], description="What a mission that this one continues has done.")
     steps: str = Field(default="", description="From begin_steps: the key for call_skill and end_steps.")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import aclosing, contextmanager, suppress
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import anyio
 from mcp.server.elicitation import AcceptedElicitation, CancelledElicitation, ElicitationResult
@@ -20,6 +20,8 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.missions.authoring import ModelAuthor, prompt_of
 from codebotler.missions.mission import MissionError
+from codebotler.missions.past import MissionPast
+from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.missions.wording import event_text
@@ -48,6 +50,16 @@ class NotAsked(Consent):
     """The answer to a question that nobody was asked."""
 
     approve: bool = False
+
+
+class StepWord(BaseModel):
+    """The form in which a client asks its person about an unsure step."""
+
+    answer: Literal["it happened", "it did not happen"] = Field(title="Did this happen?")
+
+
+class NoWord(StepWord):
+    """The answer to a question about a step that nobody was asked."""
 
 
 def read_robot(ctx: AgentContext) -> RobotReport:
@@ -114,6 +126,49 @@ async def propose_mission(
     with _as_tool_errors():
         author = _name(ctx) if program.strip() else ""
         session = gatekeeper.propose(MissionOrder(instruction, program=program, author=author))
+    return await _prepared(gatekeeper, session)
+
+
+async def _read_past(ctx: AgentContext) -> MissionPast:
+    console = _gatekeeper(ctx).console
+    with _as_tool_errors():
+        if console.view.past is not None and not console.view.is_over:
+            return console.view.past
+        return await asyncio.to_thread(console.past_of, "last")
+
+
+async def _ask_whether(
+    past: Annotated[MissionPast, Resolve(_read_past)], ctx: AgentContext
+) -> Elicit[StepWord] | NoWord:
+    """Have the client ask its person whether an unsure step happened, beside what the robot says."""
+    gatekeeper = _gatekeeper(ctx)
+    if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
+        return NoWord(answer="it did not happen")
+    robot, home = gatekeeper.console.robot, gatekeeper.console.home
+    evidence = await asyncio.to_thread(ask_evidence, robot, home, past, ignore_text)
+    return Elicit("\n".join((past.question, *evidence)), StepWord)
+
+
+async def continue_mission(
+    ctx: AgentContext,
+    past: Annotated[MissionPast, Resolve(_read_past)],
+    answer: Annotated[ElicitationResult[StepWord], Resolve(_ask_whether)],
+    program: Annotated[str, Field(description="The rest; if empty, CodeBotler's model writes it.")] = "",
+) -> MissionReport:
+    """Propose the rest of the last mission, which failed or was stopped. The robot does not move.
+
+    `done_before` lists what the robot has done, which the rest must not repeat. Then call run_mission.
+    """
+    gatekeeper = _gatekeeper(ctx)
+    with _as_tool_errors():
+        if isinstance(answer, AcceptedElicitation) and not isinstance(answer.data, NoWord):
+            past = past.resolve(happened=answer.data.answer == "it happened")
+        if past.unsure is not None:
+            raise UserError(f"{past.question}; a person must say so, on the page {gatekeeper.page}")
+        if not program.strip() and not past.instruction:
+            raise UserError("this mission has no instruction; send a program for the rest")
+        author = _name(ctx) if program.strip() else ""
+        session = gatekeeper.propose(gatekeeper.console.rest_of(past, program, author))
     return await _prepared(gatekeeper, session)
 
 
@@ -235,6 +290,7 @@ async def stop(ctx: AgentContext) -> MissionReport:
 READING: Sequence[Callable[..., object]] = (read_robot, check_program, follow_mission, write_program)
 ACTING: Sequence[Callable[..., object]] = (
     propose_mission,
+    continue_mission,
     begin_steps,
     run_mission,
     call_skill,

@@ -214,6 +214,7 @@ def serve_page(
         typer.Option(min=1, help="Stop the robot this many seconds after the last page is closed."),
     ] = None,
     runs: Annotated[Path, typer.Option(help="The folder that contains benchmark runs.")] = Path("runs"),
+    recover: options.RecoverOption = 0,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Serve the web page for operating a robot.
@@ -241,7 +242,15 @@ def serve_page(
     body = open_robot(kind, settings) if shown is None else open_with_face(kind, settings, shown)
     tell_missing(body)
     console = Console(
-        body, home(), opened, models=models, world=settings.world, face=shown, rules=rules, within=allowed
+        body,
+        home(),
+        opened,
+        models=models,
+        world=settings.world,
+        face=shown,
+        rules=rules,
+        within=allowed,
+        recoveries=recover,
     )
     serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
 

@@ -7,7 +7,7 @@ import json
 import logging
 from collections.abc import Callable, Coroutine, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from mcp import Client
@@ -30,6 +30,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.simulator.house_rule import Rule
 from codebotler.web.console import Console
 from doubles import Answering, raising
+from ended import cut, failed_mission, line_of
 
 WORLD = World((Room("hall"), Room("kitchen"), Room("vault")), "hall")
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
@@ -142,7 +143,7 @@ def test_every_tool_has_a_description_and_typed_arguments_and_none_approves(gate
         tools = {tool.name: tool for tool in (await agent.client.list_tools()).tools}
         assert {*tools} == {
             *("read_robot", "check_program", "write_program", "propose_mission", "begin_steps"),
-            *("run_mission", "follow_mission", "call_skill", "end_steps", "stop"),
+            *("continue_mission", "run_mission", "follow_mission", "call_skill", "end_steps", "stop"),
         }
         for tool in tools.values():
             assert len(tool.description or "") > 60
@@ -716,3 +717,86 @@ def test_a_program_that_a_person_put_in_place_of_the_steps_runs_instead(tmp_path
 
     with gatekeeper.console:
         use(gatekeeper, act)
+
+
+# --- the rest of a mission
+
+
+def left(home: Path, skill: str, event: str, instruction: str = "") -> None:
+    """Leave a mission of another process that ended at this event."""
+    program = "def task_program():\n    say('hello')\n    go_to('cellar')\n"
+    folder = failed_mission(home, program, WORLD, instruction)
+    cut(folder, line_of(folder, skill, event))
+
+
+def test_an_agent_proposes_the_rest_and_learns_what_was_done(gatekeeper: Gatekeeper, tmp_path: Path) -> None:
+    left(tmp_path, "say", "result")
+
+    async def act(agent: Agent) -> None:
+        assert "program" in await agent.fails("continue_mission")
+        found = await agent.call("continue_mission", program=HELLO)
+        assert (found["state"], len(found["done_before"])) == ("checked", 1)
+        assert gatekeeper.console.view.state is MissionState.CHECKED
+        assert gatekeeper.console.view.past is not None
+        repeated = await agent.call("continue_mission", program=HELLO.replace("    go_to('kitchen')\n", ""))
+        assert (found["check"]["accepted"], repeated["check"]["accepted"]) == (True, False)
+
+    use(gatekeeper, act)
+
+
+def test_no_model_is_asked_for_the_rest_unless_one_is_configured(
+    gatekeeper: Gatekeeper, tmp_path: Path
+) -> None:
+    left(tmp_path, "say", "result", "Say hello.")
+
+    async def act(agent: Agent) -> None:
+        assert "model" in await agent.fails("continue_mission")
+
+    use(gatekeeper, act)
+
+
+@pytest.mark.parametrize(
+    ("action", "content", "steps"),
+    [
+        ("accept", {"answer": "it happened"}, 1),
+        ("accept", {"answer": "it did not happen"}, 0),
+        ("decline", None, None),
+        ("cancel", None, None),
+    ],
+)
+def test_a_person_says_in_the_dialog_whether_a_step_happened(
+    gatekeeper: Gatekeeper,
+    tmp_path: Path,
+    action: Literal["accept", "decline", "cancel"],
+    content: dict[str, Any] | None,
+    steps: int | None,
+) -> None:
+    left(tmp_path, "say", "skill")
+    asked: list[str] = []
+
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+        asked.append(params.message)
+        return ElicitResult(action=action, content=content)
+
+    async def act(agent: Agent) -> None:
+        if steps is None:
+            assert gatekeeper.page in await agent.fails("continue_mission", program=HELLO)
+        else:
+            found = await agent.call("continue_mission", program=HELLO)
+            assert len(found["done_before"]) == steps
+
+    gatekeeper.asks_client = True
+    use(gatekeeper, act, answer=answer)
+    assert len(asked) == 1
+    assert "hello" in asked[0]
+    assert "hall" in asked[0]
+
+
+def test_without_a_dialog_a_person_must_answer_on_the_page(gatekeeper: Gatekeeper, tmp_path: Path) -> None:
+    left(tmp_path, "say", "skill")
+
+    async def act(agent: Agent) -> None:
+        assert gatekeeper.page in await agent.fails("continue_mission", program=HELLO)
+        assert gatekeeper.console.session is None
+
+    use(gatekeeper, act)
