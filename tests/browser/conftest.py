@@ -24,6 +24,8 @@ SECONDS = 60.0  # a busy machine is no fault of the page
 
 
 ONLY_FOR_SHOTS = {
+    *("test_continue[desk-dark]", "test_continue[tablet-light]", "test_continue[tablet-dark]"),
+    *("test_continue[desk-light]", "test_continue[phone-light]"),
     *(
         "test_pages[desk-dark]",
         "test_pages[tablet-light]",

@@ -10,6 +10,7 @@ from PIL import Image
 
 CHOSEN = {
     "checked-desk-light": "checked-desk-light.png",
+    "continue-desk-light": "continue-desk-light.png",
     "running-desk-light": "running-desk-light.png",
     "running-desk-dark": "running-desk-dark.png",
     "operator-asked-desk-light": "operator-asked-desk-light.png",

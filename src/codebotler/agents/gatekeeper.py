@@ -155,6 +155,7 @@ class Gatekeeper:
             remarks=[*view.unknown_rooms, *view.remarks],
             events=[text for text in map(event_text, events[after:]) if text],
             event_count=len(events),
+            done_before=[] if view.past is None else view.past.steps,
             is_over=view.is_over,
             next=self._next(view),
         )
@@ -178,6 +179,8 @@ class Gatekeeper:
             return "This mission is over; propose another." if view.number else "Propose a mission."
         if view.is_running:
             return "Follow the mission with follow_mission, or call its skills; stop stops the robot."
+        if view.waits_for_answer:
+            return "The person must choose between behaviours: call choose_behaviour, or they use the page."
         if not view.may_be_approved:
             return view.error or "The program is not ready: call follow_mission, or propose another one."
         if not view.can_run:

@@ -6,7 +6,9 @@ from typing import Any
 
 from pydantic import BaseModel, Field, model_validator
 
+from codebotler.candidates.question import ClarifyingQuestion
 from codebotler.core.terminal import shortened, visible_lines
+from codebotler.core.words import listed
 from codebotler.missions.view import SessionView
 from codebotler.web.storyboard import Scene, Strip, strips
 
@@ -52,6 +54,7 @@ class MissionReport(_Report):
     event_count: int = Field(description="Pass this as `after` to see only later events.")
     is_over: bool
     next: str = Field(description="What can be done now.")
+    done_before: list[str] = Field(default=[], description="What a mission that this one continues has done.")
     steps: str = Field(default="", description="From begin_steps: the key for call_skill and end_steps.")
 
 
@@ -89,6 +92,15 @@ def question(view: SessionView, robot: str, contract: str) -> str:
         f"Mission {view.id}, digest {view.digest}, program:\n{visible_lines(view.program.strip())}",
     ]
     return "\n\n".join(filter(None, parts))
+
+
+def which_question(asked: ClarifyingQuestion) -> str:
+    """Return the question by which a client asks its person which behaviour they mean."""
+    facts = f"Suppose that {listed([*map(shortened, asked.facts)])}." if asked.facts else ""
+    options = (
+        f"{number}. The robot {shortened(one.difference)}." for number, one in enumerate(asked.options, 1)
+    )
+    return "\n".join(filter(None, ("Which did you mean?", facts, *options)))
 
 
 def _sendable(value: object) -> object:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import aclosing, contextmanager, suppress
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import anyio
 from mcp.server.elicitation import AcceptedElicitation, CancelledElicitation, ElicitationResult
@@ -15,11 +15,20 @@ from mcp.server.mcpserver.resolve import Elicit, Resolve
 from pydantic import BaseModel, Field
 
 from codebotler.agents.gatekeeper import Gatekeeper
-from codebotler.agents.reports import CheckReport, MissionReport, RobotReport, SkillOutcome, question
+from codebotler.agents.reports import (
+    CheckReport,
+    MissionReport,
+    RobotReport,
+    SkillOutcome,
+    question,
+    which_question,
+)
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.missions.authoring import ModelAuthor, prompt_of
 from codebotler.missions.mission import MissionError
+from codebotler.missions.past import MissionPast
+from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.missions.wording import event_text
@@ -51,6 +60,27 @@ class NotAsked(Consent):
     """The answer to a question that nobody was asked."""
 
     approve: bool = False
+
+
+class Choice(BaseModel):
+    """The form in which a client asks its person which behaviour they mean."""
+
+    answer: Literal["1", "2", "3", "none", "you decide"] = Field(title="Which did you mean?")
+    more: str = Field(default="", max_length=MAX_ARGUMENT, title="If none: what should be different?")
+
+
+class NotChosen(Choice):
+    """The answer to a question about behaviours that nobody was asked."""
+
+
+class StepWord(BaseModel):
+    """The form in which a client asks its person about an unsure step."""
+
+    answer: Literal["it happened", "it did not happen"] = Field(title="Did this happen?")
+
+
+class NoWord(StepWord):
+    """The answer to a question about a step that nobody was asked."""
 
 
 def read_robot(ctx: AgentContext) -> RobotReport:
@@ -127,6 +157,86 @@ async def propose_mission(
     with _as_tool_errors():
         author = _name(ctx) if program.strip() else ""
         session = gatekeeper.propose(MissionOrder(instruction, program=program, author=author))
+    return await _prepared(gatekeeper, session)
+
+
+async def _find_question(ctx: AgentContext) -> MissionSession:
+    session = _gatekeeper(ctx).console.session
+    if session is None or not session.view.waits_for_answer:
+        with _as_tool_errors():
+            raise MissionError("no mission waits for such an answer")
+    return session
+
+
+def _ask_which(
+    session: Annotated[MissionSession, Resolve(_find_question)], ctx: AgentContext
+) -> Elicit[Choice] | NotChosen:
+    """Have the client ask its person which behaviour they mean, if it can."""
+    asked = session.view.question
+    if asked is None or not _gatekeeper(ctx).asks_client or not _has_dialogs(ctx):
+        return NotChosen(answer="none")
+    return Elicit(which_question(asked), Choice)
+
+
+async def choose_behaviour(
+    ctx: AgentContext,
+    session: Annotated[MissionSession, Resolve(_find_question)],
+    answer: Annotated[ElicitationResult[Choice], Resolve(_ask_which)],
+) -> MissionReport:
+    """Let the person say which of several behaviours they mean, if a proposed mission waits for that.
+
+    You cannot choose for them. Afterwards, the answer has the program, which still needs approval.
+    """
+    gatekeeper = _gatekeeper(ctx)
+    with _as_tool_errors():
+        if not isinstance(answer, AcceptedElicitation) or isinstance(answer.data, NotChosen):
+            raise MissionError(f"a person must choose on the page {gatekeeper.page}".rstrip())
+        asked, given = session.view.question, answer.data
+        if asked is not None:
+            session.answer(asked.parse(given.answer), given.more)
+    return await _prepared(gatekeeper, session)
+
+
+async def _read_past(ctx: AgentContext) -> MissionPast:
+    console = _gatekeeper(ctx).console
+    with _as_tool_errors():
+        if console.view.past is not None and not console.view.is_over:
+            return console.view.past
+        return await asyncio.to_thread(console.past_of, "last")
+
+
+async def _ask_whether(
+    past: Annotated[MissionPast, Resolve(_read_past)], ctx: AgentContext
+) -> Elicit[StepWord] | NoWord:
+    """Have the client ask its person whether an unsure step happened, beside what the robot says."""
+    gatekeeper = _gatekeeper(ctx)
+    if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
+        return NoWord(answer="it did not happen")
+    robot, home = gatekeeper.console.robot, gatekeeper.console.home
+    evidence = await asyncio.to_thread(ask_evidence, robot, home, past, ignore_text)
+    return Elicit("\n".join((past.question, *evidence)), StepWord)
+
+
+async def continue_mission(
+    ctx: AgentContext,
+    past: Annotated[MissionPast, Resolve(_read_past)],
+    answer: Annotated[ElicitationResult[StepWord], Resolve(_ask_whether)],
+    program: Annotated[str, Field(description="The rest; if empty, CodeBotler's model writes it.")] = "",
+) -> MissionReport:
+    """Propose the rest of the last mission, which failed or was stopped. The robot does not move.
+
+    `done_before` lists what the robot has done, which the rest must not repeat. Then call run_mission.
+    """
+    gatekeeper = _gatekeeper(ctx)
+    with _as_tool_errors():
+        if isinstance(answer, AcceptedElicitation) and not isinstance(answer.data, NoWord):
+            past = past.resolve(happened=answer.data.answer == "it happened")
+        if past.unsure is not None:
+            raise UserError(f"{past.question}; a person must say so, on the page {gatekeeper.page}")
+        if not program.strip() and not past.instruction:
+            raise UserError("this mission has no instruction; send a program for the rest")
+        author = _name(ctx) if program.strip() else ""
+        session = gatekeeper.propose(gatekeeper.console.rest_of(past, program, author))
     return await _prepared(gatekeeper, session)
 
 
@@ -248,6 +358,8 @@ async def stop(ctx: AgentContext) -> MissionReport:
 READING: Sequence[Callable[..., object]] = (read_robot, check_program, follow_mission, write_program)
 ACTING: Sequence[Callable[..., object]] = (
     propose_mission,
+    choose_behaviour,
+    continue_mission,
     begin_steps,
     run_mission,
     call_skill,
@@ -296,7 +408,7 @@ async def _prepared(gatekeeper: Gatekeeper, session: MissionSession) -> MissionR
 
     def is_ready() -> bool:
         view = session.view
-        return view.is_over or view.may_be_approved or view.waits_for_program
+        return view.is_over or view.may_be_approved or view.waits_for_program or view.waits_for_answer
 
     try:
         await gatekeeper.console.notifier.until(is_ready)

@@ -11,10 +11,9 @@ from rich.text import Text
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import confirm, note, print_rich, shortened
 from codebotler.missions.past import MissionPast, read_past
-from codebotler.missions.preflight import ask_rooms
+from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.store import find_mission, recover_missions
 from codebotler.robots.base import Robot
-from codebotler.robots.reservation import Reservation
 
 
 def choose_past(robot: Robot, home: Path, name: str, *, happened: bool | None) -> MissionPast:
@@ -28,7 +27,6 @@ def choose_past(robot: Robot, home: Path, name: str, *, happened: bool | None) -
 
     Raises:
         UserError: there is no such mission, it cannot be continued, or nobody can answer.
-        NotReadyError: the robot cannot be used.
     """
     recover_missions(home)
     past = read_past(find_mission(home, name), robot.skills)
@@ -38,15 +36,10 @@ def choose_past(robot: Robot, home: Path, name: str, *, happened: bool | None) -
     if happened is None:
         if not sys.stdin.isatty():
             raise UserError(f"{past.question}; add --happened or --not-happened")
-        place = _ask_place(robot, home)
-        note(f"{past.question}{f'; the robot says that it is in {place}' if place else ''}")
+        for sentence in (past.question, *ask_evidence(robot, home, past, note)):
+            note(sentence)
         happened = confirm("did this happen?")
     return past.resolve(happened=happened)
-
-
-def _ask_place(robot: Robot, home: Path) -> str:
-    with Reservation(robot, home):
-        return ask_rooms(robot, note)[1]
 
 
 def past_view(past: MissionPast) -> Group:

@@ -46,6 +46,7 @@ def serve_agents(
     agent_token: AgentTokenOption = None,
     model: options.ModelsOption = None,
     base_url: options.BaseUrlOption = None,
+    candidates: options.CandidatesOption = 1,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Let agents use the robot, with a person's approval.
@@ -76,7 +77,16 @@ def serve_agents(
     opened = make_opener(models, base_url, model_settings(**options_for(model_settings, shared)))
     body = open_robot(kind, settings)
     tell_missing(body)
-    console = Console(body, home(), opened, models=models, world=settings.world, rules=rules, within=within)
+    console = Console(
+        body,
+        home(),
+        opened,
+        models=models,
+        world=settings.world,
+        rules=rules,
+        within=within,
+        candidates=candidates,
+    )
     writes = bool(model) or not is_recorded(default)
     gatekeeper = Gatekeeper(console, asks_client=asks, writes=writes)
     agents = server.make_server(gatekeeper)

@@ -227,6 +227,7 @@ def serve_page(
         typer.Option(min=1, help="Stop the robot this many seconds after the last page is closed."),
     ] = None,
     runs: Annotated[Path, typer.Option(help="The folder that contains benchmark runs.")] = Path("runs"),
+    recover: options.RecoverOption = 0,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Serve the web page for operating a robot.
@@ -263,6 +264,7 @@ def serve_page(
         rules=rules,
         within=allowed,
         candidates=candidates,
+        recoveries=recover,
     )
     serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
 

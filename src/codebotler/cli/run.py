@@ -22,10 +22,10 @@ from codebotler.core.words import listed
 from codebotler.core.world import World
 from codebotler.missions.log import MissionState
 from codebotler.missions.mission import STOP_GRACE_SECONDS, MissionError
-from codebotler.missions.past import MissionPast, read_past
-from codebotler.missions.recovery import PriorApproval, is_recoverable
+from codebotler.missions.past import MissionPast
+from codebotler.missions.recovery import PriorApproval, past_to_recover
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import find_mission, recover_missions
+from codebotler.missions.store import recover_missions
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.base import Model
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
@@ -232,12 +232,10 @@ def _watched(session: MissionSession, view: SessionView, robot: Robot, request: 
 
 def _recovery(session: MissionSession, robot: Robot, request: Request, home: Path) -> Request | None:
     """Return the request for the rest of a mission that failed, or None if a person must decide."""
-    view = session.view
-    if not request.recoveries or not is_recoverable(view, session.events()):
+    past = past_to_recover(session, robot, home) if request.recoveries else None
+    if past is None:
         return None
-    session.join()
-    past = read_past(find_mission(home, view.id), robot.skills)
-    approval = request.approval or PriorApproval.of(view)
+    approval = request.approval or PriorApproval.of(session.view)
     note(f"recovering: asking {request.model} for the rest")
     return replace(
         request,

@@ -14,6 +14,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.live import check_answer
+from codebotler.missions.past import MissionPast
 from codebotler.models.recorded import UnknownInstructionError, find_closest, open_recorded
 from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotLostError, RobotResult
 from codebotler.simulator.house_rule import Rule
@@ -21,6 +22,13 @@ from codebotler.simulator.room_map import RoomMap
 
 MAX_CHECKED_ROOMS = 1_000
 """The limit for a check, which compares each drive with all rooms."""
+
+
+def resume_robot(robot: Robot, past: MissionPast) -> None:
+    """Bring a connected robot to where it was after a past, if it is simulated."""
+    resume = getattr(robot, "resume", None)  # an optional method of simulated robots
+    if resume is not None:
+        resume(past.trace)
 
 
 def ask_rooms(

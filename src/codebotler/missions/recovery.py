@@ -1,16 +1,23 @@
-"""Decide whether a failed mission may be continued without a person, and within which contract."""
+"""Decide whether a failed mission may be continued without a person, and what to ask a person otherwise."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from codebotler.core.skills.declaration import by_event
+from codebotler.core.terminal import shortened
 from codebotler.core.trace import Trace
 from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState
-from codebotler.missions.past import MissionPast
+from codebotler.missions.past import MissionPast, read_past
+from codebotler.missions.preflight import ask_rooms, resume_robot
+from codebotler.missions.session import MissionSession
+from codebotler.missions.store import find_mission
 from codebotler.missions.view import SessionView
+from codebotler.robots.base import NotReadyError, Robot
+from codebotler.robots.reservation import Reservation
 from codebotler.simulator.contract import Contract
 
 
@@ -57,3 +64,28 @@ def is_recoverable(view: SessionView, events: Sequence[LogLine]) -> bool:
     ends = [line for line in events if line["event"] in SKILL_END_EVENTS]
     failed = bool(ends) and ends[-1]["event"] == "error" and view.reason.startswith(f"{ends[-1]['kind']}: ")
     return failed and view.state is MissionState.FAILED and bool(view.instruction)
+
+
+def past_to_recover(session: MissionSession, robot: Robot, home: Path) -> MissionPast | None:
+    """Return the past of a session's mission if a skill failed, or None if a person must decide."""
+    session.join()
+    if not is_recoverable(session.view, session.events()):
+        return None
+    return read_past(find_mission(home, session.view.id), robot.skills)
+
+
+def ask_evidence(robot: Robot, home: Path, past: MissionPast, remark: Callable[[str], None]) -> list[str]:
+    """Return what the log and the robot say, for a person who decides whether an unsure step happened.
+
+    The robot is connected, unless it is in use. `remark` receives likely mistakes in its setup.
+    """
+    try:
+        with Reservation(robot, home):
+            resume_robot(robot, past)
+            place = ask_rooms(robot, remark)[1]
+    except (NotReadyError, OSError) as error:
+        remark(str(error))
+        place = ""
+    before = [f"Before, according to the log: {past.here(past.place)}"] if past.place else []
+    where = f'says that it is in "{shortened(place)}"' if place else "does not say where it is"
+    return [*before, f"Now, the robot {where}."]

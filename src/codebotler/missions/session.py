@@ -29,6 +29,7 @@ from codebotler.missions.preflight import (
     ask_rooms,
     expect_poses,
     limit_rooms,
+    resume_robot,
     with_closest_here,
 )
 from codebotler.missions.stop import StopButton
@@ -244,9 +245,7 @@ class MissionSession:
                     mission.show_map(self._world)
                 if (past := self._order.past) is not None:
                     mission.continue_from(past)
-                    resume = getattr(self._robot, "resume", None)  # an optional method of simulated robots
-                    if resume is not None:
-                        resume(past.trace)
+                    resume_robot(self._robot, past)
                 room_map, place = self._prepare_rooms()
                 self._await_approval(mission)
                 if mission.state is MissionState.APPROVED:
@@ -257,6 +256,7 @@ class MissionSession:
         room_map, place = ask_rooms(self._robot, self._add_remark, self._world)
         if (past := self._order.past) is not None:
             room_map, place = past.add_to(room_map, place)
+            self._show(progress=replace(self._view.progress, room=place, held=past.held))
         self._show(room_map=limit_rooms(room_map, self._add_remark))
         rules, rooms = self._view.rules, () if room_map is None else room_map.goals
         regexes = () if room_map is None or room_map.plain else rooms

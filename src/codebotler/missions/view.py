@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 
 from codebotler.candidates.question import ClarifyingQuestion
 from codebotler.checking.problems import CheckResult
+from codebotler.core.errors import UserError
 from codebotler.generation.no_program import ProgramlessReply
 from codebotler.generation.partial_reply import PartialReply, split_partial
 from codebotler.missions.log import MissionState
@@ -26,7 +27,7 @@ Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking",
 
 @dataclass(frozen=True)
 class MissionOrder:
-    """A request for a mission, with an instruction or a program. It raises UserError if both are missing."""
+    """A request for a mission. It raises UserError if it asks for nothing, or if its past is unsure."""
 
     instruction: str = ""
     model: str = ""  # empty if no model may be asked
@@ -39,6 +40,8 @@ class MissionOrder:
     asks: bool = True  # whether somebody can say which of several behaviours they mean
 
     def __post_init__(self) -> None:
+        if self.past is not None and self.past.unsure is not None:
+            raise UserError(f"{self.past.question}; a person must say whether this happened")
         if not self.has_program:
             clean_instruction(self.instruction)
 

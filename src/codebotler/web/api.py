@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import json
 from collections.abc import AsyncIterator, Iterator
@@ -76,6 +77,14 @@ class AskAgainForm(_Form):
     )
 
 
+class ContinueForm(_Form):
+    """A request for the rest of a mission."""
+
+    happened: bool | None = Field(
+        None, description="A person's word on whether the last step happened, if the log does not say so."
+    )
+
+
 class AsciiJSONResponse(JSONResponse):
     """ASCII-only JSON, because programs may contain lone surrogates."""
 
@@ -112,10 +121,18 @@ def _add_missions(api: APIRouter, console: Console) -> None:
         """Begin a mission, unless another one runs, and prepare its program in the background."""
         with as_http_errors():
             session = console.begin(MissionOrder(new.instruction, new.model, new.program))
-        await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
-        if not session.view.id:
-            raise HTTPException(409, session.view.error or "the mission was stopped before it started")
-        return view_data(session.view)
+        return await _begun_data(console, session)
+
+    @api.post("/missions/{mission}/continue", status_code=201)
+    async def continue_mission(mission: str, form: ContinueForm) -> dict[str, Any]:
+        """Begin the rest of a mission as a new mission. Without an instruction, replace its program."""
+        summary, _ = await asyncio.to_thread(_read_mission, console, mission)
+        with as_http_errors():
+            past = await asyncio.to_thread(console.past_of, summary.id)
+            if form.happened is not None:
+                past = past.resolve(happened=form.happened)
+            session = console.begin(console.rest_of(past))
+        return await _begun_data(console, session)
 
     @api.get("/missions/{mission}")
     def show(mission: str) -> dict[str, Any]:
@@ -240,6 +257,14 @@ def _add_rest(api: APIRouter, console: Console) -> None:
         }
 
 
+async def _begun_data(console: Console, session: MissionSession) -> dict[str, Any]:
+    """Return the view of a session once its mission exists."""
+    await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
+    if not session.view.id:
+        raise HTTPException(409, session.view.error or "the mission was stopped before it started")
+    return view_data(session.view)
+
+
 async def _stream(console: Console, session: MissionSession, known: int) -> AsyncIterator[str]:
     """Yield server-sent events. A slow client misses no events, and delays no other client."""
 
@@ -267,6 +292,7 @@ def view_data(view: SessionView) -> dict[str, Any]:
         "instruction": view.instruction,
         "model": view.model,
         "author": view.author,
+        "past": None if view.past is None else {"mission": view.past.mission, "steps": view.past.steps},
         "program": view.arriving.code if view.is_written else view.program,
         "digest": view.digest,
         "is_written": view.is_written,

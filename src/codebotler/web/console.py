@@ -17,9 +17,12 @@ from codebotler.core.files import make_folder
 from codebotler.core.world import World
 from codebotler.missions.log import MissionSummary
 from codebotler.missions.mission import BY_SHUTDOWN, STOP_GRACE_SECONDS, MissionError
+from codebotler.missions.past import MissionPast, read_past
+from codebotler.missions.recovery import PriorApproval, past_to_recover
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import recover_missions
+from codebotler.missions.store import find_mission, recover_missions
 from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.missions.wording import BY_PAGE
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
@@ -38,7 +41,8 @@ MAX_WAIT_SECONDS = 15.0
 class Console:
     """Holds the robot and the current mission for viewers on any thread. Only missions connect the robot.
 
-    `models` are the names of the available models, beginning with the default.
+    `models` are the names of the available models, beginning with the default. `recoveries` says how many
+    times a model may write the rest of a mission without a request, if a skill fails.
     """
 
     def __init__(
@@ -53,6 +57,7 @@ class Console:
         rules: tuple[Rule, ...] = (),
         within: Contract | None = None,
         candidates: int = 1,
+        recoveries: int = 0,
     ) -> None:
         self.robot, self.home, self.models, self.world = robot, home, tuple(models), world
         self.candidates = candidates
@@ -60,9 +65,10 @@ class Console:
         if face is not None:
             face.changed = self.notifier.change
         self.interrupted: tuple[MissionSummary, ...] = ()
-        self.open_model = open_model
-        self._lock = threading.Lock()  # held briefly
+        self.open_model, self.recoveries = open_model, recoveries
+        self._lock = threading.RLock()  # held briefly, and again by a signal handler
         self.session: MissionSession | None = None  # the current session, or else the last one
+        self._may_recover: MissionSession | None = None  # the current session, unless somebody pressed STOP
         self._checking = threading.Lock()
         self._held = ExitStack()
         self._pool: WorkerPool | None = None
@@ -79,7 +85,8 @@ class Console:
 
     def end(self) -> None:
         """Stop the current mission, and wait until it is over."""
-        session = self.session
+        with self._lock:
+            session, self._may_recover = self.session, None
         if session is not None:
             session.stop(BY_SHUTDOWN)
             session.join(STOP_GRACE_SECONDS + 1)
@@ -97,8 +104,15 @@ class Console:
 
     def begin(self, order: MissionOrder) -> MissionSession:
         """Begin a mission, by default with the first model. Raise MissionError while another mission runs."""
+        session = self._begin(order)
+        if self.recoveries:
+            threading.Thread(target=self._recover, args=(session,), daemon=True).start()
+        return session
+
+    def _begin(self, order: MissionOrder, *, after: MissionSession | None = None) -> MissionSession:
+        """Begin a mission, or only if nothing has happened since the end of the session `after`."""
         model = order.model.strip() or ("" if order.has_program else self.models[0])
-        count = 1 if order.has_program else self.candidates
+        count = 1 if order.has_program or order.past is not None else self.candidates
         order = replace(order, instruction=order.instruction.strip(), model=model, candidates=count)
         for text in (order.instruction, order.program):
             _check_length(text)
@@ -106,7 +120,9 @@ class Console:
             before = self.session
             if before is not None and before.view.is_running:
                 raise MissionError(f"mission {before.view.id} is {before.view.state}; stop it first")
-            self.session = session = MissionSession(
+            if after is not None and after is not self._may_recover:
+                raise MissionError("somebody pressed STOP, or began another mission")
+            self.session = self._may_recover = session = MissionSession(
                 self.robot,
                 self.home,
                 order,
@@ -121,9 +137,39 @@ class Console:
             )
         if before is not None:
             before.stop_soon("another instruction")
+        if order.past is not None:
+            ended = order.past.mission
+            self.interrupted = tuple(one for one in self.interrupted if one.id != ended)
         session.start()
         self.notifier.change()
         return session
+
+    def past_of(self, mission: str) -> MissionPast:
+        """Read what a mission did and saw, given its ID or `last`. Raise UserError if it has no rest."""
+        return read_past(find_mission(self.home, mission), self.robot.skills)
+
+    def rest_of(self, past: MissionPast, program: str = "", author: str = "") -> MissionOrder:
+        """Return the order for the rest of a mission. Without an instruction, start from its program."""
+        program = program or ("" if past.instruction else past.program)
+        model = "" if program else past.model if past.model in self.models else self.models[0]
+        return MissionOrder(past.instruction, model, program, author, past=past)
+
+    def _recover(self, session: MissionSession) -> None:
+        """Begin the rest of a mission while skills fail, and approve what the first approval allows."""
+        approval: PriorApproval | None = None
+        with suppress(MissionError, UserError):  # a person must decide
+            for _ in range(self.recoveries):
+                past = past_to_recover(session, self.robot, self.home)
+                if past is None:
+                    return
+                approval = approval or PriorApproval.of(session.view)
+                session = self._begin(self.rest_of(past), after=session)
+                view = session.wait_until(lambda now: now.may_be_approved or now.waits_for_program)
+                if approval is not None and approval.allows(view, past) and self._may_recover is session:
+                    session.approve(view.digest, by=f"the approval of mission {past.mission}")
+                    session.wait_until(lambda now: now.is_running)  # from then on, `stop` stops it
+                    if self._may_recover is not session:
+                        session.stop(BY_PAGE)
 
     def edit(self, program: str) -> MissionSession:
         """Replace the current program, or begin a new mission if the current one has ended."""
@@ -131,10 +177,12 @@ class Console:
         session = self.session
         if session is None or session.view.is_over:
             before = self.view
+            past = None if before.progress.has_begun else before.past  # the rest still has to be done
             if program == before.program:
-                return self.begin(MissionOrder(before.instruction, before.model, program, before.author))
-            kept = before.instruction if is_version_of(before.program, program) else ""
-            return self.begin(MissionOrder(kept, before.model if kept else "", program))
+                order = MissionOrder(before.instruction, before.model, program, before.author, past=past)
+                return self.begin(order)
+            kept = before.instruction if past or is_version_of(before.program, program) else ""
+            return self.begin(MissionOrder(kept, before.model if kept else "", program, past=past))
         session.edit(program)
         return session
 
@@ -145,8 +193,9 @@ class Console:
 
     def stop(self, by: str, *, only_moving: bool = False) -> bool:
         """Stop the mission, or only a running one, without waiting. Return whether there was one to stop."""
-        session, view = self.session, self.view
-        if session is None or view.is_over or (only_moving and not view.is_running):
+        with self._lock:
+            session, self._may_recover = self.session, None
+        if session is None or session.view.is_over or (only_moving and not session.view.is_running):
             return False
         session.stop_soon(by)
         return True

@@ -29,7 +29,8 @@ def add(console: Console, frame: Frame) -> None:
 
         def show() -> None:
             view = console.view
-            box.classes(replace=f"operate to-{_next_step(view)}")
+            step = _next_step(view, has_notice=bool(console.interrupted))
+            box.classes(replace=f"operate to-{step}")
             for pane in panes:
                 pane.show(view)
 
@@ -46,10 +47,10 @@ def add(console: Console, frame: Frame) -> None:
     past_mission.add(console, frame)
 
 
-def _next_step(view: SessionView) -> str:
+def _next_step(view: SessionView, *, has_notice: bool) -> str:
     """Return the operator's next step, which determines the order of panes on small screens."""
     if view.is_running:
         return "watch"
     if not view.is_over:
         return "decide"
-    return "ask" if view.state is None or view.error else "see"
+    return "ask" if view.error or (view.state is None and not has_notice) else "see"

@@ -9,6 +9,7 @@ from typing import Any
 from nicegui import ui
 
 from codebotler.checking.problems import CheckResult, Sample
+from codebotler.checking.repetition import repeated_steps
 from codebotler.checking.storyboard import event_from_step, select_steps, steps_of
 from codebotler.core.phrases import NO_ANSWER, is_question, is_spoken, phrase
 from codebotler.core.skills.kinds import CHECK, GOTO
@@ -27,6 +28,7 @@ class Action:
     kind: str  # the kind of event, or `answer`
     text: str
     step: int = field(default=0, compare=False)  # the position in the trace, from 1; 0 for an answer
+    is_repeated: bool = False  # whether an earlier mission has done the same
 
 
 @dataclass(frozen=True)
@@ -62,13 +64,15 @@ NO_PROGRESS = RouteProgress()
 _NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which are only examples."
 
 
-def draw_strips(check: CheckResult, reached: RouteProgress = NO_PROGRESS) -> None:
+def draw_strips(
+    check: CheckResult, reached: RouteProgress = NO_PROGRESS, title: str = "What the robot would do"
+) -> None:
     """Draw what a robot would do in each kind of world, according to a check.
 
     Visited rooms are ticked off, and strips that the actual run contradicts are collapsed.
     """
     shown = strips(check)
-    PlainText("h3", "What the robot would do" if shown else "")
+    PlainText("h3", title if shown else "")
     numbers = [scenes_reached(strip, reached) for strip in shown]
     if shown and all(number is None for number in numbers):
         PlainText("p", _NO_STRIP_FITS, "quiet unsure")
@@ -132,6 +136,8 @@ def draw_scene(
             look = f"deed deed-{deed.kind}" if deed.kind == "answer" or is_spoken(deed.kind) else "deed"
             shown = PlainText("span", deed.text, f"{look} wrong" if deed.step in wrong else look)
             _number(shown, deed.step, anchor)
+            if deed.is_repeated:
+                PlainText("span", "already done", "repeated")
 
 
 def _number(element: PlainText, step: int, anchor: str) -> None:
@@ -161,7 +167,12 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
     else:
         ending = "Done."
     world = shortened(f"If {sample.world}", _MAX_WORLD_TEXT) if sample.facts else ""
-    shown = scenes(steps_of(sample.outcome.trace, has_places=True), check.room_map.start)
+    trace, repeated = sample.outcome.trace, [*repeated_steps(sample.outcome.trace, check.room_map)]
+    steps = steps_of(trace, has_places=True)
+    for step, event in zip(steps, trace, strict=True):
+        step["is_repeated"] = event in repeated
+    needed = [step["step"] for step in steps if step["is_repeated"]]
+    shown = scenes(steps, check.room_map.start, needed)
     return Strip(world, shown, ending, error is None or sample.in_vain)
 
 
@@ -186,12 +197,13 @@ def scenes(
 
 def _actions(step: Mapping[str, Any]) -> Sequence[Action]:
     kind, text, number = step["kind"], shortened(step["text"], _MAX_STEP_TEXT), step["step"]
+    is_repeated = bool(step.get("is_repeated"))
     if not is_question(kind) and not is_spoken(kind):
-        return (Action(kind, _phrase(event_from_step(step)), number),)
+        return (Action(kind, _phrase(event_from_step(step)), number, is_repeated),)
     if "answer" not in step:
-        return (Action(kind, text, number),)
+        return (Action(kind, text, number, is_repeated),)
     heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), _MAX_STEP_TEXT)
-    return (Action(kind, text, number), Action("answer", heard))
+    return (Action(kind, text, number, is_repeated), Action("answer", heard))
 
 
 def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the trace

@@ -7,7 +7,7 @@ import json
 import logging
 from collections.abc import Callable, Coroutine, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from mcp import Client
@@ -23,17 +23,19 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.log import MissionState
 from codebotler.missions.preflight import known_instructions
-from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.missions.view import MissionOrder, SessionView, program_digest
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import RobotLostError, RobotResult
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
 from codebotler.simulator.house_rule import Rule
 from codebotler.web.console import Console
-from doubles import Answering, raising
+from doubles import Answering, Several, raising
+from ended import cut, failed_mission, line_of
 
 WORLD = World((Room("hall"), Room("kitchen"), Room("vault")), "hall")
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
+QUIET = "def task_program():\n    go_to('kitchen')\n"
 FAULTY = "def task_program():\n    go_to('cellar')\n"
 FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('hall')\n"
 STAY_OUT = Rule("vault", "Stay out of the vault.", parse('not tr.Exists(goto("vault"))'))
@@ -144,7 +146,8 @@ def test_every_tool_has_a_description_and_typed_arguments_and_none_approves(gate
         tools = {tool.name: tool for tool in (await agent.client.list_tools()).tools}
         assert {*tools} == {
             *("read_robot", "check_program", "write_program", "propose_mission", "begin_steps"),
-            *("run_mission", "follow_mission", "call_skill", "end_steps", "stop"),
+            "choose_behaviour",
+            *("continue_mission", "run_mission", "follow_mission", "call_skill", "end_steps", "stop"),
         }
         for tool in tools.values():
             assert len(tool.description or "") > 60
@@ -763,4 +766,143 @@ def test_a_program_that_a_person_put_in_place_of_the_steps_runs_instead(tmp_path
         assert 'drives to "kitchen"' in (await agent.call("stop"))["events"]
 
     with gatekeeper.console:
+        use(gatekeeper, act)
+
+
+# --- the rest of a mission
+
+
+def left(home: Path, skill: str, event: str, instruction: str = "") -> None:
+    """Leave a mission of another process that ended at this event."""
+    program = "def task_program():\n    say('hello')\n    go_to('cellar')\n"
+    folder = failed_mission(home, program, WORLD, instruction)
+    cut(folder, line_of(folder, skill, event))
+
+
+def test_an_agent_proposes_the_rest_and_learns_what_was_done(gatekeeper: Gatekeeper, tmp_path: Path) -> None:
+    left(tmp_path, "say", "result")
+
+    async def act(agent: Agent) -> None:
+        assert "program" in await agent.fails("continue_mission")
+        found = await agent.call("continue_mission", program=HELLO)
+        assert (found["state"], len(found["done_before"])) == ("checked", 1)
+        assert gatekeeper.console.view.state is MissionState.CHECKED
+        assert gatekeeper.console.view.past is not None
+        repeated = await agent.call("continue_mission", program=HELLO.replace("    go_to('kitchen')\n", ""))
+        assert (found["check"]["accepted"], repeated["check"]["accepted"]) == (True, False)
+
+    use(gatekeeper, act)
+
+
+def test_no_model_is_asked_for_the_rest_unless_one_is_configured(
+    gatekeeper: Gatekeeper, tmp_path: Path
+) -> None:
+    left(tmp_path, "say", "result", "Say hello.")
+
+    async def act(agent: Agent) -> None:
+        assert "model" in await agent.fails("continue_mission")
+
+    use(gatekeeper, act)
+
+
+@pytest.mark.parametrize(
+    ("action", "content", "steps"),
+    [
+        ("accept", {"answer": "it happened"}, 1),
+        ("accept", {"answer": "it did not happen"}, 0),
+        ("decline", None, None),
+        ("cancel", None, None),
+    ],
+)
+def test_a_person_says_in_the_dialog_whether_a_step_happened(
+    gatekeeper: Gatekeeper,
+    tmp_path: Path,
+    action: Literal["accept", "decline", "cancel"],
+    content: dict[str, Any] | None,
+    steps: int | None,
+) -> None:
+    left(tmp_path, "say", "skill")
+    asked: list[str] = []
+
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+        asked.append(params.message)
+        return ElicitResult(action=action, content=content)
+
+    async def act(agent: Agent) -> None:
+        if steps is None:
+            assert gatekeeper.page in await agent.fails("continue_mission", program=HELLO)
+        else:
+            found = await agent.call("continue_mission", program=HELLO)
+            assert len(found["done_before"]) == steps
+
+    gatekeeper.asks_client = True
+    use(gatekeeper, act, answer=answer)
+    assert len(asked) == 1
+    assert "hello" in asked[0]
+    assert "hall" in asked[0]
+
+
+def test_without_a_dialog_a_person_must_answer_on_the_page(gatekeeper: Gatekeeper, tmp_path: Path) -> None:
+    left(tmp_path, "say", "skill")
+
+    async def act(agent: Agent) -> None:
+        assert gatekeeper.page in await agent.fails("continue_mission", program=HELLO)
+        assert gatekeeper.console.session is None
+
+    use(gatekeeper, act)
+
+
+@pytest.mark.parametrize(
+    ("action", "content", "program"),
+    [
+        ("accept", {"answer": "2"}, HELLO),
+        ("accept", {"answer": "you decide"}, QUIET),
+        ("accept", {"answer": "3"}, ""),
+        ("decline", None, ""),
+    ],
+)
+@MODES
+def test_a_person_chooses_a_behaviour_in_the_dialog(
+    tmp_path: Path,
+    action: Literal["accept", "decline"],
+    content: dict[str, str] | None,
+    program: str,
+    mode: str,
+) -> None:
+    asked: list[str] = []
+
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+        asked.append(params.message)
+        return ElicitResult(action=action, content=content)
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", instruction="Do it.")
+        assert (proposed["state"], proposed["digest"]) == ("question", program_digest(""))
+        if program:
+            found = await agent.call("choose_behaviour")
+            assert (found["state"], found["check"]["program"]) == ("checked", program)
+        else:
+            await agent.fails("choose_behaviour")
+            assert view_of(gatekeeper).waits_for_answer
+            return
+        await agent.fails("choose_behaviour")
+
+    robot = Simulated(WORLD, speed=None)
+    console = Console(robot, tmp_path, lambda _: Several([QUIET, HELLO]), candidates=2)
+    gatekeeper = Gatekeeper(console, asks_client=True, writes=True, page="http://localhost:1/")
+    with console:
+        use(gatekeeper, act, answer=answer, mode=mode)
+    assert len(asked) == 1
+    assert "hello" in asked[0]
+
+
+def test_without_a_dialog_a_person_chooses_on_the_page(tmp_path: Path) -> None:
+    async def act(agent: Agent) -> None:
+        await agent.call("propose_mission", instruction="Do it.")
+        assert gatekeeper.page in await agent.fails("choose_behaviour")
+
+    robot = Simulated(WORLD, speed=None)
+    console = Console(robot, tmp_path, lambda _: Several([QUIET, HELLO]), candidates=2)
+    gatekeeper = Gatekeeper(console, writes=True, page="http://localhost:1/")
+    with console:
         use(gatekeeper, act)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -15,7 +14,7 @@ from codebotler.core.skills.kinds import ASK, PICK, PLACE, SAY
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
-from codebotler.missions.log import EVENTS_FILE, MissionState, MissionSummary
+from codebotler.missions.log import MissionSummary
 from codebotler.missions.mission import Mission
 from codebotler.missions.past import read_past
 from codebotler.missions.recovery import PriorApproval
@@ -25,6 +24,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.simulator.contract import Contract, SkillBound
 from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.room_map import RoomMap
+from ended import cut, failed_mission, line_of
 
 WORLD = World(
     (Room("hall"), Room("kitchen", ("mug",)), Room("lab", people=(Person("Anne", ("no",)),))), "hall"
@@ -44,32 +44,7 @@ YES_NO = (Option("yes"), Option("no"))
 
 
 def failed(home: Path, program: str) -> Path:
-    """The folder of a mission that ended early."""
-    robot = Simulated(WORLD, speed=None)
-    mission = Mission(home, "simulated", "Bring Anne the mug.")
-    mission.draft(program)
-    mission.check([])
-    mission.approve()
-    with Reservation(robot, home) as reserved, mission:
-        mission.run(reserved, "hall")
-    assert mission.state is MissionState.FAILED
-    return mission.folder
-
-
-def cut(folder: Path, lines: int) -> None:
-    """Let the tool have died after so many lines of the log, and the next one have found that."""
-    log = folder / EVENTS_FILE
-    kept = log.read_text().splitlines(keepends=True)[:lines]
-    log.write_text("".join(kept))
-    summary = MissionSummary.read(folder)
-    summary.state, summary.reason = MissionState.INTERRUPTED, "CodeBotler ended unexpectedly"
-    summary.write(folder)
-
-
-def line_of(folder: Path, skill: str, event: str) -> int:
-    """The number of a line in the log, from 1."""
-    lines = [json.loads(line) for line in (folder / EVENTS_FILE).read_text().splitlines()]
-    return next(n for n, line in enumerate(lines, 1) if (line.get("skill"), line["event"]) == (skill, event))
+    return failed_mission(home, program, WORLD)
 
 
 def test_a_log_tells_what_was_done_and_where(tmp_path: Path) -> None:

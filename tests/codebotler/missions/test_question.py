@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,34 +15,13 @@ from codebotler.missions.log import MissionState, MissionSummary, read_events
 from codebotler.missions.mission import MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import MissionOrder, SessionView
-from codebotler.models.base import Reply, TextListener, Usage, ignore_text
-from codebotler.models.sampling import SamplingSettings
-from codebotler.prompts import Prompt
 from codebotler.robots.simulated import Simulated
+from doubles import Several
 
 HOUSE = World((Room("hall"), Room("kitchen", ("mug",))), "hall")
 STAY = 'def task_program():\n    say("hello")\n'
 GO = 'def task_program():\n    go_to("kitchen")\n    say("hello")\n'
 FETCH = 'def task_program():\n    go_to("kitchen")\n    pick("mug")\n    go_to("hall")\n    place("mug")\n'
-
-
-class Several:
-    """A model that writes one program after another."""
-
-    name = "several"
-    settings = SamplingSettings()
-
-    def __init__(self, programs: Sequence[str]) -> None:
-        self.programs, self.prompts = programs, list[Prompt]()
-
-    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
-        self.prompts.append(prompt)
-        program = self.programs[number]
-        on_text(program)
-        return Reply(program, program, Usage(), None, "stop", no_program=None if program else "no-code")
-
-    async def close(self) -> None:
-        """Do nothing."""
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Robots that answer as a test tells them to."""
+"""Robots and a model that answer as a test tells them to."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from codebotler.core.skills.paper import SKILLS
+from codebotler.models.base import Reply, TextListener, Usage, ignore_text
+from codebotler.models.sampling import SamplingSettings
+from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, Feedback, RobotArgument, RobotResult, ignore_feedback
 from codebotler.robots.clock import Clock
 
@@ -62,3 +65,22 @@ def giving(*results: RobotResult) -> Callable[[str, str], RobotResult]:
     """Answers, one after the other."""
     rest = iter(results)
     return lambda _skill, _first: next(rest)
+
+
+class Several:
+    """A model that writes one program after another."""
+
+    name = "several"
+    settings = SamplingSettings()
+
+    def __init__(self, programs: Sequence[str]) -> None:
+        self.programs, self.prompts = programs, list[Prompt]()
+
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
+        self.prompts.append(prompt)
+        program = self.programs[number]
+        on_text(program)
+        return Reply(program, program, Usage(), None, "stop", no_program=None if program else "no-code")
+
+    async def close(self) -> None:
+        """Do nothing."""

@@ -18,12 +18,16 @@ from typing import Any
 
 import pytest
 
+from codebotler.core.world import Room, World
 from codebotler.missions.store import read_missions
 from codebotler.robots.simulated import OFFICE
+from ended import cut, failed_mission, line_of
 from pageserver import SERVE, WORLD, PageServer
 from server import Server
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
+FAILS_LATE = "def task_program():\n    say('hello')\n    go_to('cellar')\n"
+SMALL = World((Room("hall"), Room("kitchen")), "hall")
 BAD = "def task_program():\n    go_to('cellar')\n"
 FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('study')\n"
 
@@ -179,6 +183,58 @@ def test_a_key_stops_only_a_robot_that_runs(server: PageServer) -> None:
     assert server.call("POST", "/api/stop?only_moving=true").data == {"stopping": False}
     assert server.call("GET", "/api/robot").data["state"] == "checked"
     assert server.call("POST", "/api/stop").data == {"stopping": True}
+
+
+@pytest.mark.slow
+def test_the_rest_of_a_mission_is_a_mission_of_its_own(server: PageServer) -> None:
+    fails = "def task_program():\n    say('hello')\n    raise ValueError('odd')\n"
+    server.run(fails, despite_problems=True)
+    failed = until(server, lambda now: now["is_over"])
+    begun = server.call("POST", "/api/missions/current/continue", {})
+    assert begun.status == 201
+    assert begun.data["id"] != failed["id"]
+    assert begun.data["past"]["mission"] == failed["id"]
+    assert len(begun.data["past"]["steps"]) == 1
+    assert begun.data["program"] == fails
+    server.rest()
+    assert server.call("POST", "/api/missions/unknown/continue", {}).status == 404
+    server.run(HELLO)
+    done = until(server, lambda now: now["is_over"])
+    assert (done["state"], done["past"]) == ("done", None)
+    assert server.call("POST", "/api/missions/current/continue", {}).status == 422
+
+
+@pytest.mark.slow
+def test_the_server_recovers_from_a_failed_skill(tmp_path: Path) -> None:
+    fetch = "def task_program():\n    go_to('kitchen')\n    pick('cup')\n    go_to('hall')\n"
+    go_back = "def task_program():\n    go_to('hall')\n"
+    with (
+        Server(answer=lambda asked: go_back if "pick('cup')" in json.dumps(asked.body) else fetch) as model,
+        PageServer(
+            tmp_path,
+            *("--model", "completions:m", "--base-url", model.url),
+            *("--speed", "0", "--recover", "1"),
+        ) as server,
+    ):
+        first = server.call("POST", "/api/missions", {"instruction": "Fetch a cup."}).data["id"]
+        checked = until(server, lambda now: now["check"] is not None)
+        server.call("POST", "/api/missions/current/approve", {"program": checked["digest"]})
+        done = until(server, lambda now: now["id"] not in {"", first} and now["is_over"])
+        assert (done["state"], done["past"]["mission"]) == ("done", first)
+
+
+@pytest.mark.slow
+def test_only_a_person_says_whether_an_unsure_step_happened(tmp_path: Path) -> None:
+    folder = failed_mission(tmp_path / "home", FAILS_LATE, SMALL, "")
+    cut(folder, line_of(folder, "say", "skill"))
+    with PageServer(tmp_path) as server:
+        path = f"/api/missions/{folder.name}/continue"
+        unsure = server.call("POST", path, {})
+        assert (unsure.status, "hello" in unsure.data["detail"]) == (422, True)
+        assert server.call("GET", "/api/robot").data["mission"] == ""
+        for happened in (True, False):
+            begun = server.call("POST", path, {"happened": happened}).data
+            assert len(begun["past"]["steps"]) == int(happened)
 
 
 def test_a_check_alone_begins_nothing(server: PageServer) -> None:

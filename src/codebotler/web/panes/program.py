@@ -23,6 +23,7 @@ from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.frame import Button, PlainText, script, scroll_up, warn
 from codebotler.web.panes.candidates import CandidatesPane
+from codebotler.web.panes.continuing import PastPane, origin_text, storyboard_title
 from codebotler.web.panes.contract import ContractPane
 from codebotler.web.panes.reply import ReplyPane
 from codebotler.web.panes.rules import RulesPane
@@ -49,6 +50,7 @@ class ProgramPane:
             with ui.element("div").classes("head"):
                 PlainText("h2", "Program").props("id=h-program")
                 self._busy = PlainText("span", "", "busy").props("role=status")
+            self._origin = PlainText("p", "", "quiet origin")
             self._reply = ReplyPane()
             self._candidates = CandidatesPane(console)
             self._writer = PlainText("p", "", "quiet")
@@ -67,6 +69,7 @@ class ProgramPane:
                 self._raise = Button("", self._raise_limit, "plain")
                 self._repair = Button("Repair", lambda: self._again(repair=True), "plain")
                 self._again_button = Button("Ask again", lambda: self._again(repair=False), "plain")
+            self._past = PastPane()
             self._board = ui.element("div").classes("storyboard")
         self._view = console.view
         self._shown = console.view.program
@@ -83,6 +86,8 @@ class ProgramPane:
         self._view = view
         shown = _for_editor(view.arriving.code if view.is_written else view.program)
         self._send(view, shown)
+        self._origin.say(origin_text(view))
+        self._past.show(view)
         self._reply.show(view)
         self._candidates.show(view)
         self._editor.set_visibility(not view.waits_for_answer)
@@ -94,7 +99,7 @@ class ProgramPane:
         self._rules.show(view)
         self._show_approval(view)
         reached = route_progress(view)
-        drawn = (view.check, view.problems, view.unknown_rooms, shown, reached)
+        drawn = (view.check, view.problems, view.unknown_rooms, shown, reached, storyboard_title(view))
         if drawn != self._drawn:
             self._drawn = drawn
             self._draw(view, reached)
@@ -230,7 +235,7 @@ class ProgramPane:
         self._board.clear()
         if view.check is not None:
             with self._board:
-                draw_strips(view.check, reached)
+                draw_strips(view.check, reached, storyboard_title(view))
 
 
 def route_progress(view: SessionView) -> RouteProgress:

@@ -17,6 +17,7 @@ from codebotler.missions.wording import reason_text
 from codebotler.web.console import Console
 from codebotler.web.floorplan import MapState, floorplan, room_at
 from codebotler.web.frame import Button, PlainText, script
+from codebotler.web.panes.continuing import ContinueButton
 from codebotler.web.panes.question import QuestionPane
 
 _PHASE_HEADLINES: Mapping[Phase, str] = {
@@ -49,6 +50,7 @@ class RobotPane:
             self._where = PlainText("p", "", "quiet")
             self._asking = None if console.face is None else QuestionPane(console.face)
             self._reason = PlainText("p", "", "reason")
+            self._continue = ContinueButton(console)
             self._map = ui.html("", sanitize=False).classes("map")
             self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')
         self._shown_interrupted: tuple[MissionSummary, ...] = ()
@@ -68,6 +70,7 @@ class RobotPane:
             where.append(f"{progress.clock:.1f} s on the robot's clock")
         self._where.say(" · ".join(where))
         self._reason.say(reason_text(view.reason, view.line))
+        self._continue.show(view)
         if self._asking is not None:
             self._asking.show(is_over=view.is_over)
         self._draw_map(view)
@@ -113,6 +116,7 @@ class RobotPane:
         with self._interrupted:
             for summary in summaries:
                 PlainText("p", f"Mission {summary.id} was interrupted: {summary.reason}")
+                ContinueButton(self._console, summary.id).props(f'aria-label="Continue mission {summary.id}"')
             Button("Dismiss", self._console.dismiss, "plain")
 
 

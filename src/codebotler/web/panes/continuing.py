@@ -1,0 +1,125 @@
+"""The parts of the page that offer to continue a mission, and that show what was done before."""
+
+from __future__ import annotations
+
+import asyncio
+
+from nicegui import html, ui
+
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import note, shortened
+from codebotler.core.words import counted
+from codebotler.missions.log import MissionState
+from codebotler.missions.mission import MissionError
+from codebotler.missions.past import MissionPast
+from codebotler.missions.recovery import ask_evidence
+from codebotler.missions.view import SessionView
+from codebotler.web.console import Console
+from codebotler.web.frame import Button, PlainText, scroll_up, warn
+
+MAX_OPEN_STEPS = 12
+_MAX_STEPS, _MAX_STEP_CHARACTERS = 500, 300
+_EARLY_ENDS = frozenset({MissionState.FAILED, MissionState.STOPPED, MissionState.INTERRUPTED})
+
+
+class ContinueButton(Button):
+    """A button that begins the rest of a mission."""
+
+    def __init__(self, console: Console, mission: str = "") -> None:
+        super().__init__("Continue", self._continue, "primary")
+        self._console, self._mission = console, mission
+
+    def show(self, view: SessionView) -> None:
+        """Offer to continue the mission of a view, if it has begun and ended early."""
+        self._mission = view.id
+        has_past = view.progress.has_begun or view.past is not None
+        self.set_visibility(view.is_over and view.state in _EARLY_ENDS and has_past)
+
+    async def _continue(self) -> None:
+        console = self._console
+        try:
+            past = await asyncio.to_thread(console.past_of, self._mission)
+            if past.unsure is None:
+                _begin(console, past)
+                return
+            evidence = await asyncio.to_thread(ask_evidence, console.robot, console.home, past, note)
+        except (UserError, MissionError) as error:
+            warn(error.sentence)
+            return
+        if not self.is_deleted:
+            with self:
+                _ask(console, past, evidence)
+
+
+def _ask(console: Console, past: MissionPast, evidence: list[str]) -> None:
+    """Ask a person whether the unsure step happened, beside what the log and the robot say."""
+
+    def answer(happened: bool) -> None:  # noqa: FBT001 - the only argument
+        dialog.close()
+        try:
+            _begin(console, past.resolve(happened=happened))
+        except (UserError, MissionError) as error:
+            warn(error.sentence)
+
+    with ui.dialog() as dialog, ui.card().classes("pane"):
+        PlainText("h3", "Did this happen?")
+        PlainText("p", f"{past.question[:1].upper()}{past.question[1:]}.")
+        for sentence in evidence:
+            PlainText("p", sentence, "quiet")
+        with ui.element("div").classes("word"):
+            Button("It happened", lambda: answer(True), "plain")  # noqa: FBT003
+            Button("It did not happen", lambda: answer(False), "plain")  # noqa: FBT003
+    dialog.props('aria-label="Did this happen?"').on("hide", dialog.delete)
+    dialog.open()
+
+
+def _begin(console: Console, past: MissionPast) -> None:
+    console.begin(console.rest_of(past))
+    scroll_up()
+
+
+class PastPane:
+    """Shows what was done before the mission that a session continues."""
+
+    def __init__(self) -> None:
+        self._drawn: MissionPast | None = None
+        self._box = ui.element("div").classes("done-before")
+        self._box.set_visibility(False)
+
+    def show(self, view: SessionView) -> None:
+        """Update the pane for a view."""
+        past = view.past
+        self._box.set_visibility(past is not None)
+        if past is None or past is self._drawn:
+            return
+        self._drawn = past
+        self._box.clear()
+        with self._box:
+            PlainText("h3", "Done so far")
+            if earlier := past.steps[-_MAX_STEPS:-MAX_OPEN_STEPS]:
+                with html.details():
+                    PlainText("summary", counted(len(earlier), "earlier step"))
+                    _draw_steps(earlier)
+            _draw_steps(past.steps[-MAX_OPEN_STEPS:] or ["the robot did nothing"])
+
+
+def _draw_steps(steps: list[str]) -> None:
+    with ui.element("ol"):
+        for step in steps:
+            PlainText("li", shortened(step, _MAX_STEP_CHARACTERS))
+
+
+def origin_text(view: SessionView) -> str:
+    """Say which mission a session continues, and whether a person must write the rest."""
+    if view.past is None:
+        return ""
+    why = shortened(view.past.why, _MAX_STEP_CHARACTERS)
+    sentence = f"Continues mission {view.past.mission}, which ended early: {why}."
+    if view.instruction or not view.may_be_edited:
+        return sentence
+    return f"{sentence} It has no instruction, so a person must write the rest: delete what is done already."
+
+
+def storyboard_title(view: SessionView) -> str:
+    """Return the title of the storyboard."""
+    return "What the robot would do" if view.past is None or view.is_over else "Still to do"

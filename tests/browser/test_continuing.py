@@ -1,0 +1,113 @@
+"""On the page, a mission that ended early goes on: what was done is shown, and nothing happens twice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from codebotler.core.world import Person, Room, World
+from codebotler.missions.log import MissionState
+from ended import cut, failed_mission, line_of
+from pageserver import PageServer
+from viewing import DESK, PHONE, SCREENS, OpenPage, Screen, Shoot, expect_no_grave_fault, write
+
+STAPLERS = "Check every printer room for a stapler, and come back and tell me which have none."
+SMALL = World(
+    (Room("hall"), Room("kitchen", ("mug",)), Room("study", people=(Person("ann", ("yes",)),))), "hall"
+)
+BRING = """def task_program():
+    go_to("kitchen")
+    say("I take the mug now.")
+    pick("mug")
+    say("I have the mug.")
+    go_to("nowhere")
+"""
+
+
+def press(page: Page, name: str) -> None:
+    page.get_by_role("button", name=name, exact=True).click()
+
+
+def look(page: Page, shoot: Shoot, name: str) -> None:
+    page.evaluate("scrollTo(0, 0)")
+    page.wait_for_timeout(400)
+    shoot(page, name)
+    expect_no_grave_fault(page)
+
+
+@pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])
+def test_continue(tmp_path: Path, opened: OpenPage, shoot: Shoot, screen: Screen) -> None:
+    which, size, dark = screen
+    with PageServer(tmp_path, "--speed", "3", serve=("codebotler", "serve")) as server:
+        page = opened(server, size=size, dark=dark)
+        expect(page.get_by_role("button", name="Continue")).to_be_hidden()
+        page.locator("textarea").fill(STAPLERS)
+        press(page, "Write the program")
+        press(page, "Run it on the robot")
+        expect(page.locator(".moment", has_text="→ not found").first).to_be_visible()
+        page.locator("#stop").click()
+        expect(page.get_by_role("button", name="Continue", exact=True)).to_be_visible()
+        look(page, shoot, f"continue-offered-{which}")
+        press(page, "Continue")
+        expect(page.get_by_role("button", name="Run it on the robot")).to_be_enabled()
+        expect(page.locator(".done-before li")).to_have_count(2)
+        expect(page.locator(".storyboard h3")).to_have_text("Still to do")
+        expect(page.locator(".repeated")).to_have_count(0)
+        expect(page.locator(".scene .room").first).to_have_text("printer room 1")
+        look(page, shoot, f"continue-{which}")
+        press(page, "Run it on the robot")
+        expect(page.locator(".headline")).to_have_text("Done")
+        expect(page.get_by_role("button", name="Continue", exact=True)).to_be_hidden()
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
+def test_a_person_is_asked_about_an_unsure_step_and_types_the_rest(
+    tmp_path: Path, opened: OpenPage, shoot: Shoot, size: tuple[int, int]
+) -> None:
+    folder = failed_mission(tmp_path / "home", BRING, SMALL, "")
+    cut(folder, line_of(folder, "pick", "skill"), MissionState.RUNNING)
+    with PageServer(tmp_path, "--speed", "40") as server:
+        page, other = opened(server, size=size), opened(server)
+        if size == PHONE:
+            expect(page.locator(".interrupted .primary")).to_be_in_viewport(ratio=1)
+        press(page, f"Continue mission {folder.name}")
+        card = page.locator(".q-dialog .pane")
+        expect(card).to_contain_text('picked up "mug" in "kitchen"')
+        expect(card.locator(".quiet")).to_have_count(2)
+        expect(card.locator(".quiet").last).to_contain_text("kitchen")
+        page.wait_for_timeout(400)
+        evidence, button = (card.locator(each).bounding_box() for each in (".quiet >> nth=-1", ".word"))
+        assert evidence is not None
+        assert button is not None
+        assert evidence["y"] + evidence["height"] <= button["y"], "the buttons cover what the robot says"
+        shoot(page, f"continue-asks-{size[0]}", full_page=False)
+        expect_no_grave_fault(page)
+        press(page, "It happened")
+        for operator in (page, other):
+            expect(operator.locator(".done-before li")).to_have_count(3)
+            expect(operator.locator(".done-before li").last).to_contain_text('picked up "mug"')
+            expect(operator.locator(".repeated")).to_have_count(1)
+            expect(operator.locator(".origin")).to_contain_text("no instruction")
+            expect(operator.locator(".interrupted")).to_be_hidden()
+            expect(operator.locator(".floorplan .held")).to_have_count(1)
+        look(page, shoot, f"continue-typed-{size[0]}")
+        write(page, "def task_program():\n    go_to('study')\n    place('mug')\n")
+        expect(page.get_by_text("Checked: no problems.")).to_be_visible()
+        expect(page.locator(".repeated")).to_have_count(0)
+        press(page, "Run it on the robot")
+        expect(page.locator(".headline")).to_have_text("Done")
+        expect(other.locator(".done-before li")).to_have_count(3)
+
+
+def test_many_steps_are_folded(tmp_path: Path, opened: OpenPage) -> None:
+    words = "def task_program():\n    for n in range(20):\n        say(str(n))\n    go_to('nowhere')\n"
+    failed_mission(tmp_path / "home", words, SMALL, "")
+    with PageServer(tmp_path, "--speed", "40") as server:
+        page = opened(server)
+        server.call("POST", "/api/missions/last/continue", {})
+        expect(page.locator(".done-before > ol li")).to_have_count(12)
+        expect(page.locator(".done-before details li").first).to_be_hidden()
+        page.get_by_text("8 earlier steps").click()
+        expect(page.locator(".done-before details li").first).to_have_text('in "hall": said "0"')

@@ -1,0 +1,293 @@
+"""The console continues missions that ended early: at a person's word, or by itself if a skill failed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from codebotler.core.errors import UserError
+from codebotler.core.trace import Event
+from codebotler.core.world import Room, World
+from codebotler.missions import recovery
+from codebotler.missions.log import MissionState, MissionSummary
+from codebotler.missions.past import MissionPast
+from codebotler.missions.recovery import ask_evidence
+from codebotler.missions.session import MissionSession
+from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.models.base import Model, ModelError, Reply, TextListener, Usage, ignore_text
+from codebotler.models.sampling import SamplingSettings
+from codebotler.prompts import Prompt
+from codebotler.robots.base import Robot
+from codebotler.robots.reservation import Reservation
+from codebotler.robots.simulated import Simulated
+from codebotler.web import console as console_module
+from codebotler.web.console import Console
+from codebotler.web.panes.continuing import origin_text, storyboard_title
+from codebotler.web.storyboard import strips
+from ended import cut, failed_mission, line_of
+
+WORLD = World((Room("hall"), Room("kitchen"), Room("study")), "hall")
+FETCH = "def task_program():\n    go_to('kitchen')\n    pick('mug')\n    say('done')\n    go_to('hall')\n"
+GO_BACK = "def task_program():\n    go_to('hall')\n"
+ELSEWHERE = "def task_program():\n    go_to('study')\n"
+TYPED = "def task_program():\n    go_to('kitchen')\n    say('hello')\n    go_to('cellar')\n"
+
+
+class Author:
+    """A model that writes one program after the other, and may do something before a reply."""
+
+    name = "author"
+    settings = SamplingSettings()
+
+    def __init__(self, *programs: str) -> None:
+        self.programs = list(programs)
+        self.asked: list[Prompt] = []
+        self.before_last: Callable[[], object] = lambda: None
+
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:  # noqa: ARG002 - as models have it
+        self.asked.append(prompt)
+        if not self.programs:
+            raise ModelError("the model is not there", may_pass=False)
+        program = self.programs.pop(0)
+        if not self.programs:
+            self.before_last()
+        return Reply(program, program, Usage(), 0.0, "stop")
+
+    async def close(self) -> None:
+        pass
+
+
+def desk_of(home: Path, author: Author, recoveries: int = 0, speed: float | None = None) -> Console:
+    def model(_name: str) -> Model:
+        return author
+
+    robot = Simulated(WORLD, speed=speed)
+    return Console(robot, home, model, models=("other", "author"), world=WORLD, recoveries=recoveries)
+
+
+@pytest.fixture
+def console(tmp_path: Path) -> Iterator[Console]:
+    with desk_of(tmp_path, Author()) as console:
+        yield console
+
+
+def until(console: Console, holds: Callable[[SessionView], bool], seconds: float = 15.0) -> SessionView:
+    ends = time.monotonic() + seconds
+    while not holds(console.view):
+        assert time.monotonic() < ends, console.view
+        time.sleep(0.005)
+    return console.view
+
+
+def fetch(console: Console) -> SessionView:
+    """Have the model's program run, which fails because there is no mug."""
+    session = console.begin(MissionOrder("Fetch the mug.", "author"))
+    view = until(console, lambda view: view.may_be_approved)
+    assert view.problems == ()
+    session.approve(view.digest)
+    view = session.wait_until(lambda _: False)
+    assert (view.state, session.view.number) == (MissionState.FAILED, 1)
+    return view
+
+
+def test_the_model_of_the_program_writes_the_rest_and_a_person_approves_it(tmp_path: Path) -> None:
+    author = Author(FETCH, GO_BACK)
+    with desk_of(tmp_path, author) as console:
+        before = fetch(console)
+        past = console.past_of("last")
+        session = console.begin(console.rest_of(past))
+        view = until(console, lambda view: view.may_be_approved)
+        assert (view.model, view.instruction, view.program) == ("author", "Fetch the mug.", GO_BACK)
+        assert view.past == past
+        assert (past.mission, view.progress.room) == (before.id, "kitchen")
+        assert "went to" in str(author.asked[-1].messages)
+        assert (storyboard_title(view), storyboard_title(before)) == (
+            "Still to do",
+            "What the robot would do",
+        )
+        assert (origin_text(before), before.id in origin_text(view)) == ("", True)
+        session.approve(view.digest)
+        assert session.wait_until(lambda _: False).state is MissionState.DONE
+
+
+def test_a_mission_without_an_instruction_is_continued_from_its_program(tmp_path: Path) -> None:
+    failed_mission(tmp_path, TYPED, WORLD, "")
+    with desk_of(tmp_path, Author()) as console:
+        console.begin(console.rest_of(console.past_of("last")))
+        view = until(console, lambda view: view.check is not None)
+        assert view.check is not None
+        assert (view.program, view.model, view.may_be_edited) == (TYPED, "", True)
+        assert any("hello" in problem.message for problem in view.check.problems)
+        (strip,) = strips(view.check)
+        marked = [(deed.text, deed.is_repeated) for scene in strip.scenes for deed in scene.deeds]
+        assert marked == [("hello", True)]
+        console.edit(GO_BACK)
+        view = until(console, lambda view: view.program == GO_BACK and view.check is not None)
+        assert (view.problems, view.past is None) == ((), False)
+
+
+def test_the_past_is_kept_until_the_rest_has_begun(tmp_path: Path) -> None:
+    author = Author(FETCH, GO_BACK)
+    with desk_of(tmp_path, author) as console:
+        fetch(console)
+        console.begin(console.rest_of(console.past_of("last")))
+        view = until(console, lambda view: view.may_be_approved)
+        console.stop("a test")
+        until(console, lambda view: view.is_over)
+        session = console.edit(GO_BACK)
+        again = until(console, lambda now: now.number == 3 and now.may_be_approved)
+        assert (again.past, again.instruction) == (view.past, view.instruction)
+        session.approve(again.digest)
+        session.wait_until(lambda _: False)
+        console.edit(GO_BACK)
+        assert until(console, lambda now: now.number == 4 and now.may_be_approved).past is None
+
+
+def test_an_unsure_step_is_a_persons_to_decide(tmp_path: Path) -> None:
+    folder = failed_mission(tmp_path, TYPED, WORLD, "")
+    cut(folder, line_of(folder, "say", "skill"), MissionState.RUNNING)
+    with desk_of(tmp_path, Author()) as console:
+        assert [one.id for one in console.interrupted] == [folder.name]
+        past = console.past_of(folder.name)
+        with pytest.raises(UserError):
+            console.rest_of(past)
+        console.begin(console.rest_of(past.resolve(happened=True)))
+        assert console.interrupted == ()
+        view = until(console, lambda view: view.check is not None)
+        assert view.past is not None
+        assert view.past.trace[-1].text == "hello"
+
+
+def test_the_robot_and_the_log_are_witnesses(tmp_path: Path) -> None:
+    robot: Robot = Simulated(WORLD, speed=None)
+    trace = (
+        Event("goto", "kitchen", place="hall", destination="kitchen"),
+        Event("pick", "mug", place="kitchen"),
+    )
+    past = MissionPast("1", "", "", TYPED, "", trace, "study", Event("say", "hello", place="study"))
+    log, robot_says = ask_evidence(robot, tmp_path, past, lambda _: None)
+    assert "study" in log
+    assert "mug" in log
+    assert "kitchen" in robot_says
+    noted: list[str] = []
+    with Reservation(robot, tmp_path):
+        assert "kitchen" not in ask_evidence(robot, tmp_path, past, noted.append)[1]
+    assert len(noted) == 1
+
+
+# --- by itself
+
+
+def test_a_failed_skill_is_recovered_within_the_approval(tmp_path: Path) -> None:
+    with desk_of(tmp_path, Author(FETCH, GO_BACK), recoveries=1) as console:
+        before = fetch(console)
+        view = until(console, lambda view: view.number == 2 and view.is_over)
+        assert view.state is MissionState.DONE
+        assert MissionSummary.read(tmp_path / "missions" / view.id).continues == before.id
+
+
+def test_a_rest_beyond_the_approval_waits_for_a_person(tmp_path: Path) -> None:
+    with desk_of(tmp_path, Author(FETCH, ELSEWHERE), recoveries=1) as console:
+        fetch(console)
+        until(console, lambda view: view.number == 2 and view.may_be_approved)
+        time.sleep(0.05)
+        assert console.view.state is MissionState.CHECKED
+
+
+def test_recoveries_are_counted(tmp_path: Path) -> None:
+    author = Author(FETCH, "def task_program():\n    pick('mug')\n", GO_BACK)
+    with desk_of(tmp_path, author, recoveries=1) as console:
+        fetch(console)
+        until(console, lambda view: view.number == 2 and view.is_over)
+        assert console.view.state is MissionState.FAILED
+        time.sleep(0.05)
+        assert (console.view.number, len(author.programs)) == (2, 1)
+
+
+def test_a_stop_before_the_recovery_ends_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read = recovery.past_to_recover
+    with desk_of(tmp_path, Author(FETCH, GO_BACK), recoveries=1) as console:
+
+        def stop_first(session: MissionSession, robot: Robot, home: Path) -> MissionPast | None:
+            past = read(session, robot, home)
+            console.stop("a test", only_moving=True)
+            stopped.append(past)
+            return past
+
+        stopped: list[MissionPast | None] = []
+        monkeypatch.setattr(console_module, "past_to_recover", stop_first)
+        fetch(console)
+        until(console, lambda _: bool(stopped))
+        time.sleep(0.05)
+        assert stopped[0] is not None
+        assert (console.view.number, console.view.is_over) == (1, True)
+
+
+def test_a_stop_while_the_rest_is_written_leaves_nothing_to_run(tmp_path: Path) -> None:
+    author = Author(FETCH, GO_BACK)
+    with desk_of(tmp_path, author, recoveries=1) as console:
+        author.before_last = lambda: console.stop("a test")
+        fetch(console)
+        view = until(console, lambda view: view.number == 2 and view.is_over)
+        assert (view.state, view.progress.has_begun) == (MissionState.STOPPED, False)
+
+
+def test_after_a_stop_by_key_a_person_must_approve(tmp_path: Path) -> None:
+    author = Author(FETCH, GO_BACK)
+    with desk_of(tmp_path, author, recoveries=1) as console:
+        author.before_last = lambda: console.stop("a test", only_moving=True)
+        fetch(console)
+        until(console, lambda view: view.number == 2 and view.may_be_approved)
+        time.sleep(0.05)
+        assert console.view.state is MissionState.CHECKED
+
+
+def test_a_stop_is_never_recovered(tmp_path: Path) -> None:
+    far = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('hall')\n"
+    with desk_of(tmp_path, Author(far, GO_BACK), 3, speed=1.0) as console:
+        session = console.begin(MissionOrder("Walk.", "author"))
+        view = until(console, lambda view: view.may_be_approved)
+        session.approve(view.digest)
+        until(console, lambda view: view.is_running and view.progress.is_driving)
+        console.stop("a test")
+        session.join()
+        assert console.view.state is MissionState.STOPPED
+        time.sleep(0.05)
+        assert console.view.number == 1
+
+
+def test_a_crash_of_the_program_is_never_recovered(tmp_path: Path) -> None:
+    crashes = "def task_program():\n    go_to('kitchen')\n    raise ValueError('odd')\n"
+    with desk_of(tmp_path, Author(crashes, GO_BACK), recoveries=3) as console:
+        session = console.begin(MissionOrder("Walk.", "author"))
+        view = until(console, lambda view: view.may_be_approved)
+        session.approve(view.digest, despite_problems=True)
+        assert session.wait_until(lambda _: False).state is MissionState.FAILED
+        time.sleep(0.05)
+        assert console.view.number == 1
+
+
+def test_a_key_pressed_while_the_recovery_is_approved_stops_the_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    approve = MissionSession.approve
+    far = (
+        "def task_program():\n    go_to('kitchen')\n    pick('mug')\n    go_to('hall')\n    go_to('study')\n"
+    )
+    back = "def task_program():\n    go_to('hall')\n    go_to('study')\n"
+    with desk_of(tmp_path, Author(far, back), 1, speed=50.0) as console:
+
+        def approve_and_press(session: MissionSession, seen: str, *, by: str = "") -> None:
+            console.stop("a test", only_moving=True)
+            approve(session, seen, by=by)
+
+        def watch(session: MissionSession, seen: str, *, by: str = "") -> None:
+            (approve_and_press if by else approve)(session, seen, by=by)
+
+        monkeypatch.setattr(MissionSession, "approve", watch)
+        fetch(console)
+        view = until(console, lambda view: view.number == 2 and view.is_over)
+        assert view.state is MissionState.STOPPED
