@@ -865,7 +865,7 @@ def test_without_a_dialog_a_person_must_answer_on_the_page(gatekeeper: Gatekeepe
 def test_a_person_chooses_a_behaviour_in_the_dialog(
     tmp_path: Path,
     action: Literal["accept", "decline"],
-    content: dict[str, str] | None,
+    content: dict[str, Any] | None,
     program: str,
     mode: str,
 ) -> None:
@@ -875,6 +875,10 @@ def test_a_person_chooses_a_behaviour_in_the_dialog(
         asked.append(params.message)
         return ElicitResult(action=action, content=content)
 
+    robot = Simulated(WORLD, speed=None)
+    console = Console(robot, tmp_path, lambda _: Several([QUIET, HELLO]), candidates=2)
+    made = Gatekeeper(console, asks_client=True, writes=True, page="http://localhost:1/")
+
     async def act(agent: Agent) -> None:
         proposed = await agent.call("propose_mission", instruction="Do it.")
         assert (proposed["state"], proposed["digest"]) == ("question", program_digest(""))
@@ -883,26 +887,24 @@ def test_a_person_chooses_a_behaviour_in_the_dialog(
             assert (found["state"], found["check"]["program"]) == ("checked", program)
         else:
             await agent.fails("choose_behaviour")
-            assert view_of(gatekeeper).waits_for_answer
+            assert view_of(made).waits_for_answer
             return
         await agent.fails("choose_behaviour")
 
-    robot = Simulated(WORLD, speed=None)
-    console = Console(robot, tmp_path, lambda _: Several([QUIET, HELLO]), candidates=2)
-    gatekeeper = Gatekeeper(console, asks_client=True, writes=True, page="http://localhost:1/")
     with console:
-        use(gatekeeper, act, answer=answer, mode=mode)
+        use(made, act, answer=answer, mode=mode)
     assert len(asked) == 1
     assert "hello" in asked[0]
 
 
 def test_without_a_dialog_a_person_chooses_on_the_page(tmp_path: Path) -> None:
-    async def act(agent: Agent) -> None:
-        await agent.call("propose_mission", instruction="Do it.")
-        assert gatekeeper.page in await agent.fails("choose_behaviour")
-
     robot = Simulated(WORLD, speed=None)
     console = Console(robot, tmp_path, lambda _: Several([QUIET, HELLO]), candidates=2)
-    gatekeeper = Gatekeeper(console, writes=True, page="http://localhost:1/")
+    made = Gatekeeper(console, writes=True, page="http://localhost:1/")
+
+    async def act(agent: Agent) -> None:
+        await agent.call("propose_mission", instruction="Do it.")
+        assert made.page in await agent.fails("choose_behaviour")
+
     with console:
-        use(gatekeeper, act)
+        use(made, act)
