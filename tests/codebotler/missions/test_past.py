@@ -259,6 +259,7 @@ def task_program():
 REFUSED = Event(ASK, "Do you want tea?", YES_NO, "no", place="lab", to="Anne")
 
 
+@pytest.mark.slow
 def test_what_has_no_end_has_no_number() -> None:
     assert follow(VISIT, VISIT.replace("Do you want tea?", "May I bring you a cup?"), WENT, REFUSED) == set()
 
