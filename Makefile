@@ -172,6 +172,7 @@ bench: $(VENV)/installed $(ROS2_VENV)-kilted/made
 	$(BIN)/python bench/rules.py
 	$(BIN)/python bench/replay.py
 	$(BIN)/python bench/household.py
+	$(BIN)/python bench/continuations.py
 	$(BIN)/python bench/reward.py
 	$(BIN)/python bench/report.py
 	ROS2_PYTHON="$(abspath $(ROS2_VENV))-kilted/bin/python" $(BIN)/python bench/stop.py

@@ -13,7 +13,7 @@ NARROW = 80
 
 @pytest.mark.parametrize(
     ("name", "least"),
-    [("codebotler", 7), ("roboeval", 13)],
+    [("codebotler", 7), ("roboeval", 14)],
 )
 def test_every_command_is_told_in_a_whole_sentence(name: str, least: int) -> None:
     code = f"import sys; from {name}.__main__ import main; sys.argv = ['{name}', '--help']; main()"

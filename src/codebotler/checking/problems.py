@@ -126,6 +126,7 @@ class CheckResult:
         strict: whether all facts were random.
         proofs: what is proved of each house rule; empty unless all worlds were explored.
         contract: what the program may do at most; None unless all worlds were explored.
+        remaining: what the program of the mission that it continues would still do, if that is known.
     """
 
     problems: tuple[Problem, ...]
@@ -135,6 +136,7 @@ class CheckResult:
     strict: bool = False
     proofs: tuple[RuleProof, ...] = ()
     contract: Contract | None = None
+    remaining: tuple[Outcome, ...] = ()
 
     def __repr__(self) -> str:
         return (

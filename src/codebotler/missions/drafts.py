@@ -9,6 +9,7 @@ from typing import Any
 from codebotler.candidates.clusters import CandidateClusters, cluster_candidates
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.proof import hold_within
+from codebotler.checking.remaining import remaining_outcomes
 from codebotler.checking.repetition import hold_to_past
 from codebotler.checking.sampled import CheckSettings
 from codebotler.missions.preflight import missing_skills, unknown_rooms
@@ -30,7 +31,9 @@ def examine_draft(
         robot: the connected robot.
     """
     if view.past is not None:
-        check = hold_to_past(check, view.past.program)
+        begun, before = view.past.program, view.past.before
+        left = remaining_outcomes(begun, check.room_map, robot.skills, first=before)
+        check = hold_to_past(check, begun, left)
     if order.drive is not None and program == order.program:
         check = replace(check, contract=order.contract, proofs=(), samples=())
     if view.within is not None:

@@ -44,6 +44,7 @@ class MissionPast:
         trace: what the robot did and saw, with the names that programs used.
         place: where the robot was last; empty if unknown.
         unsure: a step that may have happened or not; None if there is none.
+        before: the number of steps that missions did before this program.
     """
 
     mission: str
@@ -54,6 +55,7 @@ class MissionPast:
     trace: Trace
     place: str = ""
     unsure: Event | None = None
+    before: int = 0
 
     @property
     def held(self) -> str:
@@ -104,6 +106,7 @@ class MissionPast:
             "why": self.why,
             "place": self.place,
             "trace": placed_trace_data(self.trace),
+            "before": self.before,
         }
 
 
@@ -132,6 +135,7 @@ def read_past(folder: Path, skills: SkillTable) -> MissionPast:
         robot.trace,
         robot.place,
         unsure,
+        len(before.get("trace", ())) if has_run else before.get("before", 0),
     )
 
 

@@ -167,7 +167,8 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
     else:
         ending = "Done."
     world = shortened(f"If {sample.world}", _MAX_WORLD_TEXT) if sample.facts else ""
-    trace, repeated = sample.outcome.trace, [*repeated_steps(sample.outcome.trace, check.room_map)]
+    trace = sample.outcome.trace
+    repeated = [*repeated_steps(trace, check.room_map, check.remaining)]
     steps = steps_of(trace, has_places=True)
     for step, event in zip(steps, trace, strict=True):
         step["is_repeated"] = event in repeated

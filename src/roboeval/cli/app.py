@@ -11,6 +11,7 @@ from roboeval.cli.evaluate import evaluate, import_
 from roboeval.cli.find import find
 from roboeval.cli.generate import generate, run
 from roboeval.cli.mutate import mutate
+from roboeval.cli.recover import recover
 from roboeval.cli.report import report
 from roboeval.cli.show import export, serve, show
 from roboeval.cli.tasks import tasks
@@ -28,6 +29,7 @@ commands = (
     report,
     compare,
     mutate,
+    recover,
     serve,
     export,
 )

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from codebotler.checking.check import check
 from codebotler.checking.problems import CheckResult
+from codebotler.checking.remaining import remaining_outcomes
 from codebotler.checking.repetition import has_same_effect, hold_to_past
+from codebotler.checking.sampled import DEFAULT_SAMPLES
+from codebotler.cli.run import checker
 from codebotler.core.errors import UserError
-from codebotler.core.skills.kinds import ASK, PICK, PLACE, SAY
+from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.log import MissionSummary
 from codebotler.missions.mission import Mission
-from codebotler.missions.past import read_past
+from codebotler.missions.past import MissionPast, read_past
 from codebotler.missions.recovery import PriorApproval
+from codebotler.missions.session import MissionSession
 from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.models.recorded import open_recorded
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.contract import Contract, SkillBound
@@ -116,6 +122,23 @@ def test_a_continuation_that_never_ran_leaves_the_past_as_it_was(tmp_path: Path)
     assert MissionSummary.read(mission.folder).continues == past.mission
 
 
+def test_the_rest_begins_after_what_earlier_missions_did(tmp_path: Path) -> None:
+    past = read_past(failed(tmp_path, BRING), SKILLS)
+    with Mission(tmp_path, "simulated") as mission:
+        mission.continue_from(past)
+        mission.draft("def task_program():\n    say('a')\n    go_to('nowhere')\n")
+        mission.check([])
+        mission.approve()
+        with Reservation(Simulated(WORLD, speed=None), tmp_path) as reserved:
+            mission.run(reserved, past.place)
+    again = read_past(mission.folder, SKILLS)
+    assert (past.before, again.before, len(again.trace)) == (0, len(past.trace), len(past.trace) + 1)
+    with Mission(tmp_path, "simulated") as other:
+        other.continue_from(again)
+        other.fail("the model is away")
+    assert read_past(other.folder, SKILLS).before == again.before
+
+
 def test_the_simulated_robot_is_where_it_was(tmp_path: Path) -> None:
     folder = failed(tmp_path, BRING)
     cut(folder, line_of(folder, "ask", "result"))
@@ -172,12 +195,147 @@ def test_a_thing_may_stay_in_hand_if_the_program_never_put_it_down() -> None:
     assert rest("say('Here.')", past=(HELD,), begun='def task_program():\n    pick("mug")\n') == set()
 
 
+# --- what the program would still have done
+
+POLL = """
+def task_program():
+    go_to("lab")
+    for _ in range(3):
+        ask("Anne", "Is it hot?", ["yes", "no"])
+    go_to("hall")
+    say("Three people were asked.")
+"""
+WAIT = """
+def task_program():
+    go_to("lab")
+    while not is_in_room("Anne"):
+        time.sleep(1)
+    say("Hello Anne")
+"""
+WENT = Event(GOTO, "lab", place="hall", destination="lab")
+ASKED = Event(ASK, "is it hot?", YES_NO, "yes", place="lab", to="anne")
+MISSED = Event(CHECK, "Anne", found=False, place="lab")
+
+
+def follow(begun: str, rest: str, *past: Event, first: int = 0) -> set[str]:
+    """The kinds of problems of a program for the rest, compared with what remained."""
+    room_map = replace(ROOMS, start="lab", past=past)
+    found = check(rest, room_map=room_map, pool=shared_pool())
+    left = remaining_outcomes(begun, room_map, SKILLS, first=first)
+    return {problem.kind for problem in hold_to_past(found, begun, left).problems}
+
+
+def poll(times: int, question: str = "Is it hot?") -> str:
+    return POLL.replace("range(3)", f"range({times})").replace("Is it hot?", question)
+
+
+@pytest.mark.parametrize("question", ["Is it hot?", "Would you say that it is warm outside?"])
+@pytest.mark.parametrize(("times", "problems"), [(1, set()), (2, {"RepeatedStep"}), (3, {"RepeatedStep"})])
+def test_as_many_steps_may_follow_as_remained(times: int, question: str, problems: set[str]) -> None:
+    assert follow(POLL, poll(times, question), WENT, ASKED, ASKED) == problems
+
+
+def test_steps_of_earlier_missions_do_not_count_as_this_programs() -> None:
+    said = Event(SAY, "I begin.", place="hall")
+    assert follow(POLL, poll(1), said, WENT, ASKED, ASKED) == {"RepeatedStep"}, "it does not say that first"
+    assert follow(POLL, poll(1), said, WENT, ASKED, ASKED, first=1) == set()
+
+
+@pytest.mark.slow
+def test_what_was_not_there_may_be_waited_for() -> None:
+    rest = WAIT.replace("Hello", "Good morning")
+    assert follow(WAIT, rest, WENT, MISSED) == set()
+    assert follow(POLL, rest, WENT, MISSED) == {"TimeoutError"}
+
+
+VISIT = """
+def task_program():
+    home = get_current_location()
+    go_to("lab")
+    while ask("Anne", "Do you want tea?", ["yes", "no"]) == "no":
+        time.sleep(1)
+    go_to(home)
+"""
+REFUSED = Event(ASK, "Do you want tea?", YES_NO, "no", place="lab", to="Anne")
+
+
+@pytest.mark.slow
+def test_what_has_no_end_has_no_number() -> None:
+    assert follow(VISIT, VISIT.replace("Do you want tea?", "May I bring you a cup?"), WENT, REFUSED) == set()
+
+
+REPORT = "def task_program():\n    for room in ROOMS:\n        say(f'There is no stapler in {room} today.')\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "problems"),
+    [
+        ("There is no stapler in the blue room today.", set()),
+        ("No stapler in the blue room.", set()),
+        ("No stapler in the red room.", {"RepeatedStep"}),
+        ("There is no stapler in the red room and in the blue room today.", {"RepeatedStep"}),
+        ("No stapler today.", set()),
+    ],
+)
+def test_a_text_is_compared_with_what_remained_to_be_said(text: str, problems: set[str]) -> None:
+    begun = REPORT.replace("ROOMS", "['the red room', 'the blue room']")
+    said = Event(SAY, "There is no stapler in the red room today.", place="lab")
+    assert follow(begun, f"def task_program():\n    say({text!r})\n", said) == problems
+
+
+def test_the_past_repeats_where_the_robot_was() -> None:
+    room_map = replace(ROOMS, start="lab", past=(WENT, replace(REFUSED, answer="yes")))
+    left = remaining_outcomes(VISIT, room_map, SKILLS)
+    assert {tuple((event.kind, event.text) for event in one.trace) for one in left} == {((GOTO, "hall"),)}
+
+
+def test_a_call_that_is_not_in_the_past_has_failed() -> None:
+    begun = """
+def task_program():
+    go_to("lab")
+    try:
+        pick("mug")
+    except Exception:
+        say("There is no mug.")
+    say(get_current_location())
+"""
+    said = Event(SAY, "there is no mug.", place="lab")
+    room_map = replace(ROOMS, start="lab", past=(WENT, said))
+    texts = {tuple(event.text for event in one.trace) for one in remaining_outcomes(begun, room_map, SKILLS)}
+    assert texts == {("lab",)}
+
+
+def test_a_session_compares_the_rest_with_what_remained(tmp_path: Path) -> None:
+    past = MissionPast("m", "", "", POLL, "stopped", (WENT, ASKED, ASKED), "lab")
+    session = MissionSession(
+        Simulated(WORLD, speed=None),
+        tmp_path,
+        MissionOrder(program=poll(1), past=past),
+        open_model=open_recorded,
+        check=checker(SKILLS),
+        world=WORLD,
+    )
+    session.start()
+    view = session.wait_until(lambda view: view.may_be_approved)
+    session.stop("the test")
+    assert view.check is not None
+    assert (view.check.problems, len(view.check.remaining)) == ((), DEFAULT_SAMPLES)
+
+
+def test_nothing_is_known_of_a_program_that_does_something_else() -> None:
+    room_map = replace(ROOMS, past=(SAID,))
+    assert remaining_outcomes(POLL, room_map, SKILLS) == ()
+    assert remaining_outcomes("def task_program():\n    pass\n", room_map, SKILLS) == ()
+
+
 @pytest.mark.parametrize(
     ("one", "other", "is_same"),
     [
         (Event(ASK, "Tea?", YES_NO, place="lab"), Event(ASK, "Tea?", place="lab"), True),
         (Event(ASK, "Tea?", YES_NO, place="lab"), Event(ASK, "Coffee?", YES_NO, place="lab"), False),
         (Event(ASK, "Tea?", place="lab", to="A"), Event(ASK, "Tea?", place="lab", to="B"), False),
+        (Event(ASK, "Tea?", place="lab", to="Anne"), Event(ASK, "Tea?", place="lab", to="anne"), True),
+        (Event(SAY, "Welcome!", place="lab"), Event(SAY, "Hello and welcome!", place="lab"), True),
         (Event(PLACE, "mug", place="lab"), Event(PLACE, "the mug", place="the lab"), True),
         (Event(PLACE, "mug", place="lab"), Event(PLACE, "big mug", place="lab"), False),
         (Event(PICK, "mug", place="lab"), Event(PICK, "mug", place="lab"), False),

@@ -1,0 +1,83 @@
+"""Find what a program would do after the part of it that a robot has done."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+
+from codebotler.checking.sampled import CheckSettings, first_samplers
+from codebotler.core.errors import RobotError
+from codebotler.core.skills.calling import SKILL_FAILED
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.trace import Outcome, Status, attempted_event
+from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.pool import shared_pool
+from codebotler.simulator.robot import Argument, Result
+from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.sampled_robot import SampledRobot
+from codebotler.simulator.settings import SimulationSettings
+from codebotler.simulator.worker import Worker
+
+
+def remaining_outcomes(
+    begun: str, room_map: RoomMap, skills: SkillTable, *, first: int = 0, worker: Worker | None = None
+) -> tuple[Outcome, ...]:
+    """Return what a program would do after the past of a map, in each sampled world where it does not fail.
+
+    Nothing is returned if the program does not repeat this past, or always fails.
+
+    Args:
+        begun: the program.
+        room_map: the rooms, with the past.
+        skills: the robot's skills.
+        first: the number of steps in the past before the program began.
+        worker: a worker that no other thread uses; by default one of the shared pool.
+    """
+    if worker is None:
+        pool = shared_pool()
+        return pool.call(lambda: remaining_outcomes(begun, room_map, skills, first=first, worker=pool.here()))
+    settings, found = CheckSettings(skills=skills), []
+    for sampler in first_samplers(settings):
+        robot = RepeatingRobot(room_map, sampler, settings.simulation, skills)
+        robot.left = deque(room_map.past[first:])
+        outcome = worker.run_alone(begun, lambda robot=robot: robot)  # type: ignore[misc]
+        if outcome.status in {Status.FINISHED, Status.TIMEOUT} and not robot.left:
+            found.append(outcome)
+    return tuple(found)
+
+
+class RepeatingRobot(SampledRobot):
+    """A robot that gives a program the results in the past of its map, and then those of a sampled world."""
+
+    def __init__(
+        self, room_map: RoomMap, sampler: FactSampler, settings: SimulationSettings, skills: SkillTable
+    ) -> None:
+        super().__init__(room_map, sampler, settings, skills)
+        self.left = deque(room_map.past)
+
+    @property
+    def idle_skills(self) -> frozenset[str]:
+        """No skill as long as results are repeated, since these may differ."""
+        return frozenset() if self.left else super().idle_skills
+
+    def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Return the result in the past. A call that is not in it failed."""
+        if not self.left:
+            return super().execute(skill, arguments)
+        row, past = self.skills[skill], self.left[0]
+        event = attempted_event(row, arguments, place=past.place, time=self.now)
+        if event is None:
+            here, self.room = self.room, self.room_for(past.place) or self.room
+            try:
+                return super().execute(skill, arguments)
+            finally:
+                self.room = here
+        if (event.kind, event.text.casefold()) != (past.kind, past.text.casefold()):
+            raise RobotError(SKILL_FAILED, "it failed before")
+        self.left.popleft()
+        if not event.options:
+            return past.found
+        texts = [option.text.casefold() for option in event.options]
+        if (past.answer or "").casefold() not in texts:
+            raise RobotError(SKILL_FAILED, "nobody answered")
+        return texts.index((past.answer or "").casefold())

@@ -1,0 +1,97 @@
+"""Defines the command recover, which measures how a model does the rest of missions that ended early."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from codebotler.cli.model_options import inherit_options, model_settings, note_unsent
+from codebotler.cli.options import BaseUrlOption, ModelOption
+from roboeval.cli.inputs import load
+from roboeval.cli.options import ConcurrencyOption, JsonOption, SuiteOption, TasksOption
+from roboeval.cli.output import fail, print_json, print_rich, progress_meter, show_progress
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from roboeval.evaluation.recovery import FaultResult
+
+
+@inherit_options(model_settings)
+def recover(
+    source: Annotated[
+        str, typer.Argument(help="The programs that begin: a run, or another source as for `evaluate`.")
+    ] = "recorded:careful",
+    *,
+    model: ModelOption = None,
+    base_url: BaseUrlOption = None,
+    suite: SuiteOption = "paper",
+    tasks: TasksOption = None,
+    concurrency: ConcurrencyOption = 8,
+    json: JsonOption = False,
+    **sampling: Any,  # noqa: ANN401 - of several kinds
+) -> None:
+    """Let skill calls fail, and judge how a model does the rest.
+
+    Each call of the first right program of each task fails once, in each world.
+    """
+    from codebotler.models.chosen import choose_model
+    from codebotler.models.open import open_model
+    from codebotler.models.recorded import is_recorded
+    from codebotler.simulator.worker import Worker
+    from roboeval.evaluation.recovery import (
+        FaultResult,
+        find_first_right,
+        recovery_data,
+        try_continuation,
+        write_continuations,
+    )
+    from roboeval.evaluation.runs.folder import tasks_to_judge
+    from roboeval.evaluation.runs.source import open_source, recorded_model_for
+
+    known, chosen = load(suite), choose_model(model, base_url)
+    completions = open_source(source, known).of(tasks_to_judge(known, tasks, ablated=False)[0])
+    settings = chosen.add_server(model_settings(**sampling))
+    is_own = is_recorded(chosen.name) and settings.base_url is None
+    opened = recorded_model_for(chosen.name, known) if is_own else open_model(chosen.name, settings)
+    note_unsent(settings, opened)
+    with closing(Worker()) as worker:
+        found = show_progress(find_first_right(worker, known, completions), "running", len(completions))
+        faults = [one for each in found for one in each]
+        if not faults:
+            fail(f"{source}: contains no right program")
+        ended = [one for one in faults if not isinstance(one, FaultResult)]
+        prompts = [one.prompt(known) for one in ended]
+        with progress_meter("asking", len({*prompts})) as update:
+            programs = write_continuations(opened, prompts, concurrency, update)
+        tried = (try_continuation(worker, known, *one) for one in zip(ended, programs, strict=True))
+        results = list(show_progress(tried, "continuing", len(ended)))
+    results += [one for one in faults if isinstance(one, FaultResult)]
+    if json:
+        data = {"source": source, "model": opened.name, **recovery_data(results)}
+        print_json({**data, "missions": list(map(asdict, results))})
+    else:
+        print_rich(recovery_view(results, f"{source}, continued by {opened.name}"))
+
+
+def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
+    """Show a table with a row for each task and one for all of them."""
+    from rich.console import Group
+    from rich.text import Text
+
+    from roboeval.cli.views.results import ruled
+    from roboeval.evaluation.recovery import recovery_data
+
+    table = ruled(
+        "task", "faults", "handled", "missing", "continued", "passed", "rejected", "steps", "repeated"
+    )
+    for task in [*dict.fromkeys(one.task for one in results), "all"]:
+        data = recovery_data([one for one in results if task in {one.task, "all"}])
+        *counts, passed, rejected, steps, shortest, repeated = data.values()
+        shares = ("-" if share is None else f"{share:.3f}" for share in (passed, rejected))
+        table.add_row(task, *map(str, counts), *shares, f"{steps} of {shortest}", str(repeated))
+    return Group(Text(title, "bold"), Text(), table)

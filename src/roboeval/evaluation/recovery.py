@@ -1,0 +1,233 @@
+"""Lets each skill call of right programs fail once, and judges the continuations that a model writes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Literal, TypeAlias
+
+from codebotler.checking.check import check_on
+from codebotler.checking.problems import CheckResult
+from codebotler.checking.remaining import remaining_outcomes
+from codebotler.checking.repetition import hold_to_past
+from codebotler.checking.sampled import CheckSettings
+from codebotler.core.errors import RobotError
+from codebotler.core.phrases import is_spoken
+from codebotler.core.skills.calling import SKILL_FAILED
+from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE
+from codebotler.core.trace import Status, Trace
+from codebotler.core.world import World
+from codebotler.missions.past import MissionPast
+from codebotler.models.base import Model, ModelError
+from codebotler.models.rate_limit import RateLimited
+from codebotler.models.recorded import is_recorded
+from codebotler.prompts import Prompt, prompt_for
+from codebotler.simulator.robot import Argument, Result, SimulatedRobot
+from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.rule_guard import RuleGuard
+from codebotler.simulator.worker import Worker
+from roboeval.evaluation.judge import judge
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.suites.load import Scenario, Suite
+
+Call: TypeAlias = tuple[str, Sequence[Argument]]
+"""A skill and its arguments."""
+
+FAULTS = {
+    GOTO: ("GoToInvalidLocation", "the door is locked"),
+    ASK: ("AskNoPerson", "the person is gone"),
+    PICK: ("PickInvalidObject", "the thing was moved"),
+}
+"""The kind and the reason of the error by which a skill fails, by the kind of event that it records."""
+
+
+class FaultyRobot(SimulatedRobot):
+    """A simulated robot that has made some calls already, and one of whose calls fails, but only once.
+
+    Args:
+        world: the world.
+        suite: the suite with the settings, skills and house rules.
+        made: the calls that it repeats at the start.
+        fault: the index of the call that fails; None if none does.
+    """
+
+    def __init__(
+        self, world: World, suite: Suite, *, made: Iterable[Call] = (), fault: int | None = None
+    ) -> None:
+        guard = None if suite.house is None else RuleGuard(suite.house.rules)
+        super().__init__(world, suite.settings, suite.skills, guard=guard)
+        self.calls: list[Call] = []
+        self._fault = fault
+        for call in made:
+            with suppress(RobotError):
+                self.perform(*call)
+
+    def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Execute a skill, or fail."""
+        if len(self.calls) == self._fault:
+            self._fault, row = None, self.skills[skill]
+            kind = "" if row.recording is None else row.recording.kind
+            raise RobotError(*FAULTS.get(kind, (SKILL_FAILED, f"the robot failed in {skill}")))
+        self.calls.append((skill, arguments))
+        return super().perform(skill, arguments)
+
+
+@dataclass(frozen=True)
+class FaultResult:
+    """What became of a mission one of whose calls failed."""
+
+    task: str
+    world: int  # the index of its world
+    call: int  # the index of the call
+    shortest: int  # the number of events without the fault
+    end: Literal["handled", "missing", "rejected", "failed", "passed"] = "handled"  # by the program itself
+    why: str = ""  # the problem, the error or the requirement by which it was rejected or failed
+    steps: int = 0  # the number of events; 0 unless it ran to its end
+    repeated: int = 0  # how many times it spoke, picked up or put down more than without the fault
+
+
+@dataclass(frozen=True)
+class Interruption:
+    """A mission that a fault ended."""
+
+    result: FaultResult  # which mission, and which fault
+    scenario: Scenario = field(repr=False)  # its world, and what its prompt asks for
+    made: Sequence[Call] = field(repr=False)  # the calls before the fault
+    whole: Trace = field(repr=False)  # the trace without the fault
+    past: MissionPast = field(repr=False)  # what it did, and why it ended
+
+    @property
+    def room_map(self) -> RoomMap:
+        """The rooms, with what the mission did and saw."""
+        return self.past.add_to(RoomMap.of(self.scenario.world), self.past.place)[0]
+
+    def prompt(self, suite: Suite) -> Prompt:
+        """Return the request for the rest of the mission."""
+        past, rules = self.past, [] if suite.house is None else [rule.says for rule in suite.house.rules]
+        request = prompt_for(
+            past.instruction, rooms=self.room_map.described, rules=rules, skills=suite.skills
+        )
+        return request.to_continue(past.program, past.steps, past.why, past.here(past.place))
+
+
+def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[Interruption | FaultResult]:
+    """Let each call of a program fail once, in each world in which the program ends.
+
+    Returns the missions that ended, and a result for each error that the program handled itself. The list is
+    empty if the program is wrong.
+    """
+    found: list[Interruption | FaultResult] = []
+    task = suite.task(one.task)
+    for number, scenario in enumerate(task.scenarios):
+        asked, robot = scenario.asked_by(one.prompt), FaultyRobot(scenario.world, suite)
+        whole = worker.run_alone(one.program, lambda robot=robot: robot)  # type: ignore[misc]
+        if not judge(whole, asked).satisfied:
+            return []
+        for call in range(len(robot.calls) if whole.status is Status.FINISHED else 0):
+            faulty = FaultyRobot(scenario.world, suite, fault=call)
+            outcome = worker.run_alone(one.program, lambda robot=faulty: robot)  # type: ignore[misc]
+            result = FaultResult(one.task, number, call, len(whole.trace))
+            if outcome.error is None:
+                found.append(result)
+                continue
+            why, instruction = f"{outcome.error.kind}: {outcome.error.message}", task.prompts[one.prompt]
+            past = MissionPast("", instruction, "", one.program, why, outcome.trace, faulty.place)
+            found.append(Interruption(result, asked, tuple(faulty.calls), whole.trace, past))
+    return found
+
+
+def find_first_right(
+    worker: Worker, suite: Suite, completions: Iterable[Completion]
+) -> Iterator[list[Interruption | FaultResult]]:
+    """Yield the faults of each completion, or none if its task has had a right program before."""
+    done: set[str] = set()
+    for one in completions:
+        found = [] if one.task in done else find_interruptions(worker, suite, one)
+        done |= {one.task} if found else set()
+        yield found
+
+
+def check_rest(worker: Worker, suite: Suite, program: str, room_map: RoomMap, begun: str) -> CheckResult:
+    """Check a program for the rest of a mission as `codebotler continue` does."""
+    rules = () if suite.house is None else suite.house.rules
+    settings = CheckSettings(skills=suite.skills, house_rules=rules)
+    left = remaining_outcomes(begun, room_map, suite.skills, worker=worker)
+    return hold_to_past(check_on(worker, program, room_map, settings), begun, left)
+
+
+def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: str | None) -> FaultResult:
+    """Check a continuation and, if it is accepted, run it where the mission ended, and judge the whole."""
+    if program is None:
+        return replace(one.result, end="missing")
+    problems = check_rest(worker, suite, program, one.room_map, one.past.program).problems
+    if problems:
+        return replace(one.result, end="rejected", why=problems[0].sentence)
+    outcome = worker.run_alone(program, partial(FaultyRobot, one.scenario.world, suite, made=one.made))
+    verdict = judge(outcome, one.scenario)
+    faults = [requirement.text for requirement in verdict.failed]
+    faults += [] if outcome.error is None else [f"{outcome.error.kind}: {outcome.error.message}"]
+    return replace(
+        one.result,
+        end="passed" if verdict.satisfied else "failed",
+        why="" if verdict.satisfied else faults[0],
+        steps=len(outcome.trace),
+        repeated=(_effects(outcome.trace) - _effects(one.whole)).total(),
+    )
+
+
+def _effects(trace: Trace) -> Counter[str]:
+    return Counter(event.kind for event in trace if is_spoken(event.kind) or event.kind in {PICK, PLACE})
+
+
+def write_continuations(
+    model: Model, prompts: Sequence[Prompt], concurrency: int, update: Callable[[int, str], None]
+) -> list[str | None]:
+    """Return a program for each request, or None if the model refuses it or has no program recorded.
+
+    Equal requests are sent once. `update` is called with the number of replies. The model is closed.
+    """
+    limited, programs = RateLimited(model, concurrency), dict[Prompt, str | None]()
+
+    async def write(prompt: Prompt) -> None:
+        try:
+            programs[prompt] = (await limited.reply(prompt, number=0)).program
+        except ModelError as error:
+            if not (error.is_refusal or is_recorded(model.name)):
+                raise
+            programs[prompt] = None
+        update(len(programs), "")
+
+    async def write_all() -> None:
+        tasks = [asyncio.create_task(write(prompt)) for prompt in dict.fromkeys(prompts)]
+        try:
+            await asyncio.gather(*tasks)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await model.close()
+
+    asyncio.run(write_all())
+    return [programs[prompt] for prompt in prompts]
+
+
+def recovery_data(results: Sequence[FaultResult]) -> dict[str, int | float | None]:
+    """Count results. Shares are of the missions that had a continuation, steps of those that passed."""
+    ends = Counter(one.end for one in results)
+    passed = [one for one in results if one.end == "passed"]
+    continued = len(results) - ends["handled"] - ends["missing"]
+    return {
+        "faults": len(results),
+        "handled": ends["handled"],
+        "missing": ends["missing"],
+        "continued": continued,
+        "passed": len(passed) / continued if continued else None,
+        "rejected": ends["rejected"] / continued if continued else None,
+        "steps": sum(one.steps for one in passed),
+        "shortest_steps": sum(one.shortest for one in passed),
+        "repeated": sum(one.repeated for one in results),
+    }
