@@ -23,6 +23,7 @@ PAPER_KINDS = frozenset({GOTO, SAY, CHECK, ASK, PICK, PLACE})
 ENDLESS_RUN = "waits"  # the ending of a run that reached a limit
 NO_NAME = re.compile(r"(?!)")  # matches nothing
 MAX_NAMES, MAX_NAME_LENGTH = 200, 60
+MAX_STATEMENT_LENGTH = 4_000  # characters; a program may talk without end, and nobody would listen
 HALF_DAY, ZERO = 12 * 60, (0,)  # minutes, and the time of day that "eggs: 0" might give
 
 Claims: TypeAlias = frozenset[tuple[str, str]]
@@ -89,7 +90,7 @@ def statements(trace: Trace) -> Iterator[tuple[str, str]]:
     for is_drive, some in groupby(spoken, key=lambda one: one.kind == GOTO):
         if not is_drive:
             said = [*some]
-            yield said[0].place, "\n".join(one.text for one in said)
+            yield said[0].place, "\n".join(one.text for one in said)[:MAX_STATEMENT_LENGTH]
 
 
 def names_in(rooms: Iterable[str], traces: Iterable[Trace]) -> re.Pattern[str]:
@@ -97,8 +98,8 @@ def names_in(rooms: Iterable[str], traces: Iterable[Trace]) -> re.Pattern[str]:
 
     These are what the programs look for, carry and offer, but not words for anybody, yes and no.
     """
-    places = {_plain(room) for room in rooms}
-    found = dict.fromkeys(places)
+    found = dict.fromkeys(map(_plain, rooms))
+    places = set(found)
     for event in (event for trace in traces for event in trace):
         texts = [event.text] if event.kind != ASK else [event.to or "", *(text for text, _ in event.options)]
         if event.kind in {ASK, CHECK, PICK, PLACE}:

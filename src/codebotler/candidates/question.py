@@ -101,8 +101,8 @@ def question_about(
     if len(groups.clusters) == 1 or largest.size >= dominant_share * groups.total:
         return None
     worlds = range(len(largest.samples))
-    number = max(worlds, key=lambda one: _rank(_told_apart(groups.clusters, one), one))
-    shown = _told_apart(groups.clusters, number)
+    number = max(worlds, key=lambda one: _rank(_distinct_clusters(groups.clusters, one), one))
+    shown = _distinct_clusters(groups.clusters, number)
     samples = [one.samples[number] for one in shown]
     behaviours = [one.behaviours[number] for one in shown]
     options = (
@@ -112,7 +112,7 @@ def question_about(
     return ClarifyingQuestion(tuple(options), _facts_that_matter(shown, number), groups.total, number)
 
 
-def _told_apart(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:
+def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:
     """Return the largest clusters with different behaviours in a world, at most three."""
     different: dict[Behaviour, CandidateCluster] = {}
     for one in clusters:

@@ -2,7 +2,14 @@
 
 import pytest
 
-from codebotler.candidates.behaviour import Behaviour, behaviour_of, claims_of, names_in
+from codebotler.candidates.behaviour import (
+    MAX_STATEMENT_LENGTH,
+    Behaviour,
+    behaviour_of,
+    claims_of,
+    names_in,
+    statements,
+)
 from codebotler.core.trace import Event, Outcome, RunError, Status, to_options
 
 START = "hall"
@@ -58,7 +65,7 @@ def test_statements_with_the_same_claims_are_alike(one: str, other: str) -> None
         ("There is a mug", "Hello!"),
     ],
 )
-def test_statements_with_different_claims_are_told_apart(one: str, other: str) -> None:
+def test_statements_with_different_claims_differ(one: str, other: str) -> None:
     assert claims_of(one, NAMES) != claims_of(other, NAMES)
 
 
@@ -91,6 +98,12 @@ def test_statements_between_two_drives_are_merged() -> None:
     assert seen(say("a mug"), drive(START, START), say("2")) == seen(say("a mug"), say("2"))
     apart = seen(say("a mug"), drive(START, "office 1"), drive("office 1", START), say("2"))
     assert apart != seen(say("a mug"), say("2"))
+
+
+def test_endless_talk_is_cut() -> None:
+    talk = [say(f"no, at {number}, but there is no mug in office 1 and ") for number in range(5_000)]
+    (statement,) = statements(tuple(talk))
+    assert len(statement[1]) == MAX_STATEMENT_LENGTH
 
 
 def test_room_of_a_statement_counts() -> None:

@@ -50,7 +50,7 @@ def test_no_question_if_one_behaviour_dominates() -> None:
     assert question_about(CandidateClusters((cluster(5, "a", ONE), other))) is not None
 
 
-def test_the_world_tells_the_most_options_apart() -> None:
+def test_the_world_has_the_most_different_options() -> None:
     question = asked(cluster(2, "a", ONE, ONE), cluster(2, "b", TWO, ONE), cluster(1, "c", TWO, TWO))
     assert (question.sample, [one.program for one in question.options]) == (0, ["a", "b"])
     question = asked(cluster(2, "a", ONE, ONE), cluster(2, "b", TWO, TWO), cluster(1, "c", TWO, THREE))
