@@ -38,8 +38,8 @@ class Behaviour:
         said: the room and the claims of the statements between two drives. All statements without claims,
             such as greetings, are alike.
         moved: the things that were picked up and put down, with the room, in order of their names.
-        asked: the room and the options of each question; case and order do not matter. Whether the program
-            calls the person in this room by name does not matter either.
+        asked: the room, the options and the person of each question; case and order do not matter. The
+            person counts only where candidates name different ones.
         done: the other skills with their arguments, in order of their names.
         ending: how the run ended; empty if it finished.
         room: the room where the robot ended; empty unless the run finished.
@@ -47,7 +47,7 @@ class Behaviour:
 
     said: frozenset[tuple[str, Claims]] = frozenset()
     moved: tuple[tuple[str, str, str], ...] = ()
-    asked: frozenset[tuple[str, tuple[str, ...]]] = frozenset()
+    asked: frozenset[tuple[str, tuple[str, ...], str]] = frozenset()
     done: tuple[tuple[str, ...], ...] = ()
     ending: str = ""
     room: str = ""
@@ -58,13 +58,19 @@ class Behaviour:
         return frozenset(name for name in names if getattr(self, name) != getattr(other, name))
 
 
-def behaviour_of(outcome: Outcome, start: str, names: re.Pattern[str] = NO_NAME) -> Behaviour:
+def behaviour_of(
+    outcome: Outcome,
+    start: str,
+    names: re.Pattern[str] = NO_NAME,
+    shared_rooms: frozenset[str] = frozenset(),
+) -> Behaviour:
     """Return the behaviour of a run.
 
     Args:
         outcome: the run.
         start: the room where the robot started.
         names: a pattern from `names_in` that finds the names which statements may make claims about.
+        shared_rooms: the rooms of `rooms_with_several` in which it matters who is asked.
     """
     trace = outcome.trace
     is_done = outcome.status is Status.FINISHED
@@ -74,7 +80,11 @@ def behaviour_of(outcome: Outcome, start: str, names: re.Pattern[str] = NO_NAME)
             sorted((one.kind, normalized(one.text), one.place) for one in trace if one.kind in {PICK, PLACE})
         ),
         asked=frozenset(
-            (one.place, tuple(sorted({_plain(option) for option, _ in one.options})))
+            (
+                one.place,
+                tuple(sorted({_plain(option) for option, _ in one.options})),
+                normalized(one.to or "") if one.place in shared_rooms else "",
+            )
             for one in trace
             if one.kind == ASK
         ),
@@ -91,6 +101,14 @@ def statements(trace: Trace) -> Iterator[tuple[str, str]]:
         if not is_drive:
             said = [*some]
             yield said[0].place, "\n".join(one.text for one in said)[:MAX_STATEMENT_LENGTH]
+
+
+def rooms_with_several(traces: Iterable[Trace]) -> frozenset[str]:
+    """Return the rooms in which runs ask people with different names."""
+    people: dict[str, set[str]] = {}
+    for event in (event for trace in traces for event in trace if event.kind == ASK):
+        people.setdefault(event.place, set()).update({normalized(event.to or "")} - {SOMEBODY, ""})
+    return frozenset(room for room, names in people.items() if len(names) > 1)
 
 
 def names_in(rooms: Iterable[str], traces: Iterable[Trace]) -> re.Pattern[str]:

@@ -7,7 +7,12 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-from codebotler.candidates.behaviour import Behaviour, behaviour_of, names_in
+from codebotler.candidates.behaviour import (
+    Behaviour,
+    behaviour_of,
+    names_in,
+    rooms_with_several,
+)
 from codebotler.checking.check import check_on
 from codebotler.checking.problems import Sample
 from codebotler.checking.sampled import CheckSettings, SampledRuns, first_samplers, unexplored_samplers
@@ -92,9 +97,10 @@ def cluster_candidates(
     rooms = room_map or shared_rooms(accepted, [checks[one].room_map for one in accepted], settings)
     runs = run_in_shared_worlds(worker, accepted, rooms, settings)
     traces = [sample.outcome.trace for samples in runs for sample in samples]
-    names = names_in(rooms.rooms, traces)
+    names, several = names_in((*rooms.rooms, *rooms.people), traces), rooms_with_several(traces)
     behaviours = [
-        tuple(behaviour_of(sample.outcome, rooms.start, names) for sample in samples) for samples in runs
+        tuple(behaviour_of(sample.outcome, rooms.start, names, several) for sample in samples)
+        for samples in runs
     ]
     together: dict[tuple[Behaviour, ...], list[int]] = {}
     for number, seen in enumerate(behaviours):

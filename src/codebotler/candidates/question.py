@@ -174,8 +174,8 @@ def _aspects(behaviour: Behaviour) -> dict[Aspect, object]:
         parts.setdefault(("said", room), []).append(claims)
     for kind, thing, room in behaviour.moved:
         parts.setdefault(("moved", thing), []).append((kind, room))
-    for room, options in behaviour.asked:
-        parts.setdefault(("asked", room), []).append(options)
+    for room, options, person in behaviour.asked:
+        parts.setdefault(("asked", room), []).append((options, person))
     rest = {("done", ""): behaviour.done, ("ending", ""): behaviour.ending, ("room", ""): behaviour.room}
     return {**{key: frozenset(Counter(values).items()) for key, values in sorted(parts.items())}, **rest}
 
@@ -184,8 +184,9 @@ def _words(key: Aspect, sample: Sample) -> str:
     kind, name = key
     outcome = sample.outcome
     if kind == "said":
-        texts = [f'"{brief(text)}"' for room, text in statements(outcome.trace) if room == name]
-        return f"says {listed(texts) or 'nothing'} in {name}"
+        said = [*statements(outcome.trace)]
+        texts = [f'"{brief(text)}"' for room, text in said if room == name]
+        return f"says {listed(texts) or 'nothing'} in {name}" if said else "says nothing"
     if kind == "moved":
         moves = (one for one in outcome.trace if one.kind in {PICK, PLACE} and normalized(one.text) == name)
         return _events(moves, f'leaves "{name}" alone')
@@ -202,4 +203,7 @@ def _words(key: Aspect, sample: Sample) -> str:
 
 
 def _events(events: Iterable[Event], nothing: str) -> str:
-    return listed([*dict.fromkeys(f"{phrase(one, 'third')} in {one.place}" for one in events)]) or nothing
+    words = (
+        f"{phrase(one, 'third')}{f' to {brief(one.to)}' if one.to else ''} in {one.place}" for one in events
+    )
+    return listed([*dict.fromkeys(words)]) or nothing

@@ -3,24 +3,50 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from codebotler.checking.problems import CheckResult, Problem, Sample
 from codebotler.core.phrases import is_spoken, phrase
 from codebotler.core.program import called_skills, parse_leniently
+from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.kinds import PICK, PLACE
 from codebotler.core.trace import Event, Outcome, Status, Trace, held_after
 from codebotler.core.words import brief
 from codebotler.rtl.text.numbers import numerals
-from codebotler.rtl.text.polarity import polarity
+from codebotler.rtl.text.polarity import Polarity, polarity
 from codebotler.simulator.matching import content_words
 from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_robot import normalized
+from codebotler.simulator.sampled_robot import AGREEING_TEXT, normalized
 
 UNBOUNDED_COUNT = 1_000_000
 """The number of steps that remain of a kind that a program repeats without end."""
+
+EMPTY_WORDS = frozenset(
+    {
+        *(
+            "do",
+            "does",
+            "you",
+            "your",
+            "i",
+            "it",
+            "me",
+            "my",
+            "we",
+            "to",
+            "for",
+            "have",
+            "has",
+            "want",
+            "like",
+        ),
+        *("would", "could", "can", "will", "please", "what", "which", "this", "not", "no", "be", "on", "at"),
+        *("hello", "hi", "hey", "sorry", "so", "just", "one", "how", "many", "much", "number", "wish", "us"),
+    }
+)
+"""Words of speech that tell nothing about its topic."""
 
 _PUNCTUATION = re.compile(r"[^\w\s]+")
 
@@ -55,19 +81,24 @@ def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = 
 def repeated_steps(trace: Trace, room_map: RoomMap, remaining: Sequence[Outcome] = ()) -> Iterator[Event]:
     """Yield the steps of a trace that have an effect which the past of the map contains already.
 
-    Where a kind of step was done before, as many may follow as remained to be done.
+    If more steps of a kind follow in a room than remained to be done, those about the same are done already.
     """
     done, later = _distinct(room_map.past), _distinct(event for one in remaining for event in one.trace)
-    done_sorts = {_sort(event, room_map) for event in done}
+    done_sorts: defaultdict[tuple[str, str], list[Event]] = defaultdict(list)
+    for one_done in done:
+        done_sorts[_sort(one_done, room_map)].append(one_done)
     left: Counter[tuple[str, str]] = Counter()
     for one in remaining:
         for sort, count in Counter(_sort(event, room_map) for event in one.trace).items():
             left[sort] = max(left[sort], UNBOUNDED_COUNT if one.status is Status.TIMEOUT else count)
     is_done = {_key(event): _is_done(event, done, later, room_map) for event in _distinct(trace)}
+    counts = Counter(_sort(event, room_map) for event in trace)
     for event in trace:
         sort = _sort(event, room_map)
-        left[sort] -= 1
-        if is_done.get(_key(event)) or (remaining and sort in done_sorts and left[sort] < 0):
+        is_surplus = bool(remaining) and counts[sort] > left[sort]
+        if is_done.get(_key(event)) or (
+            is_surplus and any(is_about_same(event, before) for before in done_sorts[sort])
+        ):
             yield event
 
 
@@ -85,9 +116,13 @@ def _is_done(event: Event, done: Sequence[Event], later: Sequence[Event], room_m
 
 def _distinct(events: Iterable[Event]) -> list[Event]:
     """Return the different steps that have an effect."""
-    return list(
-        {_key(one): one for one in events if one.kind in {PICK, PLACE} or is_spoken(one.kind)}.values()
-    )
+    return list({_key(one): one for one in events if _has_effect(one.kind)}.values())
+
+
+def _has_effect(kind: str) -> bool:
+    """Return whether a person would notice if a step of a kind were done twice. A drive may be repeated."""
+    row = by_event(kind)
+    return row is None or is_spoken(kind) or not (row.is_idle or row.is_drive)
 
 
 def _key(event: Event) -> tuple[str, ...]:
@@ -99,12 +134,38 @@ def _sort(event: Event, room_map: RoomMap) -> tuple[str, str]:
 
 
 def has_same_effect(one: Event, other: Event, room_map: RoomMap) -> bool:
-    """Return whether two steps say or ask the same, or put down the same thing, in the same room."""
-    if one.kind != other.kind or not (one.kind == PLACE or is_spoken(one.kind)):
+    """Return whether two steps say, ask or do the same in the same room. A thing may be picked up again."""
+    if one.kind != other.kind or one.kind == PICK or not _has_effect(one.kind):
         return False
     if _room(one, room_map) != _room(other, room_map) or _person(one) != _person(other):
         return False
-    return _words(one.text) == _words(other.text) or (one.kind != PLACE and _says_same(one.text, other.text))
+    is_equal = _words(one.text) == _words(other.text) and one.more == other.more
+    return is_equal or (is_spoken(one.kind) and _says_same(one.text, other.text))
+
+
+def is_about_same(one: Event, other: Event) -> bool:
+    """Return whether two steps of a kind are about the same, in whatever words."""
+    if not is_spoken(one.kind):
+        return _words(one.text) == _words(other.text)
+    if not one.options and polarity(one.text) is not polarity(other.text):
+        return False  # what was announced is now denied, or the other way round
+    topic, other_topic = _topic(one), _topic(other)
+    shared, least = len(topic & other_topic), min(len(topic), len(other_topic))
+    if 2 * shared >= max(1, least):
+        return True
+    options, others = ({_sense(text) for text, _ in each.options} for each in (one, other))
+    return options == others and (bool(shared) or bool(options - {"yes", "no"}))
+
+
+def _topic(event: Event) -> set[str]:
+    return {word.removesuffix("s") for word in _words(event.text)} - EMPTY_WORDS
+
+
+def _sense(option: str) -> str:
+    """Return `yes` or `no` for options that mean this, and others without case and articles."""
+    if AGREEING_TEXT.match(option):
+        return "yes"
+    return "no" if polarity(option) is Polarity.DENIES else normalized(option)
 
 
 def _room(event: Event, room_map: RoomMap) -> str:

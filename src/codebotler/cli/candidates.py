@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,16 @@ from codebotler.checking.storyboard import storyboard
 from codebotler.cli.generate import note_programless, open_recorder
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.terminal import busy, console, note, print_source, read_line, shortened, visible
+from codebotler.core.terminal import (
+    busy,
+    console,
+    is_interactive,
+    note,
+    print_source,
+    read_line,
+    shortened,
+    visible,
+)
 from codebotler.core.words import counted, listed
 from codebotler.generation.candidates import request_candidates
 from codebotler.generation.generate import Attempt
@@ -53,7 +61,7 @@ class CandidateSearch:
 
 def line_reader(*, is_allowed: bool) -> Callable[[str], str] | None:
     """Return a function that asks on the terminal, or None if that is not allowed or there is no terminal."""
-    return read_line if is_allowed and sys.stdin.isatty() and sys.stderr.isatty() else None
+    return read_line if is_allowed and is_interactive() else None
 
 
 def requests_to(

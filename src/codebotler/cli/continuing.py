@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from rich.console import Group
 from rich.text import Text
 
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import confirm, note, print_rich, shortened
+from codebotler.core.terminal import confirm, is_interactive, note, print_rich, read_line, shortened
 from codebotler.missions.past import MissionPast, read_past
 from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.store import find_mission, recover_missions
 from codebotler.robots.base import Robot
 
 
-def choose_past(robot: Robot, home: Path, name: str, *, happened: bool | None) -> MissionPast:
+def choose_past(
+    robot: Robot, home: Path, name: str, *, happened: bool | None, answer: str = ""
+) -> MissionPast:
     """Read the past of a mission, show it, and ask whether an unsure step happened.
 
     Args:
@@ -24,22 +25,26 @@ def choose_past(robot: Robot, home: Path, name: str, *, happened: bool | None) -
         home: the folder that contains the missions.
         name: the ID of the mission, or `last`.
         happened: whether the unsure step happened, or None to ask.
+        answer: its answer, if it is a question.
 
     Raises:
         UserError: there is no such mission, it cannot be continued, or nobody can answer.
     """
     recover_missions(home)
-    past = read_past(find_mission(home, name), robot.skills)
+    past = read_past(find_mission(home, name), robot.skills, robot.name)
     print_rich(past_view(past))
     if past.unsure is None:
         return past
     if happened is None:
-        if not sys.stdin.isatty():
+        if not is_interactive():
             raise UserError(f"{past.question}; add --happened or --not-happened")
         for sentence in (past.question, *ask_evidence(robot, home, past, note)):
             note(sentence)
         happened = confirm("did this happen?")
-    return past.resolve(happened=happened)
+        if happened and past.answers:
+            known = " | ".join(map(shortened, past.answers))
+            answer = read_line(f"what was the answer [{known}]? (Enter if you do not know) ").strip()
+    return past.resolve(happened=happened, answer=answer)
 
 
 def past_view(past: MissionPast) -> Group:

@@ -79,6 +79,9 @@ def continue_mission(
             help="Whether the last step happened, if the log does not say so; by default you are asked.",
         ),
     ] = None,
+    answer: Annotated[
+        str, typer.Option(help="With --happened: the answer to the question, if you know it.")
+    ] = "",
     model: options.ModelOption = None,
     base_url: options.BaseUrlOption = None,
     yes: options.YesOption = False,
@@ -103,7 +106,7 @@ def continue_mission(
     kind, settings, rules, allowed = options.robot_settings(**options_for(options.robot_settings, shared))
     asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
     body = open_robot(kind, settings)
-    past = choose_past(body, home(), mission, happened=happened)
+    past = choose_past(body, home(), mission, happened=happened, answer=answer)
     request = Request(
         program or past.instruction,
         chosen.name,

@@ -27,7 +27,7 @@ from codebotler.missions.recovery import PriorApproval, past_to_recover
 from codebotler.missions.session import MissionSession
 from codebotler.missions.store import recover_missions
 from codebotler.missions.view import MissionOrder, SessionView
-from codebotler.models.base import Model
+from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
 from codebotler.robots.base import Robot
 from codebotler.simulator.contract import Contract
@@ -73,6 +73,8 @@ class Request:
             raise UserError("the argument is empty; name a program, or say what the robot should do")
         if self.what.endswith(".py") and not self.is_program:
             raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
+        if self.recoveries and self.is_program and self.past is None:
+            raise UserError("--recover needs an instruction, since a model writes the rest; leave it out")
         if self.candidates > 1 and self.is_program:
             raise UserError("--candidates needs an instruction, but this is a program")
         if self.what == "-" and not self.yes:
@@ -138,16 +140,34 @@ def run(
         if view.programless is not None:
             note_programless(view.programless)
             session.reject(view.programless.sentence)
+        elif view.check is None:
+            note(f"not run: {shortened(view.reason)}")
         elif _is_approved(session, view, robot, request):
             status = _watched(session, view, robot, request)
-            rest = _recovery(session, robot, request, home) if status else None
-            return status if rest is None else run(robot, rest, home, open_model, world)
+            rest = _recovery(session, robot, request, home) if status == 1 else None
+            return status if rest is None else _run_rest(status, robot, rest, home, open_model, world)
     except BaseException as error:
         session.stop(SIGNALS[signal.SIGINT] if isinstance(error, KeyboardInterrupt) else "an error")
         session.join(CLEANUP_SECONDS)
         raise
     session.join(STOP_GRACE_SECONDS)
     return 1
+
+
+def _run_rest(
+    status: int,
+    robot: Robot,
+    rest: Request,
+    home: Path,
+    open_model: Callable[[str], Model],
+    world: World | None,
+) -> int:
+    """Run the rest of a mission that ended with a status, which also counts if no model writes the rest."""
+    try:
+        return run(robot, rest, home, open_model, world)
+    except ModelError as error:
+        note(error.sentence)
+        return status
 
 
 def tell_missing(robot: Robot) -> None:
@@ -241,6 +261,7 @@ def _recovery(session: MissionSession, robot: Robot, request: Request, home: Pat
         request,
         what=past.instruction,
         past=past,
+        despite_problems=False,  # the user accepted those of the first program only
         recoveries=request.recoveries - 1,
         approval=approval,
     )

@@ -95,8 +95,10 @@ def ending_view(ended: MissionSummary | SessionView) -> Group:
     text = Text.assemble((state, STATE_STYLES.get(state, "bold")), _why(ended))
     if state is MissionState.STOPPED:
         text.append("\nthe robot has stopped")
-    again = f"`codebotler missions {ended.id}` shows this mission again"
-    return Group(text, Text(again, "dim", no_wrap=True, overflow="ignore"))
+    again = [f"`codebotler missions {ended.id}` shows this mission again"]
+    if state in {MissionState.STOPPED, MissionState.FAILED}:
+        again.append(f"`codebotler continue {ended.id}` does the rest")
+    return Group(text, *(Text(one, "dim", no_wrap=True, overflow="ignore") for one in again))
 
 
 def _why(ended: MissionSummary | SessionView) -> str:

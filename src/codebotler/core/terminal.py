@@ -164,6 +164,11 @@ def read_line(question: str) -> str:
     return sys.stdin.readline()
 
 
+def is_interactive() -> bool:
+    """Whether a person can read a question and answer it."""
+    return sys.stdin.isatty() and sys.stderr.isatty()
+
+
 def system_sentence(error: OSError) -> str:
     """Describe a system error in a sentence that names the file and, for a full disk, the fix."""
     where = "the output" if error.filename is None else visible(os.fsdecode(error.filename))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.phrases import phrase
+from codebotler.core.phrases import NO_ANSWER, phrase
 from codebotler.core.skills.kinds import PICK, PLACE
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.terminal import shortened
@@ -22,7 +23,14 @@ from codebotler.core.trace import (
     to_options,
 )
 from codebotler.core.world import World
-from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState, MissionSummary, read_events
+from codebotler.missions.log import (
+    SKILL_END_EVENTS,
+    SUMMARY_FILE,
+    LogLine,
+    MissionState,
+    MissionSummary,
+    read_events,
+)
 from codebotler.robots.simulated import SIMULATION
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.room_map import RoomMap
@@ -83,14 +91,30 @@ class MissionPast:
         if self.unsure is None:
             return ""
         where = f' in "{shortened(self.unsure.place)}"' if self.unsure.place else ""
-        return f"the log does not say whether the robot {phrase(self.unsure, 'past', show=shortened)}{where}"
+        what = phrase(self.unsure, "past", show=shortened).removesuffix(f" → {NO_ANSWER}")
+        return f"the log does not say whether the robot {what}{where}"
 
-    def resolve(self, *, happened: bool) -> MissionPast:
-        """Return the past with a person's word on the unsure step."""
+    @property
+    def answers(self) -> tuple[str, ...]:
+        """The answers that the unsure step may have had, if it is a question."""
+        return () if self.unsure is None else tuple(option.text for option in self.unsure.options)
+
+    def resolve(self, *, happened: bool, answer: str = "") -> MissionPast:
+        """Return the past with a person's word on the unsure step.
+
+        Args:
+            happened: whether it happened.
+            answer: its answer, if it is a question; empty if nobody knows it.
+
+        Raises:
+            UserError: the answer is none of the options.
+        """
         if self.unsure is None:
             return self
-        trace = (*self.trace, self.unsure) if happened else self.trace
-        return replace(self, trace=trace, unsure=None)
+        if answer and answer not in self.answers:
+            raise UserError(f'"{shortened(answer)}" is not one of the options: {", ".join(self.answers)}')
+        done = replace(self.unsure, answer=answer or None)
+        return replace(self, trace=(*self.trace, done) if happened else self.trace, unsure=None)
 
     def add_to(self, room_map: RoomMap | None, place: str) -> tuple[RoomMap, str]:
         """Return the rooms with this past, and the robot's place, which is the last one if it is unknown."""
@@ -110,13 +134,26 @@ class MissionPast:
         }
 
 
-def read_past(folder: Path, skills: SkillTable) -> MissionPast:
-    """Read what a mission did and saw. Raise UserError if it cannot be continued, or its log is invalid."""
+def read_past(folder: Path, skills: SkillTable, robot_kind: str = "") -> MissionPast:
+    """Read what a mission did and saw.
+
+    Args:
+        folder: the folder of the mission.
+        skills: the robot's skills.
+        robot_kind: the kind of robot that is to do the rest; by default that of the mission.
+
+    Raises:
+        UserError: the mission cannot be continued, ran on another kind of robot, or its log is invalid.
+    """
     summary = MissionSummary.read(folder)
+    if robot_kind not in {"", summary.robot}:
+        raise UserError(f"mission {summary.id} ran on the robot {summary.robot}, not {robot_kind}")
     if not summary.has_ended:
         raise UserError(f"mission {summary.id} has not ended; stop it first")
     if summary.state is MissionState.DONE:
         raise UserError(f"mission {summary.id} is done; there is nothing to continue")
+    if (successor := _find_successor(folder)) is not None:
+        raise UserError(f"mission {summary.id} was continued by mission {successor}; continue that one")
     events = read_events(folder)
     before: LogLine = next((line for line in events if line["event"] == "past"), {})
     has_run = any(line["event"] == "state" and line["state"] == MissionState.RUNNING for line in events)
@@ -127,7 +164,7 @@ def read_past(folder: Path, skills: SkillTable) -> MissionPast:
         sentence = "the log does not fit the skills; name the files of own skills with --skills"
         raise UserError(sentence, file=folder) from None
     return MissionPast(
-        summary.id,
+        summary.id if has_run else before.get("continues", summary.id),
         summary.instruction,
         summary.model,
         summary.program if has_run else before.get("program", summary.program),
@@ -137,6 +174,16 @@ def read_past(folder: Path, skills: SkillTable) -> MissionPast:
         unsure,
         len(before.get("trace", ())) if has_run else before.get("before", 0),
     )
+
+
+def _find_successor(folder: Path) -> str | None:
+    """Return the ID of a mission that has done a part of the rest of this one, or None."""
+    for other in sorted(folder.parent.glob(f"*/{SUMMARY_FILE}")):
+        with suppress(UserError, OSError):  # a damaged mission says nothing about this one
+            summary = MissionSummary.read(other.parent)
+            if summary.continues == folder.name and summary.if_tool_dies:
+                return summary.id
+    return None
 
 
 def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[LoggedRobot, Event | None]:
@@ -152,7 +199,9 @@ def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[
         robot.end = next(ends, {"event": "unknown"})
         row, arguments = skills[line["skill"]], arguments_in(line, skills)
         if robot.end["event"] in {"unknown", "cancelled"} and _has_effect(row):
-            unsure = attempted_event(row, arguments, place=robot.place, time=0.0, holding=robot.held or "")
+            holding = robot.held or ""
+            unsure = attempted_event(row, arguments, place=robot.place, time=0.0, holding=holding)
+            unsure = unsure or Event(row.name, "", place=robot.place, holding=holding)
         try:
             robot.execute(row.name, arguments)
         except RobotError:  # it is in the log as well

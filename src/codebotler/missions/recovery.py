@@ -71,7 +71,7 @@ def past_to_recover(session: MissionSession, robot: Robot, home: Path) -> Missio
     session.join()
     if not is_recoverable(session.view, session.events()):
         return None
-    return read_past(find_mission(home, session.view.id), robot.skills)
+    return read_past(find_mission(home, session.view.id), robot.skills, robot.name)
 
 
 def ask_evidence(robot: Robot, home: Path, past: MissionPast, remark: Callable[[str], None]) -> list[str]:

@@ -344,7 +344,8 @@ class MissionSession:
     ) -> None:
         option = question.chosen(answer)
         if option is not None:
-            mission.note(f"a person chose what the robot should do: {option.difference}")
+            who = "a person left the choice to CodeBotler" if answer == "decide" else "a person chose"
+            mission.note(f"{who}: a robot that {option.difference}")
             self._take(mission, option.program)
         elif not more or self._rejected is not None:
             mission.fail("no program does what was meant")

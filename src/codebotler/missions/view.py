@@ -143,13 +143,13 @@ class SessionView:
     @property
     def may_be_approved(self) -> bool:
         """Whether the program can be approved now."""
-        return self.state is MissionState.CHECKED and not self.is_over and not self.busy
+        return self.state is MissionState.CHECKED and not (self.is_over or self.busy or self.question)
 
     @property
     def waits_for_program(self) -> bool:
         """Whether a model replied without a program, so that a person must decide."""
         is_open = self.state is MissionState.DRAFTING and not self.is_over and not self.busy
-        return is_open and self.programless is not None
+        return is_open and self.programless is not None and self.question is None
 
     @property
     def waits_for_answer(self) -> bool:

@@ -18,7 +18,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.yaml_files import YamlFile
 from codebotler.models.base import ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.sampling import SamplingSettings
-from codebotler.prompts import Prompt
+from codebotler.prompts import NO_STEP, Prompt
 
 RECORDED_FOLDER = Path(__file__).with_name("recorded")
 RECORDED_NAMES = ("careful", "hasty")
@@ -118,11 +118,11 @@ class RecordedModel:
         return Reply(program, program, Usage(), 0.0, "stop")
 
     def _program(self, instruction: str, number: int, last_step: str) -> str:
-        if not last_step:
+        if last_step in {"", NO_STEP}:
             return self.solution(instruction, number).program
         program = self.rests.get((instruction, last_step))
         if program is None:
-            what = f'{self.name} has no program for the rest of this mission after the step "{last_step}"'
+            what = f"{self.name} has no program for the rest of this mission after this step: {last_step}"
             raise ModelError(f"{what}; choose a language model, or write the rest", may_pass=False)
         return program
 

@@ -26,6 +26,10 @@ MAX_SEARCHED_LENGTH, MAX_END_TRIES = 100_000, 20  # limits of the search for the
 STOP_TEXTS = ("\ndef ", "\nclass ", "\n# Instruction", "\n```")  # OpenAI accepts at most four
 
 
+NO_STEP = "nothing"
+"""What a mission did that has done nothing, in words."""
+
+
 @dataclass(frozen=True)
 class PromptMessage:
     """One turn of a conversation with a chat model."""
@@ -79,7 +83,7 @@ class Prompt:
             why: why the mission ended, in a sentence.
             here: where the robot is and what it holds, in a sentence.
         """
-        listed = _listed(steps or ["nothing"])
+        listed = _listed(steps or [NO_STEP])
         request = _fill("continue", steps=listed, why=why, here=here)
         text = _fill(
             "completion-continue",
@@ -89,7 +93,7 @@ class Prompt:
             here=here,
             opening=self.opening,
         )
-        return replace(self._followed(program, request, text), last_step=steps[-1] if steps else "nothing")
+        return replace(self._followed(program, request, text), last_step=steps[-1] if steps else NO_STEP)
 
     def _followed(self, program: str, request: str, text: str) -> Prompt:
         """Return this prompt with a program and a further request: `text` is both for base models."""

@@ -132,6 +132,8 @@ class SampledRobot(SimulatedRobot):
         """Let the world be as the robot left or saw it in an event before the program began."""
         room, name = self.room_map.room(event.place), normalized(event.text)
         if room is None:
+            if event.kind in {PICK, PLACE}:
+                self._hold(event.text if event.kind == PICK else None)
             return
         self.room = room
         if event.kind == CHECK and event.found is not None:
@@ -142,14 +144,19 @@ class SampledRobot(SimulatedRobot):
             self.answers[room, who, event.text.strip()] = event.answer
         elif event.kind == PICK:
             self._see(name, is_person=False, is_there=True)
-            self.held, self.taken = event.text, next(one for one in self.things_here if _is(one, name))
-            self._remove(name)
+            self._hold(event.text, next((one for one in self.things_here if _is(one, name)), None))
+            for goal in self._reach.get(room, (room,)):
+                self.contents[goal] = [one for one in self.contents[goal] if one is not self.taken]
             self.here.gone.add(name)
         elif event.kind == PLACE:
             self.contents[room].append(self.taken or Thing(name, is_pattern=False))
-            self.held = self.taken = None
+            self._hold(None)
             self.here.missed.discard(name)
             self.here.gone.discard(name)
+
+    def _hold(self, held: str | None, taken: Thing | None = None) -> None:
+        self.held = held
+        self.taken = None if held is None else taken or Thing(normalized(held), is_pattern=False)
 
     def _see(self, name: str, *, is_person: bool, is_there: bool) -> None:
         """Let a thing or person be in this room, or not, as the robot saw it last."""
@@ -171,11 +178,13 @@ class SampledRobot(SimulatedRobot):
 
     def _remove(self, name: str) -> None:
         for goal in self._reach.get(self.room, (self.room,)):
-            self.contents[goal] = [one for one in self.contents[goal] if not _is(one, name)]
+            self.contents[goal] = [one for one in self.contents[goal] if one.label != name]
 
     def is_here(self, name: str) -> bool | None:
         """Return whether a person or thing is in this room, or None if that is undecided."""
         things, around = self.things_here if name != SOMEBODY else [], self.explored[self._around]
+        if name in self.here.missed and not any(thing.label == name for thing in things):
+            return False
         if name in around.people or any(_is(thing, name) for thing in things):
             return True
         is_missed = self.here.lacks(name) or around.lacks(name)

@@ -83,6 +83,9 @@ class ContinueForm(_Form):
     happened: bool | None = Field(
         None, description="A person's word on whether the last step happened, if the log does not say so."
     )
+    answer: Annotated[str, Field(max_length=10_000)] = Field(
+        "", description="The answer, if this step was a question and the person knows it."
+    )
 
 
 class AsciiJSONResponse(JSONResponse):
@@ -130,7 +133,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
         with as_http_errors():
             past = await asyncio.to_thread(console.past_of, summary.id)
             if form.happened is not None:
-                past = past.resolve(happened=form.happened)
+                past = past.resolve(happened=form.happened, answer=form.answer)
             session = console.begin(console.rest_of(past))
         return await _begun_data(console, session)
 

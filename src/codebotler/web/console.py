@@ -146,7 +146,7 @@ class Console:
 
     def past_of(self, mission: str) -> MissionPast:
         """Read what a mission did and saw, given its ID or `last`. Raise UserError if it has no rest."""
-        return read_past(find_mission(self.home, mission), self.robot.skills)
+        return read_past(find_mission(self.home, mission), self.robot.skills, self.robot.name)
 
     def rest_of(self, past: MissionPast, program: str = "", author: str = "") -> MissionOrder:
         """Return the order for the rest of a mission. Without an instruction, start from its program."""

@@ -103,7 +103,7 @@ def scroll_to(element: str) -> None:
 
 def warn(sentence: str, seconds: float = 5.0) -> None:
     """Show a warning for some seconds."""
-    ui.notify(visible_lines(sentence), type="warning", position="top", timeout=1000 * seconds)
+    ui.notify(visible_lines(sentence), type="warning", position="bottom", timeout=1000 * seconds)
 
 
 class Button(PlainText):

@@ -8,6 +8,7 @@ from codebotler.candidates.behaviour import (
     behaviour_of,
     claims_of,
     names_in,
+    rooms_with_several,
     statements,
 )
 from codebotler.core.trace import Event, Outcome, RunError, Status, to_options
@@ -145,3 +146,15 @@ def test_own_skills_count_by_kind_and_text() -> None:
     one = seen(Event("wave", "left", more=("twice",)), Event("nod", ""))
     assert one == seen(Event("nod", ""), Event("wave", "left", more=("twice",)))
     assert one.differences(seen(Event("nod", ""), Event("wave", "left"))) == {"done"}
+
+
+def test_who_is_asked_counts_where_candidates_name_different_people() -> None:
+    alice, bob, anybody = (ask("yes", "no", to=name) for name in ("Alice", "the Bob", "person"))
+    several = rooms_with_several([(alice,), (bob,), (anybody,)])
+    assert several == {START}
+    assert rooms_with_several([(alice,), (anybody,), (ask("yes", room="office 1", to="Bob"),)]) == frozenset()
+    shown = [
+        behaviour_of(Outcome(Status.FINISHED, (one,)), START, NAMES, several) for one in (alice, bob, anybody)
+    ]
+    assert len({*shown}) == 3
+    assert seen(alice) == seen(bob)

@@ -158,3 +158,16 @@ def test_an_unsure_step_needs_a_persons_word(folder: Path) -> None:
     assert ended(folder, "continue", "last", program, "--yes", "--not-happened").status == 1
     assert ended(folder, "continue", mission["id"], program, "--yes", "--happened").status == 0
     assert [one["state"] for one in missions(folder)][-1] == "done"
+
+
+def test_recover_needs_an_instruction(folder: Path) -> None:
+    assert ended(folder, "run", "begun.py", "--yes", "--recover", "1").status == 2
+
+
+def test_a_model_that_writes_no_rest_leaves_the_status_of_the_mission(folder: Path) -> None:
+    with server(BEGUN) as model:
+        program = model.answer
+        model.answer = lambda one: program(one) if len(model.requests) < 2 else ""
+        failed = ended(folder, "run", "Bring Anne a mug.", *at(model), "--yes", "--recover", "1")
+    assert failed.status == 1
+    assert "Traceback" not in failed.err

@@ -14,6 +14,7 @@ from codebotler.checking.repetition import has_same_effect, hold_to_past
 from codebotler.checking.sampled import DEFAULT_SAMPLES
 from codebotler.cli.run import checker
 from codebotler.core.errors import UserError
+from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Option
@@ -113,6 +114,7 @@ def test_a_continuation_that_never_ran_leaves_the_past_as_it_was(tmp_path: Path)
         mission.continue_from(past)
         mission.fail("the model is away")
     again = read_past(mission.folder, SKILLS)
+    assert again.mission == past.mission, "the mission that ran is continued"
     assert (again.trace, again.place, again.program, again.why) == (
         past.trace,
         past.place,
@@ -229,7 +231,7 @@ def poll(times: int, question: str = "Is it hot?") -> str:
     return POLL.replace("range(3)", f"range({times})").replace("Is it hot?", question)
 
 
-@pytest.mark.parametrize("question", ["Is it hot?", "Would you say that it is warm outside?"])
+@pytest.mark.parametrize("question", ["Is it hot?", "Would you say that it is hot outside?"])
 @pytest.mark.parametrize(("times", "problems"), [(1, set()), (2, {"RepeatedStep"}), (3, {"RepeatedStep"})])
 def test_as_many_steps_may_follow_as_remained(times: int, question: str, problems: set[str]) -> None:
     assert follow(POLL, poll(times, question), WENT, ASKED, ASKED) == problems
@@ -378,3 +380,93 @@ def test_an_order_for_the_rest_needs_an_instruction_or_a_program(tmp_path: Path)
     with pytest.raises(UserError):
         MissionOrder(past=past)
     assert MissionOrder(past.instruction, past=past).past is past
+
+
+def test_a_person_may_know_the_answer_to_an_unsure_question(tmp_path: Path) -> None:
+    folder = failed(tmp_path, BRING)
+    cut(folder, line_of(folder, "ask", "skill"))
+    past = read_past(folder, SKILLS)
+    assert past.answers == ("yes", "no")
+    assert past.resolve(happened=True, answer="no").trace[-1].answer == "no"
+    assert past.resolve(happened=True).trace[-1].answer is None
+    with pytest.raises(UserError):
+        past.resolve(happened=True, answer="perhaps")
+
+
+FETCH = """
+def task_program():
+    go_to("lab")
+    say("Looking for the zebra.")
+    ask("Anne", "Tea or coffee?", ["tea", "coffee"])
+    pick("zebra")
+"""
+TALKED = (
+    WENT,
+    Event(SAY, "Looking for the zebra.", place="lab"),
+    Event(ASK, "Tea or coffee?", (Option("tea"), Option("coffee")), "tea", place="lab", to="Anne"),
+)
+
+
+@pytest.mark.parametrize(
+    ("line", "problems"),
+    [
+        ("say('I cannot find the zebra.')", set()),
+        ("say('Sorry for the delay.')", set()),
+        ("ask('Anne', 'There is no tea. Do you want the mug instead?', ['yes', 'no'])", set()),
+        ("ask('Anne', 'What may I bring, coffee or tea?', ['coffee', 'tea'])", {"RepeatedStep"}),
+        ("say('I am looking for a zebra')", {"RepeatedStep"}),
+    ],
+)
+def test_a_person_may_be_told_or_asked_about_what_went_wrong(line: str, problems: set[str]) -> None:
+    assert follow(FETCH, f"def task_program():\n    {line}\n", *TALKED) == problems
+
+
+def test_a_mission_is_continued_only_once(tmp_path: Path) -> None:
+    folder = failed(tmp_path, BRING)
+    past = read_past(folder, SKILLS)
+    mission = Mission(tmp_path, "simulated", "Bring Anne the mug.")
+    mission.continue_from(past)
+    assert read_past(folder, SKILLS).trace == past.trace, "the other one has not run yet"
+    mission.draft('def task_program():\n    go_to("nowhere")\n')
+    mission.check([])
+    mission.approve()
+    with Reservation(Simulated(WORLD, speed=None), tmp_path) as reserved, mission:
+        mission.run(reserved, "lab")
+    with pytest.raises(UserError, match=mission.id):
+        read_past(folder, SKILLS)
+    assert read_past(mission.folder, SKILLS).trace == past.trace
+
+
+def test_a_mission_of_another_robot_is_not_continued(tmp_path: Path) -> None:
+    folder = failed(tmp_path, BRING)
+    assert read_past(folder, SKILLS, "simulated").mission
+    with pytest.raises(UserError):
+        read_past(folder, SKILLS, "ros2")
+
+
+def test_own_skills_are_not_repeated_either(tmp_path: Path) -> None:
+    (tmp_path / "kit.py").write_text(
+        "from codebotler import skill\n\n\n"
+        "@skill(verb='dispense {drug}', text='drug')\ndef dispense(sim, drug: str, person: str) -> None:\n"
+        '    """Give a drug to a person."""\n\n\n'
+        "@skill(event=None)\ndef ring_bell(sim) -> None:\n"
+        '    """Ring the bell."""\n    sim.value("bell", True)\n'
+    )
+    table = skills_from(tmp_path / "kit.py")
+    given = Event("dispense", "aspirin", place="lab", more=("Anne",))
+    other = replace(given, more=("Bob",))
+    assert has_same_effect(given, replace(given), ROOMS)
+    assert not has_same_effect(given, other, ROOMS)
+    program = 'def task_program():\n    ring_bell()\n    dispense("aspirin", "Anne")\n    go_to("nowhere")\n'
+    robot = Simulated(WORLD, speed=None, skills=table)
+    mission = Mission(tmp_path, "simulated", "Ring.")
+    mission.draft(program)
+    mission.check([])
+    mission.approve()
+    with Reservation(robot, tmp_path) as reserved, mission:
+        mission.run(reserved, "hall")
+    for skill in ("dispense", "ring_bell"):
+        cut(mission.folder, line_of(mission.folder, skill, "skill"))
+        past = read_past(mission.folder, table)
+        assert past.unsure is not None, skill
+        assert past.resolve(happened=True).steps

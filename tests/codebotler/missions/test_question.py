@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.candidates.question import ClarifyingAnswer
 from codebotler.cli.run import checker
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
@@ -54,7 +55,9 @@ def notes(home: Path, view: SessionView) -> list[str]:
 
 
 @pytest.mark.parametrize(("answer", "program"), [(0, STAY), (1, FETCH), ("decide", STAY)])
-def test_a_person_chooses_and_the_mission_keeps_the_answer(tmp_path: Path, answer: int, program: str) -> None:
+def test_a_person_chooses_and_the_mission_keeps_the_answer(
+    tmp_path: Path, answer: ClarifyingAnswer, program: str
+) -> None:
     with asking(tmp_path, STAY, FETCH, STAY) as (session, _):
         view = waited(session)
         assert view.phase == "question"
@@ -66,7 +69,8 @@ def test_a_person_chooses_and_the_mission_keeps_the_answer(tmp_path: Path, answe
         assert (view.program, view.question, view.author) == (program, None, "several")
         assert view.may_be_approved
         assert difference is not None
-        assert any(difference.difference in note for note in notes(tmp_path, view))
+        (note,) = [note for note in notes(tmp_path, view) if difference.difference in note]
+        assert ("left the choice" in note) == (answer == "decide")
 
 
 def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_path: Path) -> None:
@@ -116,3 +120,14 @@ def test_replies_without_a_program_do_not_count(tmp_path: Path) -> None:
         assert waited(session).program == GO
     with asking(tmp_path, "", "") as (session, _):
         assert waited(session).waits_for_program
+
+
+def test_an_old_program_cannot_be_approved_while_a_question_waits(tmp_path: Path) -> None:
+    with asking(tmp_path, STAY, FETCH) as (session, _):
+        waited(session)
+        session.answer(0)
+        waited(session)
+        session.ask_again(repair=False)
+        view = session.wait_until(lambda now: now.waits_for_answer)
+        assert view.state is MissionState.CHECKED
+        assert (view.may_be_approved, view.may_be_asked_again) == (False, False)

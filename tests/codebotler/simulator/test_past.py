@@ -110,3 +110,21 @@ def test_a_past_travels_to_the_child() -> None:
     room_map = replace(ROOMS, past=(event(PICK, "mug"),))
     assert pickle.loads(pickle.dumps(room_map)) == room_map
     assert hash(room_map) == hash(replace(room_map))
+
+
+@pytest.mark.parametrize(
+    "looks", [(("mug", True), ("blue mug", False)), (("blue mug", False), ("mug", True))]
+)
+def test_names_within_names_are_seen_apart(looks: tuple[tuple[str, bool], ...]) -> None:
+    for robot in robots(*(event(CHECK, name, found=found) for name, found in looks)):
+        assert robot.perform("is_in_room", ["mug"])
+        assert not robot.perform("is_in_room", ["blue mug"])
+
+
+def test_what_was_picked_up_in_an_unknown_room_is_held() -> None:
+    ambiguous = RoomMap(
+        ("hall", "kitchen", "lab"), "kitchen", plain=True, past=(event(PICK, "mug", "cellar"),)
+    )
+    robot = SampledRobot(ambiguous, FactSampler())
+    assert robot.held == "mug"
+    robot.perform("place", ["mug"])

@@ -12,7 +12,7 @@ from codebotler.core.words import counted, listed
 from codebotler.missions.mission import MissionError
 from codebotler.missions.view import SessionView
 from codebotler.web.console import Console
-from codebotler.web.frame import Button, PlainText, warn
+from codebotler.web.frame import Button, PlainText, scroll_up, warn
 from codebotler.web.storyboard import draw_scene, scenes
 
 _MAX_DIFFERENCE, _MAX_SENTENCE = 400, 500
@@ -50,7 +50,7 @@ class CandidatesPane:
         more = ui.input("What should be different?").props(f"outlined maxlength={_MAX_SENTENCE}")
         with ui.element("div").classes("others"):
             Button("None of these", lambda: self._answer("none", more.value or ""), "plain")
-            Button("You decide", lambda: self._answer("decide"), "plain")
+            Button("You decide (the first one)", lambda: self._answer("decide"), "plain")
 
     def _draw_option(self, question: ClarifyingQuestion, option: CandidateOption, number: int) -> None:
         PlainText("p", f"{number + 1}. {shortened(option.difference, _MAX_DIFFERENCE)}", "difference")
@@ -71,5 +71,6 @@ class CandidatesPane:
         elif session is not None:
             try:
                 await asyncio.to_thread(session.answer, answer, more)
+                scroll_up()
             except MissionError as error:
                 warn(error.sentence)

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 
 from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import note, shortened
 from codebotler.core.words import counted
-from codebotler.missions.log import MissionState
+from codebotler.missions.log import MissionState, MissionSummary
 from codebotler.missions.mission import MissionError
 from codebotler.missions.past import MissionPast
 from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.view import SessionView
 from codebotler.web.console import Console
-from codebotler.web.frame import Button, PlainText, scroll_up, warn
+from codebotler.web.frame import Button, PlainText, outside, scroll_up, warn
 
 MAX_OPEN_STEPS = 12
-_MAX_STEPS, _MAX_STEP_CHARACTERS = 500, 300
-_EARLY_ENDS = frozenset({MissionState.FAILED, MissionState.STOPPED, MissionState.INTERRUPTED})
+_MAX_STEPS, _MAX_STEP_CHARACTERS, _MAX_ANSWERS = 500, 300, 8
+EARLY_ENDS = frozenset({MissionState.FAILED, MissionState.STOPPED, MissionState.INTERRUPTED})
 
 
 class ContinueButton(Button):
@@ -31,9 +32,11 @@ class ContinueButton(Button):
 
     def show(self, view: SessionView) -> None:
         """Offer to continue the mission of a view, if it has begun and ended early."""
-        self._mission = view.id
-        has_past = view.progress.has_begun or view.past is not None
-        self.set_visibility(view.is_over and view.state in _EARLY_ENDS and has_past)
+        past = "" if view.past is None else view.past.mission
+        self._mission = view.id or past
+        has_past = view.progress.has_begun or bool(past)
+        is_early = view.state in EARLY_ENDS or view.state is None  # without a state, the robot was busy
+        self.set_visibility(view.is_over and is_early and has_past)
 
     async def _continue(self) -> None:
         console = self._console
@@ -51,13 +54,18 @@ class ContinueButton(Button):
                 _ask(console, past, evidence)
 
 
+def can_be_continued(summary: MissionSummary) -> bool:
+    """Return whether a mission has moved the robot, or was to do the rest of one that had."""
+    return bool(summary.if_tool_dies or summary.continues)
+
+
 def _ask(console: Console, past: MissionPast, evidence: list[str]) -> None:
     """Ask a person whether the unsure step happened, beside what the log and the robot say."""
 
-    def answer(happened: bool) -> None:  # noqa: FBT001 - the only argument
+    def answer(*, happened: bool, answer: str = "") -> None:
         dialog.close()
         try:
-            _begin(console, past.resolve(happened=happened))
+            _begin(console, past.resolve(happened=happened, answer=answer))
         except (UserError, MissionError) as error:
             warn(error.sentence)
 
@@ -67,15 +75,22 @@ def _ask(console: Console, past: MissionPast, evidence: list[str]) -> None:
         for sentence in evidence:
             PlainText("p", sentence, "quiet")
         with ui.element("div").classes("word"):
-            Button("It happened", lambda: answer(True), "plain")  # noqa: FBT003
-            Button("It did not happen", lambda: answer(False), "plain")  # noqa: FBT003
+            for one in past.answers[:_MAX_ANSWERS]:
+                words = f'It happened: "{shortened(one, _MAX_STEP_CHARACTERS)}"'
+                Button(words, partial(answer, happened=True, answer=one), "plain")
+            Button("It happened", partial(answer, happened=True), "plain")
+            Button("It did not happen", partial(answer, happened=False), "plain")
+            Button("Cancel", dialog.close, "plain")
     dialog.props('aria-label="Did this happen?"').on("hide", dialog.delete)
     dialog.open()
 
 
 def _begin(console: Console, past: MissionPast) -> None:
     console.begin(console.rest_of(past))
-    scroll_up()
+    if ui.context.client.page.path == "/":
+        scroll_up()
+    else:
+        ui.navigate.to(outside("/"))
 
 
 class PastPane:

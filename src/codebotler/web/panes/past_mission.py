@@ -19,6 +19,7 @@ from codebotler.missions.wording import activity, event_text, reason_text, stop_
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText, outside
 from codebotler.web.live import follow
+from codebotler.web.panes.continuing import EARLY_ENDS, ContinueButton, can_be_continued
 
 MAX_LISTED_EVENTS, _MAX_CODE_CHARACTERS = 1_000, 200
 _STATE_TITLES: Mapping[str, str] = {MissionState.DRAFTING: "Program written", MissionState.RUNNING: "Started"}
@@ -42,6 +43,12 @@ def add(console: Console, frame: Frame) -> None:
                 return
             page = _MissionPage(summary)
             page.show(summary, events)
+            if (
+                summary.state in EARLY_ENDS
+                and can_be_continued(summary)
+                and summary.robot == console.robot.name
+            ):
+                ContinueButton(console, summary.id)
             if not summary.has_ended:
                 await follow(console.notifier, partial(_update, console, page))
 

@@ -205,7 +205,7 @@ class ProgramPane:
         if seen["text"] == _for_editor(view.program):
             return True
         if seen["number"] > self._received or seen["text"] == _for_editor(self._console.view.program):
-            ui.notify("Checking your last edit first.", position="top")
+            ui.notify("Checking your last edit first.", position="bottom")
         else:
             self._restore("The program has changed; review it again.")
         return False

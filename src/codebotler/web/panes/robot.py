@@ -17,7 +17,7 @@ from codebotler.missions.wording import reason_text
 from codebotler.web.console import Console
 from codebotler.web.floorplan import MapState, floorplan, room_at
 from codebotler.web.frame import Button, PlainText, script
-from codebotler.web.panes.continuing import ContinueButton
+from codebotler.web.panes.continuing import ContinueButton, can_be_continued
 from codebotler.web.panes.question import QuestionPane
 
 _PHASE_HEADLINES: Mapping[Phase, str] = {
@@ -116,7 +116,9 @@ class RobotPane:
         with self._interrupted:
             for summary in summaries:
                 PlainText("p", f"Mission {summary.id} was interrupted: {summary.reason}")
-                ContinueButton(self._console, summary.id).props(f'aria-label="Continue mission {summary.id}"')
+                if can_be_continued(summary):
+                    button = ContinueButton(self._console, summary.id)
+                    button.props(f'aria-label="Continue mission {summary.id}"')
             Button("Dismiss", self._console.dismiss, "plain")
 
 
