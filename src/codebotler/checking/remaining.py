@@ -39,7 +39,7 @@ def remaining_outcomes(
     settings, found = CheckSettings(skills=skills), []
     for sampler in first_samplers(settings):
         robot = RepeatingRobot(room_map, sampler, settings.simulation, skills)
-        robot.left = deque(room_map.past[first:])
+        robot.left = deque(event for event in room_map.past[first:] if not event.failed)
         outcome = worker.run_alone(begun, lambda robot=robot: robot)  # type: ignore[misc]
         if outcome.status in {Status.FINISHED, Status.TIMEOUT} and not robot.left:
             found.append(outcome)
@@ -53,7 +53,7 @@ class RepeatingRobot(SampledRobot):
         self, room_map: RoomMap, sampler: FactSampler, settings: SimulationSettings, skills: SkillTable
     ) -> None:
         super().__init__(room_map, sampler, settings, skills)
-        self.left = deque(room_map.past)
+        self.left = deque(event for event in room_map.past if not event.failed)
 
     @property
     def idle_skills(self) -> frozenset[str]:

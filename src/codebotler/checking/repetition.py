@@ -83,7 +83,8 @@ def repeated_steps(trace: Trace, room_map: RoomMap, remaining: Sequence[Outcome]
 
     If more steps of a kind follow in a room than remained to be done, those about the same are done already.
     """
-    done, later = _distinct(room_map.past), _distinct(event for one in remaining for event in one.trace)
+    done = _distinct(event for event in room_map.past if not event.failed)
+    later = _distinct(event for one in remaining for event in one.trace)
     done_sorts: defaultdict[tuple[str, str], list[Event]] = defaultdict(list)
     for one_done in done:
         done_sorts[_sort(one_done, room_map)].append(one_done)

@@ -49,6 +49,7 @@ class Event:
         to: the addressee of a question; None for other kinds.
         more: further arguments, as texts.
         destination: the room where a drive ended; None for a failed drive and for other kinds.
+        failed: the kind of the error by which it failed; such events occur only in the past of a mission.
     """
 
     kind: str
@@ -62,6 +63,7 @@ class Event:
     to: str | None = field(default=None, compare=False)
     more: tuple[str, ...] = ()
     destination: str | None = field(default=None, compare=False)
+    failed: str = field(default="", compare=False)
 
     def __init__(  # noqa: PLR0917 - the fields of the data class
         self,
@@ -76,12 +78,13 @@ class Event:
         to: str | None = None,
         more: tuple[str, ...] = (),
         destination: str | None = None,
+        failed: str = "",
     ) -> None:
         values = self.__dict__  # the quickest way to fill a frozen object, since traces have many events
         values["kind"], values["text"], values["options"] = kind, text, options
         values["answer"], values["found"], values["place"], values["time"] = answer, found, place, time
         values["holding"], values["to"], values["more"] = holding, to, more
-        values["destination"] = destination
+        values["destination"], values["failed"] = destination, failed
 
 
 def attempted_event(
@@ -156,7 +159,7 @@ class Outcome:
 
 def held_after(trace: Iterable[Event]) -> str:
     """Return what the robot holds after a trace, or an empty string for nothing."""
-    moves = [event for event in trace if event.kind in {PICK, PLACE}]
+    moves = [event for event in trace if event.kind in {PICK, PLACE} and not event.failed]
     return moves[-1].text if moves and moves[-1].kind == PICK else ""
 
 
@@ -187,6 +190,7 @@ def placed_trace_data(trace: Trace) -> list[dict[str, Any]]:
             "holding": event.holding,
             "to": event.to,
             "destination": event.destination,
+            "failed": event.failed,
         }
         for event in trace
     ]

@@ -80,7 +80,9 @@ def prompt_of(view: SessionView, robot: Robot, *, repair: bool) -> Prompt:
     )
     if past is not None:
         place = past.place if room_map is None else room_map.start
-        prompt = prompt.to_continue(past.program, past.steps, past.why, past.here(place))
+        prompt = prompt.to_continue(
+            past.program, past.steps, past.why, past.here(place), (past.done or [""])[-1]
+        )
     if repair and view.problems:
         return prompt.after(view.program, view.problems)
     if repair and view.programless is not None:

@@ -73,12 +73,12 @@ class MissionPast:
     @property
     def steps(self) -> list[str]:
         """What the robot did and saw, in words."""
-        return [
-            f'in "{shortened(event.place)}": {phrase(event, "past", show=shortened)}'
-            if event.place
-            else phrase(event, "past", show=shortened)
-            for event in self.trace
-        ]
+        return [*map(_step_words, self.trace)]
+
+    @property
+    def done(self) -> list[str]:
+        """What the robot did and saw, in words, without failed steps."""
+        return [_step_words(event) for event in self.trace if not event.failed]
 
     def here(self, place: str) -> str:
         """Say that the robot is at a place, and what it holds."""
@@ -204,9 +204,18 @@ def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[
             unsure = unsure or Event(row.name, "", place=robot.place, holding=holding)
         try:
             robot.execute(row.name, arguments)
-        except RobotError:  # it is in the log as well
-            continue
+        except RobotError:
+            tried = attempted_event(row, arguments, place=robot.place, time=0.0, holding=robot.held or "")
+            if tried is not None and robot.end["event"] == "error":
+                robot.events.append(replace(tried, failed=str(robot.end["kind"])))
     return robot, unsure
+
+
+def _step_words(event: Event) -> str:
+    words = phrase(event, "past", show=shortened)
+    if event.failed:
+        words = f"failed to {phrase(event, 'base', show=shortened)} ({shortened(event.failed)})"
+    return f'in "{shortened(event.place)}": {words}' if event.place else words
 
 
 def _has_effect(row: Skill) -> bool:

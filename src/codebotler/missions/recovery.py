@@ -47,7 +47,7 @@ class PriorApproval:
 
     def contract_after(self, trace: Trace) -> Contract:
         """Return what is left of the contract after a trace."""
-        rows = (by_event(event.kind) for event in trace[self.done_before :])
+        rows = (by_event(event.kind) for event in trace[self.done_before :] if not event.failed)
         done = Counter(row.name for row in rows if row is not None)
         return Contract(
             {

@@ -74,7 +74,7 @@ class Prompt:
         )
         return self._followed(program, repair, text)
 
-    def to_continue(self, program: str, steps: Sequence[str], why: str, here: str) -> Prompt:
+    def to_continue(self, program: str, steps: Sequence[str], why: str, here: str, last_step: str) -> Prompt:
         """Return a request to write the rest of a mission that ended early.
 
         Args:
@@ -82,6 +82,7 @@ class Prompt:
             steps: what the robot did and saw, each in words.
             why: why the mission ended, in a sentence.
             here: where the robot is and what it holds, in a sentence.
+            last_step: the last of the steps that did not fail; empty if there is none.
         """
         listed = _listed(steps or [NO_STEP])
         request = _fill("continue", steps=listed, why=why, here=here)
@@ -93,7 +94,7 @@ class Prompt:
             here=here,
             opening=self.opening,
         )
-        return replace(self._followed(program, request, text), last_step=steps[-1] if steps else NO_STEP)
+        return replace(self._followed(program, request, text), last_step=last_step or NO_STEP)
 
     def _followed(self, program: str, request: str, text: str) -> Prompt:
         """Return this prompt with a program and a further request: `text` is both for base models."""

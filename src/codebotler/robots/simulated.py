@@ -81,7 +81,7 @@ class Simulated:
 
     def resume(self, past: Trace) -> None:
         """Bring the robot and the world to where they were after the steps of an earlier mission."""
-        for event in past:
+        for event in (one for one in past if not one.failed):
             row = next(
                 (one for one in self.skills.rows if one.recording and one.recording.kind == event.kind), None
             )

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 from codebotler.core.errors import RobotError
 from codebotler.core.labels import PLAIN_LABEL
+from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.kinds import GOTO, INSIDE, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
@@ -93,9 +94,11 @@ class RuleGuard:
     def _recall(self, room_map: RoomMap) -> None:
         """Add what happened before the program began to the history, without an objection."""
         for event in room_map.past:
+            if event.failed and not _counts_attempts(event.kind):
+                continue
             place = _label(room_map, event.place)
             named = replace(event, place=name_of(place, event.place))
-            if event.kind == GOTO:
+            if event.kind == GOTO and not event.failed:
                 goal = _label(room_map, event.text)
                 named = replace(named, text=name_of(goal, event.text), destination=goal)
                 for inside in self._entered(self._way(place, goal), event.holding):
@@ -289,6 +292,12 @@ class RuleGuard:
         """Return the rooms that contain each part of a simulated drive, or only its ends without a map."""
         one, other = self._stops.get(start), self._stops.get(end)
         return [(start,), (end,)] if one is None or other is None else rooms_along(self._rooms, one, other)
+
+
+def _counts_attempts(kind: str) -> bool:
+    """Return whether house rules count failed attempts of the skill that records a kind of event."""
+    row = by_event(kind)
+    return row is not None and row.recording is not None and row.recording.judged_when_tried
 
 
 def _label(room_map: RoomMap, request: str) -> str:

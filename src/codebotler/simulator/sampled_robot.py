@@ -86,7 +86,8 @@ class SampledRobot(SimulatedRobot):
         self.excuses: set[str] = set()  # messages of excused errors
         self.has_assumed = False  # whether a fact holds that strict worlds would draw
         for event in room_map.past:
-            self._recall(event)
+            if not event.failed:
+                self._recall(event)
         self.room = world.robot
 
     @property

@@ -111,7 +111,8 @@ class Interruption:
         request = prompt_for(
             past.instruction, rooms=self.room_map.described, rules=rules, skills=suite.skills
         )
-        return request.to_continue(past.program, past.steps, past.why, past.here(past.place))
+        last_step = (past.done or [""])[-1]
+        return request.to_continue(past.program, past.steps, past.why, past.here(past.place), last_step)
 
 
 def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[Interruption | FaultResult]:

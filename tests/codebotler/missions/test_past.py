@@ -64,7 +64,9 @@ def test_a_log_tells_what_was_done_and_where(tmp_path: Path) -> None:
         ("ask", "A mug?", "lab", "no"),
         ("say", "Never mind.", "lab", None),
         ("place", "mug", "lab", None),
+        ("goto", "nowhere", "lab", None),
     ]
+    assert [one.failed for one in past.trace if one.failed] == ["GoToInvalidLocation"]
     assert (past.place, past.held, past.unsure, past.program) == ("lab", "", None, BRING)
     assert past.why.startswith("GoToInvalidLocation")
 
@@ -93,7 +95,11 @@ def test_a_drive_is_never_unsure_nor_is_a_step_with_a_result(tmp_path: Path, ski
 def test_a_failed_step_was_not_done(tmp_path: Path) -> None:
     program = 'def task_program():\n    pick("moon")\n'
     past = read_past(failed(tmp_path, program), SKILLS)
-    assert (past.trace, past.unsure, past.place) == ((), None, "hall")
+    ((tried,), unsure) = past.trace, past.unsure
+    assert (tried.kind, tried.failed, unsure, past.place) == ("pick", "PickInvalidObject", None, "hall")
+    assert (past.held, past.done, len(past.steps)) == ("", [], 1)
+    left = remaining_outcomes(program, replace(ROOMS, past=past.trace), SKILLS)
+    assert all(event.kind == "pick" for one in left for event in one.trace)
 
 
 def test_a_mission_that_is_done_has_no_rest(tmp_path: Path) -> None:
@@ -134,7 +140,7 @@ def test_the_rest_begins_after_what_earlier_missions_did(tmp_path: Path) -> None
         with Reservation(Simulated(WORLD, speed=None), tmp_path) as reserved:
             mission.run(reserved, past.place)
     again = read_past(mission.folder, SKILLS)
-    assert (past.before, again.before, len(again.trace)) == (0, len(past.trace), len(past.trace) + 1)
+    assert (past.before, again.before, len(again.trace)) == (0, len(past.trace), len(past.trace) + 2)
     with Mission(tmp_path, "simulated") as other:
         other.continue_from(again)
         other.fail("the model is away")
@@ -434,7 +440,8 @@ def test_a_mission_is_continued_only_once(tmp_path: Path) -> None:
         mission.run(reserved, "lab")
     with pytest.raises(UserError, match=mission.id):
         read_past(folder, SKILLS)
-    assert read_past(mission.folder, SKILLS).trace == past.trace
+    *again, failed_drive = read_past(mission.folder, SKILLS).trace
+    assert (tuple(again), failed_drive.failed) == (past.trace, "GoToInvalidLocation")
 
 
 def test_a_mission_of_another_robot_is_not_continued(tmp_path: Path) -> None:

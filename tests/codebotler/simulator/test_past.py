@@ -128,3 +128,13 @@ def test_what_was_picked_up_in_an_unknown_room_is_held() -> None:
     robot = SampledRobot(ambiguous, FactSampler())
     assert robot.held == "mug"
     robot.perform("place", ["mug"])
+
+
+def test_rules_count_failed_attempts_but_the_world_does_not() -> None:
+    once = Rule("once", "Ask once.", parse('not tr.AtLeast(ask(".*", ".*"), 2)'))
+    tried = event(ASK, "Tea?", options=YES_NO, to="Anne", failed="AskNoPerson")
+    for robot in robots(tried, event(PICK, "mug", failed="PickInvalidObject"), rules=(once,)):
+        assert robot.held is None
+        with pytest.raises(RuleViolationError):
+            robot.perform("ask", ["Anne", "Tea?", YES_NO])
+    assert len({one.perform("is_in_room", ["Anne"]) for one in robots(tried)}) == 2

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from functools import partial
 
 from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import note, shortened
+from codebotler.core.trace import Event
 from codebotler.core.words import counted
 from codebotler.missions.log import MissionState, MissionSummary
 from codebotler.missions.mission import MissionError
@@ -111,17 +113,20 @@ class PastPane:
         self._box.clear()
         with self._box:
             PlainText("h3", "Done so far")
-            if earlier := past.steps[-_MAX_STEPS:-MAX_OPEN_STEPS]:
+            steps = [*zip(past.steps, past.trace, strict=True)]
+            if earlier := steps[-_MAX_STEPS:-MAX_OPEN_STEPS]:
                 with html.details():
                     PlainText("summary", counted(len(earlier), "earlier step"))
                     _draw_steps(earlier)
-            _draw_steps(past.steps[-MAX_OPEN_STEPS:] or ["the robot did nothing"])
+            _draw_steps(steps[-MAX_OPEN_STEPS:])
+            if not steps:
+                PlainText("p", "The robot did nothing.")
 
 
-def _draw_steps(steps: list[str]) -> None:
+def _draw_steps(steps: Sequence[tuple[str, Event]]) -> None:
     with ui.element("ol"):
-        for step in steps:
-            PlainText("li", shortened(step, _MAX_STEP_CHARACTERS))
+        for words, event in steps:
+            PlainText("li", shortened(words, _MAX_STEP_CHARACTERS), "failed" if event.failed else "")
 
 
 def origin_text(view: SessionView) -> str:
