@@ -14,6 +14,7 @@ from codebotler.agents.steps import NOT_RUNNING, Steps
 from codebotler.checking.contract_file import contract_from
 from codebotler.checking.contract_text import contract_sentence
 from codebotler.core.errors import UserError
+from codebotler.core.program import MAX_PROGRAM_LENGTH
 from codebotler.core.words import listed
 from codebotler.missions.log import MissionState
 from codebotler.missions.mission import MissionError
@@ -59,6 +60,8 @@ class Gatekeeper:
             and (before is not self._session or before.view.is_changed_by_person)
         ):
             raise MissionError("a person is working on a mission of their own; wait until it is over")
+        if len(order.program) > MAX_PROGRAM_LENGTH:  # it would have no contract
+            raise UserError(f"the program has more than {MAX_PROGRAM_LENGTH:,} characters; shorten it")
         if not order.has_program and not self.writes:
             raise UserError("no model is configured that can write programs; send a program")
         session = self.console.begin(order)

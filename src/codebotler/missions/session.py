@@ -188,7 +188,7 @@ class MissionSession:
             if seen != view.digest or seen != program_digest(mission.summary.program):
                 raise MissionError("the program has changed; review it again")
             if not view.can_run:
-                raise MissionError("this program cannot run, because it is unknown what it may do; change it")
+                raise MissionError("this program cannot run; mend it")
             mission.approve(despite_problems=despite_problems, by=by)
 
     def reject(self, reason: str) -> None:

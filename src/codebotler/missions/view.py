@@ -20,6 +20,9 @@ from codebotler.simulator.contract import Contract
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.room_map import RoomMap
 
+_SYNTAX_ERRORS = frozenset({"SyntaxError", "IndentationError", "TabError"})
+"""The kinds of problems that prevent a program from starting."""
+
 CHECKING = "checking"  # a value of `SessionView.busy`
 
 Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking", "no-program", "question"]
@@ -102,8 +105,8 @@ class SessionView:
 
     @property
     def can_run(self) -> bool:
-        """Whether the program can start, despite its problems: only if it is known what it may do."""
-        return self.check is None or self.check.contract is not None
+        """Whether the program can start, despite its problems."""
+        return self.check is None or not any(one.kind in _SYNTAX_ERRORS for one in self.check.problems)
 
     @property
     def is_changed_by_person(self) -> bool:

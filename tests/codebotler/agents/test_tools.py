@@ -660,19 +660,12 @@ def test_an_agent_does_not_replace_what_a_person_has_changed(tmp_path: Path, cha
         use(gatekeeper, act)
 
 
-def test_a_program_without_a_contract_cannot_run(gatekeeper: Gatekeeper) -> None:
-    answer, asked = answering("accept", approve=True)
-
+def test_an_agent_proposes_no_program_without_a_contract(gatekeeper: Gatekeeper) -> None:
     async def act(agent: Agent) -> None:
-        proposed = await agent.call("propose_mission", program=HELLO + "#" * 20_000)
-        assert proposed["check"]["problems"]
-        assert not view_of(gatekeeper).can_run
-        waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
-        assert waiting["state"] == "checked"
+        assert "shorten it" in await agent.fails("propose_mission", program=HELLO + "#" * 20_000)
+        assert gatekeeper.console.session is None
 
-    gatekeeper.asks_client = True
-    use(gatekeeper, act, answer=answer)
-    assert asked == []
+    use(gatekeeper, act)
 
 
 def test_an_agent_checks_one_program_at_a_time(gatekeeper: Gatekeeper) -> None:
