@@ -266,7 +266,7 @@ def test_all_tools_work_over_stdio(folder: Path, mode: str, page: str) -> None:
             asyncio.timeout(SOON),
             Client(started, elicitation_callback=accept, mode=mode) as client,
         ):
-            assert len((await client.list_tools()).tools) == 10
+            assert len((await client.list_tools()).tools) == 12
             assert (await call(client, "read_robot"))["rooms"] == ["hall", "kitchen", "study"]
             assert (await call(client, "check_program", program=HELLO))["accepted"]
             proposed = await call(client, "propose_mission", instruction="hello", program=HELLO)

@@ -222,7 +222,7 @@ def test_the_command_prints_shares_and_missions(tmp_path: Path) -> None:
     again = roboeval("recover", "--tasks", "GetDrink,SayGoodDay", "--json", cwd=tmp_path)
     assert (ended.status, ended.out) == (0, again.out)
     data = json.loads(ended.out)
-    assert (data["faults"], data["continued"], data["passed"], data["rejected"]) == (42, 4, 1.0, 0.0)
+    assert (data["faults"], data["continued"], data["passed"], data["rejected"]) == (42, 15, 1.0, 0.0)
     assert len(data["missions"]) == data["faults"]
     table = roboeval("recover", "--tasks", "GetDrink", "--model", "recorded:hasty", cwd=tmp_path)
     assert table.out.splitlines()[-1].split()[:7] == ["all", "18", "0", "16", "2", "0.000", "1.000"]
