@@ -84,7 +84,7 @@ class Known:
     def of(cls, trace: Trace) -> Known:
         """Read a trace."""
         known = cls()
-        for event in trace:
+        for event in (one for one in trace if not one.failed):
             if event.kind == CHECK:
                 known.see(event.place, event.text, is_there=bool(event.found))
                 if not event.found:
@@ -395,7 +395,7 @@ def measure_crashes(worker: Worker) -> bool:
     with tempfile.TemporaryDirectory() as folder:
         for one in recorded_completions("recorded:careful", SUITE):
             for crash in crashes(worker, one, Path(folder)):
-                step = (crash.past.steps or ["nothing"])[-1]
+                step = (crash.past.done or ["nothing"])[-1]
                 rests = (model.rests.get((crash.past.instruction, step)) for model in models)
                 counts["crashes"] += 1
                 for program in filter(None, [one.program, *rests]):
