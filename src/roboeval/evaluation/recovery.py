@@ -125,12 +125,12 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
     task = suite.task(one.task)
     for number, scenario in enumerate(task.scenarios):
         asked, robot = scenario.asked_by(one.prompt), FaultyRobot(scenario.world, suite)
-        whole = worker.run_alone(one.program, lambda robot=robot: robot)  # type: ignore[misc]
+        whole = worker.run_alone(one.program, lambda robot=robot: robot)  # type: ignore[misc]  # mypy does not infer such lambdas
         if not judge(whole, asked).satisfied:
             return []
         for call in range(len(robot.calls) if whole.status is Status.FINISHED else 0):
             faulty = FaultyRobot(scenario.world, suite, fault=call)
-            outcome = worker.run_alone(one.program, lambda robot=faulty: robot)  # type: ignore[misc]
+            outcome = worker.run_alone(one.program, lambda robot=faulty: robot)  # type: ignore[misc]  # mypy does not infer such lambdas
             result = FaultResult(one.task, number, call, len(whole.trace))
             if outcome.error is None:
                 found.append(result)
