@@ -71,7 +71,7 @@ SUITE = load_suite()
 
 @dataclass
 class Known:
-    """What a trace says of the world, without use of the code that is measured.
+    """The facts that a trace tells of the world, without use of the code that is measured.
 
     A step forgets looks that it may contradict: those for longer and shorter names in its room, and all of
     its room if it is about any person.

@@ -32,7 +32,7 @@ Claims: TypeAlias = frozenset[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Behaviour:
-    """What a person would notice of a run. Visits, looks and waiting do not count, nor does any wording.
+    """The part of a run that a person would notice. Visits, looks, waiting and words do not count.
 
     Args:
         said: the room and the claims of the statements between two drives. All statements without claims,

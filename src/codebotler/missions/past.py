@@ -41,7 +41,7 @@ DONE_EVENTS = frozenset({"result", "late"})
 
 @dataclass(frozen=True)
 class MissionPast:
-    """What a mission, and those that it continued, did and saw before it ended.
+    """The steps of a mission, and of those that it continued, until it ended.
 
     Args:
         mission: its ID.
@@ -67,17 +67,17 @@ class MissionPast:
 
     @property
     def held(self) -> str:
-        """What the robot holds; empty for nothing."""
+        """The thing in the robot's hand; empty for nothing."""
         return held_after(self.trace)
 
     @property
     def steps(self) -> list[str]:
-        """What the robot did and saw, in words."""
+        """The robot's steps, in words."""
         return [*map(_step_words, self.trace)]
 
     @property
     def done(self) -> list[str]:
-        """What the robot did and saw, in words, without failed steps."""
+        """The robot's steps that did not fail, in words."""
         return [_step_words(event) for event in self.trace if not event.failed]
 
     def here(self, place: str) -> str:

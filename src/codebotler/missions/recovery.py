@@ -23,7 +23,7 @@ from codebotler.simulator.contract import Contract
 
 @dataclass(frozen=True)
 class PriorApproval:
-    """What a person approved, for the rest of a mission.
+    """An earlier approval of a program, which may cover the rest of a mission.
 
     Args:
         contract: what the approved program may do at most.

@@ -27,7 +27,7 @@ STOP_TEXTS = ("\ndef ", "\nclass ", "\n# Instruction", "\n```")  # OpenAI accept
 
 
 NO_STEP = "nothing"
-"""What a mission did that has done nothing, in words."""
+"""The words for a mission without any step."""
 
 
 @dataclass(frozen=True)
