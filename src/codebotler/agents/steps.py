@@ -5,7 +5,6 @@ from __future__ import annotations
 import secrets
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
 from dataclasses import dataclass, field
 from queue import Empty, Queue
 from threading import Lock
@@ -16,16 +15,14 @@ from codebotler.checking.contract_file import contract_yaml
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.terminal import visible
-from codebotler.core.trace import Option, Outcome
-from codebotler.core.unicode import compose
+from codebotler.core.trace import Outcome
 from codebotler.core.words import listed
 from codebotler.missions.live import LiveRobot
 from codebotler.missions.mission import MissionError
 from codebotler.simulator.contract import TELLING_SKILLS, Contract
 from codebotler.simulator.ledger import Ledger
-from codebotler.simulator.process.errors import ProtocolError
 from codebotler.simulator.robot import Argument
-from codebotler.simulator.skill_protocol import arguments_of
+from codebotler.simulator.skill_protocol import named_arguments, named_result
 
 IDLE_POLL_SECONDS = 0.1
 """How often an idle mission looks whether it was stopped."""
@@ -64,7 +61,7 @@ class Steps:
         """Call a skill of the running mission. Raise UserError for a wrong call."""
         if name not in self.contract.skills.keys() | TELLING_SKILLS:
             raise UserError(f"this mission may call only {listed(list(self.contract.skills))}")
-        call = self.skills[name], _arguments(self.skills[name], arguments), Future[SkillOutcome]()
+        call = self.skills[name], named_arguments(self.skills[name], arguments), Future[SkillOutcome]()
         with self._lock:
             if self._is_over:
                 raise MissionError(NOT_RUNNING)
@@ -106,22 +103,8 @@ class Steps:
 def _perform(ledger: Ledger, skill: Skill, arguments: Sequence[Argument]) -> SkillOutcome:
     match ledger.perform(skill.name, arguments):
         case ("ok", result):
-            given = zip(skill.parameters, arguments, strict=True)
-            options = next((one for parameter, one in given if parameter.is_options), None)
-            chosen = options[result] if isinstance(options, tuple) else result
-            return SkillOutcome(result=chosen.text if isinstance(chosen, Option) else chosen)
+            return SkillOutcome(result=named_result(skill, arguments, result))
         case ("error", (_, kind, message)):
             return SkillOutcome(error=f"{kind}: {message}")
         case _:
             return SkillOutcome(error=ledger.limit or "the mission has ended")
-
-
-def _arguments(skill: Skill, given: Mapping[str, object]) -> list[Argument]:
-    values = [compose(given.get(parameter.name)) for parameter in skill.parameters]
-    for number, parameter in enumerate(skill.parameters):
-        if parameter.is_options and isinstance(options := values[number], list):
-            values[number] = [[str(one), isinstance(one, str)] for one in options]
-    with suppress(ProtocolError):
-        if {*given} == {parameter.name for parameter in skill.parameters}:
-            return arguments_of(skill, values)
-    raise UserError(f"call it as {skill.signature}")

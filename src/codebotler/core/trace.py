@@ -129,6 +129,7 @@ class Status(StrEnum):
     TIMEOUT = "timeout"
     PYTHON_ERROR = "python-error"
     ROBOT_ERROR = "robot-error"
+    AGENT_ERROR = "agent-error"  # of an agent that calls skills without a program
     KILLED = "killed"
 
 

@@ -11,6 +11,7 @@ from codebotler.models.no_program import NoProgram, classify_reply
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.prompts.extract import read_reply
+from codebotler.prompts.tools import ToolCall
 
 TextListener: TypeAlias = Callable[[str], None]
 """A function that receives each piece of a reply as it arrives."""
@@ -41,6 +42,8 @@ class Reply:
     finish_reason: str | None  # why the server ended the reply, such as `stop` or `length`; None if unknown
     reasoning: str = field(default="", repr=False)  # the model's reasoning, where the server shows it
     no_program: NoProgram | None = None  # why there is no program; None if there is, or may be, a program
+    calls: tuple[ToolCall, ...] = ()  # the calls that the model requests, if it was offered tools
+    turn: str = field(default="", repr=False)  # if it was offered tools: the reply as its library writes it
 
     def data(self) -> dict[str, Any]:
         """Return the reply as plain data for a row of JSON."""

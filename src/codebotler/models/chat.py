@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import json
 import os
 import re
 import time
@@ -16,10 +17,11 @@ import openai
 from openai.types import CompletionUsage
 from pydantic_ai import exceptions, messages
 from pydantic_ai.direct import model_request_stream
-from pydantic_ai.models import Model, infer_model, known_model_names
+from pydantic_ai.models import Model, ModelRequestParameters, infer_model, known_model_names
 from pydantic_ai.models.openai import OpenAIChatModel, OpenAIResponsesModel, OpenAIStreamedResponse
 from pydantic_ai.providers import Provider, gateway, infer_provider, infer_provider_class
 from pydantic_ai.settings import ModelSettings, ThinkingEffort
+from pydantic_ai.tools import ToolDefinition
 
 from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError, Reply, TextListener, Usage, ignore_text, make_reply
@@ -31,6 +33,7 @@ from codebotler.models.http_client import (
     without_proxy,
 )
 from codebotler.models.keys import guard_logs, read_key, remove_keys, unset_blank
+from codebotler.models.no_program import classify_reply
 from codebotler.models.openai_stream import Chunks, make_lenient
 from codebotler.models.sampling import CHAT_MAX_TOKENS, SamplingSettings
 from codebotler.models.server_errors import (
@@ -45,6 +48,7 @@ from codebotler.models.server_errors import (
     timeout_error,
 )
 from codebotler.prompts import PictureMessage, Prompt, PromptMessage
+from codebotler.prompts.tools import CallingMessage, ResultMessage, Tool, ToolCall, ToolPrompt
 
 BASE_URL_VARIABLE = "OPENAI_BASE_URL"
 OWN_SERVER = "openai-chat"  # the protocol of vLLM, llama.cpp and similar servers
@@ -84,7 +88,7 @@ class ChatModel:
         if (seed := self.settings.seed_of(number)) is not None:
             settings = ModelSettings(**settings, seed=seed)
         try:
-            response, chunks = await self._request(to_messages(prompt.messages), settings, on_text)
+            response, chunks = await self._request(prompt, settings, on_text)
         except ModelError:
             raise
         except Exception as error:  # noqa: BLE001 - each provider's library raises its own errors
@@ -95,7 +99,8 @@ class ChatModel:
             return make_reply(
                 failed.sentence, Usage(), latency, None, known_kind="filtered", has_answer=False
             )
-        return self._reply(response, chunks, time.monotonic() - start)
+        reply = self._reply(response, chunks, time.monotonic() - start)
+        return _turn(reply, response) if isinstance(prompt, ToolPrompt) else reply
 
     async def close(self) -> None:
         """Close the connections."""
@@ -103,9 +108,15 @@ class ChatModel:
             pass
 
     async def _request(
-        self, conversation: list[messages.ModelMessage], settings: ModelSettings, on_text: TextListener
+        self, prompt: Prompt, settings: ModelSettings, on_text: TextListener
     ) -> tuple[messages.ModelResponse, Chunks | None]:
-        async with model_request_stream(self._model, conversation, model_settings=settings) as stream:
+        tools = [*map(_definition, prompt.tools)] if isinstance(prompt, ToolPrompt) else []
+        async with model_request_stream(
+            self._model,
+            to_messages(prompt.messages),
+            model_settings=settings,
+            model_request_parameters=ModelRequestParameters(function_tools=tools),
+        ) as stream:
             chunks = None
             if isinstance(stream, OpenAIStreamedResponse):
                 chunks = stream._response = Chunks(stream._response)  # type: ignore[assignment]  # noqa: SLF001 - no public way
@@ -193,11 +204,13 @@ def to_messages(conversation: tuple[PromptMessage, ...]) -> list[messages.ModelM
     """Convert a conversation to pydantic-ai message types."""
     found: list[messages.ModelMessage] = []
     for message in conversation:
+        if isinstance(message, CallingMessage):
+            found += messages.ModelMessagesTypeAdapter.validate_json(message.data)
+            continue
         if message.role == "assistant":
             found.append(messages.ModelResponse(parts=[messages.TextPart(message.text)]))
             continue
-        is_system = message.role == "system"
-        part = messages.SystemPromptPart(message.text) if is_system else _user_part(message)
+        part = _request_part(message)
         if found and isinstance(found[-1], messages.ModelRequest):
             found[-1] = messages.ModelRequest(parts=[*found[-1].parts, part])
         else:
@@ -205,11 +218,33 @@ def to_messages(conversation: tuple[PromptMessage, ...]) -> list[messages.ModelM
     return found
 
 
-def _user_part(message: PromptMessage) -> messages.UserPromptPart:
+def _request_part(message: PromptMessage) -> messages.ModelRequestPart:
+    if isinstance(message, ResultMessage):
+        return messages.ToolReturnPart(message.call.name, message.text, message.call.id)
+    if message.role == "system":
+        return messages.SystemPromptPart(message.text)
     if not isinstance(message, PictureMessage):
         return messages.UserPromptPart(message.text)
     picture = messages.BinaryContent(message.jpeg, media_type="image/jpeg")
     return messages.UserPromptPart([message.text, picture])
+
+
+def _definition(tool: Tool) -> ToolDefinition:
+    return ToolDefinition(
+        name=tool.name, description=tool.description, parameters_json_schema=json.loads(tool.schema)
+    )
+
+
+def _turn(reply: Reply, response: messages.ModelResponse) -> Reply:
+    """Return a reply to the offer of tools, with its calls in place of a program."""
+    parts = [part for part in response.parts if isinstance(part, messages.ToolCallPart)]
+    calls = tuple(ToolCall(one.tool_call_id, one.tool_name, one.args_as_json_str()) for one in parts)
+    known = reply.no_program if reply.no_program in {"refusal", "filtered"} else None
+    has_turn = bool(calls or (response.text or "").strip())
+    why = classify_reply(reply.text, "", reply.finish_reason, has_code=has_turn, known_kind=known)
+    turn = messages.ModelMessagesTypeAdapter.dump_json([response]).decode()
+    fault = None if why == "tool-call" and calls else why
+    return replace(reply, program="", no_program=fault, calls=calls, turn=turn)
 
 
 def _is_filtered(error: Exception) -> bool:

@@ -7,6 +7,9 @@ from codebotler.models.base import Model
 from codebotler.models.recorded import open_recorded
 from codebotler.models.sampling import SamplingSettings
 
+NOT_CALLING = frozenset({"recorded", "completions", "hf"})
+"""The kinds of models that cannot call tools."""
+
 MODEL_FORMS = (
     "recorded, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, "
     "completions:NAME with --base-url, or hf:PATH"

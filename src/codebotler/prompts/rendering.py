@@ -34,7 +34,7 @@ NO_STEP = "nothing"
 class PromptMessage:
     """One turn of a conversation with a chat model."""
 
-    role: Literal["system", "user", "assistant"]
+    role: Literal["system", "user", "assistant", "tool"]
     text: str
 
 

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import inf
 from typing import TypeAlias
 
+from codebotler.core.errors import UserError
 from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import Scalar
 from codebotler.core.trace import Option, Outcome, Status
+from codebotler.core.unicode import compose
 from codebotler.simulator.ledger import MAX_LINE, STOP, WAITS, Ledger, SkillAnswer, SkillPerformer, too_long
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.exit_status import cause_of_death
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.robot import Argument
+from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
 
 ParameterDescription: TypeAlias = tuple[str, str, tuple[Scalar, ...], str]  # name, kind, choices, words
@@ -140,3 +142,23 @@ def _option(value: object) -> Option:
             return Option(text, is_text)
         case _:
             raise ProtocolError("an option is malformed")
+
+
+def named_arguments(skill: Skill, given: Mapping[str, object]) -> list[Argument]:
+    """Convert the arguments of an agent's call for the robot. Raise UserError if they do not fit."""
+    values = [compose(given.get(parameter.name)) for parameter in skill.parameters]
+    for number, parameter in enumerate(skill.parameters):
+        if parameter.is_options and isinstance(options := values[number], list):
+            values[number] = [[str(one), isinstance(one, str)] for one in options]
+    with suppress(ProtocolError):
+        if {*given} == {parameter.name for parameter in skill.parameters}:
+            return arguments_of(skill, values)
+    raise UserError(f"call it as {skill.signature}")
+
+
+def named_result(skill: Skill, arguments: Sequence[Argument], result: Result) -> Result:
+    """Return the result of an agent's call: the text of the chosen option, if it is a question."""
+    asked = zip(skill.parameters, arguments, strict=True)
+    options = next((one for parameter, one in asked if parameter.is_options), None)
+    chosen = options[result] if isinstance(options, tuple) and isinstance(result, int) else result
+    return chosen.text if isinstance(chosen, Option) else chosen

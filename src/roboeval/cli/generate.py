@@ -7,7 +7,7 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -25,6 +25,8 @@ from roboeval.cli.options import (
     FamiliesOption,
     IsolationOption,
     JsonOption,
+    MissionTokensOption,
+    ModeOption,
     NumOption,
     NumTasksOption,
     OutOption,
@@ -33,6 +35,7 @@ from roboeval.cli.options import (
     RequestsOption,
     SuiteOption,
     TasksOption,
+    TurnsOption,
     WorkersOption,
 )
 from roboeval.cli.output import fail, note, progress_meter
@@ -43,9 +46,11 @@ if TYPE_CHECKING:
     from codebotler.models.base import Model
     from codebotler.models.batch import BatchModel
     from codebotler.models.sampling import SamplingSettings
+    from roboeval.evaluation.agents.plan import AgentMode
     from roboeval.evaluation.generate import GenerationProgress, Pace
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import RunFolder
+    from roboeval.suites.load import Suite
 
 MAX_BATCH_REQUESTS = 50_000
 
@@ -84,7 +89,10 @@ class GenerationRequest:
 def read_options(
     model: ModelOption = None,
     out: OutOption = None,
-    num_completions: NumOption = 50,
+    num_completions: NumOption = None,
+    mode: ModeOption = "program",
+    max_turns: TurnsOption = None,
+    max_mission_tokens: MissionTokensOption = None,
     suite: SuiteOption = "paper",
     families: FamiliesOption = None,
     num_tasks: NumTasksOption = None,
@@ -97,8 +105,8 @@ def read_options(
 ) -> GenerationRequest:
     """Convert the options that `generate` and `run` share to a request."""
     from codebotler.models.chosen import choose_model
+    from codebotler.models.open import NOT_CALLING, kind_of
     from roboeval.evaluation.generate import Pace
-    from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import tasks_to_judge
 
     if families is not None or num_tasks is not None:
@@ -108,8 +116,33 @@ def read_options(
     settings = chosen.add_server(model_settings(**sampling))
     pace = Pace(concurrency, requests_per_minute, token_budget)
     known = load(suite)
-    plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
+    selected = tasks_to_judge(known, tasks, ablated=False)[0]
+    plan = plan_for(mode, known, selected, num_completions, max_turns, max_mission_tokens)
+    if mode == "agent" and kind_of(chosen.name) in NOT_CALLING:
+        fail(f"{chosen.name} cannot call tools; --mode agent needs a chat model, such as openai-chat:NAME")
     return GenerationRequest(chosen.name, settings, plan, pace, suite, out)
+
+
+def plan_for(
+    mode: AgentMode | Literal["program"],
+    suite: Suite,
+    tasks: frozenset[str] | None,
+    num_completions: int | None,
+    max_turns: int | None,
+    max_mission_tokens: int | None,
+) -> GenerationPlan:
+    """Return the plan for a mode, with its default numbers of completions and turns."""
+    from roboeval.evaluation.requests import GenerationPlan
+
+    if mode == "program":
+        if max_turns or max_mission_tokens:
+            fail("--max-turns and --max-mission-tokens need --mode agent or replan; add it")
+        return GenerationPlan(suite, tasks, num_completions or 50)
+    from roboeval.evaluation.agents.conversation import TurnLimits
+    from roboeval.evaluation.agents.plan import DEFAULT_TURNS, AgentPlan
+
+    limits = TurnLimits(max_turns or DEFAULT_TURNS[mode], max_mission_tokens)
+    return AgentPlan(suite, tasks, num_completions or 1, mode=mode, limits=limits)
 
 
 def suite_of_families(suite: str, families: str | None, num_tasks: int | None, seed: int | None) -> str:
@@ -156,6 +189,8 @@ def generate(
     """
     what = read_options(**options)
     if requests is not None:
+        if what.plan.has_turns:
+            fail("--requests cannot write what follows from replies; leave it or --mode out")
         write_batch(what, requests)
         return
     model = what.open()
@@ -215,6 +250,8 @@ def run(
     from roboeval.evaluation.evaluate import expect_same_judge
 
     what = read_options(tasks=tasks, **options)
+    if what.plan.has_turns and (repair or retries):
+        fail("--repair and --retries are for programs; leave them or --mode out")
     suite, plan, model = what.suite, what.plan, what.open()
     note_unsent(what.settings, model)
     first = what.run_of(model)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -112,7 +112,34 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of 
 OutOption = Annotated[
     Path | None, typer.Option(help="The run folder; by default runs/MODEL.", parser=path_to("a run"))
 ]
-NumOption = Annotated[int, typer.Option(min=1, max=10_000, help="Number of completions per prompt.")]
+NumOption = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        max=10_000,
+        help="Number of completions per prompt; with --mode, of missions per prompt and world.",
+        show_default="50; with --mode agent or replan 1",
+    ),
+]
+ModeOption = Annotated[
+    Literal["program", "agent", "replan"],
+    typer.Option(
+        help="How the model is used: it writes a program for all worlds of a task, calls skills as an agent "
+        "in each world, or writes a program in each world and, after each failure, one for the rest."
+    ),
+]
+TurnsOption = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        max=1_000,
+        help="With --mode: the maximum number of replies in a mission.",
+        show_default="100 calls; 4 programs",
+    ),
+]
+MissionTokensOption = Annotated[
+    int | None, typer.Option(min=1, help="With --mode: the maximum number of tokens of a mission.")
+]
 ConcurrencyOption = Annotated[int, typer.Option(min=1, help="Maximum number of concurrent requests.")]
 RateOption = Annotated[float | None, typer.Option(min=0.001, help="Maximum number of requests per minute.")]
 BudgetOption = Annotated[int | None, typer.Option(min=1, help="Stop after using this many tokens.")]

@@ -14,7 +14,7 @@ from codebotler.simulator.pool import WorkerPool, without_filter
 from codebotler.simulator.worker import EngineError, Worker
 
 PYTHON_VERSION = ".".join(platform.python_version_tuple()[:2])  # verdicts depend on the version
-Work: TypeAlias = tuple[str, str]  # the name of a task, and a program
+Work: TypeAlias = tuple[str, ...]  # the name of a task, a program, and where an agent acted if it is one's
 RawResult = TypeVar("RawResult")
 WorkResult = TypeVar("WorkResult")
 RunPrograms: TypeAlias = Callable[[Worker, Sequence[Work]], Sequence[RawResult]]

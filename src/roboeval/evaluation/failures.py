@@ -8,6 +8,7 @@ from typing import Any, get_args
 
 from codebotler.core.trace import Outcome, Status
 from codebotler.models.no_program import NO_PROGRAM_KINDS, NO_PROGRAM_SENTENCES
+from roboeval.evaluation.runs.endings import AGENT_SENTENCES
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.suites.load import Requirement
 from roboeval.suites.schema import Category
@@ -15,6 +16,7 @@ from roboeval.suites.schema import Category
 NO_PROGRAM_CLASS = "NoProgram"
 PYTHON_ERROR_CLASS = "PythonError"
 ROBOT_ERROR_CLASS = "RobotExecutionError"
+AGENT_ERROR_CLASS = "AgentError"
 TASK_ERROR_CLASS = "TaskCompletionError"
 
 
@@ -70,6 +72,13 @@ FAILURE_CLASSES: Mapping[str, FailureClass] = {
                 "AskEmptyOptions",
                 "AskInvalidOptions",  # not among the paper's six kinds
             ),
+        ),
+        FailureClass(
+            AGENT_ERROR_CLASS,
+            "mistake of the agent",
+            "mistakes of the agent",
+            tuple(AGENT_SENTENCES),
+            is_always_shown=False,
         ),
         FailureClass(TASK_ERROR_CLASS, "failed check", "failed checks", get_args(Category)),
     )
@@ -139,7 +148,13 @@ def failure_of_verdicts(verdicts: Sequence[Verdict]) -> Failure | None:
                     "check": first.text,
                 }
             assert error is not None, "a world with neither an error nor a failed check is satisfied"
-            is_robots = verdict.outcome.status is Status.ROBOT_ERROR
-            name = ROBOT_ERROR_CLASS if is_robots else PYTHON_ERROR_CLASS
+            name = _class_of(verdict.outcome.status, error.kind)
             return {"class": name, "kind": error.kind, "world": index, "check": None}
     return None
+
+
+def _class_of(status: Status, kind: str) -> str:
+    if status is Status.ROBOT_ERROR:
+        return ROBOT_ERROR_CLASS
+    is_limit_of_agent = status is Status.TIMEOUT and kind in AGENT_SENTENCES
+    return AGENT_ERROR_CLASS if status is Status.AGENT_ERROR or is_limit_of_agent else PYTHON_ERROR_CLASS

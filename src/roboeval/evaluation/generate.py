@@ -9,6 +9,8 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from dataclasses import asdict, dataclass, field
+from functools import partial
+from typing import Any
 
 from codebotler.core.files import MAX_ROW, Appender, to_line, to_text, write_whole
 from codebotler.models.base import (
@@ -33,8 +35,9 @@ from roboeval.evaluation.requests import (
     timestamp,
     with_batch,
 )
-from roboeval.evaluation.runs.completions import CompletionKey, how_many, reply_row
+from roboeval.evaluation.runs.completions import CompletionKey, how_many
 from roboeval.evaluation.runs.folder import RunFolder
+from roboeval.evaluation.runs.turns import TurnLog
 
 FAILURES_IN_A_ROW = 3  # stop after this many, or the number of concurrent requests if larger
 
@@ -106,9 +109,9 @@ def generate_run(
             for completion in given:
                 file.append(to_line(completion.row))
             progress = GenerationProgress(len(keys), len(keys) - len(todo), log.interrupted, usage)
-            with log:
+            with log, _turns_of(plan, run, done) as turns:
                 on_progress(progress)
-                generation = _Generation(plan, model, pace, file, log, progress, on_progress)
+                generation = _Generation(plan, model, pace, file, log, turns, progress, on_progress)
                 try:
                     asyncio.run(generation.generate(todo))
                 finally:
@@ -116,11 +119,21 @@ def generate_run(
             if todo and progress.missing is None:
                 metadata["batches"][-1]["ended"] = timestamp()
             write_whole(run.about, to_text(metadata))
-        if generation.error is not None and not run.completions.stat().st_size:
+        is_empty = not run.completions.stat().st_size and not run.turns.exists()
+        if generation.error is not None and is_empty:
             run.completions.unlink()
             run.about.unlink()
             raise generation.error
     return progress
+
+
+@contextlib.contextmanager
+def _turns_of(plan: GenerationPlan, run: RunFolder, done: set[CompletionKey]) -> Iterator[TurnLog | None]:
+    if not plan.has_turns:
+        yield None
+        return
+    with contextlib.closing(TurnLog(run.turns, done)) as turns:
+        yield turns
 
 
 def reply_of_refusal(error: ModelError) -> Reply:
@@ -167,6 +180,7 @@ class _Generation:
     pace: Pace
     file: Appender
     log: RequestLog
+    turns: TurnLog | None  # None if each completion is one reply
     progress: GenerationProgress
     on_progress: Callable[[GenerationProgress], None]
     error: ModelError | None = None
@@ -184,7 +198,7 @@ class _Generation:
                 for _ in range(min(self.pace.concurrency, len(keys))):
                     group.create_task(self._request_each(waiting))
             if self.progress.stopped is None and self.progress.done:
-                self._keep_refused()
+                await self._keep_refused()
             if self._budget is not None:  # pending requests have used more tokens in the meantime
                 self.progress.stopped = BudgetSpentError(self._budget, self._paced.tokens_used).sentence
         except BaseExceptionGroup as errors:
@@ -200,8 +214,8 @@ class _Generation:
     async def _request(self, key: CompletionKey) -> None:
         _KEY.set(key)
         try:
-            reply = await self._paced.reply(self.plan.prompt(key), number=self.plan.sample(key))
-            await self._keep(key, reply)
+            row = await self.plan.complete(key, self.model.name, partial(self._ask, key), self._earlier(key))
+            await self._keep(key, row)
         except BudgetSpentError as error:
             self._budget, self.progress.stopped = error.budget, error.sentence
         except ModelError as error:
@@ -214,28 +228,42 @@ class _Generation:
             if self._failures_in_a_row >= max(FAILURES_IN_A_ROW, self.pace.concurrency):
                 self.progress.stopped = error.sentence
 
-    async def _keep(self, key: CompletionKey, reply: Reply) -> None:
-        line = self._line(key, reply)
+    async def _ask(self, key: CompletionKey, prompt: Prompt) -> Reply:
+        reply = await self._paced.reply(prompt, number=self.plan.sample(key))
+        if self.turns is not None:
+            await self.turns.keep(key, reply)
+            self.log.answered(key)
+        return reply
+
+    def _earlier(self, key: CompletionKey) -> list[Reply]:
+        return [] if self.turns is None else self.turns.replies(key)
+
+    async def _keep(self, key: CompletionKey, row: dict[str, Any]) -> None:
+        line = self._line(row)
         if len(line) > MAX_ROW:
             raise ModelError(f"the reply is too long to save: {len(line):,} bytes", may_pass=True)
         self.file.append(line)
-        self.log.kept(key)
+        if self.turns is None:
+            self.log.kept(key)
+        else:
+            self.turns.forget(key)
         try:
             await asyncio.to_thread(self.file.sync)
         finally:  # also after an interrupt, because closing the file syncs it to disk
-            add_usage(self.progress.usage, asdict(reply.usage))
+            add_usage(self.progress.usage, row["usage"])
             self.progress.done += 1
         self._failures_in_a_row = 0
         self.on_progress(self.progress)
 
-    def _keep_refused(self) -> None:
+    async def _keep_refused(self) -> None:
         # The server accepted other requests, so these were refused because of their content.
         for key, error in self._refused.items():
-            self.file.append(self._line(key, reply_of_refusal(error)))
+            replies = [*self._earlier(key), reply_of_refusal(error)]
+            row = await self.plan.complete(key, self.model.name, partial(self._ask, key), replies)
+            self.file.append(self._line(row))
             del self.progress.failures[key]
             self.progress.done += 1
         self._refused.clear()
 
-    def _line(self, key: CompletionKey, reply: Reply) -> bytes:
-        row = reply_row(key, self.plan.instruction(key), self.model.name, reply)
+    def _line(self, row: dict[str, Any]) -> bytes:
         return to_line({**row, **self.plan.mark()})

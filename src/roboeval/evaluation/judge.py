@@ -6,6 +6,7 @@ import json
 import logging
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 from codebotler.core.errors import UserError
@@ -16,10 +17,11 @@ from codebotler.rtl.semantics import visible
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.worker import Worker
-from roboeval.evaluation.engines import Local, OpenEngine
+from roboeval.evaluation.engines import Local, OpenEngine, Work
 from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.result_cache import ResultCache
-from roboeval.evaluation.runs.completions import Completion, find_key_fault, name_of
+from roboeval.evaluation.runs.completions import Acted, Completion, find_key_fault, name_of
+from roboeval.evaluation.runs.endings import apply_ending
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.serialization import add_reply_fault, judgements_for, row_line
 from roboeval.evaluation.time_limit import TimeLimitExceeded, time_limit
@@ -106,11 +108,12 @@ def judgements(
     """Yield each completion and its judgement as JSON, or None and a warning if judging takes too long."""
     waiting: deque[Completion] = deque()
 
-    def works() -> Iterator[tuple[str, str]]:
+    def works() -> Iterator[Work]:
         for completion in completions:
             _expect_judgeable(completion, suite, ablated=ablated)
             waiting.append(completion)
-            yield completion.task, completion.program
+            acted = completion.acted
+            yield (completion.task, completion.program, *(() if acted is None else (acted.text,)))
 
     with engine as opened:
         running = partial(run_in_worlds, suite, ablated=ablated)
@@ -138,18 +141,45 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
         raise UserError(problem)
     if ablated and suite.tasks[completion.task].ablation is None:
         raise UserError(f'the task "{completion.task}" has no ablation')
+    worlds = suite.tasks[completion.task].judged_in(ablated=ablated)
+    if completion.acted is not None and (ablated or completion.acted.world >= len(worlds)):
+        what = "an ablation" if ablated else f"world {completion.acted.world}"
+        raise UserError(
+            f"{name_of(completion.key)} is a mission of an agent, which cannot be judged in {what}"
+        )
 
 
-def run_in_worlds(
-    suite: Suite, worker: Worker, works: Sequence[tuple[str, str]], *, ablated: bool
-) -> list[tuple[str, Sequence[Outcome]]]:
-    """Run programs in the worlds of their tasks, and return the task and the outcomes of each program."""
-    jobs = [
-        (program, [partial(robot_in, one.world, suite) for one in scenarios])
-        for task, program in works
-        for scenarios in [suite.tasks[task].judged_in(ablated=ablated)]
+@dataclass(frozen=True)
+class Ran:
+    """What a program did in the worlds in which it is judged."""
+
+    task: str
+    acted: Acted | None  # where an agent acted; None for a program, which is judged in all worlds
+    outcomes: Sequence[Outcome]
+
+    def scenarios(self, suite: Suite, *, ablated: bool) -> tuple[Scenario, ...]:
+        """Return the worlds with their requirements."""
+        scenarios = suite.tasks[self.task].judged_in(ablated=ablated)
+        return scenarios if self.acted is None else scenarios[self.acted.world :][:1]
+
+
+def run_in_worlds(suite: Suite, worker: Worker, works: Sequence[Work], *, ablated: bool) -> list[Ran]:
+    """Run programs in the worlds of their tasks, and missions of agents in the worlds where they acted."""
+    planned = [
+        (program, Ran(task, Acted.parse(where[0]) if where else None, ())) for task, program, *where in works
     ]
-    return [(task, outcomes) for (task, _), outcomes in zip(works, worker.run_all(jobs), strict=True)]
+    jobs = [
+        (program, [partial(robot_in, one.world, suite) for one in ran.scenarios(suite, ablated=ablated)])
+        for program, ran in planned
+    ]
+    return [
+        replace(ran, outcomes=_with_ending(outcomes, ran.acted))
+        for (_, ran), outcomes in zip(planned, worker.run_all(jobs), strict=True)
+    ]
+
+
+def _with_ending(outcomes: list[Outcome], acted: Acted | None) -> list[Outcome]:
+    return outcomes if acted is None else [apply_ending(outcome, acted.ending) for outcome in outcomes]
 
 
 def robot_in(world: World, suite: Suite) -> SimulatedRobot:
@@ -158,18 +188,14 @@ def robot_in(world: World, suite: Suite) -> SimulatedRobot:
     return SimulatedRobot(world, suite.settings, suite.skills, guard=guard)
 
 
-def judge_outcomes(
-    suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool
-) -> tuple[bytes, ...] | None:
+def judge_outcomes(suite: Suite, ran: Ran, *, ablated: bool) -> tuple[bytes, ...] | None:
     """Return the judgement on a program for each prompt as JSON, or None if judging takes too long."""
-    name, outcomes = ran
-    task = suite.tasks[name]
-    scenarios = task.judged_in(ablated=ablated)
+    outcomes, scenarios = ran.outcomes, ran.scenarios(suite, ablated=ablated)
 
     def compute() -> tuple[bytes, ...]:
         with time_limit(BUDGET):
             verdicts = [judge(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)]
-            return judgements_for(verdicts, len(task.prompts))
+            return judgements_for(verdicts, len(suite.tasks[ran.task].prompts))
 
     try:
         key = (*map(id, outcomes), *map(id, scenarios))

@@ -37,6 +37,9 @@ from roboeval.suites.load import Scenario, Suite
 Call: TypeAlias = tuple[str, Sequence[Argument]]
 """A skill and its arguments."""
 
+SLEEP = "time.sleep"
+"""The name of a call that lets time pass, until its only argument in seconds since the start."""
+
 FAULTS = {
     GOTO: ("GoToInvalidLocation", "the door is locked"),
     ASK: ("AskNoPerson", "the person is gone"),
@@ -45,34 +48,53 @@ FAULTS = {
 """The kind and the reason of the error by which a skill fails, by the kind of event that it records."""
 
 
-class FaultyRobot(SimulatedRobot):
-    """A simulated robot that has made some calls already, and one of whose calls fails, but only once.
+class RecordingRobot(SimulatedRobot):
+    """A simulated robot that records its calls, and has made some already.
 
     Args:
         world: the world.
         suite: the suite with the settings, skills and house rules.
-        made: the calls that it repeats at the start.
-        fault: the index of the call that fails; None if none does.
+        made: the calls that it repeats at the start. A call of `SLEEP` lets time pass.
     """
+
+    def __init__(self, world: World, suite: Suite, *, made: Iterable[Call] = ()) -> None:
+        guard = None if suite.house is None else RuleGuard(suite.house.rules)
+        super().__init__(world, suite.settings, suite.skills, guard=guard)
+        self.calls: list[Call] = []
+        for skill, arguments in made:
+            with suppress(RobotError):
+                if skill == SLEEP:
+                    self.sleep_until(float(arguments[0]))  # type: ignore[arg-type]  # a number of seconds
+                else:
+                    self.perform(skill, arguments)
+
+    def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Record a call and make it."""
+        self.calls.append((skill, arguments))
+        return super().perform(skill, arguments)
+
+    def sleep_until(self, now: float) -> None:
+        """Record that time passes until `now` seconds since the start."""
+        self.calls.append((SLEEP, (now,)))
+        super().sleep_until(now)
+
+
+class FaultyRobot(RecordingRobot):
+    """A robot one of whose calls fails, but only once. `fault` is its index; None if none fails."""
 
     def __init__(
         self, world: World, suite: Suite, *, made: Iterable[Call] = (), fault: int | None = None
     ) -> None:
-        guard = None if suite.house is None else RuleGuard(suite.house.rules)
-        super().__init__(world, suite.settings, suite.skills, guard=guard)
-        self.calls: list[Call] = []
+        self._fault: int | None = None  # not among the calls that it repeats
+        super().__init__(world, suite, made=made)
         self._fault = fault
-        for call in made:
-            with suppress(RobotError):
-                self.perform(*call)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute a skill, or fail."""
-        if len(self.calls) == self._fault:
+        if sum(name != SLEEP for name, _ in self.calls) == self._fault:
             self._fault, row = None, self.skills[skill]
             kind = "" if row.recording is None else row.recording.kind
             raise RobotError(*FAULTS.get(kind, (SKILL_FAILED, f"the robot failed in {skill}")))
-        self.calls.append((skill, arguments))
         return super().perform(skill, arguments)
 
 
@@ -107,12 +129,17 @@ class Interruption:
 
     def prompt(self, suite: Suite) -> Prompt:
         """Return the request for the rest of the mission."""
-        past, rules = self.past, [] if suite.house is None else [rule.says for rule in suite.house.rules]
-        request = prompt_for(
-            past.instruction, rooms=self.room_map.described, rules=rules, skills=suite.skills
+        rules = [] if suite.house is None else [rule.says for rule in suite.house.rules]
+        rooms = self.room_map.described
+        return rest_prompt(
+            self.past, prompt_for(self.past.instruction, rooms=rooms, rules=rules, skills=suite.skills)
         )
-        last_step = (past.done or [""])[-1]
-        return request.to_continue(past.program, past.steps, past.why, past.here(past.place), last_step)
+
+
+def rest_prompt(past: MissionPast, request: Prompt) -> Prompt:
+    """Return the request for the rest of a mission, given the request for the whole."""
+    last_step = (past.done or [""])[-1]
+    return request.to_continue(past.program, past.steps, past.why, past.here(past.place), last_step)
 
 
 def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[Interruption | FaultResult]:
@@ -128,7 +155,8 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
         whole = worker.run_alone(one.program, lambda robot=robot: robot)  # type: ignore[misc]  # mypy does not infer such lambdas
         if not judge(whole, asked).satisfied:
             return []
-        for call in range(len(robot.calls) if whole.status is Status.FINISHED else 0):
+        skill_calls = sum(name != SLEEP for name, _ in robot.calls)
+        for call in range(skill_calls if whole.status is Status.FINISHED else 0):
             faulty = FaultyRobot(scenario.world, suite, fault=call)
             outcome = worker.run_alone(one.program, lambda robot=faulty: robot)  # type: ignore[misc]  # mypy does not infer such lambdas
             result = FaultResult(one.task, number, call, len(whole.trace))

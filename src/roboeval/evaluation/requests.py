@@ -5,25 +5,34 @@ from __future__ import annotations
 import contextlib
 import platform
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line, write_whole
 from codebotler.core.words import brief
-from codebotler.models.base import Model
+from codebotler.models.base import Model, Reply
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for, template_hash
-from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of, read_completions
+from roboeval.evaluation.runs.completions import (
+    Completion,
+    CompletionKey,
+    name_of,
+    read_completions,
+    reply_row,
+)
 from roboeval.evaluation.runs.folder import RunFolder, load_json_object
 from roboeval.suites.load import Suite
 
 if TYPE_CHECKING:
     from codebotler.models.batch import BatchModel  # importing it at run time would load large libraries
+
+Ask: TypeAlias = Callable[[Prompt], Awaitable[Reply]]
+"""Requests a reply."""
 
 WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change a model's replies
 OPTIONAL_SETTINGS = ("reasoning_effort", "extra_body")  # left out of run.json if unset
@@ -36,6 +45,8 @@ class GenerationPlan:
     suite: Suite
     tasks: frozenset[str] | None = None
     num_completions: int = 50
+
+    has_turns: ClassVar[bool] = False  # whether a completion takes several replies
 
     def keys(self) -> list[CompletionKey]:
         """Return all keys: first the first completion of every prompt, then the second one, and so on."""
@@ -59,6 +70,17 @@ class GenerationPlan:
     def given(self) -> Iterable[Completion]:
         """Return the completions to copy from another run."""
         return ()
+
+    def describe(self) -> dict[str, Any]:
+        """Return entries of run.json that all completions of the run share."""
+        return {"template": template_hash(self.suite.skills)}
+
+    async def complete(
+        self, key: CompletionKey, model: str, ask: Ask, earlier: Sequence[Reply] = ()
+    ) -> dict[str, Any]:
+        """Request a completion from the model of this name, unless it replied earlier, and return its row."""
+        reply = earlier[-1] if earlier else await ask(self.prompt(key))
+        return reply_row(key, self.instruction(key), model, reply)
 
     def mark(self) -> Mapping[str, int]:
         """Return extra entries to add to each row of completions.jsonl."""
@@ -94,7 +116,7 @@ def run_metadata(run: RunFolder, plan: GenerationPlan, model: Model | BatchModel
     fixed = {
         "model": model.name,
         "settings": _recorded(model.settings),
-        "template": template_hash(suite.skills),
+        **plan.describe(),
         "suite": suite.name,
     }
     families = {}
@@ -219,6 +241,11 @@ class RequestLog:
             self.kept(key)
             self._file.append(to_line({"failed": key}))
 
+    def answered(self, key: CompletionKey) -> None:
+        """Log that a turn of a mission has been saved."""
+        self.kept(key)
+        self._file.append(to_line({"answered": key}))
+
     def kept(self, key: CompletionKey) -> None:
         """Forget a request whose completion has been saved."""
         self.under_way.remove(key)
@@ -232,7 +259,9 @@ class RequestLog:
                     pass
                 case {"sent": [str(task), int(prompt), int(index)]}:
                     pending.add((task, prompt, index))
-                case {"failed": [str(task), int(prompt), int(index)]}:
+                case {"failed": [str(task), int(prompt), int(index)]} | {
+                    "answered": [str(task), int(prompt), int(index)]
+                }:
                     pending.discard((task, prompt, index))
                 case _:
                     raise UserError(

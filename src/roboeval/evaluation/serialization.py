@@ -10,8 +10,9 @@ from typing import Any
 
 from codebotler.core.files import to_line
 from codebotler.core.trace import outcome_data
-from roboeval.evaluation.failures import NO_PROGRAM_CLASS, Verdict, failure_of_verdicts
+from roboeval.evaluation.failures import AGENT_ERROR_CLASS, NO_PROGRAM_CLASS, Verdict, failure_of_verdicts
 from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.endings import NO_CALL
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, first_events
 
 ROW_BYTES = 1_000_000  # limit for a row, unless it has very many worlds
@@ -24,14 +25,20 @@ FAILED_PREFIX = b'{"passed": false, '  # how `judgement` starts a failed judgeme
 
 
 def add_reply_fault(completion: Completion, judgement_json: bytes) -> bytes:
-    """Set the failure in a judgement, given as JSON, to the lack of a program if the reply contained none.
+    """Set the failure in a judgement, given as JSON, to the lack of a program or of calls, if that is why.
 
     Running such a reply ends in an error or a failed check, but that is not why the completion fails.
     """
-    if not judgement_json.startswith(FAILED_PREFIX) or (kind := completion.no_program) is None:
+    if not judgement_json.startswith(FAILED_PREFIX):
+        return judgement_json
+    kind: str | None = completion.no_program
+    name = NO_PROGRAM_CLASS
+    if completion.acted is not None and completion.acted.ending == NO_CALL:
+        name, kind = AGENT_ERROR_CLASS, NO_CALL
+    if kind is None:
         return judgement_json
     found = json.loads(judgement_json)
-    cause = {"class": NO_PROGRAM_CLASS, "kind": kind, "world": found["failure"]["world"], "check": None}
+    cause = {"class": name, "kind": kind, "world": found["failure"]["world"], "check": None}
     return to_line({**found, "failure": cause}).removesuffix(b"\n")
 
 

@@ -56,12 +56,12 @@ def suite_of(world: World, rules: SimulationSettings, *formulas: str, skills: Sk
 
 def judge(worker: Worker, suite: Suite, program: str) -> tuple[Outcome, dict[str, Any]]:
     """How a program ends, and its row as it is read back."""
-    ((name, outcomes),) = run_in_worlds(suite, worker, [("T", program)], ablated=False)
-    told = judge_outcomes(suite, (name, outcomes), ablated=False)
+    (ran,) = run_in_worlds(suite, worker, [("T", program)], ablated=False)
+    told = judge_outcomes(suite, ran, ablated=False)
     assert told is not None
     line = row_line(Completion(task="T", prompt=0, index=0, program=program), told[0])
     assert key_of(decode_row(line, check_kinds=suite.skills is SKILLS)) == ("T", 0, 0)
-    return outcomes[0], json.loads(line)
+    return ran.outcomes[0], json.loads(line)
 
 
 def explained(row: dict[str, Any], suite: Suite) -> list[str]:

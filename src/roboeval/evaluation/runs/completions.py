@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parse_row, read_lines, to_line
@@ -15,6 +15,7 @@ from codebotler.core.words import counted
 from codebotler.models.base import Reply
 from codebotler.models.no_program import NO_PROGRAM_KINDS, NoProgram, classify_reply, is_cut_off
 from codebotler.prompts.extract import read_reply
+from roboeval.evaluation.runs.endings import ENDINGS
 from roboeval.evaluation.runs.rows import add_or_raise
 from roboeval.suites.load import Suite
 
@@ -27,6 +28,24 @@ KEY = ("task", "prompt", "index")  # names of the key's parts in tables and rows
 REQUIRED = (*KEY, "program")
 FIELDS = (*REQUIRED, "instruction", "model")
 NO_PROGRAM_COLUMN = "no_program"  # the table column for replies without a program
+
+
+class Acted(NamedTuple):
+    """Where an agent acted, instead of writing a program for all worlds, and how its mission ended."""
+
+    world: int  # the index of the world in its task
+    ending: str  # one of `ENDINGS`
+
+    @property
+    def text(self) -> str:
+        """Write it as a text, which `parse` reads."""
+        return f"{self.world} {self.ending}"
+
+    @classmethod
+    def parse(cls, text: str) -> Acted:
+        """Read a text that `text` wrote."""
+        world, _, ending = text.partition(" ")
+        return cls(int(world), ending)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +83,8 @@ class Completion:
             text = getattr(self, name)
             if not isinstance(text, str) and (text is not None or name in REQUIRED):
                 raise UserError(f"the {name} is {text!r}, not a string")
+        if "world" in self.more and self.acted is None:
+            raise UserError(f'"world" or "ending" of a mission is invalid; endings are {", ".join(ENDINGS)}')
         if (kind := self.more.get(NO_PROGRAM_COLUMN)) not in (None, *NO_PROGRAM_KINDS):
             raise UserError(
                 f'"{NO_PROGRAM_COLUMN}" is {kind!r}; use null or one of {", ".join(NO_PROGRAM_KINDS)}'
@@ -100,6 +121,18 @@ class Completion:
     def is_cut_off(self) -> bool:
         """Whether the reply ended at the token limit, even if the program is complete."""
         return is_cut_off(self.finish_reason)
+
+    @property
+    def acted(self) -> Acted | None:
+        """Return where an agent acted and how that ended, or None for a program."""
+        world, ending = self.more.get("world"), self.more.get("ending")
+        is_valid = type(world) is int and 0 <= world < NUMBER_LIMIT and ending in ENDINGS
+        return Acted(world, ending) if is_valid else None  # type: ignore[arg-type]  # `is_valid` has checked them
+
+    @property
+    def mode(self) -> str:
+        """Return how the model was used: to write a program, as an agent, or to write programs again."""
+        return str(self.more.get("mode", "program"))
 
     @property
     def no_program(self) -> NoProgram | None:

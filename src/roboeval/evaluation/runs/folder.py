@@ -42,6 +42,11 @@ class RunFolder:
         """Return the path of the log of pending requests."""
         return self.path / "inflight.jsonl"
 
+    @property
+    def turns(self) -> Path:
+        """Return the path of the log of turns, if the model acts as an agent."""
+        return self.path / "turns.jsonl"
+
     def rows(self, key: str) -> Path:
         """Return the path of an evaluation's rows, given its `evaluation_key`."""
         return self.path / "evaluations" / f"{key}.jsonl"

@@ -108,7 +108,9 @@ def requested_of_prompts(about: Mapping[str, Any], suite: Suite | None) -> dict[
         if type(count) is not int:
             return None
         each |= Counter(dict.fromkeys(tasks if isinstance(tasks, list) else suite.tasks, count))
-    return {name: count for name, count in each.items() if name in suite.tasks}
+    # An agent has a mission in each world.
+    worlds = {name: len(task.scenarios) if "mode" in about else 1 for name, task in suite.tasks.items()}
+    return {name: count * worlds[name] for name, count in each.items() if name in suite.tasks}
 
 
 def limit_of(about: Mapping[str, Any]) -> int | None:

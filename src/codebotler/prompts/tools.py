@@ -1,0 +1,139 @@
+"""Offer skills to a model as tools, instead of asking it for a program."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.skills.values import ValueType
+from codebotler.prompts.rendering import Prompt, PromptMessage, clean_instruction
+
+GIVE_UP, WAIT = "give_up", "wait"
+"""The tools that every agent has besides the skills, unless a skill has the same name."""
+
+_AGENT_FILE = Path(__file__).parent / "agent.txt"
+_RULES_FILE = Path(__file__).parent / "rules.txt"
+_JSON_TYPES = {"str": "string", "int": "integer", "float": "number", "bool": "boolean"}
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A function that a model may call."""
+
+    name: str
+    description: str
+    schema: str  # the JSON Schema of its arguments, as JSON text
+
+
+@dataclass(frozen=True)
+class ToolCall:
+    """A call of a tool that a model requests."""
+
+    id: str  # links the result to the call
+    name: str
+    arguments: str  # JSON text, which may be invalid
+
+
+@dataclass(frozen=True)
+class CallingMessage(PromptMessage):
+    """A model's turn in which it called tools."""
+
+    data: str = field(repr=False)  # the turn as the model's library writes it, with signatures of thoughts
+
+
+@dataclass(frozen=True)
+class ResultMessage(PromptMessage):
+    """The result of a call, as text."""
+
+    call: ToolCall
+
+
+@dataclass(frozen=True)
+class ToolPrompt(Prompt):
+    """A request to call one of some tools."""
+
+    tools: tuple[Tool, ...] = ()
+
+
+def agent_prompt(instruction: str, *, rules: Sequence[str] = (), skills: SkillTable = SKILLS) -> ToolPrompt:
+    """Return the request to carry out an instruction by calling skills.
+
+    Args:
+        instruction: the robot's task, in plain words.
+        rules: sentences that every mission must obey.
+        skills: the skills that may be called.
+
+    Raises:
+        UserError: the instruction is empty.
+    """
+    instruction = clean_instruction(instruction)
+    listed = "\n".join(f"- {rule}" for rule in rules)
+    about_rules = Template(_RULES_FILE.read_text(encoding="utf-8")).substitute(rules=listed) if rules else ""
+    messages = (
+        PromptMessage("system", _AGENT_FILE.read_text(encoding="utf-8").strip()),
+        PromptMessage("user", "\n\n".join(filter(None, (instruction, about_rules.strip())))),
+    )
+    return ToolPrompt(instruction, messages, instruction, (), "", tools=tools_for(skills))
+
+
+def tools_for(skills: SkillTable) -> tuple[Tool, ...]:
+    """Return a tool for each skill, and those to wait and to give up."""
+    own = {skill.name: Tool(skill.name, _description(skill), schema_of(skill)) for skill in skills.values()}
+    return tuple(({one.name: one for one in _MORE_TOOLS} | own).values())
+
+
+def schema_of(skill: Skill) -> str:
+    """Return the JSON Schema of a skill's arguments, as JSON text."""
+    return _object_schema({parameter.name: _schema(parameter.type) for parameter in skill.parameters})
+
+
+@cache
+def agent_template_hash(skills: SkillTable = SKILLS) -> str:
+    """Return the SHA-256 hash, in hexadecimal, of everything in an agent's prompt except the instruction."""
+    shapes = [agent_prompt("INSTRUCTION", rules=rules, skills=skills) for rules in ((), ("RULE",))]
+    return hashlib.sha256(json.dumps([asdict(shape) for shape in shapes]).encode()).hexdigest()
+
+
+def _description(skill: Skill) -> str:
+    fails = [f"Fails if {when}." for _, when in skill.fails]
+    return " ".join([skill.doc, *fails])
+
+
+def _schema(value: ValueType) -> dict[str, Any]:
+    one: dict[str, Any] = {"type": _JSON_TYPES[value.base or "str"]}
+    if value.choices:
+        one["enum"] = [*value.choices]
+    return {"type": "array", "items": one} if value.is_list else one
+
+
+def _object_schema(properties: dict[str, Any]) -> str:
+    return json.dumps(
+        {
+            "type": "object",
+            "properties": properties,
+            "required": [*properties],
+            "additionalProperties": False,
+        }
+    )
+
+
+_MORE_TOOLS = (
+    Tool(
+        WAIT,
+        "Let some seconds pass, and read the time afterwards.",
+        _object_schema({"seconds": {"type": "number"}}),
+    ),
+    Tool(
+        GIVE_UP,
+        "End the mission because the instruction cannot be carried out. Say why.",
+        _object_schema({"reason": {"type": "string"}}),
+    ),
+)

@@ -1,0 +1,93 @@
+"""Plans the missions of a run in which a model acts, instead of writing one program for all worlds."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar, Literal, TypeAlias
+
+from codebotler.models.base import Reply
+from codebotler.prompts import Prompt, template_hash
+from codebotler.prompts.tools import ToolPrompt, agent_prompt, agent_template_hash
+from roboeval.evaluation.agents.conversation import AgentConversation, Conversation, TurnLimits
+from roboeval.evaluation.agents.mission import AgentMission
+from roboeval.evaluation.agents.replan import ReplanConversation
+from roboeval.evaluation.requests import Ask, GenerationPlan
+from roboeval.evaluation.runs.completions import KEY, CompletionKey
+
+AgentMode: TypeAlias = Literal["agent", "replan"]
+DEFAULT_TURNS: dict[AgentMode, int] = {"agent": 100, "replan": 4}
+
+
+@dataclass(frozen=True, kw_only=True)
+class AgentPlan(GenerationPlan):
+    """Plans missions: for each prompt, a number of them in each world of its task.
+
+    Args:
+        mode: `agent` if the model calls skills, or `replan` if it writes a program and, after each failure,
+            another one for the rest.
+        limits: when a mission ends at the latest.
+    """
+
+    mode: AgentMode
+    limits: TurnLimits
+
+    has_turns: ClassVar[bool] = True
+
+    def keys(self) -> list[CompletionKey]:
+        """Return all keys. The index counts worlds first: those of the first missions, then of the second."""
+        first = GenerationPlan(self.suite, self.tasks, 1)
+        prompts = [(task, prompt) for task, prompt, _ in first.keys()]  # noqa: SIM118 - a plan is no mapping
+        return [
+            (task, prompt, sample * self._worlds(task) + world)
+            for sample in range(self.num_completions)
+            for task, prompt in prompts
+            for world in range(self._worlds(task))
+        ]
+
+    def describe(self) -> dict[str, Any]:
+        """Return entries of run.json that all completions of the run share."""
+        is_agent = self.mode == "agent"
+        hashed = agent_template_hash if is_agent else template_hash
+        return {
+            "template": hashed(self.suite.skills),
+            "mode": self.mode,
+            "max_turns": self.limits.turns,
+            **({} if self.limits.tokens is None else {"max_mission_tokens": self.limits.tokens}),
+        }
+
+    async def complete(
+        self, key: CompletionKey, model: str, ask: Ask, earlier: Sequence[Reply] = ()
+    ) -> dict[str, Any]:
+        """Let the model carry out a mission, beginning with the replies that it gave earlier."""
+        conversation = self.begin(key)
+        for reply in earlier:
+            await asyncio.to_thread(conversation.add, reply)
+        while (prompt := conversation.prompt) is not None:
+            await asyncio.to_thread(conversation.add, await ask(prompt))
+        identity = {**dict(zip(KEY, key, strict=True)), "instruction": self.instruction(key), "model": model}
+        return {**identity, "mode": self.mode, "world": self.world(key), **conversation.data()}
+
+    def begin(self, key: CompletionKey) -> Conversation:
+        """Begin the conversation about a mission."""
+        begin = partial(AgentMission.begin, self.suite, key[0], key[1], self.world(key))
+        if self.mode == "replan":
+            return ReplanConversation(begin, self.prompt(key), self.limits)
+        return AgentConversation(begin(), self._agent_prompt(key), self.limits)
+
+    def prompt(self, key: CompletionKey) -> Prompt:
+        """Return the first request of a mission."""
+        return self._agent_prompt(key) if self.mode == "agent" else super().prompt(key)
+
+    def world(self, key: CompletionKey) -> int:
+        """Return the index of the world of a mission."""
+        return key[2] % self._worlds(key[0])
+
+    def _worlds(self, task: str) -> int:
+        return len(self.suite.tasks[task].scenarios)
+
+    def _agent_prompt(self, key: CompletionKey) -> ToolPrompt:
+        rules, skills = self.suite.house_sentences, self.suite.skills
+        return agent_prompt(self.instruction(key), rules=rules, skills=skills)

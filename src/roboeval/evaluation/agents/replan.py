@@ -1,0 +1,103 @@
+"""Lets a model write a program and, after each failure, another one for the rest of the mission."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from codebotler.core.errors import VIOLATION
+from codebotler.core.trace import Outcome, Status
+from codebotler.missions.past import MissionPast
+from codebotler.models.base import Reply
+from codebotler.prompts import Prompt
+from codebotler.simulator.pool import shared_pool
+from roboeval.evaluation.agents.conversation import TurnLimits, Turns, mission_data
+from roboeval.evaluation.agents.mission import AgentMission
+from roboeval.evaluation.recovery import SLEEP, Call, RecordingRobot, rest_prompt
+from roboeval.evaluation.runs.endings import TIMEOUT
+
+
+class ReplanConversation:
+    """Runs a model's programs one after the other, until one of them ends without an error.
+
+    Args:
+        begin: begins the mission. It is called at the end, to make the calls of all programs.
+        prompt: the request for the first program.
+        limits: the numbers of programs and tokens at most.
+    """
+
+    def __init__(self, begin: Callable[[], AgentMission], prompt: Prompt, limits: TurnLimits) -> None:
+        self.mission, self._first, self._turns = begin(), prompt, Turns(limits)
+        self._next: Prompt | None = prompt
+        self._calls: Sequence[Call] = ()
+
+    @property
+    def prompt(self) -> Prompt | None:
+        """The request for the next program."""
+        return self._next
+
+    def add(self, reply: Reply) -> None:
+        """Run a reply's program where the last one has stopped, or end the mission."""
+        self._turns.replies.append(reply)
+        if reply.no_program is not None:
+            self._end(None)
+            self.mission.end(reply.no_program)
+            return
+        robot, outcome = _run(reply.program, self.mission, self._calls)
+        self._calls = robot.calls
+        if _may_go_on(outcome) and self._turns.ending is None:
+            assert outcome.error is not None, "the mission may go on only after an error"
+            why = f"{outcome.error.kind}: {outcome.error.message}"
+            self.mission.mistakes[outcome.error.kind] += 1
+            instruction = self._first.instruction
+            past = MissionPast("", instruction, "", reply.program, why, outcome.trace, robot.place)
+            self._next = rest_prompt(past, self._first)
+        else:
+            self._end(outcome)
+
+    def data(self) -> dict[str, Any]:
+        """Return the mission as entries of a row."""
+        return mission_data(self.mission) | self._turns.data()
+
+    def _end(self, outcome: Outcome | None) -> None:
+        """Make all calls in the mission, and end it as the last program ended."""
+        self._next, mission = None, self.mission
+        mistakes = mission.mistakes.copy()
+        for name, arguments in self._calls:
+            if name == SLEEP:
+                mission.sleep_until(float(arguments[0]))  # type: ignore[arg-type]  # a number of seconds
+            else:
+                mission.repeat(mission.suite.skills[name], arguments)
+        mission.mistakes = mistakes
+        if outcome is None or mission.ending is not None:
+            return
+        if outcome.error is None:
+            mission.answer("")
+        elif outcome.status is Status.ROBOT_ERROR:
+            mission.mistakes[outcome.error.kind] += 1
+            mission.call("give_up", {"reason": outcome.error.message})
+        elif outcome.status is Status.TIMEOUT:
+            mission.end(TIMEOUT)
+        else:
+            mission.crash(outcome.error.kind, outcome.error.message)
+
+
+def _may_go_on(outcome: Outcome) -> bool:
+    """Whether a program failed, but neither broke a rule nor reached a limit."""
+    is_failure = outcome.status in {Status.ROBOT_ERROR, Status.PYTHON_ERROR, Status.KILLED}
+    return is_failure and outcome.error is not None and outcome.error.kind != VIOLATION
+
+
+def _run(program: str, mission: AgentMission, made: Sequence[Call]) -> tuple[RecordingRobot, Outcome]:
+    """Run a program on a robot that has made some calls already."""
+    robots: list[RecordingRobot] = []
+
+    def new_robot() -> RecordingRobot:
+        robots.append(RecordingRobot(mission.scenario.world, mission.suite, made=made))
+        return robots[-1]
+
+    pool = shared_pool()
+    outcome = pool.submit(lambda: pool.here().run_alone(program, new_robot)).result()
+    if not robots:  # the program does not parse
+        new_robot()
+    return robots[-1], outcome

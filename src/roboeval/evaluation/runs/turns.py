@@ -1,0 +1,54 @@
+"""The log of the turns of agents, which lets an interrupted mission go on without paying twice."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Collection, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from codebotler.core.errors import UserError
+from codebotler.core.files import Appender, read_rows, to_line
+from codebotler.models.base import Reply, Usage
+from codebotler.prompts.tools import ToolCall
+from roboeval.evaluation.runs.completions import KEY, CompletionKey
+from roboeval.evaluation.runs.rows import key_of
+
+
+class TurnLog:
+    """Saves each reply to an agent as soon as it arrives, and knows those of missions that have not ended."""
+
+    def __init__(self, path: Path, done: Collection[CompletionKey]) -> None:
+        self._replies: dict[CompletionKey, list[Reply]] = {}
+        for number, row in read_rows(path, growing=True) if path.exists() else ():
+            try:
+                if (key := key_of(row)) not in done:
+                    self._replies.setdefault(key, []).append(_reply_from(row["reply"]))
+            except (KeyError, TypeError):
+                sentence = "this line is not a turn; name another folder"
+                raise UserError(sentence, file=path, line=number) from None
+        self._file = Appender(path)
+
+    def replies(self, key: CompletionKey) -> list[Reply]:
+        """Return the replies to a mission that has not ended."""
+        return list(self._replies.get(key, ()))
+
+    def forget(self, key: CompletionKey) -> None:
+        """Forget a mission whose completion has been saved."""
+        self._replies.pop(key, None)
+
+    async def keep(self, key: CompletionKey, reply: Reply) -> None:
+        """Save a reply."""
+        self._replies.setdefault(key, []).append(reply)
+        self._file.append(to_line({**dict(zip(KEY, key, strict=True)), "reply": asdict(reply)}))
+        await asyncio.to_thread(self._file.sync)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def _reply_from(data: Mapping[str, Any]) -> Reply:
+    calls = tuple(ToolCall(**one) for one in data["calls"])
+    return Reply(**{**data, "usage": Usage(**data["usage"]), "calls": calls})

@@ -1,0 +1,308 @@
+"""Runs in which a real chat client lets a scripted server act as an agent."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from agents.agent_server import (
+    INPUT_TOKENS,
+    OUTPUT_TOKENS,
+    REASONING_TOKENS,
+    Agent,
+    Turn,
+    results_in,
+    serve,
+    turns_before,
+)
+from codebotler.models.open import open_model
+from codebotler.models.sampling import SamplingSettings
+from roboeval.evaluation.agents.conversation import TurnLimits
+from roboeval.evaluation.agents.plan import AgentMode, AgentPlan
+from roboeval.evaluation.evaluate import evaluate_run
+from roboeval.evaluation.generate import GenerationProgress, Pace, generate_run
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.folder import RunFolder
+from roboeval.evaluation.runs.rows import Row
+from roboeval.suites.load import Suite, load_suite
+from server import Request, Server
+from small_suite import a_suite
+
+LIMITS = TurnLimits(20)
+WORLDS = """\
+name: T
+summary: s
+prompts: [Greet Jill., Say hello to Jill.]
+checks:
+  says(what): {category: SayAtLocation, rtl: 'tr.Exists(say("{what}"))'}
+worlds:
+- {about: one, robot: lobby, rooms: [kitchen, lobby], require: [says("hello")]}
+- {about: two, robot: kitchen, rooms: [kitchen, lobby], require: [says("hello")]}
+"""
+GO: Turn = [("go_to", {"location": "kitchen"})]
+LOOK: Turn = [("is_in_room", {"entity": "jill"})]
+STOP: Turn = [("give_up", {"reason": "I cannot."})]
+
+
+@pytest.fixture
+def suite(tmp_path: Path) -> Suite:
+    """A suite of two prompts and two worlds."""
+    return load_suite(a_suite(_new(tmp_path / "suite"), WORLDS))
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Suite:
+    """A suite of one prompt and one world."""
+    return load_suite(a_suite(_new(tmp_path / "small")))
+
+
+def _new(folder: Path) -> Path:
+    folder.mkdir()
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "a key")
+
+
+def act(
+    run: RunFolder,
+    suite: Suite,
+    server: Server,
+    *,
+    mode: AgentMode = "agent",
+    limits: TurnLimits = LIMITS,
+    count: int = 1,
+) -> GenerationProgress:
+    model = open_model("openai-chat:agent", SamplingSettings(base_url=server.url, seed=0))
+    plan = AgentPlan(suite, None, count, mode=mode, limits=limits)
+    return generate_run(run, plan, model, Pace())
+
+
+def rows_of(run: RunFolder, suite: Suite) -> list[Row]:
+    return [*evaluate_run(run, suite, ablated=False, tasks=None, redo=False)]
+
+
+def ran(
+    tmp_path: Path, suite: Suite, turns: Sequence[Turn], limits: TurnLimits = LIMITS
+) -> tuple[list[Completion], list[Row], Agent, list[Request]]:
+    run = RunFolder(tmp_path / "run")
+    agent, server = serve(lambda _: turns)
+    with server:
+        assert act(run, suite, server, limits=limits).missing is None
+    return [*run.read(suite)], rows_of(run, suite), agent, server.requests
+
+
+def test_each_world_of_each_prompt_is_a_mission_whose_row_says_what_it_took(
+    tmp_path: Path, suite: Suite
+) -> None:
+    completions, rows, agent, _ = ran(tmp_path, suite, [GO, LOOK, "Done."])
+    prompts = len(suite.tasks["T"].prompts)
+    assert {(one.prompt, one.more["world"]) for one in completions} == {
+        (prompt, world) for prompt in range(prompts) for world in range(2)
+    }
+    for one in completions:
+        assert (one.mode, one.more["turns"], one.more["ending"]) == ("agent", 3, "answer")
+        assert one.more["usage"] == {
+            "input_tokens": 3 * INPUT_TOKENS,
+            "output_tokens": 3 * OUTPUT_TOKENS,
+            "reasoning_tokens": 3 * REASONING_TOKENS,
+        }
+    assert sum(agent.answered.values()) == 3 * len(completions)
+    assert [len(row["verdicts"]) for row in rows] == [1] * len(completions)
+    abouts = {one.world.about for one in suite.tasks["T"].scenarios}
+    assert {row["verdicts"][0]["world"] for row in rows} == abouts
+
+
+@pytest.mark.parametrize(
+    ("turns", "failure"),
+    [
+        ([[("fly", {"to": "the moon"})]], ("AgentError", "UnknownTool")),
+        ([[("go_to", {"place": "lobby"})]], ("AgentError", "WrongArguments")),
+        ([[("go_to", '{"location": ')]], ("AgentError", "WrongArguments")),
+        ([[*GO, *LOOK]], ("AgentError", "SeveralCalls")),
+        (["I would go to her office and ask her."], ("AgentError", "NoCall")),
+        ([LOOK, [("wait", {"seconds": 1})]] * 150, ("AgentError", "RepeatedCalls")),
+        ([GO, LOOK] * 100, ("AgentError", "TurnLimit")),
+        ([LOOK, STOP], ("AgentError", "GaveUp")),
+        ([[("go_to", {"location": "x"})], STOP], ("RobotExecutionError", "GoToInvalidLocation")),
+        ([LOOK, "She comes at noon, and I have told you so."], ("TaskCompletionError", "Location")),
+        ([GO, ""], ("NoProgram", "empty")),
+    ],
+    ids=lambda one: one[1] if isinstance(one, tuple) else "",
+)
+def test_a_mistake_ends_a_mission_with_its_class(
+    tmp_path: Path, small: Suite, monkeypatch: pytest.MonkeyPatch, turns: list[Turn], failure: tuple[str, str]
+) -> None:
+    monkeypatch.setattr("roboeval.evaluation.agents.mission.MAX_REPEATS", 6)
+    completions, (row,), agent, _ = ran(tmp_path, small, turns)
+    assert row["failure"] is not None
+    assert (row["failure"]["class"], row["failure"]["kind"]) == failure
+    assert sum(agent.answered.values()) == sum(one.more["turns"] for one in completions)
+
+
+def test_a_limit_of_tokens_ends_a_mission(tmp_path: Path, small: Suite) -> None:
+    each = INPUT_TOKENS + OUTPUT_TOKENS
+    completions, _, _, _ = ran(tmp_path, small, [GO, LOOK] * 10, TurnLimits(20, tokens=4 * each))
+    assert {(one.more["ending"], one.more["turns"]) for one in completions} == {("TokenLimit", 4)}
+
+
+def test_the_model_sees_each_result_and_its_own_calls(tmp_path: Path, small: Suite) -> None:
+    _, _, _, requests = ran(tmp_path, small, [[("fly", {})], GO, LOOK, "Done."])
+    last = max(requests, key=turns_before)
+    told = results_in(last)
+    assert told[0].startswith("UnknownTool")
+    assert told[1] == "done"
+    assert told[2] in {"true", "false"}
+    calls = [one["tool_calls"][0] for one in last.body["messages"] if one["role"] == "assistant"]
+    assert [call["function"]["name"] for call in calls] == ["fly", "go_to", "is_in_room"]
+    assert {tool["function"]["name"] for tool in last.body["tools"]} == {
+        *small.skills,
+        "wait",
+        "give_up",
+    }
+
+
+def test_a_failed_request_is_made_again_where_the_mission_was(tmp_path: Path, suite: Suite) -> None:
+    run = RunFolder(tmp_path / "run")
+    agent, server = serve(lambda _: [GO, LOOK, "Done."])
+    agent_sends, broken = server.sends, True
+
+    def sends(request: Request) -> tuple[int, dict[str, str], bytes] | None:
+        if broken and turns_before(request) == 2:
+            return 401, {"Content-Type": "application/json"}, b'{"error": {"message": "No."}}'
+        return agent_sends(request)
+
+    server.sends = sends
+    with server:
+        assert act(run, suite, server).missing is not None
+        broken = False
+        assert act(run, suite, server).missing is None
+    assert {*agent.answered.values()} == {1}
+    assert {one.more["turns"] for one in run.read(suite)} == {3}
+
+
+def test_a_reasoning_models_thoughts_are_kept(tmp_path: Path, small: Suite) -> None:
+    completions, _, _, _ = ran(tmp_path, small, [GO, "<think>She is away.</think>Done."])
+    assert {one.more["reasoning"] for one in completions} == {"She is away."}
+
+
+PROGRAM = """
+```python
+def task_program():
+    {body}
+```
+"""
+WRONG_DOOR = "say('Hello'); go_to('the moon')"
+
+
+def replan(
+    tmp_path: Path, suite: Suite, bodies: Sequence[str], turns: int = 4
+) -> tuple[list[Completion], list[Row], Server]:
+    run = RunFolder(tmp_path / "run")
+    _, server = serve(lambda _: [PROGRAM.format(body=body) for body in bodies])
+    with server:
+        assert act(run, suite, server, mode="replan", limits=TurnLimits(turns)).missing is None
+    return [*run.read(suite)], rows_of(run, suite), server
+
+
+def test_after_a_failure_the_model_writes_the_rest(tmp_path: Path, suite: Suite) -> None:
+    completions, rows, server = replan(tmp_path, suite, [WRONG_DOOR, "say('Sorry')"])
+    for one in completions:
+        assert (one.mode, one.more["turns"], one.more["ending"]) == ("replan", 2, "answer")
+        assert one.more["tool_errors"] == {"GoToInvalidLocation": 1}
+    for row in rows:
+        spoken = [event[1] for event in row["verdicts"][0]["trace"] if event[0] == "say"]
+        assert spoken == ["hello", "sorry"]  # the suite lower-cases texts; the first is not said again
+    second = max(server.requests, key=turns_before)
+    assert "the moon" in second.body["messages"][-1]["content"]
+
+
+@pytest.mark.parametrize(
+    ("body", "name", "kind"),
+    [
+        (WRONG_DOOR, "RobotExecutionError", "GoToInvalidLocation"),
+        ("say(undefined)", "PythonError", "NameError"),
+        ("say('x'", "PythonError", "SyntaxError"),
+        ("import time\n    while True: time.sleep(1)", "PythonError", "TimeoutError"),
+    ],
+)
+def test_the_last_failure_counts(tmp_path: Path, small: Suite, body: str, name: str, kind: str) -> None:
+    completions, rows, _ = replan(tmp_path, small, [body], turns=2)
+    is_limit = kind == "TimeoutError"
+    assert {one.more["turns"] for one in completions} == {1 if is_limit else 2}
+    for row in rows:
+        assert row["failure"] is not None
+        assert (row["failure"]["class"], row["failure"]["kind"]) == (name, kind)
+
+
+SCRIPT = """
+import pathlib, sys
+from codebotler.models.open import open_model
+from codebotler.models.sampling import SamplingSettings
+from roboeval.evaluation.agents.conversation import TurnLimits
+from roboeval.evaluation.agents.plan import AgentPlan
+from roboeval.evaluation.generate import Pace, generate_run
+from roboeval.evaluation.runs.folder import RunFolder
+from roboeval.suites.load import load_suite
+model = open_model("openai-chat:agent", SamplingSettings(base_url={url!r}, seed=0))
+plan = AgentPlan(load_suite({suite!r}), None, 3, mode="agent", limits=TurnLimits(20))
+generate_run(RunFolder(pathlib.Path({run!r})), plan, model, Pace(concurrency=3))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
+def test_an_interrupted_run_goes_on_after_the_last_turn_that_came(
+    tmp_path: Path, suite: Suite, end: signal.Signals
+) -> None:
+    run = RunFolder(tmp_path / "run")
+    agent, server = serve(lambda _: [GO, LOOK, *[[("say", {"message": str(n)})] for n in range(5)], "Done."])
+    server.pause = 0.02
+    answers = server.sends
+
+    def slowly(request: Request) -> tuple[int, dict[str, str], bytes] | None:
+        time.sleep(0.01)  # so that a signal finds requests under way
+        return answers(request)
+
+    server.sends = slowly
+    environment = {**os.environ, "OPENAI_API_KEY": "a key"}
+    with server:
+        for asked in (20, 90):
+            script = SCRIPT.format(url=server.url, suite=str(suite.folder), run=str(run.path))
+            process = subprocess.Popen(
+                [sys.executable, "-c", script],
+                env=environment,
+                stderr=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+            )
+            deadline = time.monotonic() + 60
+            while len(server.requests) < asked and process.poll() is None:
+                assert time.monotonic() < deadline
+                time.sleep(0.005)
+            process.send_signal(end)
+            process.communicate(timeout=60)
+        progress = act(run, suite, server, count=3)
+    assert progress.missing is None
+    completions = [*run.read(suite)]
+    assert {one.more["turns"] for one in completions} == {8}
+    twice = sum(agent.answered.values()) - len(agent.answered)
+    assert len(agent.answered) == 8 * len(completions)
+    about = json.loads(run.about.read_text())
+    assert twice <= about["possibly_paid_twice"] <= 6
+    assert about["usage"]["input_tokens"] == INPUT_TOKENS * 8 * len(completions)
+
+
+def test_the_log_of_turns_has_every_reply(tmp_path: Path, suite: Suite) -> None:
+    completions, _, _, _ = ran(tmp_path, suite, [GO, LOOK, "Done."])
+    lines = map(json.loads, (tmp_path / "run" / "turns.jsonl").read_text().splitlines())
+    turns = Counter((row["task"], row["prompt"], row["index"]) for row in lines)
+    assert turns == {one.key: 3 for one in completions}

@@ -1,0 +1,214 @@
+"""Missions of agents in the simulator, and the programs that they become."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from codebotler.core.errors import VIOLATION, UserError
+from codebotler.core.trace import Status
+from roboeval.evaluation.agents.mission import MAX_MISTAKES, MAX_REPEATS, AgentMission
+from roboeval.evaluation.judge import evaluate, judge
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.rows import Row
+from roboeval.suites.house import HouseRules
+from roboeval.suites.load import Suite
+
+TASK, WORLD = "LunchTime", 0
+
+
+@pytest.fixture
+def mission(paper: Suite) -> AgentMission:
+    return AgentMission.begin(paper, TASK, 0, WORLD)
+
+
+def judged(mission: AgentMission, suite: Suite, *, index: int = 0) -> Row:
+    assert mission.ending is not None
+    more = {"world": WORLD, "ending": mission.ending, "no_program": None}
+    completion = Completion(task=TASK, prompt=0, index=index, program=mission.program, more=more)
+    (row,) = evaluate([completion], suite)
+    return row
+
+
+def test_calls_tell_what_skills_return(mission: AgentMission) -> None:
+    rooms = json.loads(mission.call("get_all_rooms", ""))
+    assert mission.call("get_current_location", {}) in {json.dumps(room) for room in rooms}
+    assert mission.call("is_in_room", '{"entity": "unicorn"}') == "false"
+    assert mission.call("go_to", {"location": rooms[0]}) == "done"
+    assert mission.mistakes == {}
+    assert mission.ending is None
+
+
+def test_an_answer_is_the_option_that_a_person_chose(mission: AgentMission) -> None:
+    mission.call("go_to", {"location": "jill's office"})
+    options = ["yes", "no"]
+    told = mission.call("ask", {"person": "Jill", "question": "Lunch?", "options": options})
+    assert json.loads(told) in options
+    assert mission.outcome.trace[-1].answer == json.loads(told)
+
+
+def test_time_passes_while_it_waits(mission: AgentMission) -> None:
+    before, after = (mission.call("wait", {"seconds": seconds}) for seconds in (0, 90))
+    assert before != after
+    assert "time.sleep(90.0)" in mission.program
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "kind"),
+    [
+        ("fly", {}, "UnknownTool"),
+        ("go_to", {"room": "lobby"}, "WrongArguments"),
+        ("go_to", {"location": 3}, "WrongArguments"),
+        ("go_to", "not JSON", "WrongArguments"),
+        ("go_to", "[]", "WrongArguments"),
+        ("ask", {"person": "", "question": "?", "options": "yes"}, "WrongArguments"),
+        ("wait", {"seconds": -1}, "WrongArguments"),
+        ("wait", {"seconds": float("nan")}, "WrongArguments"),
+    ],
+)
+def test_a_mistake_moves_nothing_and_the_third_in_a_row_ends_it(
+    mission: AgentMission, paper: Suite, name: str, arguments: str, kind: str
+) -> None:
+    for number in range(MAX_MISTAKES):
+        assert mission.ending is None
+        assert mission.call(name, arguments).startswith(f"{kind}: ")
+        assert mission.mistakes == {kind: number + 1}
+    assert mission.ending == kind
+    assert not mission.outcome.trace
+    with pytest.raises(UserError):
+        mission.call("get_all_rooms", {})
+    row = judged(mission, paper)
+    assert row["failure"] is not None
+    assert row["failure"]["class"] == "AgentError"
+    assert row["failure"]["kind"] == kind
+    assert row["verdicts"][0]["status"] == "agent-error"
+
+
+def test_a_right_call_between_mistakes_lets_it_go_on(mission: AgentMission) -> None:
+    for _ in range(MAX_MISTAKES + 1):
+        mission.call("fly", {})
+        mission.call("get_all_rooms", {})
+    assert mission.ending is None
+    assert mission.mistakes["UnknownTool"] == MAX_MISTAKES + 1
+
+
+def test_several_calls_at_once_are_not_made(mission: AgentMission) -> None:
+    for _ in range(MAX_MISTAKES):
+        mission.refuse_several(["go_to", "say"])
+    assert mission.ending == "SeveralCalls"
+
+
+def test_equal_calls_without_end_are_a_limit(mission: AgentMission, paper: Suite) -> None:
+    while mission.ending is None:
+        mission.call("is_in_room", {"entity": "jill"})
+        if mission.ending is None:
+            mission.call("wait", {"seconds": 1})
+    assert mission.ending == "RepeatedCalls"
+    assert sum(event.kind == "check" for event in mission.outcome.trace) == MAX_REPEATS
+    assert mission.outcome.status is Status.TIMEOUT
+    assert judged(mission, paper)["failure"] == {
+        "class": "AgentError", "kind": "RepeatedCalls", "world": 0, "check": None
+    }  # fmt: skip
+
+
+def test_to_give_up_fails_with_the_error_that_was_the_cause(mission: AgentMission, paper: Suite) -> None:
+    mission.call("go_to", {"location": "the moon"})
+    mission.call("give_up", {"reason": "no such room"})
+    failure = judged(mission, paper)["failure"]
+    assert failure is not None
+    assert (failure["class"], failure["kind"]) == ("RobotExecutionError", "GoToInvalidLocation")
+
+
+def test_to_give_up_without_an_error_is_the_agents_own_failure(mission: AgentMission, paper: Suite) -> None:
+    mission.call("get_all_rooms", {})
+    mission.call("give_up", {"reason": "I do not know"})
+    failure = judged(mission, paper)["failure"]
+    assert failure is not None
+    assert (failure["class"], failure["kind"]) == ("AgentError", "GaveUp")
+
+
+def test_an_answer_without_a_call_is_named_as_such_if_it_fails(mission: AgentMission, paper: Suite) -> None:
+    mission.answer("I would go there and ask her.")
+    failure = judged(mission, paper)["failure"]
+    assert failure is not None
+    assert (failure["class"], failure["kind"]) == ("AgentError", "NoCall")
+
+
+def test_a_claim_to_be_done_is_judged_by_what_was_done(mission: AgentMission, paper: Suite) -> None:
+    mission.call("go_to", {"location": "jill's office"})
+    mission.answer("Done! Jill comes at noon.")
+    failure = judged(mission, paper)["failure"]
+    assert failure is not None
+    assert failure["class"] == "TaskCompletionError"
+
+
+def test_a_house_rule_ends_a_mission_as_it_ends_a_program(tmp_path: Path, paper: Suite) -> None:
+    file = tmp_path / "quiet.yaml"
+    file.write_text("rules:\n- {name: away, says: Leave her., always: 'not tr.Exists(goto(\"jill\"))'}\n")
+    suite = paper.with_house_rules(HouseRules.read(file))
+    mission = AgentMission.begin(suite, TASK, 0, WORLD)
+    mission.call("go_to", {"location": "jill's office"})
+    assert mission.ending == "error"
+    assert mission.mistakes == {VIOLATION: 1}
+    assert mission.outcome.error is not None
+    assert mission.outcome.error.kind == VIOLATION
+    failure = judged(mission, suite)["failure"]
+    assert failure is not None
+    assert failure["kind"] == VIOLATION
+
+
+def test_a_missing_world_is_named(paper: Suite) -> None:
+    completion = Completion(task=TASK, prompt=0, index=0, program="", more={"world": 99, "ending": "answer"})
+    with pytest.raises(UserError, match="LunchTime/0/0"):
+        list(evaluate([completion], paper))
+
+
+@pytest.mark.parametrize(
+    "more", [{"world": 0}, {"world": -1, "ending": "answer"}, {"world": 0, "ending": "?"}]
+)
+def test_a_row_with_half_an_ending_is_refused(more: dict[str, object]) -> None:
+    with pytest.raises(UserError):
+        Completion(task=TASK, prompt=0, index=0, program="", more=more)
+
+
+CALLS = st.one_of(
+    st.sampled_from(
+        [
+            ("get_all_rooms", {}),
+            ("go_to", {"location": "jill's office"}),
+            ("go_to", {"location": "nowhere"}),
+            ("is_in_room", {"entity": "jill"}),
+            ("ask", {"person": "jill", "question": "Lunch?", "options": ["Yes", "No"]}),
+            ("ask", {"person": "jill", "question": "Lunch?", "options": []}),
+            ("pick", {"obj": "apple"}),
+            ("place", {"obj": "apple"}),
+            ("wait", {"seconds": 0.1}),
+            ("wait", {"seconds": 9_999}),
+            ("fly", {}),
+            ("give_up", {"reason": "tired"}),
+        ]
+    ),
+    st.builds(lambda text: ("say", {"message": text}), st.text()),
+)
+
+
+@settings(max_examples=20)
+@given(calls=st.lists(CALLS, max_size=12), ends=st.booleans())
+def test_a_mission_and_its_program_do_the_same(
+    paper: Suite, calls: Sequence[tuple[str, dict[str, object]]], *, ends: bool
+) -> None:
+    mission = AgentMission.begin(paper, TASK, 0, WORLD)
+    for name, arguments in calls:
+        if mission.ending is None:
+            mission.call(name, arguments)
+    if mission.ending is None:
+        mission.answer("done") if ends else mission.end("TurnLimit")
+    verdict = judge(mission.outcome, mission.scenario)
+    row = judged(mission, paper)
+    (of_program,) = row["verdicts"]
+    assert (of_program["satisfied"], of_program["status"]) == (verdict.satisfied, mission.outcome.status)
+    assert of_program["failed_checks"] == [one.text for one in verdict.failed]
+    assert len(of_program["trace"]) == len(mission.outcome.trace)
