@@ -14,7 +14,7 @@ from roboeval.cli.options import (
     SuiteOption,
     WorkersOption,
 )
-from roboeval.cli.output import print_json, print_rich, show_progress
+from roboeval.cli.output import note, print_json, print_rich, show_progress
 
 
 def clarify(
@@ -34,21 +34,28 @@ def clarify(
 ) -> None:
     """Measure how much one question about candidate programs helps.
 
-    A simulated person chooses among the behaviours of several programs for the same prompt.
+    A simulated person chooses among the behaviours of several programs for the same prompt. A run keeps the
+    result for `roboeval report`, unless there are --rules.
     """
     from codebotler.simulator.pool import WorkerPool, cores
     from roboeval.cli.views.clarify import clarify_view
-    from roboeval.evaluation.clarify import ClarifySettings, clarified_data, clarify
+    from roboeval.evaluation.clarify import ClarifySettings, clarify, measurement_data, store_measurement
+    from roboeval.evaluation.runs.folder import with_judged_worlds
     from roboeval.evaluation.runs.source import open_source
 
     known = load(suite, rules)
-    completions = open_source(source, known).of(None)
+    opened = open_source(source, known)
+    completions = opened.of(None)
+    if opened.run is not None:
+        known = with_judged_worlds(opened.run, known, ablated=False)
     settings = ClarifySettings(candidates, noise, seed)
     count = len({(one.task, one.prompt) for one in completions})
     with WorkerPool(workers or cores()) as pool:
         prompts = [*show_progress(clarify(completions, known, pool, settings), "asking", count)]
-    data = clarified_data(prompts)
+    data = measurement_data(completions, known, settings, prompts)
     if json:
-        print_json({"suite": known.name, "candidates": candidates, "noise": noise, "seed": seed, **data})
+        print_json(data)
     else:
         print_rich(clarify_view(data, source, candidates))
+    if opened.run is not None and rules is None:
+        note(f"the result is in {store_measurement(opened.run, known, data)}")

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from random import Random
 from statistics import fmean
-from typing import Any
+from typing import Any, TypedDict
+
+import msgspec
 
 from codebotler.candidates.clusters import cluster_candidates
 from codebotler.candidates.question import question_about
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.errors import UserError
+from codebotler.core.files import read_text, to_text, write_whole
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool
 from roboeval.evaluation.engines import Local
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.requests import add_usage
 from roboeval.evaluation.runs.completions import Completion, CompletionKey
+from roboeval.evaluation.runs.folder import RunFolder, evaluation_key
+from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import key_of
 from roboeval.suites.load import Suite
 
@@ -165,3 +171,70 @@ def _shares(trials: Sequence[ClarifyTrial]) -> dict[str, float | None]:
         "asked": fmean(trial.asked for trial in trials),
         "mattered": fmean(changed) if changed else None,
     }
+
+
+# --- measurements that are stored in a run
+
+
+class ClarifyShares(TypedDict):
+    """Shares of trials, as in `clarified_data`."""
+
+    one: float
+    majority: float
+    question: float
+    asked: float
+    mattered: float | None
+    tokens: float | None
+
+
+class PromptShares(ClarifyShares):
+    """Shares of the trials of a prompt."""
+
+    task: str
+    prompt: int
+
+
+class ClarifyMeasurement(ClarifyShares):
+    """A measurement with its settings, and with hashes of the suite and the completions."""
+
+    digest: str
+    completions: str
+    candidates: int
+    noise: float
+    seed: int
+    prompts: list[PromptShares]
+
+
+def measurement_data(
+    completions: Iterable[Completion],
+    suite: Suite,
+    settings: ClarifySettings,
+    prompts: Sequence[ClarifiedPrompt],
+) -> dict[str, Any]:
+    """Return a measurement as plain data, which depends only on the arguments."""
+    measured = {"suite": suite.name, "digest": suite.digest, "completions": _hash_of(completions)}
+    return {**measured, **asdict(settings), **clarified_data(prompts)}
+
+
+def store_measurement(run: RunFolder, suite: Suite, data: dict[str, Any]) -> Path:
+    """Store a measurement in a run, in a file named after its settings, and return the file's path."""
+    name = "candidates-{candidates:02}-noise-{noise}-seed-{seed}.json".format_map(data)
+    path = run.questions(evaluation_key(suite, ablated=False)) / name
+    write_whole(path, to_text(data))
+    return path
+
+
+def read_measurements(results: Results) -> Iterator[tuple[ClarifyMeasurement, bool]]:
+    """Yield the measurements stored in a run, and whether its completions and suite are still the same."""
+    for path in sorted(results.run.questions(results.key or "").glob("*.json")):
+        try:
+            one = msgspec.json.decode(read_text(path), type=ClarifyMeasurement)
+        except (msgspec.DecodeError, RecursionError):
+            mend = "is not a result of `roboeval clarify`; remove it and measure again"
+            raise UserError(mend, file=path) from None
+        now = results.manifest.get("digest"), _hash_of(results.completions.values())
+        yield one, (one["digest"], one["completions"]) == now
+
+
+def _hash_of(completions: Iterable[Completion]) -> str:
+    return digest(*(f"{one.key} {one.program_sha256}" for one in completions)).hex()

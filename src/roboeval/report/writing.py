@@ -13,7 +13,7 @@ from roboeval.analysis.metrics import overall
 from roboeval.evaluation.requests import batches
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.evaluation.runs.table import Price
-from roboeval.report import breakdown, cost, failures, house, scores
+from roboeval.report import breakdown, cost, failures, house, question, scores
 from roboeval.report.drawing import darken, render, use_style
 from roboeval.report.page import GENERATOR, DrawnFigure, page
 from roboeval.report.runs import JudgedRun
@@ -73,6 +73,7 @@ def sections(
         breakdown.abilities(runs),
         breakdown.phrasings(runs),
         cost.rejection_sampling(runs),
+        question.question(runs),
         cost.costs(runs, prices),
         scores.prompts(runs),
         origin(runs, command),

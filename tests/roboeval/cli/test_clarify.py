@@ -1,5 +1,6 @@
 """`roboeval clarify` prints a table, or JSON for machines."""
 
+import csv
 import json
 from pathlib import Path
 
@@ -40,6 +41,28 @@ def test_the_table_has_a_row_for_each_prompt(source: Path) -> None:
     ended = roboeval("clarify", source, "--candidates", "4", "--workers", "1")
     assert ended.status == 0
     assert ended.out.count("SayGoodDay") == 2
+
+
+@pytest.mark.slow
+def test_a_run_keeps_the_result_for_the_report(source: Path, tmp_path: Path) -> None:
+    suite = ("--suite", "plus")
+    judged = roboeval("evaluate", source, *suite, "--worlds", "31", "--out", "run", cwd=tmp_path)
+    assert judged.status == 0, judged
+    rules = tmp_path / "rules.yaml"
+    rules.write_text('rules:\n  - name: hush\n    says: Be quiet.\n    always: not tr.Exists(say(".*"))\n')
+    asked = ("clarify", "run", *suite, "--candidates", "4", "--workers", "1", "--json")
+    assert roboeval(*asked, "--rules", rules, cwd=tmp_path).status == 0
+    assert not (tmp_path / "run" / "clarify").exists()
+    ended = roboeval(*asked, cwd=tmp_path)
+    (kept,) = (tmp_path / "run" / "clarify" / "plus").iterdir()
+    assert json.loads(kept.read_text()) == json.loads(ended.out)
+    made = roboeval("report", "run", *suite, "--no-check", "--out", "report", cwd=tmp_path)
+    assert made.status == 0, made
+    with (tmp_path / "report" / "tables" / "question-prompts.csv").open(newline="") as file:
+        rows = [*csv.DictReader(file)]
+    assert [(row["task"], row["prompt"], row["asked"]) for row in rows] == [
+        *(("SayGoodDay", str(prompt), "1.0") for prompt in (0, 1))
+    ]
 
 
 def test_too_few_completions(source: Path) -> None:

@@ -1,11 +1,15 @@
 """What a question gains is measured with a person who judges options by the task's requirements."""
 
+import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.simulator.pool import WorkerPool
+from made_results import results_of
 from roboeval.evaluation.clarify import (
     DRAWS_PER_PROMPT,
     ClarifiedPrompt,
@@ -13,8 +17,13 @@ from roboeval.evaluation.clarify import (
     ClarifyTrial,
     clarified_data,
     clarify,
+    measurement_data,
+    read_measurements,
+    store_measurement,
 )
 from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.folder import RunFolder
+from roboeval.evaluation.runs.results import Results
 from roboeval.suites.load import Suite
 
 TASK = "SayGoodDay"
@@ -119,3 +128,43 @@ def test_shares_are_of_all_trials_but_what_mattered_is_of_questions() -> None:
 def test_nothing_mattered_without_a_question() -> None:
     silent = trial(majority=True, question=True, asked=False)
     assert clarified_data([ClarifiedPrompt("A", 0, (silent,))])["mattered"] is None
+
+
+# --- measurements in a run
+
+
+def judged_by(suite: Suite, written: Sequence[Completion], run: Path) -> Results:
+    results = results_of([], suite, completions=written, head={"digest": suite.digest})
+    return replace(results, run=RunFolder(run))
+
+
+def test_a_stored_measurement_is_outdated_when_programs_or_the_suite_change(
+    paper: Suite, tmp_path: Path
+) -> None:
+    written = completions(RIGHT, SILENT)
+    prompts = [ClarifiedPrompt(TASK, 0, (trial(majority=False, question=True),))]
+    data = measurement_data(written, paper, ClarifySettings(2, 0.1, 7), prompts)
+    path = store_measurement(RunFolder(tmp_path), paper, data)
+    assert (path.parent, json.loads(path.read_text())) == (RunFolder(tmp_path).questions("paper"), data)
+    results = judged_by(paper, written, tmp_path)
+    ((found, is_current),) = read_measurements(results)
+    assert (found["candidates"], found["noise"], found["seed"], is_current) == (2, 0.1, 7, True)
+    assert (found["question"], found["mattered"], found["prompts"][0]["task"]) == (1.0, 1.0, TASK)
+    others = [
+        judged_by(paper, completions(RIGHT, WRONG), tmp_path),
+        judged_by(paper, [replace(one, prompt=1) for one in written], tmp_path),
+        judged_by(replace(paper, digest="0"), written, tmp_path),
+    ]
+    assert [is_current for each in others for _, is_current in read_measurements(each)] == [False] * 3
+    store_measurement(RunFolder(tmp_path), paper, {**data, "candidates": 10})
+    assert [one["candidates"] for one, _ in read_measurements(results)] == [2, 10]
+
+
+@pytest.mark.parametrize("content", ["{}", '{"candidates": 2', '{"x": ' + "[" * 100_000])
+def test_a_damaged_measurement_is_named(paper: Suite, tmp_path: Path, content: str) -> None:
+    path = RunFolder(tmp_path).questions("paper") / "a.json"
+    path.parent.mkdir(parents=True)
+    path.write_text(content)
+    with pytest.raises(UserError, match="clarify") as refused:
+        list(read_measurements(judged_by(paper, [], tmp_path)))
+    assert refused.value.file == path

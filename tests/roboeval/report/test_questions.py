@@ -3,12 +3,20 @@
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from codebotler.core.errors import UserError
 from made_up_runs import SUITE, made_up, usual
+from roboeval.evaluation.clarify import (
+    ClarifiedPrompt,
+    ClarifySettings,
+    ClarifyTrial,
+    measurement_data,
+    store_measurement,
+)
 from roboeval.evaluation.runs.table import Price
 from roboeval.report.breakdown import (
     ability_sheet,
@@ -20,6 +28,7 @@ from roboeval.report.breakdown import (
 )
 from roboeval.report.cost import budget_sheet, cost_sheet, expect_known, price_of, read_prices
 from roboeval.report.failures import failures_section
+from roboeval.report.question import question
 from roboeval.report.runs import JudgedRun
 from roboeval.report.scores import differences
 from roboeval.report.sheets import Groups, Prose, Sheet
@@ -191,3 +200,43 @@ def test_where_it_comes_from() -> None:
     assert found["suite hash"] == SUITE.digest
     assert found["prompt template"] == "not recorded"
     assert SUITE.digest in about_suite([run])[0]
+
+
+# --- one question
+
+
+def test_what_a_question_gains_by_run_and_by_prompt(tmp_path: Path) -> None:
+    measured, plain = made_up("a", {"Visit": (5, 5)}, folder=str(tmp_path), key="small"), made_up("b", {})
+    trials = [ClarifyTrial(0.5, majority=False, question=asked, asked=asked) for asked in (True, False)]
+    prompts = [ClarifiedPrompt("Visit", 0, tuple(trials), 30), ClarifiedPrompt("Visit", 1, (trials[1],))]
+    data = measurement_data(measured.results.completions.values(), SUITE, ClarifySettings(3, 0.1, 7), prompts)
+    store_measurement(measured.results.run, SUITE, data)
+    by_run, by_prompt = question([measured, plain]).parts
+    assert isinstance(by_run, Sheet)
+    assert as_dicts(by_run) == [
+        {
+            "model": "a",
+            "candidates": 3,
+            "one program": 0.5,
+            "majority": 0.0,
+            "one question": pytest.approx(1 / 3),
+            "asked": pytest.approx(1 / 3),
+            "mattered": 1.0,
+            "noise": 0.1,
+            "tokens per group": 30,
+            "seed": 7,
+            "prompts": 2,
+        }
+    ]
+    assert isinstance(by_prompt, Sheet)
+    first, second = as_dicts(by_prompt)
+    assert (first["prompt"], first["one question"], first["asked"], first["mattered"]) == (0, 0.5, 0.5, 1.0)
+    assert (second["prompt"], second["one question"], second["mattered"]) == (1, 0.0, None)
+    assert [first[name] for name in ("task", "model", "candidates", "noise", "seed")] == [
+        *("Visit", "a", 3, 0.1, 7)
+    ]
+    assert question([plain]).parts == []
+    store_measurement(measured.results.run, SUITE, {**data, "digest": "other"})
+    (outdated,) = question([measured, plain]).parts
+    assert isinstance(outdated, Prose)
+    assert [words.partition(":")[0] for words in outdated.paragraphs] == ["a"]

@@ -63,6 +63,10 @@ class RunFolder:
         """Return the path of the file that records the suite and settings of the check."""
         return self.path / "checks" / f"{key}.json"
 
+    def questions(self, key: str) -> Path:
+        """Return the folder of what `roboeval clarify` measured, given the key of an evaluation."""
+        return self.path / "clarify" / key
+
     def judged_by(self) -> list[str]:
         """Return the sorted names of the evaluations, except ablations."""
         keys = (path.stem for path in self.rows("").parent.glob("*.jsonl"))
