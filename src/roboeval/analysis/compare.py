@@ -145,6 +145,9 @@ def other_differences(first: Results, second: Results) -> list[str]:
         {**one.about, **{name: one.manifest.get(name) for name in judged_with}} for one in (first, second)
     ]
     found = []
+    modes = [run.get("mode", "program") for run in runs]
+    if modes[0] != modes[1]:
+        found.append(f"the modes differ: {modes[0]} and {modes[1]}; {MISSIONS_COMPARED}")
     for name, words in COMPARED_SETTINGS.items():
         a, b = (run.get(name) for run in runs)
         if a is not None and b is not None and a != b:
@@ -158,6 +161,8 @@ def other_differences(first: Results, second: Results) -> list[str]:
             found.append(f"{name.replace('_', '-')} differs: {_short(a)} and {_short(b)}")
     return found
 
+
+MISSIONS_COMPARED = "each program or agent in each world counts as one mission"
 
 COMPARED_SETTINGS = {
     "python": "the Python versions used for judging",

@@ -19,7 +19,7 @@ from roboeval.analysis.metrics import (
     prompts_of,
 )
 from roboeval.analysis.tally import Tally
-from roboeval.evaluation.failures import FAILURE_CLASSES, NO_PROGRAM_CLASS
+from roboeval.evaluation.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES, NO_PROGRAM_CLASS
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.scope import Coverage, CutOff, JudgingScope
 from roboeval.suites.load import Suite
@@ -120,7 +120,8 @@ def failures(tally: Tally) -> tuple[Failures, ...]:
         kinds = tuple(Failures(kind, counts[kind], counts[kind] / n) for kind in [*known, *others])
         return Failures(name, counts.total(), counts.total() / n, kinds)
 
-    return tuple(of_class(name) for name in [*FAILURE_CLASSES, *sorted(failed.keys() - set(FAILURE_CLASSES))])
+    usual = [name for name in FAILURE_CLASSES if name != AGENT_ERROR_CLASS or name in failed]
+    return tuple(of_class(name) for name in [*usual, *sorted(failed.keys() - set(FAILURE_CLASSES))])
 
 
 PASSED, ALL = "passed", "all"
@@ -164,6 +165,7 @@ def summary_data(summary: EvaluationSummary) -> dict[str, Any]:
         "requested": summary.coverage.requested,
         "cut_off": summary.cut_off.replies,
         "max_tokens": summary.scope.limit,
+        **({"endings": dict(ends), "turns": summary.scope.turns} if (ends := summary.scope.endings) else {}),
         **_counts(summary.prompts),
         **{f"pass@{k}": asdict(estimate) for k, estimate in estimates},
         "tasks": [_task_score_data(task, summary) for task in summary.tasks],

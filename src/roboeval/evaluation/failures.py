@@ -73,6 +73,7 @@ FAILURE_CLASSES: Mapping[str, FailureClass] = {
                 "AskInvalidOptions",  # not among the paper's six kinds
             ),
         ),
+        FailureClass(TASK_ERROR_CLASS, "failed check", "failed checks", get_args(Category)),
         FailureClass(
             AGENT_ERROR_CLASS,
             "mistake of the agent",
@@ -80,7 +81,6 @@ FAILURE_CLASSES: Mapping[str, FailureClass] = {
             tuple(AGENT_SENTENCES),
             is_always_shown=False,
         ),
-        FailureClass(TASK_ERROR_CLASS, "failed check", "failed checks", get_args(Category)),
     )
 }
 """All classes by name. The kind of a failed check is the category of the check."""

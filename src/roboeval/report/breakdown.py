@@ -10,7 +10,7 @@ import polars as pl
 
 from roboeval.analysis.breakdown import by_ability, compare_phrasings, compare_report_back, spread_by_task
 from roboeval.analysis.counts import prompt_scores
-from roboeval.evaluation.failures import FAILURE_CLASSES
+from roboeval.evaluation.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES
 from roboeval.report.runs import JudgedRun, tasks_of
 from roboeval.report.sheets import Cell, Prose, Section, Sheet, section, sheet
 
@@ -29,13 +29,13 @@ def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """Build the table of pass@1 and causes of failures by ability."""
     order: list[str] = [ability for task in runs[0].suite.tasks.values() for ability in task.abilities]
     found = {(row[0], run.name): row[1:] for run in runs for row in by_ability(run.table, run.suite)}
+    agent_failed = any(row[-1][AGENT_ERROR_CLASS] for row in found.values())
+    shown = [name for name in FAILURE_CLASSES if name != AGENT_ERROR_CLASS or agent_failed]
     rows: list[list[Cell]] = []
     for ability, name in sorted(found, key=lambda key: order.index(key[0])):
         tasks, at, failed = found[ability, name]
-        rows.append(
-            [ability, name, tasks, at.mean, at.low, at.high, *(failed[name] for name in FAILURE_CLASSES)]
-        )
-    return sheet("abilities", rows, shares=[one.plural for one in FAILURE_CLASSES.values()])
+        rows.append([ability, name, tasks, at.mean, at.low, at.high, *(failed[name] for name in shown)])
+    return sheet("abilities", rows, shares=[FAILURE_CLASSES[name].plural for name in shown])
 
 
 def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:

@@ -25,7 +25,7 @@ from roboeval.analysis.metrics import (
 from roboeval.analysis.statistics import MIN_CLUSTERS, by_bootstrap
 from roboeval.report import figures, paper
 from roboeval.report.curves import draw_thresholds
-from roboeval.report.runs import JudgedRun, coverage_of, tasks_of
+from roboeval.report.runs import JudgedRun, by_prompt_of, coverage_of, tasks_of
 from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, note, section, sheet
 
 
@@ -120,7 +120,7 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
     notes: list[str] = []
     for first, second in pairs_to_compare(runs, lambda run: run.mean):
         try:
-            found = compare_scores(first.by_prompt, second.by_prompt)
+            found = compare_scores(*by_prompt_of(first, second))
         except UserError:  # no prompt in common
             continue
         if len(sentences) < MAX_PAIRS:
@@ -145,9 +145,7 @@ def leader(runs: Sequence[JudgedRun]) -> list[str]:
         return []
     best, second, *_ = sorted(runs, key=lambda run: -run.mean)
     try:
-        return [
-            comparison_sentence(compare_scores(second.by_prompt, best.by_prompt), (second.name, best.name))
-        ]
+        return [comparison_sentence(compare_scores(*by_prompt_of(second, best)), (second.name, best.name))]
     except UserError:  # no prompt in common
         return []
 

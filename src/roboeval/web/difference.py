@@ -14,6 +14,7 @@ from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
 from roboeval.analysis.compare import compare_scores, comparison_sentence, pairs_to_compare
 from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, pass_at_1
+from roboeval.analysis.missions import comparable_scores
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of
 from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.snapshot import Snapshot
@@ -38,7 +39,7 @@ class TaskRow:
 
 def task_rows(first: Snapshot, second: Snapshot) -> list[TaskRow]:
     """Compare the tasks that two runs have in common, and return the largest differences first."""
-    scores = [pass_at_1(run.scores) for run in (first, second)]
+    scores = [*map(pass_at_1, comparable_scores(first.results.table, second.results.table))]
     prompts: dict[str, list[tuple[float, float]]] = {}
     for key in scores[0]:
         if key in scores[1]:
@@ -86,7 +87,8 @@ def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
 def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Difference:
     names = shortened(first.name, MAX_NAME), shortened(second.name, MAX_NAME)
     try:
-        found = compare_scores(pass_at_1(first.scores), pass_at_1(second.scores))
+        tables = first.results.table, second.results.table
+        found = compare_scores(*map(pass_at_1, comparable_scores(*tables)))
     except UserError:
         return Difference((first, second), f"{names[0]} and {names[1]} have no prompt in common.")
     sentence = comparison_sentence(found, names)

@@ -129,7 +129,8 @@ def _overall(summary: EvaluationSummary) -> list[Text]:
     tasks, prompts = counted(len(summary.tasks), "task"), counted(len(summary.prompts), "prompt")
     coverage = summary.coverage
     of = Text(f"{coverage}, {prompts} of {tasks}", style="" if coverage.is_whole else "yellow")
-    return [*lines, of]
+    missions = summary.scope.missions_sentence
+    return [*lines, of, *([] if missions is None else [Text(missions)])]
 
 
 def _failure_table(failures: Failures) -> Table:

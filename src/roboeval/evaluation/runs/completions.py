@@ -135,6 +135,12 @@ class Completion:
         return str(self.more.get("mode", "program"))
 
     @property
+    def turns(self) -> int:
+        """Return the number of replies that it took."""
+        turns = self.more.get("turns", 1)
+        return turns if type(turns) is int else 1
+
+    @property
     def no_program(self) -> NoProgram | None:
         """Return why the reply contained no program, or None if it contained one or the reason is unknown.
 

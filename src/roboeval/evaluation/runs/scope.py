@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from roboeval.evaluation.requests import batches
@@ -49,6 +49,8 @@ class JudgingScope:
     requested: Mapping[str, int] | None = None  # requested completions of each task, from run.json
     cut_off: int = 0  # replies for selected tasks that ended at the token limit
     limit: int | None = None  # the token limit, if it was set
+    endings: Mapping[str, int] = field(default_factory=dict)  # of an agent's missions, with their numbers
+    turns: int = 0  # replies in all missions
 
     @classmethod
     def of(
@@ -61,14 +63,19 @@ class JudgingScope:
         """Count the completions of the selected tasks, or of all if `tasks` is None."""
         counts: Counter[str] = Counter()
         models: set[str | None] = set()
-        cut_off = 0
+        endings: Counter[str] = Counter()
+        cut_off = turns = 0
         for completion in completions:
             counts[completion.task] += 1
             if tasks is None or completion.task in tasks:
                 models.add(completion.model)
                 cut_off += completion.is_cut_off
+                if completion.acted is not None:
+                    endings[completion.acted.ending] += 1
+                    turns += completion.turns
         requested = requested_of(about, suite)
-        return cls(counts, tasks, frozenset(models), requested, cut_off, limit_of(about))
+        limit = limit_of(about)
+        return cls(counts, tasks, frozenset(models), requested, cut_off, limit, endings, turns)
 
     @property
     def total(self) -> int:
@@ -78,6 +85,15 @@ class JudgingScope:
     def selects(self, task: str) -> bool:
         """Whether a task is selected."""
         return self.tasks is None or task in self.tasks
+
+    @property
+    def missions_sentence(self) -> str | None:
+        """Return a sentence about the missions of an agent, or None if there are none."""
+        if not (count := sum(self.endings.values())):
+            return None
+        ended = ", ".join(f"{ending} {number:,}" for ending, number in Counter(self.endings).most_common())
+        turns = f"{self.turns / count:.1f} replies on average"
+        return f"each completion is one mission in one world: {turns}; how they ended: {ended}"
 
     def coverage(self, judged: int, task: str | None = None) -> Coverage:
         """Return the coverage of a task or of all selected tasks, given the number of judged completions."""

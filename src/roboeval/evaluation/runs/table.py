@@ -40,6 +40,10 @@ COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "output_tokens": pl.Int64,
     "reasoning_tokens": pl.Int64,
     "latency_s": pl.Float64,
+    "mode": pl.String,
+    "ending": pl.String,
+    "turns": pl.Int64,
+    "tool_errors": pl.Int64,
     "cost": pl.Float64,
     "accepted": pl.Boolean,
 }
@@ -141,6 +145,7 @@ class TableBuilder:
                 is_stale,
                 *((None,) * 5 if written is None or is_stale else _texts(written)),
                 *_usage(written),
+                *_mission(written),
                 None,
                 self._accepted.get((row["task"], row["program_sha256"])),
             )
@@ -188,6 +193,18 @@ def _usage(written: Completion | None) -> tuple[float | None, ...]:
     usage = usage if isinstance(usage, dict) else {}
     tokens = [number_or_none(usage.get(name), int) for name in TOKENS]
     return *tokens, number_or_none(more.get("latency_s"), int | float)
+
+
+def _mission(written: Completion | None) -> tuple[str | float | None, ...]:
+    """Return how a model was used, and how a mission of an agent ended and what it took."""
+    if written is None:
+        return (None,) * 4
+    more, acted = written.more, written.acted
+    if acted is None:
+        return written.mode, None, 1, None
+    counts = more.get("tool_errors")
+    errors = [number_or_none(one, int) or 0 for one in counts.values()] if isinstance(counts, dict) else []
+    return written.mode, acted.ending, written.turns, sum(errors)
 
 
 def storable(text: str) -> str:

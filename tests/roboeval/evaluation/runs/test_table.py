@@ -87,6 +87,10 @@ def test_each_world_of_a_completion_is_a_row() -> None:
         "output_tokens": None,
         "reasoning_tokens": None,
         "latency_s": None,
+        "mode": "program",
+        "ending": None,
+        "turns": 1,
+        "tool_errors": None,
         "cost": None,
         "accepted": None,
         "world_number": 1,
@@ -145,7 +149,7 @@ def test_the_bytes_of_a_csv(tmp_path: Path) -> None:
     (line,) = (tmp_path / "t").read_bytes().splitlines()[1:]
     assert line.startswith(b"Visit,1,2,,")
     assert line.endswith(
-        b",false,RobotExecutionError,GoToInvalidLocation,0,,true,,,,,,,,,,,,0,in,true,finished,,,,,,1"
+        b",false,RobotExecutionError,GoToInvalidLocation,0,,true,,,,,,,,,,,,,,,,0,in,true,finished,,,,,,1"
     )
 
 

@@ -1,0 +1,119 @@
+"""Programs and agents, compared mission by mission."""
+
+import csv
+import json
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from codebotler.core.files import to_line
+from command_line import roboeval
+from roboeval.analysis.metrics import pass_at_1
+from roboeval.analysis.missions import comparable_scores, has_missions, mission_costs
+from roboeval.evaluation.runs.results import load_results
+from small_suite import a_suite
+
+WORLDS = """\
+name: T
+summary: s
+prompts: [Say hello in the kitchen.]
+checks:
+  says(what): {category: SayAtLocation, rtl: 'tr.Exists(say("{what}"))'}
+worlds:
+- {about: one, robot: lobby, rooms: [kitchen, lobby], require: [says("hello")]}
+- {about: two, robot: lobby, rooms: [lobby], require: [says("hello")]}
+"""
+GO = 'def task_program():\n    go_to("kitchen")\n    say("hello")\n'  # fails in the second world
+SAY = 'def task_program():\n    say("hello")\n'
+USAGE = {"input_tokens": 90, "output_tokens": 10, "reasoning_tokens": None}
+
+
+def a_run(folder: Path, suite: str, rows: list[dict[str, object]], mode: str = "program") -> Path:
+    folder.mkdir()
+    identity = {"task": "T", "prompt": 0, "instruction": "Say hello in the kitchen.", "usage": USAGE}
+    lines = [to_line({**identity, "index": index, "model": "m", **row}) for index, row in enumerate(rows)]
+    (folder / "completions.jsonl").write_bytes(b"".join(lines))
+    (folder / "run.json").write_text(json.dumps({"settings": {}, "model": "m", "mode": mode}))
+    roboeval("evaluate", str(folder), "--suite", suite)
+    return folder
+
+
+def mission(world: int, program: str, ending: str = "answer", **more: object) -> dict[str, object]:
+    entries = {"mode": "agent", "world": world, "ending": ending, "turns": 3, "no_program": None}
+    return {"program": program, **entries, "tool_errors": {}, **more}
+
+
+@pytest.fixture
+def runs(tmp_path: Path) -> tuple[Path, Path, str]:
+    """A program that succeeds in one of two worlds, and an agent that succeeds in both, once of twice."""
+    folder = tmp_path / "suite"
+    folder.mkdir()
+    suite = a_suite(folder, WORLDS)
+    programs = a_run(tmp_path / "programs", suite, [{"program": GO}])
+    missions = [
+        mission(0, GO),
+        mission(1, SAY, tool_errors={"GoToInvalidLocation": 2}),
+        mission(0, SAY),
+        mission(1, "def task_program():\n    pass\n", "TurnLimit"),
+    ]
+    agents = a_run(tmp_path / "agents", suite, missions, "agent")
+    return programs, agents, suite
+
+
+def tables(runs: tuple[Path, Path, str]) -> list[pl.DataFrame]:
+    return [load_results(run, suite=runs[2]) for run in runs[:2]]
+
+
+def test_both_are_counted_by_missions(runs: tuple[Path, Path, str]) -> None:
+    programs, agents = tables(runs)
+    assert (has_missions(programs), has_missions(agents)) == (False, True)
+    first, second = map(pass_at_1, comparable_scores(programs, agents))
+    assert (first, second) == ({("T", 0): 0.5}, {("T", 0): 0.75})
+
+
+def test_two_runs_of_programs_are_counted_by_programs(runs: tuple[Path, Path, str]) -> None:
+    programs, _ = tables(runs)
+    (scores, _) = comparable_scores(programs, programs)
+    assert pass_at_1(scores) == {("T", 0): 0.0}
+
+
+def test_costs_are_those_of_a_mission(runs: tuple[Path, Path, str]) -> None:
+    programs, agents = tables(runs)
+    one, other = mission_costs(programs), mission_costs(agents)
+    assert (one.mode, one.missions, one.satisfied.mean, one.turns) == ("program", 2, 0.5, 1)
+    assert (one.tokens, one.tokens_per_success, one.tool_errors) == (100, 200, None)
+    assert (other.mode, other.missions, other.satisfied.mean, other.turns) == ("agent", 4, 0.75, 3)
+    assert other.tokens_per_success == pytest.approx(100 / 0.75)
+    assert (other.tool_errors, other.forbidden) == (0.5, 0)
+
+
+def test_the_command_compares_them_and_says_how(runs: tuple[Path, Path, str]) -> None:
+    programs, agents, suite = runs
+    paths = [str(programs), str(agents)]
+    data = json.loads(roboeval("compare", *paths, "--suite", suite, "--json").out)
+    assert (data["first"]["pass@1"], data["second"]["pass@1"]) == (0.5, 0.75)
+    assert any("mission" in warning for warning in data["warnings"])
+
+
+@pytest.mark.slow
+def test_a_report_has_a_table_of_missions(runs: tuple[Path, Path, str], tmp_path: Path) -> None:
+    programs, agents, suite = runs
+    paths = [str(programs), str(agents)]
+    roboeval("report", *paths, "--suite", suite, "--out", str(tmp_path / "report"))
+    with (tmp_path / "report" / "tables" / "modes.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["mode"], row["missions"], float(row["succeed"])) for row in rows] == [
+        ("program", "2", 0.5),
+        ("agent", "4", 0.75),
+    ]
+    roboeval("report", paths[0], "--suite", suite, "--out", str(tmp_path / "plain"))
+    assert not (tmp_path / "plain" / "tables" / "modes.csv").exists()
+
+
+def test_a_summary_says_how_missions_ended(runs: tuple[Path, Path, str]) -> None:
+    _, agents, suite = runs
+    data = json.loads(roboeval("show", str(agents), "--suite", suite, "--json").out)
+    assert (data["endings"], data["turns"]) == ({"answer": 3, "TurnLimit": 1}, 12)
+    kinds = [kind for one in data["failures"] if one["class"] == "AgentError" for kind in one["kinds"]]
+    assert [kind["kind"] for kind in kinds if kind["count"]] == ["TurnLimit"]
