@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from agents.agent_server import (
+from agent_server import (
     INPUT_TOKENS,
     OUTPUT_TOKENS,
     REASONING_TOKENS,
