@@ -16,6 +16,7 @@ from codebotler.core.phrases import phrase
 from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE
 from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
+from codebotler.models.recorded import is_recorded
 from codebotler.simulator.sampled_robot import normalized
 
 DOMINANT_SHARE = 0.75
@@ -58,12 +59,14 @@ class ClarifyingQuestion:
         facts: the facts of the imagined world that matter, in words.
         total: the number of accepted candidates.
         sample: the number of the world.
+        why_last: why no programs follow the answer `none`; empty if they do.
     """
 
     options: tuple[CandidateOption, ...]
     facts: tuple[str, ...]
     total: int
     sample: int
+    why_last: str = ""
 
     @property
     def rejections(self) -> list[str]:
@@ -94,9 +97,12 @@ class ClarifyingQuestion:
 
 
 def question_about(
-    groups: CandidateClusters, dominant_share: float = DOMINANT_SHARE
+    groups: CandidateClusters, dominant_share: float = DOMINANT_SHARE, *, why_last: str = ""
 ) -> ClarifyingQuestion | None:
-    """Return a question, or None if one behaviour dominates or all candidates do the same."""
+    """Return a question, or None if one behaviour dominates or all candidates do the same.
+
+    `why_last` says why no programs follow the answer `none`, if they do not.
+    """
     largest = groups.clusters[0]
     if len(groups.clusters) == 1 or largest.size >= dominant_share * groups.total:
         return None
@@ -109,7 +115,15 @@ def question_about(
         CandidateOption(one.program, one.size, tuple(steps_of(sample.outcome.trace, has_places=True)), words)
         for one, sample, words in zip(shown, samples, describe_differences(samples, behaviours), strict=True)
     )
-    return ClarifyingQuestion(tuple(options), _facts_that_matter(shown, number), groups.total, number)
+    facts = _facts_that_matter(shown, number)
+    return ClarifyingQuestion(tuple(options), facts, groups.total, number, why_last)
+
+
+def why_question_is_last(model: str, *, is_second: bool) -> str:
+    """Say why a model writes no programs after the answer `none`, or return an empty string if it does."""
+    if is_recorded(model):
+        return "a recorded model writes no new programs"
+    return "this is the second question" if is_second else ""
 
 
 def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:

@@ -74,7 +74,9 @@ def generate(
         expect_no_retries(retries, repair=repair)
         opener = partial(open_model, chosen.name, settings)
         request = requests_to(opener, make_prompt, candidates, room_map, record)
-        accepted = write_candidates(request, instruction, house_rules, table, room_map, asks=not yes)
+        accepted = write_candidates(
+            request, instruction, house_rules, table, room_map, chosen.name, asks=not yes
+        )
     else:
         accepted = write(
             make_prompt(instruction),

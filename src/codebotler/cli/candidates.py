@@ -11,7 +11,12 @@ from rich.padding import Padding
 from rich.text import Text
 
 from codebotler.candidates.clusters import CandidateClusters, cluster_candidates
-from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
+from codebotler.candidates.question import (
+    ClarifyingAnswer,
+    ClarifyingQuestion,
+    question_about,
+    why_question_is_last,
+)
 from codebotler.checking.check import check
 from codebotler.checking.sampled import CheckSettings
 from codebotler.checking.storyboard import storyboard
@@ -51,12 +56,14 @@ class CandidateSearch:
         settings: the settings for runs in imagined worlds.
         room_map: the rooms; by default those that the programs name.
         read_line: asks the person for a line, which is empty at the end; None if nobody can answer.
+        model: the name of the model.
     """
 
     request: Callable[[str], Sequence[Attempt]]
     settings: CheckSettings
     room_map: RoomMap | None
     read_line: Callable[[str], str] | None
+    model: str = ""
 
 
 def line_reader(*, is_allowed: bool) -> Callable[[str], str] | None:
@@ -96,13 +103,14 @@ def write_candidates(
     house_rules: tuple[Rule, ...],
     skills: SkillTable,
     room_map: RoomMap | None,
+    model: str,
     *,
     asks: bool,
 ) -> bool:
     """Print the candidate that a person means, and return whether the check accepts it."""
     how = CheckSettings(skills=skills, house_rules=house_rules)
     found = choose_candidate(
-        CandidateSearch(request, how, room_map, line_reader(is_allowed=asks)), instruction
+        CandidateSearch(request, how, room_map, line_reader(is_allowed=asks), model), instruction
     )
     if found is None:
         return False
@@ -118,7 +126,7 @@ def choose_candidate(search: CandidateSearch, instruction: str) -> tuple[str, st
 
     After the first "none of these", they may add a sentence to the instruction for a second round.
     """
-    for is_last in (False, True):
+    for is_second in (False, True):
         attempts = search.request(instruction)
         programs = [one.reply.program for one in attempts if one.programless is None]
         if not programs:
@@ -126,14 +134,15 @@ def choose_candidate(search: CandidateSearch, instruction: str) -> tuple[str, st
             note_programless(attempts[0].programless)
             return None
         groups = _group(programs, search)
-        question = question_about(groups)
+        why_last = why_question_is_last(search.model, is_second=is_second)
+        question = question_about(groups, why_last=why_last)
         if question is None or search.read_line is None:
             note(groups.summary)
             return instruction, groups.clusters[0].program
         chosen = question.chosen(ask_which(question, search.read_line))
         if chosen is not None:
             return instruction, chosen.program
-        more = "" if is_last else search.read_line(ADD_SENTENCE).strip()
+        more = "" if question.why_last else search.read_line(ADD_SENTENCE).strip()
         if not more:
             break
         instruction = f"{instruction.rstrip()} {more}"
@@ -155,7 +164,8 @@ def question_view(question: ClarifyingQuestion) -> RenderableType:
         like = f"{option.size} of {counted(question.total, 'program')}"
         parts += [Text(), Text.assemble((head, "bold"), (f"  ({like})", "dim"))]
         parts.append(Padding(storyboard(option.steps, set()), (0, 0, 0, 2)))
-    return Group(*parts, Text())
+    last = f'The answer "none" gives up: {question.why_last}.\n' if question.why_last else ""
+    return Group(*parts, Text(), Text(last, "dim", end=""))
 
 
 def ask_which(question: ClarifyingQuestion, read_line: Callable[[str], str]) -> ClarifyingAnswer:

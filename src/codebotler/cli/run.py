@@ -191,7 +191,8 @@ def _prepared(session: MissionSession) -> SessionView:
     while not (view.is_over or view.may_be_approved or view.waits_for_program):
         if view.question is not None and view.waits_for_answer:
             answer = ask_which(view.question, read_line)
-            session.answer(answer, read_line(ADD_SENTENCE) if answer == "none" else "")
+            adds = answer == "none" and not view.question.why_last
+            session.answer(answer, read_line(ADD_SENTENCE) if adds else "")
             view = session.view
         before = view.busy
         with busy(before or "finishing"):

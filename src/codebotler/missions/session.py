@@ -14,7 +14,12 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
+from codebotler.candidates.question import (
+    ClarifyingAnswer,
+    ClarifyingQuestion,
+    question_about,
+    why_question_is_last,
+)
 from codebotler.checking.evasions import find_evasions
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.rule_rooms import expect_rooms
@@ -163,7 +168,7 @@ class MissionSession:
     def answer(self, answer: ClarifyingAnswer, more: str = "") -> None:
         """Say which behaviour is meant. With `none`, a sentence is added to the instruction.
 
-        The second answer `none`, or one without a sentence, ends the mission.
+        The answer `none` without a sentence, or to the last question, ends the mission.
 
         Raises:
             MissionError: there is no question, or no such option.
@@ -332,7 +337,8 @@ class MissionSession:
         """Take one of several programs, or ask the person which one is meant if they differ."""
         self._show(busy="comparing the programs")
         groups = compare_drafts(programs, self._view, self._robot)
-        question = question_about(groups)
+        why_last = why_question_is_last(self._view.model, is_second=self._rejected is not None)
+        question = question_about(groups, why_last=why_last)
         if question is not None and self._order.asks:
             self._show(question=question, busy="")
         else:
@@ -347,8 +353,8 @@ class MissionSession:
             who = "a person left the choice to CodeBotler" if answer == "decide" else "a person chose"
             mission.note(f"{who}: a robot that {option.difference}")
             self._take(mission, option.program)
-        elif not more or self._rejected is not None:
-            mission.fail("no program does what was meant")
+        elif not more or question.why_last:
+            mission.fail(f"no program does what was meant{question.why_last and '; '}{question.why_last}")
         else:
             self._rejected = question
             mission.extend_instruction(more)
