@@ -106,7 +106,7 @@ def continue_mission(
     kind, settings, rules, allowed = options.robot_settings(**options_for(options.robot_settings, shared))
     asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
     body = open_robot(kind, settings)
-    past = choose_past(body, home(), mission, happened=happened, answer=answer)
+    past = choose_past(body, home(), mission, settings.world, happened=happened, answer=answer)
     request = Request(
         program or past.instruction,
         chosen.name,
