@@ -17,7 +17,7 @@ from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE
 from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
 from codebotler.models.recorded import is_recorded
-from codebotler.simulator.sampled_robot import normalized
+from codebotler.simulator.matching import normalized
 
 DOMINANT_SHARE = 0.75
 """The share of the candidates from which the largest cluster is taken without a question."""

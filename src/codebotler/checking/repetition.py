@@ -16,34 +16,19 @@ from codebotler.core.trace import Event, Outcome, Status, Trace, held_after
 from codebotler.core.words import brief
 from codebotler.rtl.text.numbers import numerals
 from codebotler.rtl.text.polarity import Polarity, polarity
-from codebotler.simulator.matching import content_words
+from codebotler.simulator.matching import content_words, normalized
 from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_robot import AGREEING_TEXT, normalized
+from codebotler.simulator.sampled_robot import AGREEING_TEXT
 
 UNBOUNDED_COUNT = 1_000_000
 """The number of steps that remain of a kind that a program repeats without end."""
 
 EMPTY_WORDS = frozenset(
     {
-        *(
-            "do",
-            "does",
-            "you",
-            "your",
-            "i",
-            "it",
-            "me",
-            "my",
-            "we",
-            "to",
-            "for",
-            "have",
-            "has",
-            "want",
-            "like",
-        ),
-        *("would", "could", "can", "will", "please", "what", "which", "this", "not", "no", "be", "on", "at"),
-        *("hello", "hi", "hey", "sorry", "so", "just", "one", "how", "many", "much", "number", "wish", "us"),
+        *("do", "does", "you", "your", "i", "it", "me", "my", "we", "to", "for", "have", "has", "want"),
+        *("like", "would", "could", "can", "will", "please", "what", "which", "this", "not", "no", "be"),
+        *("on", "at", "hello", "hi", "hey", "sorry", "so", "just", "one", "how", "many", "much", "number"),
+        *("wish", "us"),
     }
 )
 """Words of speech that tell nothing about its topic."""
