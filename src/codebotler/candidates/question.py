@@ -97,11 +97,19 @@ class ClarifyingQuestion:
 
 
 def question_about(
-    groups: CandidateClusters, dominant_share: float = DOMINANT_SHARE, *, why_last: str = ""
+    groups: CandidateClusters,
+    dominant_share: float = DOMINANT_SHARE,
+    *,
+    model: str = "",
+    is_second: bool = False,
 ) -> ClarifyingQuestion | None:
     """Return a question, or None if one behaviour dominates or all candidates do the same.
 
-    `why_last` says why no programs follow the answer `none`, if they do not.
+    Args:
+        groups: the candidates by behaviour.
+        dominant_share: the share of the candidates from which no question is asked.
+        model: the model that would write other programs.
+        is_second: whether the person rejected other programs before, after which there are no more.
     """
     largest = groups.clusters[0]
     if len(groups.clusters) == 1 or largest.size >= dominant_share * groups.total:
@@ -115,15 +123,10 @@ def question_about(
         CandidateOption(one.program, one.size, tuple(steps_of(sample.outcome.trace, has_places=True)), words)
         for one, sample, words in zip(shown, samples, describe_differences(samples, behaviours), strict=True)
     )
+    why_last = "this is the second question" if is_second else ""
+    why_last = "a recorded model writes no new programs" if is_recorded(model) else why_last
     facts = _facts_that_matter(shown, number)
     return ClarifyingQuestion(tuple(options), facts, groups.total, number, why_last)
-
-
-def why_question_is_last(model: str, *, is_second: bool) -> str:
-    """Say why a model writes no programs after the answer `none`, or return an empty string if it does."""
-    if is_recorded(model):
-        return "a recorded model writes no new programs"
-    return "this is the second question" if is_second else ""
 
 
 def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:

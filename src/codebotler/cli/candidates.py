@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,12 +12,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 from codebotler.candidates.clusters import CandidateClusters, cluster_candidates
-from codebotler.candidates.question import (
-    ClarifyingAnswer,
-    ClarifyingQuestion,
-    question_about,
-    why_question_is_last,
-)
+from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
 from codebotler.checking.check import check
 from codebotler.checking.sampled import CheckSettings
 from codebotler.checking.storyboard import storyboard
@@ -34,7 +30,7 @@ from codebotler.core.terminal import (
     visible,
 )
 from codebotler.core.words import counted, listed
-from codebotler.generation.candidates import request_candidates
+from codebotler.generation.candidates import gather_candidates
 from codebotler.generation.generate import Attempt
 from codebotler.missions.preflight import with_closest_here
 from codebotler.models.base import Model
@@ -84,7 +80,7 @@ def requests_to(
         opened = open_model()
         with busy(f"asking {opened.name}"), open_recorder(record, opened.name) as add:
             try:
-                return request_candidates(opened, make_prompt(instruction), count, on_attempt=add)
+                return asyncio.run(gather_candidates(opened, make_prompt(instruction), count, add))
             except UnknownInstructionError as error:
                 raise with_closest_here(error, room_map) from None
 
@@ -134,8 +130,7 @@ def choose_candidate(search: CandidateSearch, instruction: str) -> tuple[str, st
             note_programless(attempts[0].programless)
             return None
         groups = _group(programs, search)
-        why_last = why_question_is_last(search.model, is_second=is_second)
-        question = question_about(groups, why_last=why_last)
+        question = question_about(groups, model=search.model, is_second=is_second)
         if question is None or search.read_line is None:
             note(groups.summary)
             return instruction, groups.clusters[0].program

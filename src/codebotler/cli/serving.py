@@ -26,13 +26,8 @@ def open_console(
 ) -> Console:
     """Return a console with the robot and the models that the options name.
 
-    Args:
-        model: the names of the models; by default the chosen one and the recorded ones.
-        base_url: the address of the models' server.
-        candidates: how many programs to get from a model.
-        shared: the options for the settings of the robot and of the models.
-        face: the robot's face, if it has one.
-        recoveries: how many times a model may write the rest of a mission without a request.
+    By default, its models are the chosen one and the recorded ones. `shared` holds the options for the
+    settings of the robot and of the models. The other arguments are those of the console.
     """
     kind, settings, rules, within = options.robot_settings(**options_for(options.robot_settings, shared))
     options.note_office(kind, shared["world"])

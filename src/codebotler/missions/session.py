@@ -14,12 +14,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from codebotler.candidates.question import (
-    ClarifyingAnswer,
-    ClarifyingQuestion,
-    question_about,
-    why_question_is_last,
-)
+from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
 from codebotler.checking.evasions import find_evasions
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.rule_rooms import expect_rooms
@@ -320,8 +315,8 @@ class MissionSession(SharedView):
         """Take one of several programs, or ask the person which one is meant if they differ."""
         self._show(busy="comparing the programs")
         groups = compare_drafts(programs, self._view, self._robot)
-        why_last = why_question_is_last(self._view.model, is_second=self._rejected is not None)
-        question = question_about(groups, why_last=why_last)
+        is_second = self._rejected is not None
+        question = question_about(groups, model=self._view.model, is_second=is_second)
         if question is not None and self._order.asks:
             self._show(question=question, busy="")
         else:
