@@ -13,18 +13,16 @@ from codebotler.cli.model_options import inherit_options, model_settings, option
 from codebotler.core.terminal import note, print_text
 
 if TYPE_CHECKING:
-    from codebotler.cli.run import Request
     from codebotler.core.world import World
     from codebotler.robots.base import Robot
 
 
 class RunSettings(NamedTuple):
-    """The options that `run` and `continue` share."""
+    """The robot and the way to run it, from the options that `run` and `continue` share."""
 
     robot: Robot
     world: World | None
-    make_request: Callable[..., Request]  # lacks what to run
-    carry_out: Callable[[Request], int]  # returns the exit status
+    carry_out: Callable[..., int]  # takes the fields of a `Request` that are left, returns the exit status
 
 
 @inherit_options(options.robot_settings)
@@ -51,22 +49,14 @@ def run_settings(
     kind, settings, rules, within = options.robot_settings(**options_for(options.robot_settings, shared))
     asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
     robot = open_robot(kind, settings)
-    make_request = partial(
-        run.Request,
-        model=chosen.name,
-        yes=yes,
-        despite_problems=despite_problems,
-        shows_all=shows_all,
-        rules=rules,
-        within=within,
-        recoveries=recover,
-    )
 
-    def carry_out(request: Request) -> int:
+    def carry_out(what: str, **more: Any) -> int:  # noqa: ANN401 - of several kinds
+        how = chosen.name, yes, despite_problems, shows_all, rules, within
+        request = run.Request(what, *how, recoveries=recover, **more)
         options.note_office(kind, shared["world"])
         return run.run(robot, request, home(), partial(open_model, settings=asked), settings.world)
 
-    return RunSettings(robot, settings.world, make_request, carry_out)
+    return RunSettings(robot, settings.world, carry_out)
 
 
 @inherit_options(run_settings)
@@ -84,8 +74,7 @@ def run(
 
     Ctrl-C stops the robot, and the exit status is then 130.
     """
-    settings = run_settings(**shared)
-    raise typer.Exit(settings.carry_out(settings.make_request(program, candidates=candidates)))
+    raise typer.Exit(run_settings(**shared).carry_out(program, candidates=candidates))
 
 
 @inherit_options(run_settings)
@@ -115,10 +104,9 @@ def continue_mission(
     from codebotler.cli.continuing import choose_past
     from codebotler.core.files import home
 
-    settings = run_settings(**shared)
-    past = choose_past(settings.robot, home(), mission, settings.world, happened=happened, answer=answer)
-    request = settings.make_request(program or past.instruction, past=past)
-    raise typer.Exit(settings.carry_out(request))
+    robot, known, carry_out = run_settings(**shared)
+    past = choose_past(robot, home(), mission, known, happened=happened, answer=answer)
+    raise typer.Exit(carry_out(program or past.instruction, past=past))
 
 
 def missions(
