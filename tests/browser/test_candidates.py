@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
 
 from pageserver import PageServer
-from viewing import DESK, PHONE, TABLET, OpenPage, Shoot
+from server import Request, Server
+from viewing import DESK, PHONE, TABLET, OpenPage, Shoot, expect_no_grave_fault
 
 INSTRUCTION = "See whether Ann wants tea."
 SOLUTIONS = f"""
@@ -82,14 +84,45 @@ def test_a_card_for_each_behaviour_and_one_answer(server: PageServer, opened: Op
     assert text.startswith("def task_program")
 
 
-def test_none_of_these_needs_a_sentence(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
+@pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
+def test_a_recorded_model_offers_no_field_for_a_sentence(
+    server: PageServer, opened: OpenPage, shoot: Shoot, size: tuple[int, int]
+) -> None:
+    page = opened(server, size=size, dark=True)
     ask(server)
+    expect(page.locator(".which")).to_contain_text("A recorded model writes no new programs")
+    expect(page.get_by_label("What should be different?")).to_have_count(0)
+    expect_no_grave_fault(page)
+    shoot(page, f"candidates-recorded-{size[0]}")
+    other = opened(server, "missions", size=size)
+    expect(other.locator(".rows .state").first).to_have_text("waits for an answer")
+    shoot(other, f"candidates-waits-{size[0]}")
     page.get_by_role("button", name="None of these").click()
-    expect(page.get_by_text("Say what should be different")).to_be_visible()
-    assert server.call("GET", "/api/missions/current").data["phase"] == "question"
-    page.get_by_role("button", name="You decide").click()
-    expect(page.get_by_text("Checked: no problems.")).to_be_visible()
+    expect(page.locator(".headline")).to_have_text("Failed")
+    expect(other.locator(".rows .state").first).to_have_text("failed")
+
+
+def test_none_of_these_needs_a_sentence(tmp_path: Path, opened: OpenPage) -> None:
+    said: dict[int, str] = {}  # by request, of which the server may ask twice
+
+    def answer(request: Request) -> str:
+        text = said.setdefault(id(request), ("There is a mug", "There is no mug")[len(said) % 2])
+        return f"```python\ndef task_program():\n    say('{text}')\n```\n"
+
+    with Server(answer=answer) as model:
+        settings = ("--model", "openai-chat:m", "--base-url", model.url, "--candidates", "2")
+        with PageServer(tmp_path, *settings) as server:
+            page = opened(server)
+            ask(server)
+            page.get_by_role("button", name="None of these").click()
+            expect(page.get_by_text("Say what should be different")).to_be_visible()
+            assert server.call("GET", "/api/missions/current").data["phase"] == "question"
+            page.get_by_label("What should be different?").fill("Speak Latin.")
+            page.get_by_role("button", name="None of these").click()
+            expect(page.locator(".which")).to_contain_text("second question")
+            page.get_by_role("button", name="You decide").click()
+            expect(page.get_by_text("Checked: no problems.")).to_be_visible()
+            page.close()
 
 
 def test_the_api_shows_the_question_and_takes_an_answer(server: PageServer, opened: OpenPage) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -102,6 +103,51 @@ def test_a_person_is_asked_about_an_unsure_step_and_types_the_rest(
         expect(other.locator(".done-before li")).to_have_count(3)
         page.close()
         other.close()
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
+def test_missions_link_to_those_they_continue(
+    tmp_path: Path, opened: OpenPage, shoot: Shoot, size: tuple[int, int]
+) -> None:
+    first = failed_mission(tmp_path / "home", BRING, SMALL, "").name
+    with PageServer(tmp_path, "--speed", "40") as server:
+        second = server.call("POST", f"/api/missions/{first}/continue", {}).data["id"]
+        server.rest()
+        page = opened(server, "missions", size=size)
+        expect(page.locator(".rows .outcome").first).to_contain_text(f"continues mission {first}")
+        expect(page.locator(".rows .outcome").last).to_contain_text(f"continued by mission {second}")
+        look(page, shoot, f"continue-list-{size[0]}")
+        page.locator(".rows a").last.click()
+        page.locator(".chain a", has_text=second).click()
+        expect(page.locator(".chain")).to_have_count(1)
+        look(page, shoot, f"continue-link-{size[0]}")
+        page.locator(".chain a", has_text=first).click()
+        expect(page.locator(".chain")).to_contain_text(second)
+        page.close()
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
+def test_a_mission_in_another_world_is_not_offered(
+    tmp_path: Path, opened: OpenPage, shoot: Shoot, size: tuple[int, int]
+) -> None:
+    with PageServer(tmp_path, "--speed", "1") as server:
+        server.run("def task_program():\n    go_to('study')\n    go_to('kitchen')\n    go_to('study')\n")
+        page = opened(server)
+        expect(page.locator(".doing")).to_be_visible()
+        page.close()
+        mission = server.call("GET", "/api/robot").data["mission"]
+        server.end(signal.SIGKILL)
+    with PageServer(tmp_path, world="robot: hall\nrooms: [hall, kitchen]\n") as server:
+        page = opened(server, size=size)
+        notice = page.locator(".interrupted")
+        expect(notice).to_contain_text("--world")
+        expect(page.get_by_role("button", name="Continue")).to_be_hidden()
+        look(page, shoot, f"other-world-{size[0]}")
+        page.goto(f"http://localhost:{server.port}/missions/{mission}")
+        expect(page.get_by_text("ran on another map")).to_be_visible()
+        expect(page.get_by_role("button", name="Continue")).to_have_count(0)
+        look(page, shoot, f"other-world-mission-{size[0]}")
+        page.close()
 
 
 def test_many_steps_are_folded(tmp_path: Path, opened: OpenPage) -> None:

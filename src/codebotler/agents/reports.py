@@ -100,7 +100,8 @@ def which_question(asked: ClarifyingQuestion) -> str:
     options = (
         f"{number}. The robot {shortened(one.difference)}." for number, one in enumerate(asked.options, 1)
     )
-    return "\n".join(filter(None, ("Which did you mean?", facts, *options)))
+    last = f'The answer "none" ends the mission: {asked.why_last}.' if asked.why_last else ""
+    return "\n".join(filter(None, ("Which did you mean?", facts, *options, last)))
 
 
 def _sendable(value: object) -> object:

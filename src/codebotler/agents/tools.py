@@ -5,41 +5,50 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import aclosing, contextmanager, suppress
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any
 
 import anyio
 from mcp.server.elicitation import AcceptedElicitation, CancelledElicitation, ElicitationResult
-from mcp.server.mcpserver import Context
-from mcp.server.mcpserver.exceptions import ToolError
-from mcp.server.mcpserver.resolve import Elicit, Resolve
-from pydantic import BaseModel, Field
+from mcp.server.mcpserver.resolve import Resolve
+from pydantic import Field
 
+from codebotler.agents.dialogs import (
+    MAX_ARGUMENT,
+    AgentContext,
+    Choice,
+    Consent,
+    NotAsked,
+    NotChosen,
+    NoWord,
+    StepWord,
+    agent_name,
+    as_tool_errors,
+    ask_person,
+    ask_whether,
+    ask_which_behaviour,
+    find_question,
+    find_session,
+    gatekeeper_of,
+    read_last_past,
+)
 from codebotler.agents.gatekeeper import Gatekeeper
 from codebotler.agents.reports import (
     CheckReport,
     MissionReport,
     RobotReport,
     SkillOutcome,
-    question,
-    which_question,
 )
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import shortened
 from codebotler.missions.authoring import ModelAuthor, prompt_of
 from codebotler.missions.mission import MissionError
 from codebotler.missions.past import MissionPast
-from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.missions.wording import event_text
-from codebotler.models.base import ModelError, ignore_text
+from codebotler.models.base import ignore_text
 from codebotler.prompts import clean_instruction
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS
 
-MAX_ARGUMENT = 10_000
-"""The limit for an instruction, in characters."""
-
-AgentContext: TypeAlias = Context[Gatekeeper, Any]
 _Digest = Annotated[str, Field(description="The digest of the program, from propose_mission or begin_steps.")]
 _Key = Annotated[str, Field(description="The key `steps` from begin_steps.")]
 _After = Annotated[int, Field(ge=0, description="Leave out this many earlier events.")]
@@ -48,47 +57,12 @@ _Seconds = Annotated[
 ]
 
 
-class Consent(BaseModel):
-    """The form in which a client asks its person."""
-
-    approve: bool = Field(
-        title="Run it on the robot", description="Tick this to let the robot do exactly this."
-    )
-
-
-class NotAsked(Consent):
-    """The answer to a question that nobody was asked."""
-
-    approve: bool = False
-
-
-class Choice(BaseModel):
-    """The form in which a client asks its person which behaviour they mean."""
-
-    answer: Literal["1", "2", "3", "none", "you decide"] = Field(title="Which did you mean?")
-    more: str = Field(default="", max_length=MAX_ARGUMENT, title="If none: what should be different?")
-
-
-class NotChosen(Choice):
-    """The answer to a question about behaviours that nobody was asked."""
-
-
-class StepWord(BaseModel):
-    """The form in which a client asks its person about an unsure step."""
-
-    answer: Literal["it happened", "it did not happen"] = Field(title="Did this happen?")
-
-
-class NoWord(StepWord):
-    """The answer to a question about a step that nobody was asked."""
-
-
 def read_robot(ctx: AgentContext) -> RobotReport:
     """Read the robot's rooms, its skills, the house rules, and how to write a program for it.
 
     Call this first. It changes nothing.
     """
-    return _gatekeeper(ctx).report_robot()
+    return gatekeeper_of(ctx).report_robot()
 
 
 async def check_program(
@@ -104,9 +78,9 @@ async def check_program(
 
     It changes nothing and needs no approval. Mend all problems before you propose the program.
     """
-    with _as_tool_errors():
+    with as_tool_errors():
         return await asyncio.to_thread(
-            _gatekeeper(ctx).check, program
+            gatekeeper_of(ctx).check, program
         )  # not on the SDK's threads, which answer
 
 
@@ -120,8 +94,8 @@ async def write_program(
 
     You may also write the program yourself; read_robot explains how.
     """
-    gatekeeper, console = _gatekeeper(ctx), _gatekeeper(ctx).console
-    with _as_tool_errors():
+    gatekeeper, console = gatekeeper_of(ctx), gatekeeper_of(ctx).console
+    with as_tool_errors():
         if not gatekeeper.writes:
             raise UserError("no model is configured; write the program yourself, as read_robot explains")
         asked = SessionView(
@@ -153,42 +127,24 @@ async def propose_mission(
     The answer has the problems, storyboards, and a digest. You cannot approve it yourself. Call run_mission,
     which waits until a person has approved exactly this program.
     """
-    gatekeeper = _gatekeeper(ctx)
-    with _as_tool_errors():
-        author = _name(ctx) if program.strip() else ""
+    gatekeeper = gatekeeper_of(ctx)
+    with as_tool_errors():
+        author = agent_name(ctx) if program.strip() else ""
         session = gatekeeper.propose(MissionOrder(instruction, program=program, author=author))
     return await _prepared(gatekeeper, session)
 
 
-async def _find_question(ctx: AgentContext) -> MissionSession:
-    session = _gatekeeper(ctx).console.session
-    if session is None or not session.view.waits_for_answer:
-        with _as_tool_errors():
-            raise MissionError("no mission waits for such an answer")
-    return session
-
-
-def _ask_which(
-    session: Annotated[MissionSession, Resolve(_find_question)], ctx: AgentContext
-) -> Elicit[Choice] | NotChosen:
-    """Have the client ask its person which behaviour they mean, if it can."""
-    asked = session.view.question
-    if asked is None or not _gatekeeper(ctx).asks_client or not _has_dialogs(ctx):
-        return NotChosen(answer="none")
-    return Elicit(which_question(asked), Choice)
-
-
 async def choose_behaviour(
     ctx: AgentContext,
-    session: Annotated[MissionSession, Resolve(_find_question)],
-    answer: Annotated[ElicitationResult[Choice], Resolve(_ask_which)],
+    session: Annotated[MissionSession, Resolve(find_question)],
+    answer: Annotated[ElicitationResult[Choice], Resolve(ask_which_behaviour)],
 ) -> MissionReport:
     """Let the person say which of several behaviours they mean, if a proposed mission waits for that.
 
     You cannot choose for them. Afterwards, the answer has the program, which still needs approval.
     """
-    gatekeeper = _gatekeeper(ctx)
-    with _as_tool_errors():
+    gatekeeper = gatekeeper_of(ctx)
+    with as_tool_errors():
         if not isinstance(answer, AcceptedElicitation) or isinstance(answer.data, NotChosen):
             raise MissionError(f"a person must choose on the page {gatekeeper.page}".rstrip())
         asked, given = session.view.question, answer.data
@@ -197,45 +153,25 @@ async def choose_behaviour(
     return await _prepared(gatekeeper, session)
 
 
-async def _read_past(ctx: AgentContext) -> MissionPast:
-    console = _gatekeeper(ctx).console
-    with _as_tool_errors():
-        if console.view.past is not None and not console.view.is_over:
-            return console.view.past
-        return await asyncio.to_thread(console.past_of, "last")
-
-
-async def _ask_whether(
-    past: Annotated[MissionPast, Resolve(_read_past)], ctx: AgentContext
-) -> Elicit[StepWord] | NoWord:
-    """Have the client ask its person whether an unsure step happened, beside what the robot says."""
-    gatekeeper = _gatekeeper(ctx)
-    if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
-        return NoWord(answer="it did not happen")
-    robot, home = gatekeeper.console.robot, gatekeeper.console.home
-    evidence = await asyncio.to_thread(ask_evidence, robot, home, past, ignore_text)
-    return Elicit("\n".join((past.question, *evidence)), StepWord)
-
-
 async def continue_mission(
     ctx: AgentContext,
-    past: Annotated[MissionPast, Resolve(_read_past)],
-    answer: Annotated[ElicitationResult[StepWord], Resolve(_ask_whether)],
+    past: Annotated[MissionPast, Resolve(read_last_past)],
+    answer: Annotated[ElicitationResult[StepWord], Resolve(ask_whether)],
     program: Annotated[str, Field(description="The rest; if empty, CodeBotler's model writes it.")] = "",
 ) -> MissionReport:
     """Propose the rest of the last mission, which failed or was stopped. The robot does not move.
 
     `done_before` lists what the robot has done, which the rest must not repeat. Then call run_mission.
     """
-    gatekeeper = _gatekeeper(ctx)
-    with _as_tool_errors():
+    gatekeeper = gatekeeper_of(ctx)
+    with as_tool_errors():
         if isinstance(answer, AcceptedElicitation) and not isinstance(answer.data, NoWord):
             past = past.resolve(happened=answer.data.answer == "it happened")
         if past.unsure is not None:
             raise UserError(f"{past.question}; a person must say so, on the page {gatekeeper.page}")
         if not program.strip() and not past.instruction:
             raise UserError("this mission has no instruction; send a program for the rest")
-        author = _name(ctx) if program.strip() else ""
+        author = agent_name(ctx) if program.strip() else ""
         session = gatekeeper.propose(gatekeeper.console.rest_of(past, program, author))
     return await _prepared(gatekeeper, session)
 
@@ -260,34 +196,18 @@ async def begin_steps(
     Call run_mission with the digest, which waits until a person has approved it. Then call call_skill with
     the key `steps` as often as you need, and end_steps at the end.
     """
-    gatekeeper = _gatekeeper(ctx)
-    with _as_tool_errors():
-        session, steps = gatekeeper.propose_steps(purpose, contract, _name(ctx))
+    gatekeeper = gatekeeper_of(ctx)
+    with as_tool_errors():
+        session, steps = gatekeeper.propose_steps(purpose, contract, agent_name(ctx))
     report = await _prepared(gatekeeper, session)
     return report.model_copy(update={"steps": steps.key})
-
-
-async def _find_session(digest: str, ctx: AgentContext) -> MissionSession:
-    with _as_tool_errors():
-        return _gatekeeper(ctx).find_session(digest)
-
-
-def _ask_person(
-    session: Annotated[MissionSession, Resolve(_find_session)], ctx: AgentContext
-) -> Elicit[Consent] | NotAsked:
-    """Have the client ask its person, unless the program is already approved or the client cannot ask."""
-    gatekeeper, view = _gatekeeper(ctx), session.view
-    may_ask = view.may_be_approved and gatekeeper.may_ask_client(view) and _has_dialogs(ctx)
-    if not may_ask or gatekeeper.approves_alone(session):
-        return NotAsked()
-    return Elicit(question(view, gatekeeper.console.robot.name, gatekeeper.contract_text(view)), Consent)
 
 
 async def run_mission(
     digest: _Digest,
     ctx: AgentContext,
-    session: Annotated[MissionSession, Resolve(_find_session)],
-    answer: Annotated[ElicitationResult[Consent], Resolve(_ask_person)],
+    session: Annotated[MissionSession, Resolve(find_session)],
+    answer: Annotated[ElicitationResult[Consent], Resolve(ask_person)],
     seconds: _Seconds = 45,
 ) -> MissionReport:
     """Run a proposed mission on the robot as soon as a person has approved it, and follow it to its end.
@@ -296,10 +216,10 @@ async def run_mission(
     the mission is still running, the answer says so. Then call run_mission or follow_mission again. If you
     cancel this call while the robot works, the robot stops.
     """
-    gatekeeper = _gatekeeper(ctx)
-    with _as_tool_errors():
-        _take_answer(gatekeeper, session, digest, answer, _name(ctx))
-    with _stopping_if_cancelled(session, _name(ctx)):
+    gatekeeper = gatekeeper_of(ctx)
+    with as_tool_errors():
+        _take_answer(gatekeeper, session, digest, answer, agent_name(ctx))
+    with _stopping_if_cancelled(session, agent_name(ctx)):
         await _follow(gatekeeper, session, ctx, seconds)
     return gatekeeper.report(session)
 
@@ -309,7 +229,7 @@ async def follow_mission(ctx: AgentContext, after: _After = 0, seconds: _Seconds
 
     It reports progress while it waits. Cancelling this call stops nothing.
     """
-    gatekeeper = _gatekeeper(ctx)
+    gatekeeper = gatekeeper_of(ctx)
     session = gatekeeper.console.session
     if session is not None:
         await _follow(gatekeeper, session, ctx, seconds, after)
@@ -326,17 +246,17 @@ async def call_skill(
 
     House rules judge each call first. If you cancel this call, the robot stops.
     """
-    with _as_tool_errors():
-        session, known = _gatekeeper(ctx).find_steps(steps)
+    with as_tool_errors():
+        session, known = gatekeeper_of(ctx).find_steps(steps)
         called = known.call(name, arguments or {})
-        with _stopping_if_cancelled(session, _name(ctx)):
+        with _stopping_if_cancelled(session, agent_name(ctx)):
             return await asyncio.shield(asyncio.wrap_future(called))
 
 
 async def end_steps(steps: _Key, ctx: AgentContext) -> MissionReport:
     """End a step-by-step mission, so that the robot is free for others."""
-    gatekeeper = _gatekeeper(ctx)
-    with _as_tool_errors():
+    gatekeeper = gatekeeper_of(ctx)
+    with as_tool_errors():
         session, known = gatekeeper.find_steps(steps)
     known.end()
     await gatekeeper.console.notifier.until(lambda: session.view.is_over, 15)
@@ -348,9 +268,9 @@ async def stop(ctx: AgentContext) -> MissionReport:
 
     Call it whenever anything is wrong, also while another call is waiting.
     """
-    gatekeeper = _gatekeeper(ctx)
+    gatekeeper = gatekeeper_of(ctx)
     session = gatekeeper.console.session
-    if gatekeeper.console.stop(_name(ctx)) and session is not None:
+    if gatekeeper.console.stop(agent_name(ctx)) and session is not None:
         await gatekeeper.console.notifier.until(lambda: session.view.is_over, 15)
     return gatekeeper.report(session)
 
@@ -366,22 +286,6 @@ ACTING: Sequence[Callable[..., object]] = (
     end_steps,
     stop,
 )
-
-
-def _gatekeeper(ctx: AgentContext) -> Gatekeeper:
-    return ctx.request_context.lifespan_context
-
-
-def _name(ctx: AgentContext) -> str:
-    """Return the agent's name for logs, as its client gives it."""
-    known = ctx.session.client_params
-    return f"agent {shortened(known.client_info.name, 60)}" if known is not None else "an agent"
-
-
-def _has_dialogs(ctx: AgentContext) -> bool:
-    capabilities = ctx.client_capabilities
-    forms = None if capabilities is None else capabilities.elicitation
-    return forms is not None and (forms.form is not None or forms.url is None)
 
 
 def _take_answer(
@@ -442,12 +346,3 @@ def _stopping_if_cancelled(session: MissionSession, by: str) -> Iterator[None]:
         if session.view.is_running:
             session.stop_soon(f"{by}, which cancelled its call")
         raise
-
-
-@contextmanager
-def _as_tool_errors() -> Iterator[None]:
-    """Tell agents about mistakes in a sentence."""
-    try:
-        yield
-    except (UserError, MissionError, ModelError) as error:
-        raise ToolError(error.sentence) from None

@@ -19,9 +19,8 @@ from codebotler.checking.sampled import CheckSettings, SampledRuns, first_sample
 from codebotler.checking.static import read_rooms
 from codebotler.core.words import counted
 from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.matching import contains
+from codebotler.simulator.matching import contains, normalized
 from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_robot import normalized
 from codebotler.simulator.worker import Worker
 
 RANDOM_WORLDS, MAX_SHARED_WORLDS = 8, 24  # random worlds, and worlds with those that try further facts

@@ -16,7 +16,8 @@ from codebotler.core.phrases import phrase
 from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE
 from codebotler.core.trace import Event
 from codebotler.core.words import brief, listed
-from codebotler.simulator.sampled_robot import normalized
+from codebotler.models.recorded import is_recorded
+from codebotler.simulator.matching import normalized
 
 DOMINANT_SHARE = 0.75
 """The share of the candidates from which the largest cluster is taken without a question."""
@@ -58,12 +59,14 @@ class ClarifyingQuestion:
         facts: the facts of the imagined world that matter, in words.
         total: the number of accepted candidates.
         sample: the number of the world.
+        why_last: why no programs follow the answer `none`; empty if they do.
     """
 
     options: tuple[CandidateOption, ...]
     facts: tuple[str, ...]
     total: int
     sample: int
+    why_last: str = ""
 
     @property
     def rejections(self) -> list[str]:
@@ -94,9 +97,20 @@ class ClarifyingQuestion:
 
 
 def question_about(
-    groups: CandidateClusters, dominant_share: float = DOMINANT_SHARE
+    groups: CandidateClusters,
+    dominant_share: float = DOMINANT_SHARE,
+    *,
+    model: str = "",
+    is_second: bool = False,
 ) -> ClarifyingQuestion | None:
-    """Return a question, or None if one behaviour dominates or all candidates do the same."""
+    """Return a question, or None if one behaviour dominates or all candidates do the same.
+
+    Args:
+        groups: the candidates by behaviour.
+        dominant_share: the share of the candidates from which no question is asked.
+        model: the model that would write other programs.
+        is_second: whether the person rejected other programs before, after which there are no more.
+    """
     largest = groups.clusters[0]
     if len(groups.clusters) == 1 or largest.size >= dominant_share * groups.total:
         return None
@@ -109,7 +123,10 @@ def question_about(
         CandidateOption(one.program, one.size, tuple(steps_of(sample.outcome.trace, has_places=True)), words)
         for one, sample, words in zip(shown, samples, describe_differences(samples, behaviours), strict=True)
     )
-    return ClarifyingQuestion(tuple(options), _facts_that_matter(shown, number), groups.total, number)
+    why_last = "this is the second question" if is_second else ""
+    why_last = "a recorded model writes no new programs" if is_recorded(model) else why_last
+    facts = _facts_that_matter(shown, number)
+    return ClarifyingQuestion(tuple(options), facts, groups.total, number, why_last)
 
 
 def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:

@@ -16,34 +16,19 @@ from codebotler.core.trace import Event, Outcome, Status, Trace, held_after
 from codebotler.core.words import brief
 from codebotler.rtl.text.numbers import numerals
 from codebotler.rtl.text.polarity import Polarity, polarity
-from codebotler.simulator.matching import content_words
+from codebotler.simulator.matching import content_words, normalized
 from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_robot import AGREEING_TEXT, normalized
+from codebotler.simulator.sampled_robot import AGREEING_TEXT
 
 UNBOUNDED_COUNT = 1_000_000
 """The number of steps that remain of a kind that a program repeats without end."""
 
 EMPTY_WORDS = frozenset(
     {
-        *(
-            "do",
-            "does",
-            "you",
-            "your",
-            "i",
-            "it",
-            "me",
-            "my",
-            "we",
-            "to",
-            "for",
-            "have",
-            "has",
-            "want",
-            "like",
-        ),
-        *("would", "could", "can", "will", "please", "what", "which", "this", "not", "no", "be", "on", "at"),
-        *("hello", "hi", "hey", "sorry", "so", "just", "one", "how", "many", "much", "number", "wish", "us"),
+        *("do", "does", "you", "your", "i", "it", "me", "my", "we", "to", "for", "have", "has", "want"),
+        *("like", "would", "could", "can", "will", "please", "what", "which", "this", "not", "no", "be"),
+        *("on", "at", "hello", "hi", "hey", "sorry", "so", "just", "one", "how", "many", "much", "number"),
+        *("wish", "us"),
     }
 )
 """Words of speech that tell nothing about its topic."""
@@ -66,14 +51,15 @@ def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = 
         problems = [problem for problem in problems if problem.kind != "TimeoutError"]
     for sample in found.samples:
         for event in repeated_steps(sample.outcome.trace, found.room_map, remaining):
-            message = f"this was done before: {phrase(event, 'past')}"
+            again = f'{phrase(event, "base")} in "{brief(event.place)}"'
+            message = f"the robot has done this already and would do it again: {again}"
             if all(problem.message != message for problem in problems):
                 problems.append(Problem("RepeatedStep", message, samples=(sample.number,)))
     held = held_after(past)
     finished = [one for one in found.samples if one.outcome.status is Status.FINISHED]
     puts_down = "place" in called_skills(parse_leniently(begun))
     if held and puts_down and finished and all(map(_keeps, finished)):
-        message = f'the robot still holds "{brief(held)}" at the end'
+        message = f'at the end, the robot still holds "{brief(held)}", which the first program puts down'
         problems.append(Problem("KeepsThing", message, samples=tuple(one.number for one in finished)))
     return replace(found, problems=tuple(problems), remaining=tuple(remaining))
 

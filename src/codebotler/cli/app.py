@@ -46,13 +46,12 @@ def generate(
     from functools import partial
 
     from codebotler.cli.candidates import expect_no_retries, requests_to, write_candidates
-    from codebotler.cli.generate import print_prompt, write
+    from codebotler.cli.generate import print_prompt, prompt_maker, write
     from codebotler.cli.rules import rules_for
     from codebotler.core.skills.files import skills_from
     from codebotler.core.world_file import read_world
     from codebotler.models.chosen import choose_model
     from codebotler.models.open import open_model
-    from codebotler.prompts import prompt_for
     from codebotler.simulator.room_map import RoomMap
 
     chosen = choose_model(model, base_url)
@@ -61,12 +60,7 @@ def generate(
     known = None if world is None else read_world(world, table)
     house_rules = rules_for(known, rules, table)
     room_map = None if known is None else RoomMap.of(known)
-    make_prompt = partial(
-        prompt_for,
-        skills=table,
-        rooms=() if room_map is None else room_map.described,
-        rules=[rule.says for rule in house_rules],
-    )
+    make_prompt = prompt_maker(table, room_map, house_rules)
     if show_prompt:
         print_prompt(make_prompt(instruction), chosen.name)
         return
@@ -74,7 +68,9 @@ def generate(
         expect_no_retries(retries, repair=repair)
         opener = partial(open_model, chosen.name, settings)
         request = requests_to(opener, make_prompt, candidates, room_map, record)
-        accepted = write_candidates(request, instruction, house_rules, table, room_map, asks=not yes)
+        accepted = write_candidates(
+            request, instruction, house_rules, table, room_map, chosen.name, asks=not yes
+        )
     else:
         accepted = write(
             make_prompt(instruction),

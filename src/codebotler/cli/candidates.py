@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +30,7 @@ from codebotler.core.terminal import (
     visible,
 )
 from codebotler.core.words import counted, listed
-from codebotler.generation.candidates import request_candidates
+from codebotler.generation.candidates import gather_candidates
 from codebotler.generation.generate import Attempt
 from codebotler.missions.preflight import with_closest_here
 from codebotler.models.base import Model
@@ -51,12 +52,14 @@ class CandidateSearch:
         settings: the settings for runs in imagined worlds.
         room_map: the rooms; by default those that the programs name.
         read_line: asks the person for a line, which is empty at the end; None if nobody can answer.
+        model: the name of the model.
     """
 
     request: Callable[[str], Sequence[Attempt]]
     settings: CheckSettings
     room_map: RoomMap | None
     read_line: Callable[[str], str] | None
+    model: str = ""
 
 
 def line_reader(*, is_allowed: bool) -> Callable[[str], str] | None:
@@ -77,7 +80,7 @@ def requests_to(
         opened = open_model()
         with busy(f"asking {opened.name}"), open_recorder(record, opened.name) as add:
             try:
-                return request_candidates(opened, make_prompt(instruction), count, on_attempt=add)
+                return asyncio.run(gather_candidates(opened, make_prompt(instruction), count, add))
             except UnknownInstructionError as error:
                 raise with_closest_here(error, room_map) from None
 
@@ -96,13 +99,14 @@ def write_candidates(
     house_rules: tuple[Rule, ...],
     skills: SkillTable,
     room_map: RoomMap | None,
+    model: str,
     *,
     asks: bool,
 ) -> bool:
     """Print the candidate that a person means, and return whether the check accepts it."""
     how = CheckSettings(skills=skills, house_rules=house_rules)
     found = choose_candidate(
-        CandidateSearch(request, how, room_map, line_reader(is_allowed=asks)), instruction
+        CandidateSearch(request, how, room_map, line_reader(is_allowed=asks), model), instruction
     )
     if found is None:
         return False
@@ -118,7 +122,7 @@ def choose_candidate(search: CandidateSearch, instruction: str) -> tuple[str, st
 
     After the first "none of these", they may add a sentence to the instruction for a second round.
     """
-    for is_last in (False, True):
+    for is_second in (False, True):
         attempts = search.request(instruction)
         programs = [one.reply.program for one in attempts if one.programless is None]
         if not programs:
@@ -126,14 +130,14 @@ def choose_candidate(search: CandidateSearch, instruction: str) -> tuple[str, st
             note_programless(attempts[0].programless)
             return None
         groups = _group(programs, search)
-        question = question_about(groups)
+        question = question_about(groups, model=search.model, is_second=is_second)
         if question is None or search.read_line is None:
             note(groups.summary)
             return instruction, groups.clusters[0].program
         chosen = question.chosen(ask_which(question, search.read_line))
         if chosen is not None:
             return instruction, chosen.program
-        more = "" if is_last else search.read_line(ADD_SENTENCE).strip()
+        more = "" if question.why_last else search.read_line(ADD_SENTENCE).strip()
         if not more:
             break
         instruction = f"{instruction.rstrip()} {more}"
@@ -155,7 +159,8 @@ def question_view(question: ClarifyingQuestion) -> RenderableType:
         like = f"{option.size} of {counted(question.total, 'program')}"
         parts += [Text(), Text.assemble((head, "bold"), (f"  ({like})", "dim"))]
         parts.append(Padding(storyboard(option.steps, set()), (0, 0, 0, 2)))
-    return Group(*parts, Text())
+    last = f'The answer "none" gives up: {question.why_last}.\n' if question.why_last else ""
+    return Group(*parts, Text(), Text(last, "dim", end=""))
 
 
 def ask_which(question: ClarifyingQuestion, read_line: Callable[[str], str]) -> ClarifyingAnswer:

@@ -9,6 +9,7 @@ from rich.text import Text
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import confirm, is_interactive, note, print_rich, read_line, shortened
+from codebotler.core.world import World
 from codebotler.missions.past import MissionPast, read_past
 from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.store import find_mission, recover_missions
@@ -16,7 +17,13 @@ from codebotler.robots.base import Robot
 
 
 def choose_past(
-    robot: Robot, home: Path, name: str, *, happened: bool | None, answer: str = ""
+    robot: Robot,
+    home: Path,
+    name: str,
+    world: World | None = None,
+    *,
+    happened: bool | None,
+    answer: str = "",
 ) -> MissionPast:
     """Read the past of a mission, show it, and ask whether an unsure step happened.
 
@@ -24,6 +31,7 @@ def choose_past(
         robot: the robot, which is asked where it is if a step is unsure.
         home: the folder that contains the missions.
         name: the ID of the mission, or `last`.
+        world: the robot's map, or None if it has none.
         happened: whether the unsure step happened, or None to ask.
         answer: its answer, if it is a question.
 
@@ -31,7 +39,7 @@ def choose_past(
         UserError: there is no such mission, it cannot be continued, or nobody can answer.
     """
     recover_missions(home)
-    past = read_past(find_mission(home, name), robot.skills, robot.name)
+    past = read_past(find_mission(home, name), robot.skills, robot.name, world)
     print_rich(past_view(past))
     if past.unsure is None:
         return past

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
+from functools import partial
 from pathlib import Path
 
 from codebotler.core.files import Appender, expect_replaceable, to_line
@@ -18,11 +19,19 @@ from codebotler.missions.preflight import with_closest_here
 from codebotler.models.open import kind_of, open_model
 from codebotler.models.recorded import RECORDED_NOTICE, UnknownInstructionError, is_recorded
 from codebotler.models.sampling import SamplingSettings
-from codebotler.prompts import Prompt
+from codebotler.prompts import Prompt, prompt_for
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.room_map import RoomMap
 
 MAX_REPLY_SHOWN = 300  # how many characters to show of a reply without a program
+
+
+def prompt_maker(
+    skills: SkillTable, room_map: RoomMap | None, house_rules: Sequence[Rule]
+) -> Callable[[str], Prompt]:
+    """Return a function that makes the prompt for an instruction."""
+    rooms = () if room_map is None else room_map.described
+    return partial(prompt_for, skills=skills, rooms=rooms, rules=[rule.says for rule in house_rules])
 
 
 def write(

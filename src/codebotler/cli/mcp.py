@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from codebotler.cli import options
-from codebotler.cli.model_options import inherit_options, model_settings, options_for
+from codebotler.cli.model_options import inherit_options, model_settings
 from codebotler.core.errors import UserError
 
 HttpOption = Annotated[
@@ -55,14 +55,10 @@ def serve_agents(
     """
     from codebotler.agents import server
     from codebotler.agents.gatekeeper import Gatekeeper
-    from codebotler.cli.run import tell_missing
-    from codebotler.core.files import home
+    from codebotler.cli.serving import open_console
     from codebotler.core.terminal import note
-    from codebotler.models.chosen import choose_model, make_opener
     from codebotler.models.recorded import is_recorded
-    from codebotler.robots.open import open_robot
     from codebotler.web.access import AGENT_PATH, Access, PageAddress
-    from codebotler.web.console import Console
     from codebotler.web.server import serve
 
     asks = not http if ask_client is None else ask_client
@@ -70,24 +66,8 @@ def serve_agents(
     if agent_token is not None and not http:
         raise UserError("--agent-token is for --http; leave it out")
     streams = None if http else server.take_streams()
-    kind, settings, rules, within = options.robot_settings(**options_for(options.robot_settings, shared))
-    options.note_office(kind, shared["world"])
-    default = choose_model().name
-    models = tuple(model or dict.fromkeys((default, "recorded:careful", "recorded:hasty")))
-    opened = make_opener(models, base_url, model_settings(**options_for(model_settings, shared)))
-    body = open_robot(kind, settings)
-    tell_missing(body)
-    console = Console(
-        body,
-        home(),
-        opened,
-        models=models,
-        world=settings.world,
-        rules=rules,
-        within=within,
-        candidates=candidates,
-    )
-    writes = bool(model) or not is_recorded(default)
+    console = open_console(model, base_url, candidates, shared)
+    writes = bool(model) or not is_recorded(console.models[0])
     gatekeeper = Gatekeeper(console, asks_client=asks, writes=writes)
     agents = server.make_server(gatekeeper)
     access = Access.from_options(token, None, open_to_all=False, is_private=True)

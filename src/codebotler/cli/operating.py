@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -11,9 +12,54 @@ from codebotler.cli import options
 from codebotler.cli.model_options import inherit_options, model_settings, options_for
 from codebotler.core.terminal import note, print_text
 
+if TYPE_CHECKING:
+    from codebotler.core.world import World
+    from codebotler.robots.base import Robot
+
+
+class RunSettings(NamedTuple):
+    """The robot and the way to run it, from the options that `run` and `continue` share."""
+
+    robot: Robot
+    world: World | None
+    carry_out: Callable[..., int]  # takes the fields of a `Request` that are left, returns the exit status
+
 
 @inherit_options(options.robot_settings)
 @inherit_options(model_settings)
+def run_settings(
+    model: options.ModelOption = None,
+    base_url: options.BaseUrlOption = None,
+    yes: options.YesOption = False,
+    despite_problems: options.DespiteProblemsOption = False,
+    shows_all: options.AllOption = False,
+    recover: options.RecoverOption = 0,
+    **shared: Any,  # noqa: ANN401 - of several kinds
+) -> RunSettings:
+    """Open the robot that the options name, or raise UserError if an option is invalid."""
+    from functools import partial
+
+    from codebotler.cli import run
+    from codebotler.core.files import home
+    from codebotler.models.chosen import choose_model
+    from codebotler.models.open import open_model
+    from codebotler.robots.open import open_robot
+
+    chosen = choose_model(model, base_url)
+    kind, settings, rules, within = options.robot_settings(**options_for(options.robot_settings, shared))
+    asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
+    robot = open_robot(kind, settings)
+
+    def carry_out(what: str, **more: Any) -> int:  # noqa: ANN401 - of several kinds
+        how = chosen.name, yes, despite_problems, shows_all, rules, within
+        request = run.Request(what, *how, recoveries=recover, **more)
+        options.note_office(kind, shared["world"])
+        return run.run(robot, request, home(), partial(open_model, settings=asked), settings.world)
+
+    return RunSettings(robot, settings.world, carry_out)
+
+
+@inherit_options(run_settings)
 def run(
     program: Annotated[
         str,
@@ -21,50 +67,17 @@ def run(
             metavar="PROGRAM|INSTRUCTION", help="A program file, - for standard input, or an instruction."
         ),
     ],
-    model: options.ModelOption = None,
-    base_url: options.BaseUrlOption = None,
-    yes: options.YesOption = False,
-    despite_problems: options.DespiteProblemsOption = False,
-    shows_all: options.AllOption = False,
     candidates: options.CandidatesOption = 1,
-    recover: options.RecoverOption = 0,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Check a program, ask for approval, and run it on a robot.
 
     Ctrl-C stops the robot, and the exit status is then 130.
     """
-    from functools import partial
-
-    from codebotler.cli import run
-    from codebotler.cli.run import Request
-    from codebotler.core.files import home
-    from codebotler.models.chosen import choose_model
-    from codebotler.models.open import open_model
-    from codebotler.robots.open import open_robot
-
-    chosen = choose_model(model, base_url)
-    kind, settings, rules, allowed = options.robot_settings(**options_for(options.robot_settings, shared))
-    request = Request(
-        program,
-        chosen.name,
-        yes,
-        despite_problems,
-        shows_all,
-        rules,
-        allowed,
-        recoveries=recover,
-        candidates=candidates,
-    )
-    asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
-    options.note_office(kind, shared["world"])
-    body = open_robot(kind, settings)
-    opener = partial(open_model, settings=asked)
-    raise typer.Exit(run.run(body, request, home(), opener, settings.world))
+    raise typer.Exit(run_settings(**shared).carry_out(program, candidates=candidates))
 
 
-@inherit_options(options.robot_settings)
-@inherit_options(model_settings)
+@inherit_options(run_settings)
 def continue_mission(
     mission: Annotated[
         str, typer.Argument(metavar="[ID]", help="The mission; by default the most recent one.")
@@ -82,44 +95,18 @@ def continue_mission(
     answer: Annotated[
         str, typer.Option(help="With --happened: the answer to the question, if you know it.")
     ] = "",
-    model: options.ModelOption = None,
-    base_url: options.BaseUrlOption = None,
-    yes: options.YesOption = False,
-    despite_problems: options.DespiteProblemsOption = False,
-    shows_all: options.AllOption = False,
-    recover: options.RecoverOption = 0,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Do the rest of a mission that ended early.
 
     A model is shown what the robot did and saw, and writes a program for the rest.
     """
-    from codebotler.cli import run
     from codebotler.cli.continuing import choose_past
-    from codebotler.cli.run import Request
     from codebotler.core.files import home
-    from codebotler.models.chosen import choose_model
-    from codebotler.models.open import open_model
-    from codebotler.robots.open import open_robot
 
-    chosen = choose_model(model, base_url)
-    kind, settings, rules, allowed = options.robot_settings(**options_for(options.robot_settings, shared))
-    asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
-    body = open_robot(kind, settings)
-    past = choose_past(body, home(), mission, happened=happened, answer=answer)
-    request = Request(
-        program or past.instruction,
-        chosen.name,
-        yes,
-        despite_problems,
-        shows_all,
-        rules,
-        allowed,
-        past,
-        recover,
-    )
-    options.note_office(kind, shared["world"])
-    raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, asked), settings.world))
+    robot, known, carry_out = run_settings(**shared)
+    past = choose_past(robot, home(), mission, known, happened=happened, answer=answer)
+    raise typer.Exit(carry_out(program or past.instruction, past=past))
 
 
 def missions(
@@ -237,38 +224,17 @@ def serve_page(
 
     Ctrl-C ends the server and stops the robot.
     """
-    from codebotler.cli.run import tell_missing
-    from codebotler.core.files import home
-    from codebotler.models.chosen import choose_model, make_opener
+    from codebotler.cli.serving import open_console
     from codebotler.robots.face import Face
-    from codebotler.robots.open import open_robot, open_with_face
     from codebotler.web.access import Access, PageAddress
-    from codebotler.web.console import Console
     from codebotler.web.frame import installed_pages
     from codebotler.web.proxy import proxies_in_front
     from codebotler.web.server import serve
 
-    kind, settings, rules, allowed = options.robot_settings(**options_for(options.robot_settings, shared))
     place = PageAddress(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
     access = Access.from_options(token, face_token, open_to_all=no_token, is_private=place.is_private)
-    options.note_office(kind, shared["world"])
-    models = tuple(model or dict.fromkeys((choose_model().name, "recorded:careful", "recorded:hasty")))
-    opened = make_opener(models, base_url, model_settings(**options_for(model_settings, shared)))
     shown = Face(face_timeout) if face else None
-    body = open_robot(kind, settings) if shown is None else open_with_face(kind, settings, shown)
-    tell_missing(body)
-    console = Console(
-        body,
-        home(),
-        opened,
-        models=models,
-        world=settings.world,
-        face=shown,
-        rules=rules,
-        within=allowed,
-        candidates=candidates,
-        recoveries=recover,
-    )
+    console = open_console(model, base_url, candidates, shared, face=shown, recoveries=recover)
     serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
 
 

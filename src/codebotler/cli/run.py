@@ -145,29 +145,19 @@ def run(
         elif _is_approved(session, view, robot, request):
             status = _watched(session, view, robot, request)
             rest = _recovery(session, robot, request, home) if status == 1 else None
-            return status if rest is None else _run_rest(status, robot, rest, home, open_model, world)
+            if rest is None:
+                return status
+            try:
+                return run(robot, rest, home, open_model, world)
+            except ModelError as error:  # without a rest, the status of the first mission counts
+                note(error.sentence)
+                return status
     except BaseException as error:
         session.stop(SIGNALS[signal.SIGINT] if isinstance(error, KeyboardInterrupt) else "an error")
         session.join(CLEANUP_SECONDS)
         raise
     session.join(STOP_GRACE_SECONDS)
     return 1
-
-
-def _run_rest(
-    status: int,
-    robot: Robot,
-    rest: Request,
-    home: Path,
-    open_model: Callable[[str], Model],
-    world: World | None,
-) -> int:
-    """Run the rest of a mission that ended with a status, which also counts if no model writes the rest."""
-    try:
-        return run(robot, rest, home, open_model, world)
-    except ModelError as error:
-        note(error.sentence)
-        return status
 
 
 def tell_missing(robot: Robot) -> None:
@@ -191,7 +181,8 @@ def _prepared(session: MissionSession) -> SessionView:
     while not (view.is_over or view.may_be_approved or view.waits_for_program):
         if view.question is not None and view.waits_for_answer:
             answer = ask_which(view.question, read_line)
-            session.answer(answer, read_line(ADD_SENTENCE) if answer == "none" else "")
+            adds = answer == "none" and not view.question.why_last
+            session.answer(answer, read_line(ADD_SENTENCE) if adds else "")
             view = session.view
         before = view.busy
         with busy(before or "finishing"):

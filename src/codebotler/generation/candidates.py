@@ -15,21 +15,14 @@ from codebotler.prompts import Prompt
 CONCURRENT_REQUESTS = 4
 
 
-def request_candidates(
-    model: Model, prompt: Prompt, count: int, *, on_attempt: Callable[[Attempt], None] = ignore_attempt
+async def gather_candidates(
+    model: Model, prompt: Prompt, count: int, on_attempt: Callable[[Attempt], None] = ignore_attempt
 ) -> list[Attempt]:
     """Ask a model `count` times for a program, check none of them, and close the model.
 
     Raises:
         ModelError: the model sent no complete reply to one of the requests.
     """
-    return asyncio.run(gather_candidates(model, prompt, count, on_attempt))
-
-
-async def gather_candidates(
-    model: Model, prompt: Prompt, count: int, on_attempt: Callable[[Attempt], None] = ignore_attempt
-) -> list[Attempt]:
-    """Ask a model `count` times for a program, as `request_candidates` does, in an event loop."""
     limited = RateLimited(model, concurrency=CONCURRENT_REQUESTS)
     try:
         replies = await asyncio.gather(*(limited.reply(prompt, number=number) for number in range(count)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,12 +24,12 @@ from codebotler.core.trace import (
 from codebotler.core.world import World
 from codebotler.missions.log import (
     SKILL_END_EVENTS,
-    SUMMARY_FILE,
     LogLine,
     MissionState,
     MissionSummary,
     read_events,
 )
+from codebotler.missions.store import find_continuations
 from codebotler.robots.simulated import SIMULATION
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.room_map import RoomMap
@@ -134,16 +133,20 @@ class MissionPast:
         }
 
 
-def read_past(folder: Path, skills: SkillTable, robot_kind: str = "") -> MissionPast:
+def read_past(
+    folder: Path, skills: SkillTable, robot_kind: str = "", world: World | None = None
+) -> MissionPast:
     """Read what a mission did and saw.
 
     Args:
         folder: the folder of the mission.
         skills: the robot's skills.
         robot_kind: the kind of robot that is to do the rest; by default that of the mission.
+        world: the map of that robot, or None if it has none.
 
     Raises:
-        UserError: the mission cannot be continued, ran on another kind of robot, or its log is invalid.
+        UserError: the mission cannot be continued, ran on another kind of robot or another map, or its log is
+            invalid.
     """
     summary = MissionSummary.read(folder)
     if robot_kind not in {"", summary.robot}:
@@ -152,14 +155,19 @@ def read_past(folder: Path, skills: SkillTable, robot_kind: str = "") -> Mission
         raise UserError(f"mission {summary.id} has not ended; stop it first")
     if summary.state is MissionState.DONE:
         raise UserError(f"mission {summary.id} is done; there is nothing to continue")
-    if (successor := _find_successor(folder)) is not None:
-        raise UserError(f"mission {summary.id} was continued by mission {successor}; continue that one")
+    for later in find_continuations(folder):
+        if later.if_tool_dies:  # it has done a part of the rest
+            raise UserError(f"mission {summary.id} was continued by mission {later.id}; continue that one")
     events = read_events(folder)
     before: LogLine = next((line for line in events if line["event"] == "past"), {})
     has_run = any(line["event"] == "state" and line["state"] == MissionState.RUNNING for line in events)
     place = summary.place if has_run else before.get("place", "")
     try:
+        if world is not None:
+            _expect_same_map(summary.id, events, world)
         robot, unsure = _repeat(events, skills, place)
+    except UserError:
+        raise
     except (AttributeError, LookupError, TypeError, ValueError, re.error):
         sentence = "the log does not fit the skills; name the files of own skills with --skills"
         raise UserError(sentence, file=folder) from None
@@ -176,14 +184,14 @@ def read_past(folder: Path, skills: SkillTable, robot_kind: str = "") -> Mission
     )
 
 
-def _find_successor(folder: Path) -> str | None:
-    """Return the ID of a mission that has done a part of the rest of this one, or None."""
-    for other in sorted(folder.parent.glob(f"*/{SUMMARY_FILE}")):
-        with suppress(UserError, OSError):  # a damaged mission says nothing about this one
-            summary = MissionSummary.read(other.parent)
-            if summary.continues == folder.name and summary.if_tool_dies:
-                return summary.id
-    return None
+def _expect_same_map(mission: str, events: Sequence[LogLine], world: World) -> None:
+    """Raise UserError if a mission had a map with a room that a world lacks."""
+    here = {room.name for room in world.rooms}
+    had = (room["name"] for line in events if line["event"] == "map" for room in line["rooms"])
+    lacks = next((name for name in had if name not in here), None)
+    if lacks is not None:
+        where = f'ran on another map, with the room "{shortened(lacks)}"'
+        raise UserError(f"mission {mission} {where}; to continue it, start with that map's --world")
 
 
 def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[LoggedRobot, Event | None]:

@@ -23,7 +23,7 @@ from codebotler.core.terminal import system_sentence, visible
 from codebotler.core.world import World
 from codebotler.missions.authoring import ModelAuthor, prompt_of
 from codebotler.missions.drafts import compare_drafts, examine_draft
-from codebotler.missions.log import LogLine, MissionState
+from codebotler.missions.log import MissionState
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import (
     ask_rooms,
@@ -32,8 +32,9 @@ from codebotler.missions.preflight import (
     resume_robot,
     with_closest_here,
 )
+from codebotler.missions.shared_view import SharedView
 from codebotler.missions.stop import StopButton
-from codebotler.missions.view import CHECKING, MissionOrder, SessionView, program_digest
+from codebotler.missions.view import CHECKING, UNCHECKED, MissionOrder, SessionView, program_digest
 from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import UnknownInstructionError
 from codebotler.robots.base import CancelledError, NotReadyError, Robot
@@ -47,7 +48,7 @@ _logger = logging.getLogger("codebotler.missions")
 _EXPECTED_ERRORS = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)
 
 
-class MissionSession:
+class MissionSession(SharedView):
     """Runs one mission on its own thread, with a robot that stays connected during the whole session.
 
     `check` takes a program, the robot's rooms and the rules in force. `changed` is called whenever the view
@@ -70,15 +71,7 @@ class MissionSession:
         world: World | None = None,
         within: Contract | None = None,
     ) -> None:
-        self._robot, self._home, self._order = robot, home, order
-        self._check, self._changed, self._before, self._world = check, changed, before, world
-        self._author = ModelAuthor(open_model, order.model)
-        self._stop_button = StopButton()
-        self._lock = threading.Condition()  # held briefly, never while calling the mission
-        self._checked: Contract | None = None  # of the last checked program
-        self._editing = threading.Lock()  # held while the program is replaced or approved
-        self._rejected: ClarifyingQuestion | None = None  # whose options a person did not mean
-        self._view = SessionView(
+        view = SessionView(
             number,
             instruction=order.instruction,
             model=order.model,
@@ -90,8 +83,14 @@ class MissionSession:
             past=order.past,
             is_over=False,
         )
-        self._events: list[LogLine] = []
-        self._mission: Mission | None = None
+        super().__init__(view, changed)
+        self._robot, self._home, self._order = robot, home, order
+        self._check, self._before, self._world = check, before, world
+        self._author = ModelAuthor(open_model, order.model)
+        self._stop_button = StopButton()
+        self._checked: Contract | None = None  # of the last checked program
+        self._editing = threading.Lock()  # held while the program is replaced or approved
+        self._rejected: ClarifyingQuestion | None = None  # whose options a person did not mean
         self._next_task: Callable[[Mission], None] | None = (  # the next task for the session's own thread
             partial(self._take, program=order.program)
             if order.has_program
@@ -99,7 +98,6 @@ class MissionSession:
         )
         self._stop_button.on_press(self._end_waiting)
         self._thread = threading.Thread(target=self._run, name=f"session-{number}", daemon=True)
-        self.on_event: Callable[[LogLine], None] = lambda _: None  # an error raised here stops the robot
         self.error: Exception | None = None  # set if an error ended the session
 
     def start(self) -> None:
@@ -110,28 +108,13 @@ class MissionSession:
         """Wait for the end of the session."""
         self._thread.join(seconds)
 
-    def wait_until(self, is_met: Callable[[SessionView], bool]) -> SessionView:
-        """Wait until the view meets a condition or the session ends, and return the view."""
-        with self._lock:
-            self._lock.wait_for(lambda: self._view.is_over or is_met(self._view))
-            return self._view
-
-    @property
-    def view(self) -> SessionView:
-        """The current view."""
-        return self._view
-
-    def events(self, start: int = 0) -> list[LogLine]:
-        """Return the events of the mission, beginning at a position."""
-        return self._events[start:]
-
     def edit(self, program: str) -> None:
         """Replace and check the program. Raise MissionError after its approval or while a model writes."""
         with self._editing, self._lock:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
             self._next_task = partial(self._take, program=program)
-            self._change(program=program, author="", disabled_rules=(), **_UNCHECKED)
+            self._change(program=program, author="", disabled_rules=(), **UNCHECKED)
 
     def switch_off(self, name: str, reason: str) -> None:
         """Switch off a rule for this program only, log the reason, and check the program again."""
@@ -146,7 +129,7 @@ class MissionSession:
             mission.note(f'a person switched off the rule "{name}" for this program: {reason.strip()}')
             with self._lock:
                 self._next_task = partial(self._take, program=view.program)
-                self._change(disabled_rules=(*view.disabled_rules, name), **_UNCHECKED)
+                self._change(disabled_rules=(*view.disabled_rules, name), **UNCHECKED)
 
     def ask_again(self, *, repair: bool, max_tokens: int | None = None) -> None:
         """Ask the model for another program. For a repair, send it the program and its problems.
@@ -163,7 +146,7 @@ class MissionSession:
     def answer(self, answer: ClarifyingAnswer, more: str = "") -> None:
         """Say which behaviour is meant. With `none`, a sentence is added to the instruction.
 
-        The second answer `none`, or one without a sentence, ends the mission.
+        The answer `none` without a sentence, or to the last question, ends the mission.
 
         Raises:
             MissionError: there is no question, or no such option.
@@ -299,7 +282,7 @@ class MissionSession:
         before, count = self._view, 1 if repair else self._order.candidates
         many = f" for {count} programs" if count > 1 else ""
         writing = {"busy": f"asking {before.model}{many}", "is_written": True}
-        self._show(**_UNCHECKED | writing, program="", reply="", error="")
+        self._show(**UNCHECKED | writing, program="", reply="", error="")
         try:
             prompt = prompt_of(before, self._robot, repair=repair)
             if self._rejected is not None and not repair:
@@ -332,7 +315,8 @@ class MissionSession:
         """Take one of several programs, or ask the person which one is meant if they differ."""
         self._show(busy="comparing the programs")
         groups = compare_drafts(programs, self._view, self._robot)
-        question = question_about(groups)
+        is_second = self._rejected is not None
+        question = question_about(groups, model=self._view.model, is_second=is_second)
         if question is not None and self._order.asks:
             self._show(question=question, busy="")
         else:
@@ -347,8 +331,8 @@ class MissionSession:
             who = "a person left the choice to CodeBotler" if answer == "decide" else "a person chose"
             mission.note(f"{who}: a robot that {option.difference}")
             self._take(mission, option.program)
-        elif not more or self._rejected is not None:
-            mission.fail("no program does what was meant")
+        elif not more or question.why_last:
+            mission.fail(f"no program does what was meant{question.why_last and '; '}{question.why_last}")
         else:
             self._rejected = question
             mission.extend_instruction(more)
@@ -356,19 +340,15 @@ class MissionSession:
             self._ask(mission, repair=False)
 
     def _restore(self, before: SessionView) -> None:
-        kept = {name: getattr(before, name) for name in (*_UNCHECKED, "program", "author")}
+        kept = {name: getattr(before, name) for name in (*UNCHECKED, "program", "author")}
         self._show(**kept | {"busy": ""}, is_written=False, reply="")
-
-    def _add_to_reply(self, piece: str) -> None:
-        with self._lock:
-            self._change(reply=self._view.reply + piece)
 
     def _take(self, mission: Mission, program: str) -> None:
         """Check a program for the mission, unless a newer program is waiting."""
         with self._lock:
             if self._next_task is not None:
                 return
-            self._change(program=program, error="", reply="", **_UNCHECKED)
+            self._change(program=program, error="", reply="", **UNCHECKED)
             view = self._view
         try:
             mission.draft(program, view.author)
@@ -383,45 +363,6 @@ class MissionSession:
         with self._lock:
             if self._next_task is None:
                 self._change(**found)
-
-    # --- the view
-
-    def _add_remark(self, sentence: str) -> None:
-        assert self._mission is not None, "the mission exists before questions to the robot"
-        self._mission.note(sentence)
-        self._show(remarks=(*self._view.remarks, sentence))
-
-    def _add_event(self, line: LogLine) -> None:
-        """Add an event to the view. The mission holds its own lock during this call."""
-        with self._lock:
-            self._events.append(line)
-            self._change(progress=self._view.progress.after(line))
-        self.on_event(line)
-
-    def _show(self, **changes: object) -> None:
-        with self._lock:
-            self._change(**changes)
-
-    def _change(self, **changes: object) -> None:
-        """Update the view, including the mission's state. The caller must hold the lock."""
-        if self._mission is not None:
-            now = self._mission.summary
-            changes |= {"state": now.state, "reason": now.reason, "line": now.line}
-            if now.has_ended:
-                changes["busy"] = ""
-        self._view = replace(self._view, **changes)  # type: ignore[arg-type]  # names and values of its fields
-        self._lock.notify_all()
-        self._changed()
-
-
-_UNCHECKED: dict[str, object] = {
-    "check": None,
-    "missing_skills": (),
-    "unknown_rooms": (),
-    "programless": None,
-    "busy": CHECKING,
-}
-"""The fields of the view for a program that has not been checked."""
 
 
 def _sentence(error: Exception) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
 from codebotler.core.errors import UserError
@@ -40,6 +40,15 @@ def find_mission(home: Path, name: str) -> Path:
     if not _MISSION_ID.fullmatch(name) or not (folder / SUMMARY_FILE).is_file():
         raise UserError(f'there is no mission "{name}"; `codebotler missions` lists them')
     return folder
+
+
+def find_continuations(folder: Path) -> list[MissionSummary]:
+    """Return the missions that continue the mission in a folder, oldest first, without damaged ones."""
+    found: list[MissionSummary] = []
+    for other in sorted(folder.parent.glob(f"*/{SUMMARY_FILE}")):
+        with suppress(UserError, OSError):
+            found.append(MissionSummary.read(other.parent))
+    return [one for one in found if one.continues == folder.name]
 
 
 def recover_missions(home: Path) -> list[MissionSummary]:

@@ -25,6 +25,15 @@ _SYNTAX_ERRORS = frozenset({"SyntaxError", "IndentationError", "TabError"})
 
 CHECKING = "checking"  # a value of `SessionView.busy`
 
+UNCHECKED: dict[str, object] = {
+    "check": None,
+    "missing_skills": (),
+    "unknown_rooms": (),
+    "programless": None,
+    "busy": CHECKING,
+}
+"""The fields of the view for a program that has not been checked."""
+
 Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking", "no-program", "question"]
 
 

@@ -65,6 +65,11 @@ def reason_text(reason: str, line: int | None) -> str:
     return reason if line is None else f"line {line}: {reason}"
 
 
+def capitalize(words: str) -> str:
+    """Return a sentence with a capital letter at its beginning."""
+    return words[:1].upper() + words[1:]
+
+
 def title(summary: MissionSummary) -> str:
     """Return the title of a mission: its instruction, or else the first skills that its program calls."""
     if summary.instruction:

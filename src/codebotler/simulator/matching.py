@@ -18,6 +18,9 @@ Matching: TypeAlias = Literal["label-in-request", "whole-words", "longest-name"]
 - `longest-name`: the label that equals it, else the one that matches most of its words.
 """
 
+_ARTICLE = re.compile(r"^(?:the|an?|any|some)\s+")
+SOMEBODY = "somebody"
+
 WORDS_FOR_PEOPLE = (
     *("person", "people", "human", "someone", "somebody", "anyone", "anybody", "everyone", "everybody"),
     *("visitor", "guest", "employee", "colleague", "coworker", "occupant"),
@@ -220,3 +223,10 @@ def means_person(request: str) -> bool:
 def content_words(request: str) -> list[str]:
     """Return the words of a description without articles and the like, in lower case."""
     return [word for word in _WORD.findall(request.casefold()) if word not in _FILLERS]
+
+
+def normalized(request: str) -> str:
+    """Return the canonical form of a requested name: drop articles, and map all words for people to one."""
+    name = " ".join(request.casefold().split())
+    name = _ARTICLE.sub("", name, count=1)
+    return SOMEBODY if means_anybody(name) else name

@@ -6,9 +6,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from codebotler.core.words import brief
-from codebotler.simulator.matching import contains
-
-SOMEBODY = "somebody"
+from codebotler.simulator.matching import SOMEBODY, contains
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from codebotler.core.world import Room, World
 from codebotler.simulator.entities import NO_WORDS, Thing
 from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.matching import (
+    SOMEBODY,
     WORDS_FOR_PEOPLE,
     WORDS_FOR_THINGS,
     Entity,
@@ -27,11 +28,11 @@ from codebotler.simulator.matching import (
     means_anybody,
     means_person,
     meant_by,
+    normalized,
 )
 from codebotler.simulator.robot import SimulatedRobot, SkillGuard
 from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.sampled_facts import (
-    SOMEBODY,
     ExploredRoom,
     GivenAnswer,
     RandomOutcome,
@@ -43,7 +44,6 @@ from codebotler.simulator.settings import SimulationSettings
 
 AS_WRITTEN = SimulationSettings(literals="as-written", matching="longest-name")  # as on a robot
 AGREEING_TEXT = re.compile(r"\s*(?:yes|yeah|sure|ok)\b", re.IGNORECASE)
-_ARTICLE = re.compile(r"^(?:the|an?|any|some)\s+")
 
 
 class SampledRobot(SimulatedRobot):
@@ -397,10 +397,3 @@ class SampledRobot(SimulatedRobot):
 
 def _is(thing: Thing, name: str) -> bool:
     return thing.is_meant_by(name, "longest-name")
-
-
-def normalized(request: str) -> str:
-    """Return the canonical form of a requested name: drop articles, and map all words for people to one."""
-    name = " ".join(request.casefold().split())
-    name = _ARTICLE.sub("", name, count=1)
-    return SOMEBODY if means_anybody(name) else name

@@ -137,7 +137,7 @@ def draw_scene(
             shown = PlainText("span", deed.text, f"{look} wrong" if deed.step in wrong else look)
             _number(shown, deed.step, anchor)
             if deed.is_repeated:
-                PlainText("span", "already done", "repeated")
+                PlainText("span", "done already, would happen again", "repeated")
 
 
 def _number(element: PlainText, step: int, anchor: str) -> None:

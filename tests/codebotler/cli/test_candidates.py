@@ -32,8 +32,8 @@ def attempt(program: str, number: int) -> Attempt:
 class Terminal:
     """A person who answers with the given lines, and a model that writes the given programs."""
 
-    def __init__(self, programs: Sequence[str], *lines: str) -> None:
-        self.programs, self.lines = programs, list(lines)
+    def __init__(self, programs: Sequence[str], *lines: str, model: str = "") -> None:
+        self.programs, self.lines, self.model = programs, list(lines), model
         self.instructions: list[str] = []
         self.asked: list[str] = []
 
@@ -46,7 +46,7 @@ class Terminal:
         return self.lines.pop(0)
 
     def chosen(self, *, asks: bool = True) -> tuple[str, str] | None:
-        search = CandidateSearch(self.request, CheckSettings(), None, self.read if asks else None)
+        search = CandidateSearch(self.request, CheckSettings(), None, self.read if asks else None, self.model)
         return choose_candidate(search, "Count the mugs.")
 
 
@@ -81,6 +81,13 @@ def test_there_is_no_third_round() -> None:
     person = Terminal([ONE, TWO], "none\n", "Only clean ones.\n", "none\n")
     assert person.chosen() is None
     assert len(person.instructions) == 2
+
+
+def test_nobody_writes_a_sentence_for_a_recorded_model(capsys: pytest.CaptureFixture[str]) -> None:
+    person = Terminal([ONE, TWO], "none\n", model="recorded:careful")
+    assert person.chosen() is None
+    assert len(person.instructions) == 1
+    assert "recorded model" in capsys.readouterr().err
 
 
 def test_the_person_may_give_up() -> None:

@@ -1,8 +1,10 @@
 """Several programs for one prompt: other samples, of which none is checked."""
 
+import asyncio
+
 import pytest
 
-from codebotler.generation.candidates import CONCURRENT_REQUESTS, request_candidates
+from codebotler.generation.candidates import CONCURRENT_REQUESTS, gather_candidates
 from codebotler.generation.generate import Attempt
 from codebotler.models.base import ModelError, Reply
 from codebotler.prompts import prompt_for
@@ -13,7 +15,7 @@ PROMPT = prompt_for("Say hello.")
 
 def test_each_candidate_is_another_sample() -> None:
     model, seen = Scripted(), list[Attempt]()
-    attempts = request_candidates(model, PROMPT, 6, on_attempt=seen.append)
+    attempts = asyncio.run(gather_candidates(model, PROMPT, 6, seen.append))
     assert model.asked == [("Say hello.", number) for number in range(6)]
     assert ["say" in one.reply.program and str(one.number) in one.reply.program for one in attempts] == [
         True
@@ -24,14 +26,14 @@ def test_each_candidate_is_another_sample() -> None:
 
 def test_requests_run_at_the_same_time_and_the_model_is_closed() -> None:
     model = Scripted(seconds=0.001)
-    request_candidates(model, PROMPT, 6)
+    asyncio.run(gather_candidates(model, PROMPT, 6))
     assert (model.most, model.closed) == (CONCURRENT_REQUESTS, True)
 
 
 def test_the_model_is_closed_after_an_error() -> None:
     model = Scripted(fails=lambda _: ModelError("no quota", may_pass=False))
     with pytest.raises(ModelError, match="no quota"):
-        request_candidates(model, PROMPT, 2)
+        asyncio.run(gather_candidates(model, PROMPT, 2))
     assert model.closed
 
 
@@ -41,6 +43,6 @@ def test_a_reply_without_a_program_is_described() -> None:
             found = await super().reply(*given, **named)  # type: ignore[arg-type] # as given
             return Reply("No.", "", found.usage, None, "stop", no_program="refusal")
 
-    (attempt,) = request_candidates(Refusing(), PROMPT, 1)
+    (attempt,) = asyncio.run(gather_candidates(Refusing(), PROMPT, 1))
     assert attempt.programless is not None
     assert attempt.problems == (attempt.programless.sentence,)

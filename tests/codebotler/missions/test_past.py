@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +20,8 @@ from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
-from codebotler.missions.log import MissionSummary
+from codebotler.missions.log import MissionSummary, add_event, open_log
+from codebotler.missions.map_event import map_data
 from codebotler.missions.mission import Mission
 from codebotler.missions.past import MissionPast, read_past
 from codebotler.missions.recovery import PriorApproval
@@ -449,6 +451,16 @@ def test_a_mission_of_another_robot_is_not_continued(tmp_path: Path) -> None:
     assert read_past(folder, SKILLS, "simulated").mission
     with pytest.raises(UserError):
         read_past(folder, SKILLS, "ros2")
+
+
+def test_a_mission_on_another_map_is_not_continued(tmp_path: Path) -> None:
+    folder = failed(tmp_path, BRING)
+    with closing(open_log(folder)) as log:
+        add_event(log, "map", 0.0, **map_data(WORLD))
+    larger = World((*WORLD.rooms, Room("attic")), "hall")
+    assert [read_past(folder, SKILLS, world=world).mission for world in (WORLD, larger)] == [folder.name] * 2
+    with pytest.raises(UserError, match="lab"):
+        read_past(folder, SKILLS, world=World(WORLD.rooms[:2], "hall"))
 
 
 def test_own_skills_are_not_repeated_either(tmp_path: Path) -> None:

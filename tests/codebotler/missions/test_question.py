@@ -26,12 +26,14 @@ FETCH = 'def task_program():\n    go_to("kitchen")\n    pick("mug")\n    go_to("
 
 
 @contextmanager
-def asking(home: Path, *programs: str, asks: bool = True) -> Iterator[tuple[MissionSession, Several]]:
+def asking(
+    home: Path, *programs: str, asks: bool = True, name: str = "several"
+) -> Iterator[tuple[MissionSession, Several]]:
     model = Several(programs)
     session = MissionSession(
         Simulated(HOUSE, speed=None),
         home,
-        MissionOrder("Do it.", "several", candidates=len(programs), asks=asks),
+        MissionOrder("Do it.", name, candidates=len(programs), asks=asks),
         open_model=lambda _: model,
         check=checker(SKILLS),
     )
@@ -75,9 +77,13 @@ def test_a_person_chooses_and_the_mission_keeps_the_answer(
 
 def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_path: Path) -> None:
     with asking(tmp_path, STAY, FETCH) as (session, model):
-        waited(session)
+        question = waited(session).question
+        assert question is not None
+        assert not question.why_last
         session.answer("none", "But  quietly.")
         view = session.wait_until(lambda now: now.waits_for_answer)
+        assert view.question is not None
+        assert view.question.why_last
         assert view.instruction == "Do it. But quietly."
         assert model.prompts[-1].instruction == "Do it. But quietly."
         session.answer("none", "And fast.")
@@ -85,6 +91,17 @@ def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_pa
         assert view.state is MissionState.FAILED
         summary = MissionSummary.read(tmp_path / "missions" / view.id)
         assert summary.instruction == "Do it. But quietly."
+
+
+def test_a_recorded_model_is_not_asked_again(tmp_path: Path) -> None:
+    with asking(tmp_path, STAY, FETCH, name="recorded:several") as (session, model):
+        question = waited(session).question
+        assert question is not None
+        session.answer("none", "But quietly.")
+        view = session.wait_until(lambda now: now.state is MissionState.FAILED or now.waits_for_answer)
+        assert question.why_last
+        assert question.why_last in view.reason
+        assert (view.instruction, len(model.prompts)) == ("Do it.", 2)
 
 
 def test_nobody_is_asked_if_all_do_the_same_or_nobody_can_answer(tmp_path: Path) -> None:

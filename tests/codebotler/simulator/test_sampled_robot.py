@@ -14,10 +14,11 @@ from codebotler.core.errors import RobotError
 from codebotler.core.trace import Option
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.matching import normalized
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.sampled_facts import Whereabouts
-from codebotler.simulator.sampled_robot import SampledRobot, normalized
+from codebotler.simulator.sampled_robot import SampledRobot
 
 ROOMS = RoomMap(("start_loc", "kitchen", "lab"), "start_loc")
 YES_NO = (Option("Yes"), Option("No"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,8 @@ from codebotler.core.errors import UserError
 from codebotler.core.trace import Event
 from codebotler.core.world import Room, World
 from codebotler.missions import recovery
-from codebotler.missions.log import MissionState, MissionSummary
+from codebotler.missions.log import MissionState, MissionSummary, add_event, open_log
+from codebotler.missions.map_event import map_data
 from codebotler.missions.past import MissionPast
 from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.session import MissionSession
@@ -120,7 +122,7 @@ def test_a_mission_without_an_instruction_is_continued_from_its_program(tmp_path
         view = until(console, lambda view: view.check is not None)
         assert view.check is not None
         assert (view.program, view.model, view.may_be_edited) == (TYPED, "", True)
-        assert any("hello" in problem.message for problem in view.check.problems)
+        assert any("hello" in one.message and "kitchen" in one.message for one in view.check.problems)
         (strip,) = strips(view.check)
         marked = [(deed.text, deed.is_repeated) for scene in strip.scenes for deed in scene.deeds]
         assert marked == [("hello", True)]
@@ -159,6 +161,26 @@ def test_an_unsure_step_is_a_persons_to_decide(tmp_path: Path) -> None:
         view = until(console, lambda view: view.check is not None)
         assert view.past is not None
         assert view.past.trace[-1].text == "hello"
+
+
+def test_a_mission_on_another_map_has_an_obstacle(tmp_path: Path) -> None:
+    elsewhere = World((Room("hall"), Room("cellar")), "hall")
+    same, other = (failed_mission(tmp_path, TYPED, WORLD, "") for _ in range(2))
+    for folder, world in ((same, WORLD), (other, elsewhere)):
+        cut(folder, line_of(folder, "say", "result"), MissionState.RUNNING)
+        with closing(open_log(folder)) as log:
+            add_event(log, "map", 0.0, **map_data(world))
+    with desk_of(tmp_path, Author()) as console:
+        assert [bool(console.obstacles[folder.name]) for folder in (same, other)] == [False, True]
+
+
+def test_a_new_mission_removes_the_notice_of_another_one(tmp_path: Path) -> None:
+    folder = failed_mission(tmp_path, TYPED, WORLD, "")
+    cut(folder, line_of(folder, "say", "result"), MissionState.RUNNING)
+    with desk_of(tmp_path, Author()) as console:
+        assert console.interrupted
+        console.begin(MissionOrder(program=GO_BACK))
+        assert console.interrupted == ()
 
 
 def test_the_robot_and_the_log_are_witnesses(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from codebotler.core.terminal import shortened
 from codebotler.core.words import counted, listed
 from codebotler.missions.mission import MissionError
 from codebotler.missions.view import SessionView
+from codebotler.missions.wording import capitalize
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, scroll_up, warn
 from codebotler.web.storyboard import draw_scene, scenes
@@ -47,9 +48,13 @@ class CandidatesPane:
             for number, option in enumerate(question.options):
                 with ui.element("article").classes("card"):
                     self._draw_option(question, option, number)
-        more = ui.input("What should be different?").props(f"outlined maxlength={_MAX_SENTENCE}")
+        more = None
+        if question.why_last:
+            PlainText("p", f'{capitalize(question.why_last)}, so "None of these" ends the mission.', "quiet")
+        else:
+            more = ui.input("What should be different?").props(f"outlined maxlength={_MAX_SENTENCE}")
         with ui.element("div").classes("others"):
-            Button("None of these", lambda: self._answer("none", more.value or ""), "plain")
+            Button("None of these", lambda: self._reject(more), "plain")
             Button("You decide (the first one)", lambda: self._answer("decide"), "plain")
 
     def _draw_option(self, question: ClarifyingQuestion, option: CandidateOption, number: int) -> None:
@@ -64,11 +69,17 @@ class CandidatesPane:
         button = Button("This one", lambda: self._answer(number), "go")
         button.props(f'aria-label="This one: option {number + 1}"')
 
+    async def _reject(self, more: ui.input | None) -> None:
+        """Answer `none`, with a sentence if there is a field for one."""
+        sentence = "" if more is None else str(more.value or "").strip()
+        if more is not None and not sentence:
+            warn("Say what should be different, or stop the mission.")
+        else:
+            await self._answer("none", sentence)
+
     async def _answer(self, answer: ClarifyingAnswer, more: str = "") -> None:
         session = self._console.session
-        if answer == "none" and not more.strip():
-            warn("Say what should be different, or stop the mission.")
-        elif session is not None:
+        if session is not None:
             try:
                 await asyncio.to_thread(session.answer, answer, more)
                 scroll_up()

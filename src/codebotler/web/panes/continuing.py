@@ -17,6 +17,7 @@ from codebotler.missions.mission import MissionError
 from codebotler.missions.past import MissionPast
 from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.view import SessionView
+from codebotler.missions.wording import capitalize
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, outside, scroll_up, warn
 
@@ -73,7 +74,7 @@ def _ask(console: Console, past: MissionPast, evidence: list[str]) -> None:
 
     with ui.dialog() as dialog, ui.card().classes("pane"):
         PlainText("h3", "Did this happen?")
-        PlainText("p", f"{past.question[:1].upper()}{past.question[1:]}.")
+        PlainText("p", f"{capitalize(past.question)}.")
         for sentence in evidence:
             PlainText("p", sentence, "quiet")
         with ui.element("div").classes("word"):

@@ -16,6 +16,7 @@ from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
 from codebotler.missions.log import MissionSummary
 from codebotler.missions.store import read_missions
+from codebotler.missions.view import SessionView
 from codebotler.missions.wording import reason_text, title
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText, outside
@@ -81,7 +82,7 @@ class _MissionList:
     async def update(self) -> None:
         """Reload the list if the state of the current mission has changed."""
         view = self._console.view
-        seen = (view.id, view.state, view.reason)
+        seen = (view.id, view.state, view.reason, view.waits_for_answer)
         if seen == self._seen:
             return
         try:
@@ -108,6 +109,7 @@ class _MissionList:
         found = [summary for summary in reversed(self._known) if self._chosen.shows(summary)]
         self._count.say(_count_text(len(found), len(self._known)))
         found = found[:MAX_LISTED_MISSIONS]
+        later = {one.continues: one.id for one in self._known if one.continues}
         for gone in self._rows.keys() - {summary.id for summary in found}:
             self._rows.pop(gone).element.delete()
         for position, summary in enumerate(found):
@@ -116,7 +118,13 @@ class _MissionList:
                 with self._list:
                     row = self._rows[summary.id] = _MissionRow(summary.id)
                 row.element.move(self._list, position)
-            row.show(summary)
+            row.show(summary, state_words(summary, self._console.view), later.get(summary.id, ""))
+
+
+def state_words(summary: MissionSummary, view: SessionView) -> str:
+    """Return the state of a mission, or that it waits for a person's answer, given the current view."""
+    is_asking = summary.id == view.id and view.waits_for_answer
+    return "waits for an answer" if is_asking else str(summary.state)
 
 
 def _select_box(label: str, value: str, chosen: Any) -> ui.select:  # noqa: ANN401 - any handler of NiceGUI's
@@ -149,13 +157,15 @@ class _MissionRow:
                 self._outcome = PlainText("span", "", "outcome")
             self._state = PlainText("small")
 
-    def show(self, summary: MissionSummary) -> None:
-        """Update the entry for a mission."""
+    def show(self, summary: MissionSummary, state: str, later: str) -> None:
+        """Update the entry for a mission. `later` is the ID of a mission that continues it, if any."""
         self._time.say(f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
         self._title.say(shortened(title(summary), _MAX_TITLE))
         reason = (
             shortened(reason_text(summary.reason, summary.line), _MAX_LISTED_REASON) if summary.reason else ""
         )
-        self._outcome.say(" · ".join(filter(None, (f"robot: {summary.robot}", reason))))
-        self._state.say(summary.state)
+        before = f"continues mission {summary.continues}" if summary.continues else ""
+        after = f"continued by mission {later}" if later else ""
+        self._outcome.say(" · ".join(filter(None, (f"robot: {summary.robot}", reason, before, after))))
+        self._state.say(state)
         self._state.classes(replace=f"state state-{summary.state}")

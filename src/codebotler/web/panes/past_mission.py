@@ -14,12 +14,13 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
 from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState, MissionSummary, read_events
-from codebotler.missions.store import find_mission
-from codebotler.missions.wording import activity, event_text, reason_text, stop_text, title
+from codebotler.missions.store import find_continuations, find_mission
+from codebotler.missions.wording import activity, capitalize, event_text, reason_text, stop_text, title
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText, outside
 from codebotler.web.live import follow
 from codebotler.web.panes.continuing import EARLY_ENDS, ContinueButton, can_be_continued
+from codebotler.web.panes.mission_list import state_words
 
 MAX_LISTED_EVENTS, _MAX_CODE_CHARACTERS = 1_000, 200
 _STATE_TITLES: Mapping[str, str] = {MissionState.DRAFTING: "Program written", MissionState.RUNNING: "Started"}
@@ -37,18 +38,18 @@ def add(console: Console, frame: Frame) -> None:
         frame("Mission", "/missions")
         with ui.element("div").classes("past"):
             try:
-                summary, events = await asyncio.to_thread(_read, console, mission)
+                summary, events, later = await asyncio.to_thread(_read, console, mission)
             except UserError as error:
                 PlainText("p", error.sentence, "trouble")
                 return
-            page = _MissionPage(summary)
-            page.show(summary, events)
-            if (
-                summary.state in EARLY_ENDS
-                and can_be_continued(summary)
-                and summary.robot == console.robot.name
-            ):
-                ContinueButton(console, summary.id)
+            page = _MissionPage(console, summary)
+            page.show(summary, events, later)
+            if summary.state in EARLY_ENDS and can_be_continued(summary):
+                obstacle = await asyncio.to_thread(console.obstacle_to, mission)
+                if not obstacle:
+                    ContinueButton(console, summary.id)
+                elif not later:  # the link to a later mission says enough
+                    PlainText("p", f"{capitalize(obstacle)}.", "quiet")
             if not summary.has_ended:
                 await follow(console.notifier, partial(_update, console, page))
 
@@ -70,7 +71,7 @@ def timeline(events: Sequence[LogLine]) -> Iterator[tuple[LogLine, str]]:
             doing = ""
         if event == "stop":
             is_stopped = True
-            yield line, _capitalize(stop_text(line["by"], doing))
+            yield line, capitalize(stop_text(line["by"], doing))
             continue
         is_hidden = event == "cancelled" or (is_stopped and line.get("state") in _STATES_IMPLIED_BY_STOP)
         words = "" if is_hidden else timeline_text(line, is_first=number == 0)
@@ -88,22 +89,21 @@ def timeline_text(line: LogLine, *, is_first: bool) -> str:
             problems = len(line.get("problems", ()))
             step = f"Checked: {counted(problems, 'problem') if problems else 'no problems'}"
         return f"{step}: {reason.removeprefix(f'{state} ')}" if reason else step
-    return "" if event == "feedback" else _capitalize(event_text(line))
+    return "" if event == "feedback" else capitalize(event_text(line))
 
 
-def _capitalize(words: str) -> str:
-    return words[:1].upper() + words[1:]
-
-
-def _read(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine]]:
+def _read(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine], list[str]]:
+    """Return the summary and the events of a mission, and the IDs of missions that continue it."""
     folder = find_mission(console.home, mission)
-    return MissionSummary.read(folder), read_events(folder)
+    later = [one.id for one in find_continuations(folder)]
+    return MissionSummary.read(folder), read_events(folder), later
 
 
 class _MissionPage:
-    def __init__(self, summary: MissionSummary) -> None:
+    def __init__(self, console: Console, summary: MissionSummary) -> None:
         self.mission, self.has_ended = summary.id, False
-        self._shown: MissionSummary | None = None
+        self._console = console
+        self._shown: object = None
         self._count = 0
         self._head = ui.element("div").classes("mission-head")
         PlainText("h2", "What happened")
@@ -112,14 +112,15 @@ class _MissionPage:
         PlainText("h2", "Program")
         self._source = ui.element("pre").classes("source").props("tabindex=0 dir=auto")
 
-    def show(self, summary: MissionSummary, events: Sequence[LogLine]) -> None:
-        """Show a mission, including new events."""
+    def show(self, summary: MissionSummary, events: Sequence[LogLine], later: Sequence[str]) -> None:
+        """Show a mission, including new events, and links to the missions that continue it."""
         self.has_ended = summary.has_ended
-        if summary != self._shown:
-            self._shown = replace(summary)
+        state = state_words(summary, self._console.view)
+        if (summary, state) != self._shown:
+            self._shown = (replace(summary), state)
             self._head.clear()
             with self._head:
-                _draw_header(summary)
+                _draw_header(summary, state, later)
             self._source.clear()
             with self._source:
                 _draw_source(summary)
@@ -132,11 +133,11 @@ class _MissionPage:
         self._more.say(f"Download the events to see {more:,} more." if more > 0 else "")
 
 
-def _draw_header(summary: MissionSummary) -> None:
+def _draw_header(summary: MissionSummary, state: str, later: Sequence[str]) -> None:
     began = datetime.fromtimestamp(summary.created).astimezone()
     PlainText("h1", shortened(title(summary), 300))
     with ui.element("div").classes(f"ending ending-{summary.state}"):
-        PlainText("small", summary.state, f"state state-{summary.state}")
+        PlainText("small", state, f"state state-{summary.state}")
         if summary.reason:
             PlainText("span", shortened(reason_text(summary.reason, summary.line)), "reason")
         if code := _last_line(summary):
@@ -144,6 +145,12 @@ def _draw_header(summary: MissionSummary) -> None:
     by_hand = " · program typed or edited by hand" if summary.program else ""
     by = f" · program by {summary.model}" if summary.model else by_hand
     PlainText("p", f"{began:%d %b %Y, %H:%M:%S} · robot: {summary.robot}{shortened(by)}", "facts")
+    for words, mission in (("Continues", summary.continues), *(("Continued by", one) for one in later)):
+        if mission:
+            with ui.element("p").classes("chain"):
+                PlainText("span", words)
+                with html.a(href=outside(f"/missions/{mission}")):
+                    PlainText("span", f"mission {mission}")
     with ui.element("p").classes("downloads"):
         for kind, name in (("jsonl", "Events (JSON lines)"), ("mcap", "MCAP, for Foxglove")):
             html.a(name, href=outside(f"/api/missions/{summary.id}/events.{kind}")).props("download")

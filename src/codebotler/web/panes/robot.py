@@ -13,7 +13,7 @@ from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.log import MissionState, MissionSummary
 from codebotler.missions.progress import ANSWER, Moment, position_on_map
 from codebotler.missions.view import Phase, SessionView
-from codebotler.missions.wording import reason_text
+from codebotler.missions.wording import capitalize, reason_text
 from codebotler.web.console import Console
 from codebotler.web.floorplan import MapState, floorplan, room_at
 from codebotler.web.frame import Button, PlainText, script
@@ -116,7 +116,11 @@ class RobotPane:
         with self._interrupted:
             for summary in summaries:
                 PlainText("p", f"Mission {summary.id} was interrupted: {summary.reason}")
-                if can_be_continued(summary):
+                if not can_be_continued(summary):
+                    continue
+                if obstacle := self._console.obstacles[summary.id]:
+                    PlainText("p", f"{capitalize(obstacle)}.", "quiet")
+                else:
                     button = ContinueButton(self._console, summary.id)
                     button.props(f'aria-label="Continue mission {summary.id}"')
             Button("Dismiss", self._console.dismiss, "plain")

@@ -1,0 +1,152 @@
+"""The questions that agents' clients ask their person: to approve, to choose, and what happened."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any, Literal, TypeAlias
+
+from mcp.server.mcpserver import Context
+from mcp.server.mcpserver.exceptions import ToolError
+from mcp.server.mcpserver.resolve import Elicit, Resolve
+from pydantic import BaseModel, Field
+
+from codebotler.agents.gatekeeper import Gatekeeper
+from codebotler.agents.reports import question, which_question
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import shortened
+from codebotler.missions.mission import MissionError
+from codebotler.missions.past import MissionPast
+from codebotler.missions.recovery import ask_evidence
+from codebotler.missions.session import MissionSession
+from codebotler.models.base import ModelError, ignore_text
+
+MAX_ARGUMENT = 10_000
+"""The limit for an instruction, in characters."""
+
+AgentContext: TypeAlias = Context[Gatekeeper, Any]
+
+
+class Consent(BaseModel):
+    """The form in which a client asks its person."""
+
+    approve: bool = Field(
+        title="Run it on the robot", description="Tick this to let the robot do exactly this."
+    )
+
+
+class NotAsked(Consent):
+    """The answer to a question that nobody was asked."""
+
+    approve: bool = False
+
+
+class Choice(BaseModel):
+    """The form in which a client asks its person which behaviour they mean."""
+
+    answer: Literal["1", "2", "3", "none", "you decide"] = Field(title="Which did you mean?")
+    more: str = Field(default="", max_length=MAX_ARGUMENT, title="If none: what should be different?")
+
+
+class NotChosen(Choice):
+    """The answer to a question about behaviours that nobody was asked."""
+
+
+class StepWord(BaseModel):
+    """The form in which a client asks its person about an unsure step."""
+
+    answer: Literal["it happened", "it did not happen"] = Field(title="Did this happen?")
+
+
+class NoWord(StepWord):
+    """The answer to a question about a step that nobody was asked."""
+
+
+# --- who is asked, and what about
+
+
+async def find_question(ctx: AgentContext) -> MissionSession:
+    """Return the mission that waits for a person's choice."""
+    session = gatekeeper_of(ctx).console.session
+    if session is None or not session.view.waits_for_answer:
+        with as_tool_errors():
+            raise MissionError("no mission waits for such an answer")
+    return session
+
+
+def ask_which_behaviour(
+    session: Annotated[MissionSession, Resolve(find_question)], ctx: AgentContext
+) -> Elicit[Choice] | NotChosen:
+    """Have the client ask its person which behaviour they mean, if it can."""
+    asked = session.view.question
+    if asked is None or not gatekeeper_of(ctx).asks_client or not _has_dialogs(ctx):
+        return NotChosen(answer="none")
+    return Elicit(which_question(asked), Choice)
+
+
+async def read_last_past(ctx: AgentContext) -> MissionPast:
+    """Return the past of the last mission, or the one that the current mission continues."""
+    console = gatekeeper_of(ctx).console
+    with as_tool_errors():
+        if console.view.past is not None and not console.view.is_over:
+            return console.view.past
+        return await asyncio.to_thread(console.past_of, "last")
+
+
+async def ask_whether(
+    past: Annotated[MissionPast, Resolve(read_last_past)], ctx: AgentContext
+) -> Elicit[StepWord] | NoWord:
+    """Have the client ask its person whether an unsure step happened, beside what the robot says."""
+    gatekeeper = gatekeeper_of(ctx)
+    if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
+        return NoWord(answer="it did not happen")
+    robot, home = gatekeeper.console.robot, gatekeeper.console.home
+    evidence = await asyncio.to_thread(ask_evidence, robot, home, past, ignore_text)
+    return Elicit("\n".join((past.question, *evidence)), StepWord)
+
+
+async def find_session(digest: str, ctx: AgentContext) -> MissionSession:
+    """Return the mission whose program has a digest."""
+    with as_tool_errors():
+        return gatekeeper_of(ctx).find_session(digest)
+
+
+def ask_person(
+    session: Annotated[MissionSession, Resolve(find_session)], ctx: AgentContext
+) -> Elicit[Consent] | NotAsked:
+    """Have the client ask its person, unless the program is already approved or the client cannot ask."""
+    gatekeeper, view = gatekeeper_of(ctx), session.view
+    may_ask = view.may_be_approved and gatekeeper.may_ask_client(view) and _has_dialogs(ctx)
+    if not may_ask or gatekeeper.approves_alone(session):
+        return NotAsked()
+    return Elicit(question(view, gatekeeper.console.robot.name, gatekeeper.contract_text(view)), Consent)
+
+
+# --- the agent and its client
+
+
+def gatekeeper_of(ctx: AgentContext) -> Gatekeeper:
+    """Return what the server's tools share."""
+    return ctx.request_context.lifespan_context
+
+
+def agent_name(ctx: AgentContext) -> str:
+    """Return the agent's name for logs, as its client gives it."""
+    known = ctx.session.client_params
+    return f"agent {shortened(known.client_info.name, 60)}" if known is not None else "an agent"
+
+
+def _has_dialogs(ctx: AgentContext) -> bool:
+    capabilities = ctx.client_capabilities
+    forms = None if capabilities is None else capabilities.elicitation
+    return forms is not None and (forms.form is not None or forms.url is None)
+
+
+@contextmanager
+def as_tool_errors() -> Iterator[None]:
+    """Tell agents about mistakes in a sentence."""
+    try:
+        yield
+    except (UserError, MissionError, ModelError) as error:
+        raise ToolError(error.sentence) from None
