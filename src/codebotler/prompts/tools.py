@@ -92,7 +92,7 @@ def tools_for(skills: SkillTable) -> tuple[Tool, ...]:
 
 def schema_of(skill: Skill) -> str:
     """Return the JSON Schema of a skill's arguments, as JSON text."""
-    return _object_schema({parameter.name: _schema(parameter.type) for parameter in skill.parameters})
+    return object_schema({parameter.name: _schema(parameter.type) for parameter in skill.parameters})
 
 
 @cache
@@ -114,7 +114,8 @@ def _schema(value: ValueType) -> dict[str, Any]:
     return {"type": "array", "items": one} if value.is_list else one
 
 
-def _object_schema(properties: dict[str, Any]) -> str:
+def object_schema(properties: dict[str, Any]) -> str:
+    """Return the JSON Schema, as JSON text, of an object that has all of these properties and no others."""
     return json.dumps(
         {
             "type": "object",
@@ -129,11 +130,11 @@ _MORE_TOOLS = (
     Tool(
         WAIT,
         "Let some seconds pass, and read the time afterwards.",
-        _object_schema({"seconds": {"type": "number"}}),
+        object_schema({"seconds": {"type": "number"}}),
     ),
     Tool(
         GIVE_UP,
         "End the mission because the instruction cannot be carried out. Say why.",
-        _object_schema({"reason": {"type": "string"}}),
+        object_schema({"reason": {"type": "string"}}),
     ),
 )

@@ -8,10 +8,12 @@ from dataclasses import asdict, dataclass
 from itertools import combinations
 from typing import Any, TypeVar
 
+import polars as pl
+
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.counts import tally_of
+from roboeval.analysis.counts import completions_of, tally_of
 from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of
 from roboeval.analysis.statistics import SampleSizes, by_bootstrap, p_by_signs, sample_sizes
 from roboeval.analysis.summary import cut_off_replies, failures
@@ -150,7 +152,7 @@ def other_differences(first: Results, second: Results) -> list[str]:
         found.append(f"the modes differ: {modes[0]} and {modes[1]}; {MISSIONS_COMPARED}")
     for name, words in COMPARED_SETTINGS.items():
         a, b = (run.get(name) for run in runs)
-        if a is not None and b is not None and a != b:
+        if a is not None and b is not None and a != b and (name != "template" or modes[0] == modes[1]):
             found.append(f"{words} differ: {_short(a)} and {_short(b)}")
     settings = [value if isinstance(value := run.get("settings"), dict) else {} for run in runs]
     if bool(settings[0]) != bool(settings[1]):
@@ -185,13 +187,12 @@ class ComparedRun:
     classes: Mapping[str, float]  # shares of judged completions, by class of failure
 
     @classmethod
-    def of(cls, name: str, results: Results) -> ComparedRun:
-        """Collect the coverage, cut-off replies and failure classes of a run."""
-        tally = tally_of(results.table)
-        found = failures(tally)
+    def of(cls, name: str, results: Results, table: pl.DataFrame | None = None) -> ComparedRun:
+        """Collect the coverage, cut-off replies and failure classes of a run, by default of its own table."""
+        found = failures(tally_of(results.table if table is None else table))
         shares = {one.name: one.share for one in found}
-        scope = results.scope
-        return cls(name, scope.coverage(tally.judged.total()), cut_off_replies(found, scope), shares)
+        scope, judged = results.scope, completions_of(results.table).height
+        return cls(name, scope.coverage(judged), cut_off_replies(found, scope), shares)
 
     @property
     def data(self) -> dict[str, Any]:

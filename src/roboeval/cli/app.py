@@ -10,6 +10,7 @@ from roboeval.cli.compare import compare, resample
 from roboeval.cli.evaluate import evaluate, import_
 from roboeval.cli.find import find
 from roboeval.cli.generate import generate, run
+from roboeval.cli.mcp import mcp
 from roboeval.cli.mutate import mutate
 from roboeval.cli.recover import recover
 from roboeval.cli.report import report
@@ -28,6 +29,7 @@ commands = (
     clarify,
     report,
     compare,
+    mcp,
     mutate,
     recover,
     serve,

@@ -65,17 +65,22 @@ _PAIR = 2
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
     """Print how much better the second of two runs is."""
     from roboeval.analysis.compare import ComparedRun, compare_scores, comparison_data, other_differences
+    from roboeval.analysis.counts import task_scores
     from roboeval.analysis.metrics import pass_at_1
-    from roboeval.analysis.missions import comparable_scores
+    from roboeval.analysis.missions import comparable_tables
     from roboeval.cli.views.comparison import comparison_view
 
     opened = [open_current(path, suite, ablated=ablated) for path in paths]
     expect_same_suite(opened)
-    result = compare_scores(*map(pass_at_1, comparable_scores(*(one.results.table for one in opened))))
+    tables = comparable_tables(*(one.results.table for one in opened))
+    result = compare_scores(*(pass_at_1(task_scores(table)) for table in tables))
     warnings = other_differences(*(one.results for one in opened))
     for warning in warnings:
         note(f"warning: {warning}")
-    first, second = (ComparedRun.of(str(path), one.results) for path, one in zip(paths, opened, strict=True))
+    first, second = (
+        ComparedRun.of(str(path), one.results, table)
+        for path, one, table in zip(paths, opened, tables, strict=True)
+    )
     if as_json:
         data = comparison_data(result, (first.name, second.name))
         both = {side: data[side] | run.data for side, run in (("first", first), ("second", second))}

@@ -7,13 +7,13 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from codebotler.cli.ending import STOPPED
 from codebotler.cli.model_options import inherit_options, model_settings, note_unsent
-from codebotler.cli.options import BaseUrlOption, ModelOption
+from codebotler.cli.options import BaseUrlOption, ModelOption, WithinOption, read_within
 from codebotler.core.errors import install_command, installed
 from codebotler.core.words import counted
 from roboeval.cli.engine_choice import engine_named
@@ -46,11 +46,10 @@ if TYPE_CHECKING:
     from codebotler.models.base import Model
     from codebotler.models.batch import BatchModel
     from codebotler.models.sampling import SamplingSettings
-    from roboeval.evaluation.agents.plan import AgentMode
+    from roboeval.evaluation.agents.plan import AgentMode, AgentPlan
     from roboeval.evaluation.generate import GenerationProgress, Pace
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import RunFolder
-    from roboeval.suites.load import Suite
 
 MAX_BATCH_REQUESTS = 50_000
 
@@ -93,6 +92,7 @@ def read_options(
     mode: ModeOption = "program",
     max_turns: TurnsOption = None,
     max_mission_tokens: MissionTokensOption = None,
+    within: WithinOption = None,
     suite: SuiteOption = "paper",
     families: FamiliesOption = None,
     num_tasks: NumTasksOption = None,
@@ -107,6 +107,7 @@ def read_options(
     from codebotler.models.chosen import choose_model
     from codebotler.models.open import NOT_CALLING, kind_of
     from roboeval.evaluation.generate import Pace
+    from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import tasks_to_judge
 
     if families is not None or num_tasks is not None:
@@ -117,32 +118,31 @@ def read_options(
     pace = Pace(concurrency, requests_per_minute, token_budget)
     known = load(suite)
     selected = tasks_to_judge(known, tasks, ablated=False)[0]
-    plan = plan_for(mode, known, selected, num_completions, max_turns, max_mission_tokens)
+    plan = GenerationPlan(known, selected, num_completions or 50)
+    if mode != "program":
+        plan = missions_of(plan, mode, num_completions or 1, max_turns, max_mission_tokens, within)
+    elif max_turns or max_mission_tokens or within:
+        fail("--max-turns, --max-mission-tokens and --within need --mode agent or replan; add it")
     if mode == "agent" and kind_of(chosen.name) in NOT_CALLING:
         fail(f"{chosen.name} cannot call tools; --mode agent needs a chat model, such as openai-chat:NAME")
     return GenerationRequest(chosen.name, settings, plan, pace, suite, out)
 
 
-def plan_for(
-    mode: AgentMode | Literal["program"],
-    suite: Suite,
-    tasks: frozenset[str] | None,
-    num_completions: int | None,
-    max_turns: int | None,
-    max_mission_tokens: int | None,
-) -> GenerationPlan:
-    """Return the plan for a mode, with its default numbers of completions and turns."""
-    from roboeval.evaluation.requests import GenerationPlan
-
-    if mode == "program":
-        if max_turns or max_mission_tokens:
-            fail("--max-turns and --max-mission-tokens need --mode agent or replan; add it")
-        return GenerationPlan(suite, tasks, num_completions or 50)
+def missions_of(
+    plan: GenerationPlan,
+    mode: AgentMode,
+    count: int,
+    turns: int | None,
+    tokens: int | None,
+    within: Path | None,
+) -> AgentPlan:
+    """Return the plan of the missions for the prompts of a plan."""
     from roboeval.evaluation.agents.conversation import TurnLimits
     from roboeval.evaluation.agents.plan import DEFAULT_TURNS, AgentPlan
 
-    limits = TurnLimits(max_turns or DEFAULT_TURNS[mode], max_mission_tokens)
-    return AgentPlan(suite, tasks, num_completions or 1, mode=mode, limits=limits)
+    limits = TurnLimits(turns or DEFAULT_TURNS[mode], tokens)
+    contract = read_within(within, plan.suite.skills)
+    return AgentPlan(plan.suite, plan.tasks, count, mode=mode, limits=limits, contract=contract)
 
 
 def suite_of_families(suite: str, families: str | None, num_tasks: int | None, seed: int | None) -> str:

@@ -14,6 +14,7 @@ from codebotler.core.trace import Outcome, Status, Trace
 from codebotler.core.world import World
 from codebotler.rtl import Inconclusive, holds
 from codebotler.rtl.semantics import visible
+from codebotler.simulator.contract import Contract
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.worker import Worker
@@ -182,10 +183,16 @@ def _with_ending(outcomes: list[Outcome], acted: Acted | None) -> list[Outcome]:
     return outcomes if acted is None else [apply_ending(outcome, acted.ending) for outcome in outcomes]
 
 
-def robot_in(world: World, suite: Suite) -> SimulatedRobot:
+def robot_in(world: World, suite: Suite, contracts: Sequence[Contract] = ()) -> SimulatedRobot:
     """Return a simulated robot in a world, with the simulation settings and house rules of a suite."""
-    guard = None if suite.house is None else RuleGuard(suite.house.rules)
-    return SimulatedRobot(world, suite.settings, suite.skills, guard=guard)
+    return SimulatedRobot(world, suite.settings, suite.skills, guard=guard_of(suite, contracts))
+
+
+def guard_of(suite: Suite, contracts: Sequence[Contract] = ()) -> RuleGuard | None:
+    """Return what holds calls against the house rules of a suite and some contracts, or None without any."""
+    if suite.house is None and not contracts:
+        return None
+    return RuleGuard(() if suite.house is None else suite.house.rules, contracts=contracts)
 
 
 def judge_outcomes(suite: Suite, ran: Ran, *, ablated: bool) -> tuple[bytes, ...] | None:

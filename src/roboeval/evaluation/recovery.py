@@ -26,11 +26,11 @@ from codebotler.models.base import Model, ModelError
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.recorded import is_recorded
 from codebotler.prompts import Prompt, prompt_for
+from codebotler.simulator.contract import Contract
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.worker import Worker
-from roboeval.evaluation.judge import judge
+from roboeval.evaluation.judge import guard_of, judge
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.suites.load import Scenario, Suite
 
@@ -55,11 +55,13 @@ class RecordingRobot(SimulatedRobot):
         world: the world.
         suite: the suite with the settings, skills and house rules.
         made: the calls that it repeats at the start. A call of `SLEEP` lets time pass.
+        contracts: what it may do at most.
     """
 
-    def __init__(self, world: World, suite: Suite, *, made: Iterable[Call] = ()) -> None:
-        guard = None if suite.house is None else RuleGuard(suite.house.rules)
-        super().__init__(world, suite.settings, suite.skills, guard=guard)
+    def __init__(
+        self, world: World, suite: Suite, *, made: Iterable[Call] = (), contracts: Sequence[Contract] = ()
+    ) -> None:
+        super().__init__(world, suite.settings, suite.skills, guard=guard_of(suite, contracts))
         self.calls: list[Call] = []
         for skill, arguments in made:
             with suppress(RobotError):

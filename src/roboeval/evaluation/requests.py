@@ -9,13 +9,13 @@ from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Se
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias
+from typing import Any, ClassVar, Protocol, Self, TypeAlias
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line, write_whole
 from codebotler.core.words import brief
-from codebotler.models.base import Model, Reply
+from codebotler.models.base import Reply
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for, template_hash
 from roboeval.evaluation.runs.completions import (
@@ -28,14 +28,23 @@ from roboeval.evaluation.runs.completions import (
 from roboeval.evaluation.runs.folder import RunFolder, load_json_object
 from roboeval.suites.load import Suite
 
-if TYPE_CHECKING:
-    from codebotler.models.batch import BatchModel  # importing it at run time would load large libraries
-
 Ask: TypeAlias = Callable[[Prompt], Awaitable[Reply]]
 """Requests a reply."""
 
 WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change a model's replies
 OPTIONAL_SETTINGS = ("reasoning_effort", "extra_body")  # left out of run.json if unset
+
+
+class NamedModel(Protocol):
+    """A model with a name and settings, to which a run belongs."""
+
+    @property
+    def name(self) -> str:
+        """The name of the model."""
+
+    @property
+    def settings(self) -> SamplingSettings:
+        """The settings of the model."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +119,7 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
         total[name] += (usage or {}).get(name) or 0
 
 
-def run_metadata(run: RunFolder, plan: GenerationPlan, model: Model | BatchModel) -> dict[str, Any]:
+def run_metadata(run: RunFolder, plan: GenerationPlan, model: NamedModel) -> dict[str, Any]:
     """Return the content of run.json. Raise UserError if existing completions have other settings."""
     suite = plan.suite
     fixed = {

@@ -22,6 +22,7 @@ from roboeval.analysis.metrics import (
     share_at_least,
     threshold_curve,
 )
+from roboeval.analysis.missions import has_missions
 from roboeval.analysis.statistics import MIN_CLUSTERS, by_bootstrap
 from roboeval.report import figures, paper
 from roboeval.report.curves import draw_thresholds
@@ -48,7 +49,8 @@ def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         coverage = run.coverage
         counts = coverage.judged, coverage.total, len(run.by_prompt), len(tasks)
         rows.append([run.name, *counts, found[0].mean, *ends])
-    return sheet("overall", rows, notes=[*_unknown(runs), *_few_tasks(runs), *_unfinished(runs)])
+    missions = [note("missions")] if any(has_missions(run.table) for run in runs) else []
+    return sheet("overall", rows, notes=[*missions, *_unknown(runs), *_few_tasks(runs), *_unfinished(runs)])
 
 
 def _unknown(runs: Sequence[JudgedRun]) -> list[str]:

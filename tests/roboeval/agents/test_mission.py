@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from codebotler.checking.contract_file import contract_from
 from codebotler.core.errors import VIOLATION, UserError
 from codebotler.core.trace import Status
 from roboeval.evaluation.agents.mission import MAX_MISTAKES, MAX_REPEATS, AgentMission
@@ -158,6 +159,19 @@ def test_a_house_rule_ends_a_mission_as_it_ends_a_program(tmp_path: Path, paper:
     failure = judged(mission, suite)["failure"]
     assert failure is not None
     assert failure["kind"] == VIOLATION
+
+
+def test_a_contract_ends_a_mission_before_the_call_that_it_does_not_allow(paper: Suite) -> None:
+    allowed = contract_from({"get_all_rooms": {}, "say": {"message": ["hello"]}}, paper.skills)
+    mission = AgentMission.begin(paper, TASK, 0, WORLD, [allowed])
+    mission.call("say", {"message": "hello"})
+    mission.call("say", {"message": "goodbye"})
+    assert mission.ending == "OutsideContract"
+    assert [event.text for event in mission.outcome.trace] == ["hello"]
+    row = judged(mission, paper)
+    assert len(row["verdicts"][0]["trace"]) == 1
+    assert row["failure"] is not None
+    assert (row["failure"]["class"], row["failure"]["kind"]) == ("AgentError", "OutsideContract")
 
 
 def test_a_missing_world_is_named(paper: Suite) -> None:

@@ -88,11 +88,18 @@ def test_costs_are_those_of_a_mission(runs: tuple[Path, Path, str]) -> None:
     assert (other.tool_errors, other.forbidden) == (0.5, 0)
 
 
+def test_what_a_contract_or_a_rule_ended_is_forbidden(runs: tuple[Path, Path, str], tmp_path: Path) -> None:
+    missions = [mission(0, SAY), mission(1, SAY), mission(0, SAY, "OutsideContract"), mission(1, SAY)]
+    run = a_run(tmp_path / "bounded", runs[2], missions, "agent")
+    assert mission_costs(load_results(run, suite=runs[2])).forbidden == 0.25
+
+
 def test_the_command_compares_them_and_says_how(runs: tuple[Path, Path, str]) -> None:
     programs, agents, suite = runs
     paths = [str(programs), str(agents)]
     data = json.loads(roboeval("compare", *paths, "--suite", suite, "--json").out)
     assert (data["first"]["pass@1"], data["second"]["pass@1"]) == (0.5, 0.75)
+    assert data["first"]["failures"]["RobotExecutionError"] == 0.5  # of missions
     assert any("mission" in warning for warning in data["warnings"])
 
 

@@ -17,6 +17,8 @@ from codebotler.core.skills.values import written_call
 from codebotler.core.terminal import shortened
 from codebotler.core.trace import Option, Outcome
 from codebotler.prompts.tools import GIVE_UP, WAIT
+from codebotler.simulator.contract import CONTRACT, Contract
+from codebotler.simulator.house_rule import RuleViolationError
 from codebotler.simulator.ledger import Ledger, judge_end
 from codebotler.simulator.robot import Argument
 from codebotler.simulator.skill_protocol import named_arguments, named_result
@@ -26,6 +28,7 @@ from roboeval.evaluation.runs.endings import (
     FINAL_ANSWER,
     GAVE_UP,
     NO_CALL,
+    OUTSIDE_CONTRACT,
     REPEATED_CALLS,
     SEVERAL_CALLS,
     TIMEOUT,
@@ -51,10 +54,12 @@ class AgentMission:
     Args:
         suite: the suite with the skills, the house rules and the settings of the simulation.
         scenario: the world, and what is required there.
+        contracts: what the robot may do at most. A call outside of them ends the mission.
     """
 
     suite: Suite
     scenario: Scenario
+    contracts: Sequence[Contract] = ()
     ending: str | None = None  # one of `ENDINGS`; None before the end
     mistakes: Counter[str] = field(default_factory=Counter)  # and errors of the robot, by kind
     _lines: list[str] = field(default_factory=list)  # of the program
@@ -64,13 +69,15 @@ class AgentMission:
     _error: int | None = None  # the number of the last call's error, if it failed
 
     def __post_init__(self) -> None:
-        self._robot = robot_in(self.scenario.world, self.suite)
+        self._robot = robot_in(self.scenario.world, self.suite, self.contracts)
         self._ledger = Ledger(self._robot)
 
     @classmethod
-    def begin(cls, suite: Suite, task: str, prompt: int, world: int) -> Self:
+    def begin(
+        cls, suite: Suite, task: str, prompt: int, world: int, contracts: Sequence[Contract] = ()
+    ) -> Self:
         """Begin a mission for a prompt of a task, in the world with this index."""
-        return cls(suite, suite.task(task).scenarios[world].asked_by(prompt))
+        return cls(suite, suite.task(task).scenarios[world].asked_by(prompt), contracts)
 
     def call(self, name: str, arguments: str | Mapping[str, object]) -> str:
         """Make one call, and return what the agent is told. The call may end the mission."""
@@ -167,10 +174,11 @@ class AgentMission:
                     "    pass",
                 ]
             case _:
-                self._lines.append(source)
                 broken = self._ledger.broken
+                is_outside = isinstance(broken, RuleViolationError) and broken.rule == CONTRACT
+                self._lines.append(f"# {OUTSIDE_CONTRACT}: {source}" if is_outside else source)
                 self.mistakes[TIMEOUT if broken is None else broken.kind] += 1
-                self.ending = TIMEOUT if broken is None else ERROR
+                self.ending = TIMEOUT if broken is None else OUTSIDE_CONTRACT if is_outside else ERROR
                 return f"the mission is over: {self._ledger.limit}"
         self._watch_repeats((skill.name, values, text))
         return text

@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, ClassVar, Literal, TypeAlias
 
+from codebotler.checking.contract_file import contract_yaml
 from codebotler.models.base import Reply
 from codebotler.prompts import Prompt, template_hash
 from codebotler.prompts.tools import ToolPrompt, agent_prompt, agent_template_hash
+from codebotler.simulator.contract import Contract
 from roboeval.evaluation.agents.conversation import AgentConversation, Conversation, TurnLimits
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.agents.replan import ReplanConversation
@@ -29,10 +30,12 @@ class AgentPlan(GenerationPlan):
         mode: `agent` if the model calls skills, or `replan` if it writes a program and, after each failure,
             another one for the rest.
         limits: when a mission ends at the latest.
+        contract: what the robot may do at most in each mission, if that is limited.
     """
 
     mode: AgentMode
     limits: TurnLimits
+    contract: Contract | None = None
 
     has_turns: ClassVar[bool] = True
 
@@ -56,6 +59,7 @@ class AgentPlan(GenerationPlan):
             "mode": self.mode,
             "max_turns": self.limits.turns,
             **({} if self.limits.tokens is None else {"max_mission_tokens": self.limits.tokens}),
+            **({} if self.contract is None else {"contract": contract_yaml(self.contract)}),
         }
 
     async def complete(
@@ -72,10 +76,14 @@ class AgentPlan(GenerationPlan):
 
     def begin(self, key: CompletionKey) -> Conversation:
         """Begin the conversation about a mission."""
-        begin = partial(AgentMission.begin, self.suite, key[0], key[1], self.world(key))
         if self.mode == "replan":
-            return ReplanConversation(begin, self.prompt(key), self.limits)
-        return AgentConversation(begin(), self._agent_prompt(key), self.limits)
+            return ReplanConversation(self.begin_mission(key), self.prompt(key), self.limits)
+        return AgentConversation(self.begin_mission(key), self._agent_prompt(key), self.limits)
+
+    def begin_mission(self, key: CompletionKey) -> AgentMission:
+        """Begin a mission without a conversation."""
+        contracts = () if self.contract is None else (self.contract,)
+        return AgentMission.begin(self.suite, key[0], key[1], self.world(key), contracts)
 
     def prompt(self, key: CompletionKey) -> Prompt:
         """Return the first request of a mission."""

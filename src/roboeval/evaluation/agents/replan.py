@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from codebotler.core.errors import VIOLATION
@@ -21,13 +21,13 @@ class ReplanConversation:
     """Runs a model's programs one after the other, until one of them ends without an error.
 
     Args:
-        begin: begins the mission. It is called at the end, to make the calls of all programs.
+        mission: the mission, in which the calls of all programs are made at the end.
         prompt: the request for the first program.
         limits: the numbers of programs and tokens at most.
     """
 
-    def __init__(self, begin: Callable[[], AgentMission], prompt: Prompt, limits: TurnLimits) -> None:
-        self.mission, self._first, self._turns = begin(), prompt, Turns(limits)
+    def __init__(self, mission: AgentMission, prompt: Prompt, limits: TurnLimits) -> None:
+        self.mission, self._first, self._turns = mission, prompt, Turns(limits)
         self._next: Prompt | None = prompt
         self._calls: Sequence[Call] = ()
 
@@ -93,7 +93,8 @@ def _run(program: str, mission: AgentMission, made: Sequence[Call]) -> tuple[Rec
     robots: list[RecordingRobot] = []
 
     def new_robot() -> RecordingRobot:
-        robots.append(RecordingRobot(mission.scenario.world, mission.suite, made=made))
+        world, contracts = mission.scenario.world, mission.contracts
+        robots.append(RecordingRobot(world, mission.suite, made=made, contracts=contracts))
         return robots[-1]
 
     pool = shared_pool()

@@ -11,7 +11,7 @@ from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 FINAL_ANSWER, ERROR, TIMEOUT = "answer", "error", "TimeoutError"
 """The endings that programs have, too: a normal end, an error of the robot or a rule, and a limit."""
 
-NO_CALL, GAVE_UP = "NoCall", "GaveUp"
+NO_CALL, GAVE_UP, OUTSIDE_CONTRACT = "NoCall", "GaveUp", "OutsideContract"
 UNKNOWN_TOOL, WRONG_ARGUMENTS, SEVERAL_CALLS = "UnknownTool", "WrongArguments", "SeveralCalls"
 REPEATED_CALLS, TURN_LIMIT, TOKEN_LIMIT = "RepeatedCalls", "TurnLimit", "TokenLimit"
 
@@ -24,6 +24,7 @@ AGENT_SENTENCES: Mapping[str, str] = {
     TURN_LIMIT: "The agent reached the limit of turns.",
     TOKEN_LIMIT: "The agent reached the limit of tokens.",
     GAVE_UP: "The agent gave up.",
+    OUTSIDE_CONTRACT: "The agent wanted to do what the contract does not allow.",
 }
 """What each kind of ending means that only agents have, in a sentence."""
 

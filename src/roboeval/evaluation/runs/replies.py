@@ -11,6 +11,7 @@ from roboeval.evaluation.runs.completions import Completion
 
 TOKENS = ("input_tokens", "output_tokens", "reasoning_tokens")
 REPLY_TEXTS = ("reasoning", "raw_reply")
+MISSION_ENTRIES = ("mode", "ending", "turns", "tool_errors")
 MAX_RECORDED = 10**12  # tokens or seconds; larger numbers cannot be measurements
 
 
@@ -18,10 +19,12 @@ def reply_data(completion: Completion | None) -> dict[str, Any] | None:
     """Return the information recorded about a completion's reply, or None if there is none.
 
     The entries are `finish_reason` in the server's words, `cut_off`, `input_tokens`, `output_tokens`,
-    `reasoning_tokens`, `latency_s`, `reasoning` and `raw_reply`. Each may be None.
+    `reasoning_tokens`, `latency_s`, `reasoning` and `raw_reply`. Each may be None. A mission of an agent also
+    has `mode`, `ending`, `turns` and `tool_errors`.
     """
     more = {} if completion is None else completion.more
-    if completion is None or not any(more.get(name) for name in ("finish_reason", "raw_reply", "reasoning")):
+    is_recorded = any(more.get(name) for name in ("finish_reason", "raw_reply", "reasoning", "ending"))
+    if completion is None or not is_recorded:
         return None
     usage = more.get("usage")
     usage = usage if isinstance(usage, dict) else {}
@@ -33,6 +36,7 @@ def reply_data(completion: Completion | None) -> dict[str, Any] | None:
         **tokens,
         "latency_s": number_or_none(more.get("latency_s"), int | float),
         **texts,
+        **({} if completion.acted is None else {name: more.get(name) for name in MISSION_ENTRIES}),
     }
 
 
@@ -41,6 +45,10 @@ def reply_facts(reply: Mapping[str, Any]) -> list[str]:
     named = zip(TOKENS, ("in the prompt", "in the reply", "in its reasoning"), strict=True)
     tokens = [f"{reply[name]:,} {of}" for name, of in named if reply[name] is not None]
     facts = []
+    if "ending" in reply:
+        errors = reply["tool_errors"] if isinstance(reply["tool_errors"], dict) else {}
+        counts = "".join(f", {shortened(str(kind), 100)} {count}" for kind, count in errors.items())
+        facts.append(f"{reply['mode']}: {reply['turns']} replies{counts}; ended by {reply['ending']}")
     if reply["finish_reason"] is not None:
         ended = shortened(reply["finish_reason"], 100)
         facts.append(f'finish reason "{ended}"{" (cut off)" if reply["cut_off"] else ""}')

@@ -1,0 +1,144 @@
+"""Lets any MCP client act as the agent of a run: it asks for one mission after another and calls skills."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from mcp.server.lowlevel import Server
+from mcp.server.stdio import stdio_server
+from mcp_types import CallToolRequestParams, CallToolResult, ListToolsResult, TextContent
+from mcp_types import Tool as ClientTool
+
+from codebotler import __version__
+from codebotler.core.files import Appender, to_line, to_text, write_whole
+from codebotler.models.sampling import SamplingSettings
+from codebotler.prompts.tools import agent_prompt, object_schema, tools_for
+from roboeval.evaluation.agents.conversation import mission_data
+from roboeval.evaluation.agents.mission import AgentMission
+from roboeval.evaluation.agents.plan import AgentPlan
+from roboeval.evaluation.requests import run_metadata, with_batch
+from roboeval.evaluation.runs.completions import KEY, CompletionKey
+from roboeval.evaluation.runs.endings import TURN_LIMIT
+from roboeval.evaluation.runs.folder import RunFolder
+
+NEXT, FINISH = "next_mission", "finish_mission"
+_OVER = f"This mission is over; call {NEXT} for the next one."
+
+
+UNKNOWN_SETTINGS = SamplingSettings(temperature=None, top_p=None)
+
+
+@dataclass(frozen=True)
+class ClientAgent:
+    """A model behind an MCP client, which has settings of its own."""
+
+    name: str
+    settings: SamplingSettings = UNKNOWN_SETTINGS
+
+
+@dataclass
+class MissionDesk:
+    """Hands out the missions of a run that are not done, one at a time, and saves each at its end."""
+
+    plan: AgentPlan
+    agent: ClientAgent
+    file: Appender
+    todo: list[CompletionKey]
+    _current: tuple[CompletionKey, AgentMission] | None = None
+    _calls: int = 0
+    _lock: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    def tools(self) -> list[ClientTool]:
+        """Return the tools: the robot's skills, and those that begin and end a mission."""
+        answer = object_schema({"answer": {"type": "string"}})
+        offered = [
+            (NEXT, "Get the next mission. Call this first, and after each mission.", object_schema({})),
+            (FINISH, "End the mission, since everything is done.", answer),
+            *((tool.name, tool.description, tool.schema) for tool in tools_for(self.plan.suite.skills)),
+        ]
+        return [
+            ClientTool(name=name, description=words, input_schema=json.loads(schema))
+            for name, words, schema in offered
+        ]
+
+    async def call(self, name: str, arguments: dict[str, Any]) -> str:
+        """Make one call, and return what the client is told."""
+        async with self._lock:
+            return await asyncio.to_thread(self._call, name, arguments)
+
+    def _call(self, name: str, arguments: dict[str, Any]) -> str:
+        if self._current is None:
+            return self._begin() if name == NEXT else f"There is no mission; call {NEXT}."
+        key, mission = self._current
+        if name == NEXT:
+            return f"A mission is not over yet; go on with it, or call {FINISH} or give_up."
+        self._calls += 1
+        if name == FINISH:
+            mission.answer(str(arguments.get("answer", "")))
+            told = "done"
+        else:
+            told = mission.call(name, arguments)
+        if mission.ending is None and self._calls >= self.plan.limits.turns:
+            mission.end(TURN_LIMIT)
+        if mission.ending is None:
+            return told
+        self._keep(key, mission)
+        return f"{told}\n{_OVER}"
+
+    def _begin(self) -> str:
+        if not self.todo:
+            return "All missions are done. Say so, and stop."
+        key, self._calls = self.todo[0], 0
+        self._current = key, self.plan.begin_mission(key)
+        request = agent_prompt(
+            self.plan.instruction(key), rules=self.plan.suite.house_sentences, skills=self.plan.suite.skills
+        )
+        left = f"({len(self.todo)} missions are left.)"
+        return "\n\n".join([*(message.text for message in request.messages), left])
+
+    def _keep(self, key: CompletionKey, mission: AgentMission) -> None:
+        identity = {**dict(zip(KEY, key, strict=True)), "instruction": self.plan.instruction(key)}
+        more = {"model": self.agent.name, "mode": "agent", "world": self.plan.world(key)}
+        ended = {**mission_data(mission), "no_program": None, "turns": self._calls, "usage": None}
+        self.file.append(to_line({**identity, **more, **ended}))
+        self.file.sync()
+        self.todo.remove(key)
+        self._current = None
+
+
+@contextlib.contextmanager
+def open_desk(run: RunFolder, plan: AgentPlan, agent: ClientAgent) -> Iterator[MissionDesk]:
+    """Open a run whose missions an MCP client carries out. Those that are done stay as they are."""
+    with run.writing():
+        about = run_metadata(run, plan, agent)
+        done = {completion.key for completion in plan.completed(run)}
+        about["batches"] = with_batch(about["batches"], plan, agent.settings)
+        write_whole(run.about, to_text(about))
+        with contextlib.closing(Appender(run.completions)) as file:
+            yield MissionDesk(plan, agent, file, [key for key in plan.keys() if key not in done])  # noqa: SIM118 - a plan is no mapping
+
+
+async def serve_agent(desk: MissionDesk) -> None:
+    """Serve one client on standard input and output until it closes them."""
+
+    async def list_tools(*_: object) -> ListToolsResult:
+        return ListToolsResult(tools=desk.tools())
+
+    async def call_tool(_: object, asked: CallToolRequestParams) -> CallToolResult:
+        told = await desk.call(asked.name, asked.arguments or {})
+        return CallToolResult(content=[TextContent(text=told)])
+
+    server: Server[Any] = Server(
+        "roboeval",
+        version=__version__,
+        instructions=f"Call {NEXT}, do what it says with the robot's skills, and repeat until all is done.",
+        on_list_tools=list_tools,
+        on_call_tool=call_tool,
+    )
+    async with stdio_server() as (reading, writing):
+        await server.run(reading, writing, server.create_initialization_options())

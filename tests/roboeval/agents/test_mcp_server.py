@@ -1,0 +1,90 @@
+"""Missions that a client of the Model Context Protocol carries out."""
+
+import asyncio
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcp import Client, StdioServerParameters
+from mcp_types import TextContent
+
+from roboeval.evaluation.evaluate import evaluate_run
+from roboeval.evaluation.runs.folder import RunFolder
+from roboeval.suites.load import Suite, load_suite
+from small_suite import a_suite
+
+SOON = 60
+WORLDS = """\
+name: T
+summary: s
+prompts: [Say hello.]
+checks:
+  says(what): {category: SayAtLocation, rtl: 'tr.Exists(say("{what}"))'}
+worlds:
+- {about: one, robot: lobby, rooms: [lobby], require: [says("hello")]}
+- {about: two, robot: lobby, rooms: [lobby], require: [says("hello")]}
+- {about: three, robot: lobby, rooms: [lobby], require: [says("hello")]}
+"""
+
+
+@pytest.fixture
+def suite(tmp_path: Path) -> Suite:
+    folder = tmp_path / "suite"
+    folder.mkdir()
+    return load_suite(a_suite(folder, WORLDS))
+
+
+def client(run: Path, suite: Suite) -> Client:
+    """A client that starts the command, as a coding agent does."""
+    arguments = ["-m", "roboeval", "mcp", "--out", str(run), "--suite", str(suite.folder), "--name", "coder"]
+    return Client(
+        StdioServerParameters(
+            command=sys.executable, args=[*arguments, "--max-turns", "4"], env={**os.environ}
+        )
+    )
+
+
+async def call(to: Client, name: str, **arguments: Any) -> str:  # noqa: ANN401 - JSON
+    (content,) = (await to.call_tool(name, arguments)).content
+    assert isinstance(content, TextContent)
+    return content.text
+
+
+@pytest.mark.slow
+def test_a_client_carries_out_missions_and_goes_on_later(tmp_path: Path, suite: Suite) -> None:
+    run = tmp_path / "run"
+
+    async def first() -> None:
+        async with asyncio.timeout(SOON), client(run, suite) as agent:
+            names = {tool.name for tool in (await agent.list_tools()).tools}
+            assert names == {"next_mission", "finish_mission", "wait", "give_up", *suite.skills}
+            assert "next_mission" in await call(agent, "say", message="hello")  # there is no mission yet
+            assert "Say hello." in await call(agent, "next_mission")
+            assert "not over" in await call(agent, "next_mission")
+            assert (await call(agent, "say", message="hello")) == "done"
+            assert "over" in await call(agent, "finish_mission", answer="I said it.")
+            await call(agent, "next_mission")
+            await call(agent, "say", message="hello")  # and the client ends in the middle of the second
+
+    async def second() -> None:
+        async with asyncio.timeout(SOON), client(run, suite) as agent:
+            await call(agent, "next_mission")
+            told = [await call(agent, "is_in_room", entity="Ann") for _ in range(4)]
+            assert ["over" in one for one in told] == [False, False, False, True]
+            await call(agent, "next_mission")
+            assert "over" in await call(agent, "give_up", reason="I am shy.")
+            assert "All missions are done" in await call(agent, "next_mission")
+
+    asyncio.run(first())
+    assert [one.more["world"] for one in RunFolder(run).read(suite)] == [0]
+    asyncio.run(second())
+    completions = [*RunFolder(run).read(suite)]
+    assert [(one.model, one.more["ending"], one.turns) for one in completions] == [
+        ("mcp:coder", "answer", 2),
+        ("mcp:coder", "TurnLimit", 4),
+        ("mcp:coder", "GaveUp", 1),
+    ]
+    rows = [*evaluate_run(RunFolder(run), suite, ablated=False, tasks=None, redo=False)]
+    assert [row["passed"] for row in rows] == [True, False, False]
