@@ -135,11 +135,16 @@ def resample(
     The programs of a judged run are checked, also against its house rules. The result is computed for each
     maximum number of retries, without querying a model.
     """
+    from roboeval.analysis.missions import has_missions
     from roboeval.analysis.resample import LIMITS, curve_data, trials_by_prompt
     from roboeval.cli.views.groups import resample_view
 
     with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
         results = open_current(run, suite, ablated=False, rules=rules).results
+        if has_missions(results.table):
+            fail(
+                f"{run}: holds missions of an agent, which no check could have rejected; name a run of programs"
+            )
         checker = engine_for(len(results.places))
         prompts = trials_by_prompt(check_run(results, samples=samples, seed=seed, engine=checker))
     coverage = results.scope.coverage(len(results.places))
@@ -156,7 +161,8 @@ def check_run(results: Results, *, samples: int = 5, seed: int = 0, engine: Open
     from roboeval.evaluation.checks import check_programs
     from roboeval.evaluation.runs.table import with_answers
 
-    judged = [results.completions[key] for key in results.places]
+    completions = [results.completions[key] for key in results.places]
+    judged = [one for one in completions if one.acted is None]  # an agent's mission holds in one world only
     different = {(completion.task, completion.program) for completion in judged}
     checking = check_programs(results.run, results.known_suite, judged, engine, samples=samples, seed=seed)
     return with_answers(results.table, dict(show_progress(checking, "checking", len(different))))

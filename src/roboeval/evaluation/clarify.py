@@ -98,6 +98,8 @@ def clarify(
 def _by_prompt(completions: Iterable[Completion], least: int) -> dict[tuple[str, int], list[Completion]]:
     found: dict[tuple[str, int], list[Completion]] = {}
     for one in completions:
+        if one.acted is not None:
+            raise UserError("the completions are missions of an agent; name a run of programs")
         found.setdefault((one.task, one.prompt), []).append(one)
     if not (enough := {key: some for key, some in sorted(found.items()) if len(some) >= least}):
         most = max(map(len, found.values()), default=0)

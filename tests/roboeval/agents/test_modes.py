@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from codebotler.core.files import to_line
-from command_line import roboeval
+from command_line import refused, roboeval
 from roboeval.analysis.metrics import pass_at_1
 from roboeval.analysis.missions import comparable_scores, has_missions, mission_costs
 from roboeval.evaluation.runs.results import load_results
@@ -116,6 +116,12 @@ def test_a_report_has_a_table_of_missions(runs: tuple[Path, Path, str], tmp_path
     ]
     roboeval("report", paths[0], "--suite", suite, "--out", str(tmp_path / "plain"))
     assert not (tmp_path / "plain" / "tables" / "modes.csv").exists()
+
+
+@pytest.mark.parametrize("name", ["resample", "clarify"])
+def test_what_needs_programs_refuses_missions(runs: tuple[Path, Path, str], name: str) -> None:
+    _, agents, suite = runs
+    refused(name, str(agents), "--suite", suite)
 
 
 def test_a_summary_says_how_missions_ended(runs: tuple[Path, Path, str]) -> None:
