@@ -49,7 +49,8 @@ SHELL = bash
 # What `make test` leaves to a target of its own, since it takes long or needs more than is installed.
 APART = tests/browser tests/guide tests/ros1 tests/ros2 tests/suites tests/codebotler/models/test_local.py \
 	tests/codebotler/perception/test_zeroshot.py tests/codebotler/robots/test_pyrobosim.py \
-	tests/roboeval/evaluation/test_inspect.py tests/roboeval/evaluation/test_ray.py
+	tests/roboeval/evaluation/test_inspect.py tests/roboeval/evaluation/test_inspect_agents.py \
+	tests/roboeval/evaluation/test_ray.py
 
 .PHONY: demo serve docs test test-all test-slow test-suites test-guide test-ros1 test-ros2 test-browser pictures test-transformers test-environments \
 	test-pyrobosim test-inspect test-ray test-faulty-server messages faults fuzz lint bench clean
@@ -113,7 +114,7 @@ test-pyrobosim: $(EXTRAS_VENV)/tested
 	$(EXTRAS_VENV)/bin/python -m pytest --no-skips tests/codebotler/robots/test_pyrobosim*.py
 
 test-inspect: $(EXTRAS_VENV)/tested
-	$(EXTRAS_VENV)/bin/python -m pytest --no-skips $(if $(SHOTS),--shots "$(SHOTS)") tests/roboeval/evaluation/test_inspect.py
+	$(EXTRAS_VENV)/bin/python -m pytest --no-skips $(if $(SHOTS),--shots "$(SHOTS)") tests/roboeval/evaluation/test_inspect*.py
 
 test-ray: $(EXTRAS_VENV)/tested
 	$(EXTRAS_VENV)/bin/python -m pytest --no-skips tests/roboeval/evaluation/test_ray.py

@@ -225,8 +225,13 @@ command.load()()
 """
 
 
-def test_the_command_finds_the_task_by_its_name(tmp_path: Path) -> None:
-    asked = "eval codebotler/roboeval --model mockllm/model -T tasks=LunchTime --limit 2 --display plain"
+@pytest.mark.parametrize(
+    ("options", "kind"),
+    [("", "no-code"), ("-T mode=agent -T max_turns=2", "NoCall")],
+    ids=["program", "agent"],
+)
+def test_the_command_finds_the_task_by_its_name(tmp_path: Path, options: str, kind: str) -> None:
+    asked = f"eval {TASK} --model mockllm/model -T tasks=LunchTime {options} --limit 2 --display plain"
     command = [sys.executable, "-c", COMMAND, *asked.split(), "--log-dir", str(tmp_path)]
     ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stdout + ended.stderr
@@ -236,7 +241,7 @@ def test_the_command_finds_the_task_by_its_name(tmp_path: Path) -> None:
     assert [scorer.name for scorer in log.eval.scorers] == ["verdict"]
     for sample in log.samples or []:
         (score,) = (sample.scores or {}).values()
-        assert score.metadata["failure"]["kind"] == "no-code"
+        assert score.metadata["failure"]["kind"] == kind
 
 
 @pytest.fixture

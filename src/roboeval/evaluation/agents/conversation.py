@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Protocol
 
 from codebotler.models.base import Reply
 from codebotler.prompts import Prompt, PromptMessage
-from codebotler.prompts.tools import CallingMessage, ResultMessage, ToolPrompt
+from codebotler.prompts.tools import CallingMessage, ResultMessage, ToolCall, ToolPrompt
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.runs.endings import TOKEN_LIMIT, TURN_LIMIT
 
@@ -73,6 +73,7 @@ class AgentConversation:
 
     def __init__(self, mission: AgentMission, prompt: ToolPrompt, limits: TurnLimits) -> None:
         self.mission = mission
+        self.result: str | None = None  # of the calls in the last reply
         self._turns, self._first = Turns(limits), prompt
         self._later: list[PromptMessage] = []
 
@@ -86,13 +87,15 @@ class AgentConversation:
     def add(self, reply: Reply) -> None:
         """Make the call of a reply, or end the mission."""
         self._turns.replies.append(reply)
+        self.result = None
         if reply.no_program is not None:
             self.mission.end(reply.no_program)
         elif not reply.calls:
             self.mission.answer(reply.text)
         else:
+            self.result = result = self._make(reply.calls)
             self._later.append(CallingMessage("assistant", reply.text, reply.turn))
-            self._later += self._results(reply)
+            self._later += [ResultMessage("tool", result, call) for call in reply.calls]
             if self.mission.ending is None and (limit := self._turns.ending) is not None:
                 self.mission.end(limit)
 
@@ -100,13 +103,10 @@ class AgentConversation:
         """Return the mission as entries of a row."""
         return mission_data(self.mission) | self._turns.data()
 
-    def _results(self, reply: Reply) -> list[ResultMessage]:
-        calls = reply.calls
+    def _make(self, calls: Sequence[ToolCall]) -> str:
         if len(calls) == 1:
-            told = self.mission.call(calls[0].name, calls[0].arguments)
-        else:
-            told = self.mission.refuse_several([call.name for call in calls])
-        return [ResultMessage("tool", told, call) for call in calls]
+            return self.mission.call(calls[0].name, calls[0].arguments)
+        return self.mission.refuse_several([call.name for call in calls])
 
 
 def mission_data(mission: AgentMission) -> dict[str, Any]:
