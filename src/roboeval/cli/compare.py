@@ -142,9 +142,7 @@ def resample(
     with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
         results = open_current(run, suite, ablated=False, rules=rules).results
         if has_missions(results.table):
-            fail(
-                f"{run}: holds missions of an agent, which no check could have rejected; name a run of programs"
-            )
+            fail(f"{run}: holds missions of an agent, which cannot be checked; name a run of programs")
         checker = engine_for(len(results.places))
         prompts = trials_by_prompt(check_run(results, samples=samples, seed=seed, engine=checker))
     coverage = results.scope.coverage(len(results.places))

@@ -205,7 +205,7 @@ CALLS = st.one_of(
             ("give_up", {"reason": "tired"}),
         ]
     ),
-    st.builds(lambda text: ("say", {"message": text}), st.text()),
+    st.builds(lambda text: ("say", {"message": text}), st.text() | st.text('\ud800"\\\n')),
 )
 
 

@@ -157,7 +157,8 @@ class AgentMission:
         )
 
     def _perform(self, skill: Skill, values: Sequence[Argument], given: Sequence[object]) -> str:
-        source, self._error, self._in_a_row = written_call(skill.name, given), None, 0
+        source = written_call(skill.name, given).encode(errors="backslashreplace").decode()  # lone surrogates
+        self._error, self._in_a_row = None, 0
         match self._ledger.perform(skill.name, values):
             case ("ok", result):
                 told = json.dumps(named_result(skill, values, result), ensure_ascii=False)
