@@ -70,6 +70,7 @@ class GenerationRequest:
         from roboeval.evaluation.runs.folder import RunFolder
 
         folder = re.sub(r"[^\w.]+", "-", model.name).strip("-.")
+        folder += "".join(f"-{mode}" for name, mode in self.plan.describe().items() if name == "mode")
         fresh = self.plan.suite.families is not None
         return RunFolder(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
 

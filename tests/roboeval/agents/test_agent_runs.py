@@ -22,12 +22,14 @@ from agent_server import (
     serve,
     turns_before,
 )
+from codebotler.core.errors import UserError
 from codebotler.models.open import open_model
 from codebotler.models.sampling import SamplingSettings
 from roboeval.evaluation.agents.conversation import TurnLimits
 from roboeval.evaluation.agents.plan import AgentMode, AgentPlan
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.generate import GenerationProgress, Pace, generate_run
+from roboeval.evaluation.requests import GenerationPlan
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.rows import Row
@@ -242,6 +244,15 @@ def test_the_last_failure_counts(tmp_path: Path, small: Suite, body: str, name: 
     for row in rows:
         assert row["failure"] is not None
         assert (row["failure"]["class"], row["failure"]["kind"]) == (name, kind)
+
+
+def test_a_run_keeps_to_one_mode(tmp_path: Path, suite: Suite) -> None:
+    replan(tmp_path, suite, ["say('hello')"])
+    _, server = serve(lambda _: [PROGRAM.format(body="say('hello')")])
+    with server:
+        model = open_model("openai-chat:agent", SamplingSettings(base_url=server.url, seed=0))
+        with pytest.raises(UserError, match="mode"):
+            generate_run(RunFolder(tmp_path / "run"), GenerationPlan(suite, None, 9), model, Pace())
 
 
 SCRIPT = """
