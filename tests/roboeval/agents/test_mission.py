@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from codebotler.checking.contract_file import contract_from
 from codebotler.core.errors import VIOLATION, UserError
-from codebotler.core.trace import Status
+from codebotler.core.trace import Option, Status
 from roboeval.evaluation.agents.mission import MAX_MISTAKES, MAX_REPEATS, AgentMission
 from roboeval.evaluation.judge import evaluate, judge
 from roboeval.evaluation.runs.completions import Completion
@@ -174,6 +174,12 @@ def test_a_contract_ends_a_mission_before_the_call_that_it_does_not_allow(paper:
     assert (row["failure"]["class"], row["failure"]["kind"]) == ("AgentError", "OutsideContract")
 
 
+def test_calls_of_a_program_are_repeated_with_their_types(mission: AgentMission, paper: Suite) -> None:
+    options = (Option("1", is_text=False), Option("True", is_text=False), Option("two", is_text=True))
+    mission.repeat(paper.skills["ask"], ["jill", "How many?", options])
+    assert 'ask("jill", "How many?", [1, True, "two"])' in mission.program
+
+
 def test_a_missing_world_is_named(paper: Suite) -> None:
     completion = Completion(task=TASK, prompt=0, index=0, program="", more={"world": 99, "ending": "answer"})
     with pytest.raises(UserError, match="LunchTime/0/0"):
@@ -201,6 +207,8 @@ CALLS = st.one_of(
             ("place", {"obj": "apple"}),
             ("wait", {"seconds": 0.1}),
             ("wait", {"seconds": 9_999}),
+            ("wait", {"seconds": 1e300}),
+            ("ask", {"person": "jill", "question": "How many?", "options": [1, 2]}),
             ("fly", {}),
             ("give_up", {"reason": "tired"}),
         ]

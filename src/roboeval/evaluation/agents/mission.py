@@ -5,8 +5,10 @@ from __future__ import annotations
 import builtins
 import json
 import math
+from ast import literal_eval
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import timedelta
 from typing import Any, Self
@@ -197,6 +199,7 @@ class AgentMission:
 
     def _wait(self, seconds: float) -> str:
         self._in_a_row, self._error = 0, None
+        seconds = min(seconds, self._ledger.limits.seconds)
         self._ledger.let_time_pass(self._robot.now + seconds)
         self._lines.append(f"time.sleep({seconds!r})")
         if self._ledger.limit is not None:
@@ -227,7 +230,14 @@ def _written(value: Argument) -> object:
     """Return an argument as it is written in a program."""
     if not isinstance(value, tuple):
         return value
-    return [each.text if isinstance(each, Option) else each for each in value]
+    return [_option(each) if isinstance(each, Option) else each for each in value]
+
+
+def _option(option: Option) -> object:
+    """Return an option as a program offered it: its text, or else the number or truth value itself."""
+    with suppress(ValueError, SyntaxError):
+        return option.text if option.is_text else literal_eval(option.text)
+    return option.text
 
 
 def _lowered(value: object) -> object:
