@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from codebotler.checking.contract_file import contract_from
 from codebotler.core.errors import VIOLATION, UserError
-from codebotler.core.trace import Option, Status
+from codebotler.core.trace import Option, Status, outcome_data
 from roboeval.evaluation.agents.mission import MAX_MISTAKES, MAX_REPEATS, AgentMission
 from roboeval.evaluation.judge import evaluate, judge
 from roboeval.evaluation.runs.completions import Completion
@@ -49,6 +49,11 @@ def test_an_answer_is_the_option_that_a_person_chose(mission: AgentMission) -> N
     told = mission.call("ask", {"person": "Jill", "question": "Lunch?", "options": options})
     assert json.loads(told) in options
     assert mission.outcome.trace[-1].answer == json.loads(told)
+
+
+def test_texts_are_lower_cased_as_the_suite_does_those_of_programs(mission: AgentMission) -> None:
+    mission.call("say", {"message": "Lunch at NOON"})
+    assert mission.outcome.trace[-1].text == "lunch at noon"
 
 
 def test_time_passes_while_it_waits(mission: AgentMission) -> None:
@@ -233,4 +238,4 @@ def test_a_mission_and_its_program_do_the_same(
     (of_program,) = row["verdicts"]
     assert (of_program["satisfied"], of_program["status"]) == (verdict.satisfied, mission.outcome.status)
     assert of_program["failed_checks"] == [one.text for one in verdict.failed]
-    assert len(of_program["trace"]) == len(mission.outcome.trace)
+    assert of_program["trace"] == outcome_data(mission.outcome)["trace"]
