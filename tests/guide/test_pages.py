@@ -32,7 +32,8 @@ NOT_RUN = {
     "README.md": ["makes an environment of its own"],
     "evaluate-your-model.md": [
         *("needs a key, and costs money", "needs a model behind it", "needs Inspect, and a model behind it"),
-        *("needs a key, and costs money", "needs a Ray cluster"),
+        *("needs a key, and costs money", "needs Inspect, and a model behind it", "needs a Ray cluster"),
+        *("needs a key, and costs money", "an MCP client starts it"),
     ],
     "house-rules.md": ["needs a model behind it", "needs Inspect, and a model behind it"],
     "index.md": ["makes an environment of its own"],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -32,6 +31,8 @@ def mcp(
     The client, such as a coding agent, starts this command and calls the robot's skills as tools. Its
     missions become a run, which `roboeval evaluate` judges.
     """
+    import asyncio
+
     with installed():
         from roboeval.evaluation.agents.mcp_server import ClientAgent, open_desk, serve_agent
     from roboeval.evaluation.agents.conversation import TurnLimits
