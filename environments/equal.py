@@ -1,8 +1,9 @@
-"""Compare the rewards of all environments for the same 500 completions; exit status 1 if they differ.
+"""Compare the rewards of all environments for the same 500 completions and 200 missions of agents.
 
     python environments/equal.py trl=PYTHON verifiers=PYTHON openenv=PYTHON
 
-Each PYTHON has one of the environments installed; this script itself needs only the core.
+Each PYTHON has one of the environments installed; this script itself needs only the core. The exit
+status is 1 if rewards differ.
 """
 
 from __future__ import annotations
@@ -12,13 +13,18 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
-from roboeval.suites.families.tasks import trained_task
+from codebotler.simulator.pool import shared_pool
+from roboeval.evaluation.recovery import SLEEP, RecordingRobot
+from roboeval.suites.families.tasks import TrainedTask, trained_task
+from roboeval.training.missions import TrainingMission, load_missions
 from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Rollout, judge
 
-COUNT = 500
+COUNT, MISSIONS = 500, 200
+
+Call: TypeAlias = tuple[str, dict[str, Any]]
 
 
 def examples() -> list[tuple[dict[str, Any], str]]:
@@ -32,42 +38,98 @@ def examples() -> list[tuple[dict[str, Any], str]]:
     return found
 
 
+def missions() -> list[tuple[dict[str, Any], list[Call]]]:
+    """Rows of missions, each with calls: those of right and wrong programs, and mistakes."""
+    found = []
+    for number, row in enumerate(load_missions("validation", count=MISSIONS)):
+        task = trained_task(row["family"], row["seed"])
+        programs = [task.solution, *(one.program for one in task.wrong)]
+        calls = calls_of(task, row["world"], programs[number // 17 % len(programs)])
+        more: list[Call] = [("give_up", {"reason": "?"})] if number % 5 == 0 else []
+        mistakes: list[Call] = [("go_to", {"location": "nowhere"})] if number % 3 == 0 else []
+        found.append((row, [*mistakes, *calls, *more]))
+    return found
+
+
+def calls_of(task: TrainedTask, world: int, program: str) -> list[Call]:
+    """Return the calls that a program makes in a world."""
+    worlds = task.suite.tasks[task.name].scenarios
+    robot = RecordingRobot(worlds[world % len(worlds)].world, task.suite)
+    pool = shared_pool()
+    pool.submit(lambda: pool.here().run_alone(program, lambda: robot)).result()
+    calls: list[Call] = []
+    for name, values in robot.calls:
+        if name == SLEEP:
+            calls.append(("wait", {"seconds": 1}))
+            continue
+        names = [parameter.name for parameter in task.suite.skills[name].parameters]
+        written = [[one.text for one in value] if isinstance(value, tuple) else value for value in values]
+        calls.append((name, dict(zip(names, written, strict=True))))
+    return calls
+
+
 def by_core() -> list[float]:
-    """Compute the rewards with the library itself."""
+    """Compute the rewards with the library itself, first of the programs and then of the missions."""
     rollouts = [
         Rollout(row["family"], row["seed"], row["prompt_index"], program_in(text)) for row, text in examples()
     ]
-    return [one.reward for one in judge(rollouts)]
+    rewards = [one.reward for one in judge(rollouts)]
+    for row, calls in missions():
+        mission = TrainingMission.begin(row)
+        for call in calls:
+            mission.call(*call)
+        mission.answer("Done.")
+        rewards.append(mission.components.reward)
+    return rewards
 
 
 def by_trl() -> list[float]:
     """Compute the rewards that a trainer of TRL receives."""
-    from codebotler_trl import reward  # noqa: PLC0415 - installed in one environment only
+    from codebotler_trl import MissionEnvironment, reward  # noqa: PLC0415 - installed in one environment only
 
     rows, texts = zip(*examples(), strict=True)
     columns = {name: [row[name] for row in rows] for name in ("family", "seed", "prompt_index", "opening")}
-    return reward([[{"role": "assistant", "content": text}] for text in texts], **columns)
+    rewards = reward([[{"role": "assistant", "content": text}] for text in texts], **columns)
+    for row, calls in missions():
+        environment = MissionEnvironment()
+        environment.reset(**row)
+        for name, arguments in calls:
+            getattr(environment, name)(**arguments)
+        rewards += reward([[{"role": "assistant", "content": "Done."}]], environments=[environment])
+    return rewards
 
 
 def by_verifiers() -> list[float]:
     """Compute the rewards in traces of verifiers."""
+    import codebotler_verifiers as environment  # noqa: PLC0415 - installed in one environment only
     import verifiers.v1 as vf  # noqa: PLC0415 - installed in one environment only
-    from codebotler_verifiers import TrainingConfig, TrainingData, TrainingTaskset  # noqa: PLC0415 - installed in one environment only
     from verifiers.v1.graph import MessageNode  # noqa: PLC0415 - installed in one environment only
 
-    tasks = TrainingTaskset(TrainingConfig(id="codebotler-verifiers", split="validation", count=COUNT))
+    def tasks(mode: str, count: int) -> Any:  # noqa: ANN401 - verifiers is not installed where mypy runs
+        options = {"id": "codebotler-verifiers", "split": "validation", "mode": mode, "count": count}
+        return environment.TrainingTaskset(environment.TrainingConfig(**options)).load()
 
-    async def scored(task: Any, text: str) -> float:  # noqa: ANN401 - verifiers is not installed where mypy runs
-        trace = vf.Trace[TrainingData](
-            task=vf.TraceTask[TrainingData](type=type(task).__name__, data=task.data),
+    async def scored(task: Any, text: str, calls: list[Call]) -> float:  # noqa: ANN401 - as above
+        trace = vf.Trace[environment.TrainingData](
+            task=vf.TraceTask[environment.TrainingData](type=type(task).__name__, data=task.data),
             agent=vf.AgentInfo(config=vf.AgentConfig(runtime=vf.SubprocessConfig())),
         )
-        trace.nodes.append(MessageNode(message=vf.AssistantMessage(content=text), sampled=True))
+        made = [vf.ToolCall(id="1", name=name, arguments=json.dumps(given)) for name, given in calls]
+        messages = [
+            *(vf.AssistantMessage(tool_calls=[call]) for call in made),
+            vf.AssistantMessage(content=text),
+        ]
+        trace.nodes += [MessageNode(message=message, sampled=True) for message in messages]
         await task.score(trace)
         return trace.reward
 
     async def all_scored() -> list[float]:
-        return [await scored(task, text) for task, (_, text) in zip(tasks.load(), examples(), strict=True)]
+        programs = zip(tasks("program", COUNT), examples(), strict=True)
+        acted = zip(tasks("agent", MISSIONS), missions(), strict=True)
+        return [
+            *[await scored(task, text, []) for task, (_, text) in programs],
+            *[await scored(task, "Done.", calls) for task, (_, calls) in acted],
+        ]
 
     return asyncio.run(all_scored())
 
@@ -81,6 +143,13 @@ def by_openenv() -> list[float]:
     for number, (_, text) in enumerate(examples()):
         session.reset(seed=number, split="validation")
         found.append(session.step(CodebotlerAction(completion=text)).reward)
+    for number, (_, calls) in enumerate(missions()):
+        session.reset(seed=number, split="validation", mode="agent")
+        actions = [CodebotlerAction(tool=name, arguments=arguments) for name, arguments in calls]
+        for action in (*actions, CodebotlerAction(answer="Done.")):
+            if (step := session.step(action)).done:
+                break
+        found.append(step.reward)
     return found
 
 
@@ -103,8 +172,8 @@ def main() -> int:
         name, _, python = given.partition("=")
         done = subprocess.run([python, __file__, "--as", name], check=True, capture_output=True, text=True)
         same = sum(a == b for a, b in zip(json.loads(done.stdout.splitlines()[-1]), expected, strict=True))
-        print(f"{name}: {same} of {COUNT} equal")
-        status |= same < COUNT
+        print(f"{name}: {same} of {len(expected)} equal")
+        status |= same < len(expected)
     return status
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import socket
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from typing import Any
 
 import httpx
 import pytest
-from codebotler_openenv import CodebotlerAction, CodebotlerEnv, CodebotlerObservation
+from codebotler_openenv import CodebotlerAction, CodebotlerEnv, CodebotlerObservation, CodebotlerState
 from codebotler_openenv.environment import SEEDS
 from openenv.core.client_types import StepResult
 from openenv.core.sync_client import SyncEnvClient
@@ -28,6 +29,7 @@ from openenv.validation.runtime.contracts import load_runtime_plan
 
 from roboeval.suites.families.suite import FIRST_SEEDS
 from roboeval.suites.families.tasks import family_file, family_names, trained_task
+from roboeval.training.missions import TrainingMission, load_missions
 from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
 
@@ -158,6 +160,81 @@ def test_rewards_are_those_of_the_library(session: Session) -> None:
     assert result.reward == expected.reward < 1
 
 
+# --- missions of agents
+
+
+def right_calls(state: CodebotlerState) -> list[tuple[str, dict[str, Any]]]:
+    assert state.family is not None
+    assert state.seed is not None
+    program = trained_task(state.family, state.seed).solution
+    rooms, message = re.findall(r"\[.*\]", program)[0], re.findall(r'say\("(.*)"\)', program)[0]
+    each = [(("go_to", {"location": room}), ("say", {"message": message})) for room in json.loads(rooms)]
+    return [call for calls in each for call in calls]
+
+
+def begin_mission(session: Session, seed: int = 5) -> tuple[TrainingMission, list[CodebotlerAction]]:
+    """Begin a mission, and return it with the calls that carry it out."""
+    session.reset(seed=seed, family="AnnounceInOrder", mode="agent")
+    (row,) = load_missions(count=1, seed=seed, only=["AnnounceInOrder"])
+    calls = right_calls(session.state())
+    return TrainingMission.begin(row), [CodebotlerAction(tool=name, arguments=given) for name, given in calls]
+
+
+def test_a_mission_begins_with_its_prompt_and_its_tools(session: Session) -> None:
+    found = session.reset(seed=5, split="test", mode="agent")
+    (row,) = load_missions("test", count=1, seed=5)
+    assert [message.model_dump() for message in found.observation.messages] == row["prompt"]
+    assert found.observation.tools == row["tools"]
+    assert (found.reward, found.done) == (None, False)
+    state = session.state()
+    assert (state.mode, state.seed, state.world) == ("agent", row["seed"], row["world"])
+
+
+def test_each_step_is_a_call_and_the_answer_ends_the_mission(session: Session) -> None:
+    mission, actions = begin_mission(session)
+    asked = CodebotlerAction(tool="get_all_rooms", arguments="{}")
+    for action in (asked, CodebotlerAction(tool="say", arguments="no JSON"), *actions):
+        result = session.step(action)
+        assert (result.reward, result.done, result.observation.components) == (None, False, None)
+        assert action.tool is not None
+        assert result.observation.result == mission.call(action.tool, action.arguments)
+    result = session.step(CodebotlerAction(answer="Done."))
+    assert (result.reward, result.done) == (1.0, True)
+    assert result.observation.components == mission.components
+    assert session.state().step_count == len(actions) + 3
+
+
+def test_a_mission_may_end_with_a_call(session: Session) -> None:
+    mission, actions = begin_mission(session)
+    session.step(actions[0])
+    mission.call("go_to", actions[0].arguments)
+    result = session.step(CodebotlerAction(tool="give_up", arguments={"reason": "?"}))
+    mission.call("give_up", {"reason": "?"})
+    assert result.done
+    assert result.observation.components == mission.components
+    with pytest.raises(RuntimeError, match="this mission is over"):
+        session.step(actions[1])
+
+
+def test_an_action_of_the_other_mode_says_why_and_the_mission_goes_on(session: Session) -> None:
+    begin_mission(session)
+    for wrong in (CodebotlerAction(program=""), CodebotlerAction(tool="say", answer="")):
+        with pytest.raises(RuntimeError, match="either a tool or an answer"):
+            session.step(wrong)
+    assert session.step(CodebotlerAction(answer="")).reward == 0
+    session.reset(seed=1)
+    with pytest.raises(RuntimeError, match="either a completion or a program"):
+        session.step(CodebotlerAction(answer=""))
+
+
+def test_a_wrong_reset_leaves_no_mission(session: Session) -> None:
+    begin_mission(session)
+    with pytest.raises(RuntimeError, match="chess"):
+        session.reset(mode="chess")
+    with pytest.raises(RuntimeError, match="call reset before step"):
+        session.step(CodebotlerAction(program=""))
+
+
 # --- sessions
 
 
@@ -229,6 +306,7 @@ def test_no_more_sessions_than_allowed() -> None:
         ({"seed": -1}, "the seed is -1"),
         ({"seed": SEEDS}, "from 0 to 999,999,999"),
         ({"seed": "x"}, "the seed is 'x'"),
+        ({"mode": "chess"}, 'there is no mode "chess"'),
         ({"famly": "BringThing"}, "but not famly"),
     ],
 )

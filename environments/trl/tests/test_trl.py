@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import json
 import re
 from pathlib import Path
 from statistics import fmean
@@ -12,14 +14,26 @@ import tokenizers
 import torch
 import transformers
 import trl
-from codebotler_trl import load_prompts, parses, passed, reward, without_errors
+from codebotler_trl import (
+    MissionEnvironment,
+    load_missions,
+    load_prompts,
+    parses,
+    passed,
+    reward,
+    without_errors,
+)
+from trl import chat_template_utils
 
 from codebotler.simulator.worker import EngineError
 from roboeval.suites.families.tasks import trained_task
 from roboeval.training import rollouts
+from roboeval.training.missions import TrainingMission, mission_tools
+from roboeval.training.prompts import PolicyReply
 
-FAMILY = "BringThing"
+FAMILY, AGENT_FAMILY = "BringThing", "AnnounceInOrder"  # the latter's solutions have no branches
 END = "<end>"
+IDENTITY = ("family", "seed", "prompt_index", "world")
 
 
 def columns(rows: Any) -> dict[str, list[Any]]:  # noqa: ANN401 - of a data set
@@ -51,20 +65,71 @@ def test_a_failure_of_the_engine_is_an_error(monkeypatch: pytest.MonkeyPatch) ->
         reward(["    say('a')\n"], **columns(rows))
 
 
-# --- a real training run
+# --- missions of agents
 
 
-def model_and_tokenizer(lines: list[str]) -> tuple[Any, Any]:
-    """A model so small that it has a token for each line of a program, and one for each byte of a prompt."""
+def right_calls(row: dict[str, Any]) -> list[tuple[str, dict[str, str]]]:
+    program = trained_task(row["family"], row["seed"]).solution
+    rooms, message = re.findall(r"\[.*\]", program)[0], re.findall(r'say\("(.*)"\)', program)[0]
+    each = [(("go_to", {"location": room}), ("say", {"message": message})) for room in json.loads(rooms)]
+    return [call for calls in each for call in calls]
+
+
+def environment_after(row: dict[str, Any], calls: list[tuple[str, dict[str, Any]]]) -> MissionEnvironment:
+    environment = MissionEnvironment()
+    environment.reset(**row)
+    for name, arguments in calls:
+        getattr(environment, name)(**arguments)
+    return environment
+
+
+def test_the_methods_are_the_tools_of_missions() -> None:
+    methods = [name for name, _ in inspect.getmembers(MissionEnvironment, inspect.isfunction)]
+    public = {name for name in methods if not name.startswith("_")} - {"reset"}
+    assert public == {tool["function"]["name"] for tool in mission_tools()}
+    for tool in mission_tools():
+        function = tool["function"]
+        schema = transformers.utils.get_json_schema(getattr(MissionEnvironment(), function["name"]))
+        made, properties = schema["function"]["parameters"], function["parameters"]["properties"]
+        assert schema["function"]["description"] == function["description"]
+        assert made.get("required", []) == function["parameters"]["required"]
+        assert made["properties"].keys() == properties.keys()
+        assert all(one.items() <= made["properties"][name].items() for name, one in properties.items())
+
+
+def test_a_mission_is_judged_by_its_calls_and_by_how_the_conversation_ends() -> None:
+    row = load_missions("train", count=1, only=[AGENT_FAMILY])[0]
+    calls = right_calls(row)
+    answer = [{"role": "tool", "content": "done"}, {"role": "assistant", "content": "Done."}]
+    cut = [{"role": "assistant", "content": "", "tool_calls": [{"function": {"name": "say"}}]}]
+    some: list[tuple[list[Any], PolicyReply]] = [
+        (calls, answer), (calls[:2], answer), ([], answer), (calls, cut), (calls, answer[:1])
+    ]  # fmt: skip
+    environments = [environment_after(row, made) for made, _ in some]
+    completions = [completion for _, completion in some]
+    rewards = reward(completions, environments=environments, **columns(load_prompts("train", count=5)))
+    part = TrainingMission.begin(row)
+    for call in calls[:2]:
+        part.call(*call)
+    assert rewards == [1, part.components.reward, 0, 0.5, 0.5]
+    assert passed(completions, environments=environments) == [1, 0, 0, 0, 0]
+    assert without_errors(completions, environments=environments) == [1, 1, 1, 0, 0]
+
+
+# --- real training runs
+
+
+def model_and_tokenizer(lines: list[str], end: str = END, text: str = "") -> tuple[Any, Any]:
+    """A model so small that it has a token for each line, one for each byte, and those of a text."""
     made = tokenizers.Tokenizer(tokenizers.models.BPE())
     made.pre_tokenizer = tokenizers.pre_tokenizers.ByteLevel(add_prefix_space=False)
     made.decoder = tokenizers.decoders.ByteLevel()
     alphabet = tokenizers.pre_tokenizers.ByteLevel.alphabet()
     made.train_from_iterator(
-        [], tokenizers.trainers.BpeTrainer(special_tokens=["<pad>", END], initial_alphabet=alphabet)
+        [text], tokenizers.trainers.BpeTrainer(special_tokens=["<pad>", end], initial_alphabet=alphabet)
     )
     made.add_tokens([tokenizers.AddedToken(line, normalized=False) for line in lines])
-    tokenizer = transformers.PreTrainedTokenizerFast(tokenizer_object=made, pad_token="<pad>", eos_token=END)
+    tokenizer = transformers.PreTrainedTokenizerFast(tokenizer_object=made, pad_token="<pad>", eos_token=end)
     torch.manual_seed(0)
     config = transformers.LlamaConfig(
         vocab_size=len(tokenizer), hidden_size=64, intermediate_size=128, num_hidden_layers=2,
@@ -103,3 +168,44 @@ def test_the_reward_of_a_tiny_model_rises(tmp_path: Path) -> None:
     told = [log["rewards/reward/mean"] for log in trainer.state.log_history if "rewards/reward/mean" in log]
     assert fmean(told[:5]) < 0.4
     assert fmean(told[-5:]) > 0.8
+
+
+def replayed(completions: list[list[dict[str, Any]]], **columns: list[Any]) -> list[float]:
+    """The rewards of missions that repeat the calls of conversations."""
+    rewards = []
+    for number, completion in enumerate(completions):
+        mission = TrainingMission.begin({name: columns[name][number] for name in IDENTITY})
+        for call in [call for message in completion for call in message.get("tool_calls") or []]:
+            mission.call(call["function"]["name"], call["function"]["arguments"])
+        if not completion[-1].get("tool_calls"):
+            mission.answer("")
+        mission.stop()
+        rewards.append(mission.components.reward)
+    return rewards
+
+
+@pytest.mark.filterwarnings("ignore")  # libraries' own
+def test_a_tiny_model_acts_for_some_steps(tmp_path: Path) -> None:
+    rows = load_missions("train", count=1, only=[AGENT_FAMILY])
+    calls = [json.dumps({"name": name, "arguments": given}) for name, given in right_calls(rows[0])]
+    texts = [f"<tool_call>\n{call}\n</tool_call>" for call in dict.fromkeys(calls)]
+    text = json.dumps([rows[0]["prompt"], mission_tools()], indent=1)
+    model, tokenizer = model_and_tokenizer(texts, "<|im_end|>", text)
+    tokenizer.chat_template = chat_template_utils.qwen3_chat_template
+    config = trl.GRPOConfig(
+        output_dir=str(tmp_path), max_steps=4, per_device_train_batch_size=8, num_generations=8,
+        max_completion_length=512, max_tool_calling_iterations=6, learning_rate=1e-3, logging_steps=1,
+        reward_weights=[1.0, 0.0], report_to=[], save_strategy="no", use_cpu=True, seed=1, beta=0.0,
+        remove_unused_columns=False, bf16=False,
+    )  # fmt: skip
+    trainer = trl.GRPOTrainer(
+        model=model, reward_funcs=[reward, replayed], args=config, train_dataset=rows,
+        processing_class=tokenizer, environment_factory=MissionEnvironment,
+    )  # fmt: skip
+    trainer.train()
+    logs = [log for log in trainer.state.log_history if "rewards/reward/mean" in log]
+    assert len(logs) == 4
+    assert all(log["tools/call_frequency"] > 1 for log in logs)
+    assert all(log["tools/failure_frequency"] == 0 for log in logs)
+    assert all(0 < log["rewards/reward/mean"] < 1 for log in logs)
+    assert all(log["rewards/replayed/mean"] == log["rewards/reward/mean"] for log in logs)

@@ -5,21 +5,23 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import re
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from itertools import islice
 from pathlib import Path
 from statistics import fmean
 from time import monotonic
-from typing import Any
+from typing import Any, TypeAlias
 
 import pytest
 import verifiers.v1 as vf
 from codebotler_verifiers import (
+    MissionToolset,
     TrainingConfig,
     TrainingData,
     TrainingEnvConfig,
@@ -27,17 +29,22 @@ from codebotler_verifiers import (
     TrainingTaskset,
     TrainingTrace,
 )
+from mcp.server.mcpserver import MCPServer
 from verifiers.v1.graph import MessageNode
 from verifiers.v1.runtimes import make_runtime
 from verifiers.v1.utils.loaders import environment_class, resolve_env_config, taskset_class
 
 from codebotler.simulator.pool import SHARED_POOL, shared_pool
 from codebotler.simulator.worker import EngineError
+from roboeval.evaluation.agents.mission import MAX_MISTAKES
 from roboeval.suites.families.tasks import trained_task
+from roboeval.training.missions import TrainingMission, load_missions, mission_tools
 from roboeval.training.prompts import load_prompts
 
 NAME, FAMILY = "codebotler-verifiers", "BringThing"
+AGENT_FAMILY = "AnnounceInOrder"  # its solutions have no branches
 SCRIPTS = Path(sys.executable).parent
+Call: TypeAlias = tuple[str, dict[str, Any]]
 PARTS = {"passed", "requirements", "without_errors", "parses", "rules_kept"}
 
 
@@ -49,11 +56,14 @@ def solution(task: TrainingTask) -> str:
     return f"Here it is:\n```python\n{trained_task(task.data.family, task.data.seed).solution}```"
 
 
-def trace_of(task: TrainingTask, reply: str) -> TrainingTrace:
+def trace_of(task: TrainingTask, reply: str, calls: Sequence[Call] = ()) -> TrainingTrace:
     trace = TrainingTrace(
         task=vf.TraceTask[TrainingData](type=type(task).__name__, data=task.data),
         agent=vf.AgentInfo(config=vf.AgentConfig(runtime=vf.SubprocessConfig())),
     )
+    for name, arguments in calls:
+        call = vf.ToolCall(id="1", name=name, arguments=json.dumps(arguments))
+        trace.nodes.append(MessageNode(message=vf.AssistantMessage(tool_calls=[call]), sampled=True))
     trace.nodes.append(MessageNode(message=vf.AssistantMessage(content=reply), sampled=True))
     return trace
 
@@ -164,12 +174,124 @@ def test_a_failure_of_the_engine_is_no_reward(task: TrainingTask) -> None:
     assert trace.rewards == {"reward": None}
 
 
+# --- missions of agents
+
+
+def agent_tasks(count: int) -> list[TrainingTask]:
+    return list(taskset(mode="agent", count=count, families=[AGENT_FAMILY]))
+
+
+def right_calls(task: TrainingTask) -> list[Call]:
+    program = trained_task(task.data.family, task.data.seed).solution
+    rooms, message = re.findall(r"\[.*\]", program)[0], re.findall(r'say\("(.*)"\)', program)[0]
+    each = [(("go_to", {"location": room}), ("say", {"message": message})) for room in json.loads(rooms)]
+    return [call for calls in each for call in calls]
+
+
+def test_missions_are_those_of_load_missions() -> None:
+    some = list(taskset(mode="agent", split="test", count=3, seed=2))
+    for task, row in zip(some, load_missions("test", count=3, seed=2), strict=True):
+        assert (
+            task.data.model_dump(include={"family", "seed", "prompt_index", "world"}).items() <= row.items()
+        )
+        assert task.data.system_prompt == row["prompt"][0]["content"]
+        assert asked(task) == row["prompt"][-1]["content"]
+    assert len({task.key for task in some}) == 3
+    assert [MissionToolset] == [type(one) for one in TrainingTaskset.toolsets(TrainingConfig(mode="agent"))]
+    assert TrainingTaskset.toolsets(TrainingConfig()) == []
+
+
+def test_the_server_offers_the_tools_and_hands_arguments_on_unchanged(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sent: list[Call] = [("say", {"message": "[1, 2]"}), ("wait", {"seconds": "soon"})]
+    received: list[Call] = []
+
+    async def call(_: MissionToolset, name: str, arguments: dict[str, Any]) -> str:
+        received.append((name, arguments))
+        return ""
+
+    monkeypatch.setattr(MissionToolset, "call", call)
+    tools, server = MissionToolset(vf.SharedToolsetConfig()), MCPServer("tools")
+    tools.register(server)
+    offered = {tool.name: tool.input_schema for tool in asyncio.run(server.list_tools())}
+    for tool in mission_tools():
+        schema = tool["function"]["parameters"]
+        found = offered.pop(tool["function"]["name"])
+        assert found.get("required", []) == schema["required"]
+        for name, one in schema["properties"].items():
+            assert one.items() <= found["properties"][name].items()
+    assert not offered
+    for one in sent:
+        asyncio.run(server.call_tool(*one))
+    assert received == sent
+
+
+def test_a_mission_is_judged_by_its_calls() -> None:
+    (task,) = agent_tasks(1)
+    calls = right_calls(task)
+    cases: list[list[Call]] = [[], calls[:2], calls, [*calls, ("give_up", {})], [("fly", {})] * MAX_MISTAKES]
+    for some in cases:
+        trace, mission = trace_of(task, "Done.", some), TrainingMission.begin(task.data.model_dump())
+        for call in some:
+            mission.call(*call)
+        assert asyncio.run(task.mission_is_over(trace)) is mission.is_over
+        mission.answer("Done.")
+        asyncio.run(task.score(trace))
+        assert trace.reward == mission.components.reward
+        assert set(trace.metrics) == PARTS
+    right = trace_of(task, "Done.", calls)
+    asyncio.run(task.score(right))
+    assert right.reward == right.metrics["passed"] == 1
+
+
+def test_the_server_returns_the_results_of_calls() -> None:
+    (task,) = agent_tasks(1)
+    tools, mission = MissionToolset(vf.SharedToolsetConfig()), TrainingMission.begin(task.data.model_dump())
+    trace = trace_of(task, "")
+    trace.state = tools.state
+    asyncio.run(task.setup(trace, make_runtime(vf.SubprocessConfig())))
+    for call in [*right_calls(task), ("get_current_location", {}), ("give_up", {}), ("get_all_rooms", {})]:
+        assert asyncio.run(tools.call(*call)) == mission.call(*call)
+
+
+def test_a_mission_that_verifiers_stops_has_reached_a_limit() -> None:
+    (task,) = agent_tasks(1)
+    trace = trace_of(task, "", right_calls(task))
+    trace.stop("max_turns")
+    asyncio.run(task.score(trace))
+    assert trace.reward == 0.5
+    assert trace.metrics["without_errors"] == 0
+
+
+def test_the_eval_command_lets_agents_act(tmp_path: Path) -> None:
+    tasks = agent_tasks(4)
+    replies: dict[str, list[dict[str, Any]]] = {}
+    for number, task in enumerate(tasks):
+        calls = right_calls(task) if number % 2 else []
+        replies[asked(task)] = [*({"tool": call} for call in calls), {"content": "Done."}]
+    with scripted_model(replies) as url:
+        options = eval_options(url, tmp_path, 4, AGENT_FAMILY)
+        run(SCRIPTS / "vf-eval", *options, "--env.taskset.mode", "agent")
+    traces = [trace for one in written(tmp_path / "run" / "traces.jsonl") for trace in one["traces"]]
+    assert all(trace["ok"] for trace in traces)
+    scores = {trace["task"]["key"]: trace["rewards"]["reward"]["score"] for trace in traces}
+    assert scores == {task.key: float(number % 2) for number, task in enumerate(tasks)}
+    offered = [{tool["name"] for tool in trace["tools"]} for trace in traces]
+    assert offered == [{tool["function"]["name"] for tool in mission_tools()}] * 4
+    results = [node["message"]["content"] for trace in traces for node in trace["nodes"]
+               if node["message"]["role"] == "tool"]  # fmt: skip
+    assert results == ["done"] * sum(len(right_calls(task)) for task in tasks[1::2])
+
+
 # --- the commands of verifiers
 
 
 def test_the_eval_command(tmp_path: Path) -> None:
     tasks = list(taskset(count=4, families=[FAMILY]))
-    replies = {asked(task): solution(task) if number % 2 else "" for number, task in enumerate(tasks)}
+    replies = {
+        asked(task): [{"content": solution(task) if number % 2 else ""}] for number, task in enumerate(tasks)
+    }
     with scripted_model(replies) as url:
         run(SCRIPTS / "vf-eval", *eval_options(url, tmp_path, 4))
     episodes = written(tmp_path / "run" / "traces.jsonl")
@@ -189,7 +311,7 @@ def test_the_eval_command_sees_a_failure_of_the_engine(tmp_path: Path) -> None:
         "shared_pool().submit(lambda: shared_pool().here().stop()).result()\n"
         "main()\n"
     )
-    with scripted_model({asked(task): solution(task)}) as url:
+    with scripted_model({asked(task): [{"content": solution(task)}]}) as url:
         run(sys.executable, "-c", program, *eval_options(url, tmp_path, 1))
     (episode,) = written(tmp_path / "run" / "traces.jsonl")
     (trace,) = episode["traces"]
@@ -212,10 +334,10 @@ def asked(task: TrainingTask) -> str:
     return str(task.data.model_dump()["prompt"][-1]["content"])
 
 
-def eval_options(url: str, folder: Path, count: int) -> list[str]:
+def eval_options(url: str, folder: Path, count: int, family: str = FAMILY) -> list[str]:
     model = ["-m", "scripted", "--client.base-url", url, "--client.api-key-var", "NO_SUCH_KEY"]
     place = ["-o", str(folder), "--run.name", "run", "--no-push", "--no-rich"]
-    return [NAME, "-n", str(count), "-c", "2", *model, *place, "--env.taskset.families", f'["{FAMILY}"]']
+    return [NAME, "-n", str(count), "-c", "2", *model, *place, "--env.taskset.families", f'["{family}"]']
 
 
 def run(*command: str | Path) -> None:
@@ -231,14 +353,16 @@ def written(path: Path) -> list[dict[str, Any]]:
 
 
 @contextmanager
-def scripted_model(replies: dict[str, str]) -> Iterator[str]:
-    """The address of a server that answers each instruction with its reply."""
+def scripted_model(replies: dict[str, list[dict[str, Any]]]) -> Iterator[str]:
+    """The address of a server that answers each instruction with its replies, one after each result."""
 
     class Handler(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
             body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-            stream = bool(body.get("stream"))
-            answer = answered(replies[body["messages"][-1]["content"]], stream=stream)
+            stream, sent = bool(body.get("stream")), body["messages"]
+            instruction = [one["content"] for one in sent if one["role"] == "user"][-1]
+            results = sum(one["role"] == "tool" for one in sent)
+            answer = answered(replies[instruction][results], number=results, stream=stream)
             self.send_response(200)
             self.send_header("Content-Type", "text/event-stream" if stream else "application/json")
             self.send_header("Content-Length", str(len(answer)))
@@ -256,10 +380,17 @@ def scripted_model(replies: dict[str, str]) -> Iterator[str]:
             server.shutdown()
 
 
-def answered(text: str, *, stream: bool) -> bytes:
+def answered(reply: dict[str, Any], *, number: int, stream: bool) -> bytes:
     """A chat completion, whole or as the one event of a stream."""
-    message = {"role": "assistant", "content": text}
-    choice = {"index": 0, "finish_reason": "stop", "delta" if stream else "message": message}
+    message = {"role": "assistant", "content": reply.get("content", "")}
+    if "tool" in reply:
+        name, arguments = reply["tool"]
+        function = {"name": name, "arguments": json.dumps(arguments)}
+        message["tool_calls"] = [
+            {"index": 0, "id": f"call-{number}", "type": "function", "function": function}
+        ]
+    reason = "tool_calls" if "tool" in reply else "stop"
+    choice = {"index": 0, "finish_reason": reason, "delta" if stream else "message": message}
     usage = {"prompt_tokens": 1, "completion_tokens": 1, "total_tokens": 2}
     kind = "chat.completion.chunk" if stream else "chat.completion"
     body = {"id": "1", "object": kind, "created": 1, "model": "scripted", "choices": [choice], "usage": usage}

@@ -117,13 +117,20 @@ def _judge_batch(worlds: int, house: HouseRules | None, batch: Sequence[Rollout]
     for one, outcomes in zip(batch, ran, strict=True):
         has_run = any(outcome.trace or outcome.error is None for outcome in outcomes)
         parses = has_run or worker.compiles(one.program, robots[0]())
-        components.append(_components(outcomes, asked, parses=parses))
+        components.append(components_of(outcomes, asked, parses=parses))
     return components
 
 
-def _components(
-    outcomes: Sequence[Outcome], asked: Sequence[tuple[Scenario, list[bool]]], *, parses: bool
+def components_of(
+    outcomes: Sequence[Outcome], asked: Sequence[tuple[Scenario, list[bool]]], *, parses: bool = True
 ) -> Components:
+    """Compute the reward and its components from what happened in some worlds.
+
+    Args:
+        outcomes: the outcome in each world.
+        asked: the requirements in each world, and whether each held at the start.
+        parses: whether the program is valid Python.
+    """
     ran = [(outcome, *one) for outcome, one in zip(outcomes, asked, strict=True)]
     reward = total([Share.of(*one) for one in ran])
     kinds = ["" if outcome.error is None else outcome.error.kind for outcome in outcomes]

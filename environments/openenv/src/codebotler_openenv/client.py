@@ -9,7 +9,7 @@ from codebotler_openenv.models import CodebotlerAction, CodebotlerObservation, C
 
 
 class CodebotlerEnv(EnvClient[CodebotlerAction, CodebotlerObservation, CodebotlerState]):
-    """A session with a server: `reset` gives a prompt, `step` the reward of a program.
+    """A session with a server: `reset` gives a prompt, `step` the reward of a program or a call's result.
 
     Both raise a RuntimeError if the server reports an error or if a response has no reward.
     """

@@ -1,4 +1,4 @@
-"""An episode: a prompt, one program, its reward."""
+"""An episode: a prompt, one program or the calls of an agent, and a reward."""
 
 import secrets
 import uuid
@@ -11,9 +11,16 @@ from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.words import listed
 from codebotler.simulator.worker import EngineError
-from codebotler_openenv.models import CodebotlerAction, CodebotlerObservation, CodebotlerState, Message
+from codebotler_openenv.models import (
+    CodebotlerAction,
+    CodebotlerObservation,
+    CodebotlerState,
+    EpisodeMode,
+    Message,
+)
 from roboeval.suites.families.suite import FIRST_SEEDS
 from roboeval.suites.families.tasks import family_names
+from roboeval.training.missions import TrainingMission, load_missions
 from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Components, Rollout, judge
 
@@ -29,6 +36,7 @@ class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation,
     def __init__(self) -> None:
         super().__init__()
         self._state = CodebotlerState()
+        self._mission: TrainingMission | None = None  # of an agent
 
     def reset(
         self,
@@ -37,6 +45,7 @@ class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation,
         *,
         split: str = "train",
         family: str | None = None,
+        mode: EpisodeMode = "program",
         **others: Any,  # noqa: ANN401 - options of any type
     ) -> CodebotlerObservation:
         """Begin an episode and return its prompt.
@@ -46,29 +55,38 @@ class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation,
             episode_id: a name for the episode; by default, a new one.
             split: `train`, `validation` or `test`, which share no task.
             family: a single family; all families by default.
+            mode: `program` if one step takes a program, or `agent` if each step takes a call of a tool.
             others: other options are errors.
 
         Raises:
-            UserError: the split, family or option does not exist, or the seed is out of range.
+            UserError: the split, family, mode or option does not exist, or the seed is out of range.
         """
-        self._state = CodebotlerState()  # after a failed reset, no earlier task may be judged
+        self._state, self._mission = CodebotlerState(), None  # so that a failed reset leaves no task
         if others:
             raise UserError(
-                f"reset takes seed, episode_id, split and family, but not {listed(sorted(others))}"
+                f"reset takes seed, episode_id, split, family and mode, but not {listed(sorted(others))}"
             )
+        if mode not in {"program", "agent"}:
+            raise UserError(f'there is no mode "{mode}"; use program or agent')
         if family is not None and family not in family_names():  # clients may not name files
             raise UserError(f'there is no family "{family}"; use {listed(family_names())}')
         number = secrets.randbelow(SEEDS) if seed is None else _validate(seed)
-        (row,) = load_prompts(split, count=1, seed=number, only=() if family is None else (family,))
+        load = load_prompts if mode == "program" else load_missions
+        (row,) = load(split, count=1, seed=number, only=() if family is None else (family,))
+        self._mission = TrainingMission.begin(row) if mode == "agent" else None
         self._state = CodebotlerState(
             episode_id=episode_id or str(uuid.uuid4()),
             split=split,
             family=row["family"],
             seed=row["seed"],
             prompt_index=row["prompt_index"],
+            mode=mode,
+            world=row.get("world"),
         )
         messages = [Message(**message) for message in row["prompt"]]
-        return CodebotlerObservation(instruction=messages[-1].content, messages=messages)
+        return CodebotlerObservation(
+            instruction=messages[-1].content, messages=messages, tools=row.get("tools", [])
+        )
 
     def step(
         self,
@@ -76,19 +94,21 @@ class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation,
         timeout_s: float | None = None,  # noqa: ARG002 - each run has its own limit
         **_: Any,  # noqa: ANN401 - options of any type
     ) -> CodebotlerObservation:
-        """Judge a program, which ends the episode.
+        """Judge a program, which ends the episode, or make a call of an agent.
 
         Raises:
-            UserError: there is no open task, or the action has no program, or two.
+            UserError: there is no open task, or the action has not exactly one of the parts of its mode.
             EngineError: the engine failed; there is no reward, and the episode continues, so try again.
         """
+        if self._mission is not None:
+            return self._act(self._mission, action)
         found = self._judge(_program(action))
         self._state.step_count = 1
         return CodebotlerObservation(components=found, reward=found.reward, done=True)
 
     @property
     def state(self) -> CodebotlerState:
-        """The current task, and whether its step was taken."""
+        """The current task, and the number of steps."""
         return self._state
 
     def get_metadata(self) -> EnvironmentMetadata:
@@ -98,6 +118,23 @@ class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation,
             description="Robot programs from plain words, run in simulated worlds, judged by temporal logic.",
             version=__version__,
         )
+
+    def _act(self, mission: TrainingMission, action: CodebotlerAction) -> CodebotlerObservation:
+        """Make a call in a mission, or end it with an answer."""
+        if mission.is_over:
+            raise UserError("this mission is over; call reset for another one")
+        if (action.tool is None) == (action.answer is None):
+            raise UserError("an action of an agent has either a tool or an answer")
+        result = ""
+        if action.tool is not None:
+            result = mission.call(action.tool, action.arguments)
+        elif action.answer is not None:
+            mission.answer(action.answer)
+        self._state.step_count += 1
+        if not mission.is_over:
+            return CodebotlerObservation(result=result)
+        found = mission.components
+        return CodebotlerObservation(result=result, components=found, reward=found.reward, done=True)
 
     def _judge(self, program: str) -> Components:
         """Judge a program for the task of this session."""

@@ -1,6 +1,7 @@
 """RoboEval's training tasks as an environment for the library verifiers."""
 
 from codebotler_verifiers.environment import TrainingEnv, TrainingEnvConfig
+from codebotler_verifiers.missions import MissionState, MissionToolset
 from codebotler_verifiers.taskset import (
     TrainingConfig,
     TrainingData,
@@ -10,6 +11,8 @@ from codebotler_verifiers.taskset import (
 )
 
 __all__ = [
+    "MissionState",
+    "MissionToolset",
     "TrainingConfig",
     "TrainingData",
     "TrainingEnv",

@@ -11,7 +11,9 @@ from typing import Any, Literal, TypeAlias
 import verifiers.v1 as vf
 from pydantic import Field, field_validator
 
+from codebotler_verifiers.missions import MissionState, MissionToolset, repeated
 from roboeval.suites.families.tasks import TRAINING_WORLDS, trained_task
+from roboeval.training.missions import TrainingMission, load_missions
 from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Components, Rollout, judge
 
@@ -24,6 +26,8 @@ SEEDS = 1_000  # keeps every stream within its split
 class TrainingConfig(vf.TasksetConfig):
     """The options of the task set, under `--env.taskset.*`."""
 
+    mode: Literal["program", "agent"] = "program"
+    """Whether a policy writes a program, or calls skills as tools in one world."""
     split: Literal["train", "validation", "test"] = "train"
     """Splits share no task."""
     count: int | None = Field(None, ge=1, le=STREAM)
@@ -43,19 +47,21 @@ class TrainingConfig(vf.TasksetConfig):
 
 
 class TrainingData(vf.TaskData):
-    """A prompt, and the task that it belongs to."""
+    """A prompt, and the task that it belongs to. The world is None if the policy writes a program."""
 
     family: str
     seed: int
     prompt_index: int
     worlds: int
+    world: int | None = None
 
 
 TrainingTrace: TypeAlias = vf.Trace[TrainingData]
+AnyTrace: TypeAlias = vf.Trace[Any, Any]  # with the state of a mission, which verifiers' types do not know
 
 
-class TrainingTask(vf.Task[TrainingData, vf.State, vf.TaskConfig]):
-    """Judges the program in the last reply.
+class TrainingTask(vf.Task[TrainingData, MissionState, vf.TaskConfig]):
+    """Judges the program in the last reply, or the mission of an agent.
 
     A failure of the engine is raised, and verifiers records it as the error of the rollout.
     """
@@ -66,6 +72,15 @@ class TrainingTask(vf.Task[TrainingData, vf.State, vf.TaskConfig]):
         assert self.data.id is not None
         return self.data.id
 
+    async def setup(self, trace: AnyTrace, runtime: vf.Runtime) -> None:  # noqa: ARG002 - verifiers passes it
+        """Tell the server of the tools which mission it is."""
+        trace.state.row = self.data.model_dump(include={"family", "seed", "prompt_index", "world"})
+
+    @vf.stop
+    async def mission_is_over(self, trace: vf.Trace) -> bool:  # type: ignore[type-arg]  # as verifiers wants it
+        """Whether the last call has ended the mission of an agent."""
+        return self.data.world is not None and (await self._mission(trace)).is_over
+
     @vf.metric
     async def components(self, trace: TrainingTrace) -> dict[str, float]:
         """The components of the reward, each as a metric."""
@@ -75,7 +90,7 @@ class TrainingTask(vf.Task[TrainingData, vf.State, vf.TaskConfig]):
 
     @vf.reward
     async def reward(self, trace: TrainingTrace) -> float:
-        """The reward: 1 if and only if the program passes, 0 if it does nothing."""
+        """The reward: 1 if and only if the program or the mission passes."""
         return (await self._judged(trace)).reward
 
     async def validate(self, runtime: vf.Runtime) -> bool:  # noqa: ARG002 - programs run in the simulator
@@ -86,7 +101,21 @@ class TrainingTask(vf.Task[TrainingData, vf.State, vf.TaskConfig]):
         return solved.reward == 1 and idle.reward == 0
 
     async def _judged(self, trace: TrainingTrace) -> Components:
-        return await self._parts(await asyncio.to_thread(program_in, trace.last_reply))
+        if self.data.world is None:
+            return await self._parts(await asyncio.to_thread(program_in, trace.last_reply))
+        mission = await self._mission(trace)
+        if trace.stop_condition in {None, "agent_completed"}:
+            mission.answer(trace.last_reply)
+        else:
+            mission.stop()
+        return mission.components
+
+    async def _mission(self, trace: AnyTrace) -> TrainingMission:
+        """Repeat the calls of a trace, also those that never reached the server because they were wrong."""
+        calls = [call for message in trace.assistant_messages for call in message.tool_calls or []]
+        return await asyncio.to_thread(
+            repeated, self.data.model_dump(), [(call.name, call.arguments) for call in calls]
+        )
 
     async def _parts(self, program: str) -> Components:
         data = self.data
@@ -94,7 +123,7 @@ class TrainingTask(vf.Task[TrainingData, vf.State, vf.TaskConfig]):
         return await asyncio.to_thread(_components, rollout, data.worlds)
 
 
-class TrainingTaskset(vf.Taskset[TrainingTask, TrainingConfig]):
+class TrainingTaskset(vf.Taskset[TrainingTask, TrainingConfig]):  # type: ignore[type-var]  # of its state
     """A reproducible, possibly unlimited stream of tasks."""
 
     def __init__(self, config: TrainingConfig) -> None:
@@ -106,16 +135,22 @@ class TrainingTaskset(vf.Taskset[TrainingTask, TrainingConfig]):
         config = self.config
         first = config.seed * (config.count or STREAM)
         for number in islice(counting(first), config.count):
-            (row,) = load_prompts(config.split, count=1, seed=number, only=config.families)
+            load = load_prompts if config.mode == "program" else load_missions
+            (row,) = load(config.split, count=1, seed=number, only=config.families)
             yield TrainingTask(_data(row, config.worlds), config.task)
+
+    @classmethod
+    def toolsets(cls, config: TrainingConfig) -> list[vf.Toolset[Any, Any]]:
+        """The server of the tools, for agents only."""
+        return [] if config.mode == "program" else [MissionToolset(vf.SharedToolsetConfig())]
 
 
 def _data(row: dict[str, Any], worlds: int) -> TrainingData:
     """Convert a row of `load_prompts`; the system prompt is separate, so that verifiers can replace it."""
     system, *messages = row["prompt"]
-    name = f"{row['family']}-{row['seed']}"
+    name, world = f"{row['family']}-{row['seed']}", row.get("world")
     return TrainingData(
-        id=f"{name}-{row['prompt_index']}",
+        id=f"{name}-{row['prompt_index']}" + ("" if world is None else f"-{world}"),
         name=name,
         system_prompt=system["content"],
         prompt=messages,
@@ -123,6 +158,7 @@ def _data(row: dict[str, Any], worlds: int) -> TrainingData:
         seed=row["seed"],
         prompt_index=row["prompt_index"],
         worlds=worlds,
+        world=world,
     )
 
 
