@@ -62,7 +62,7 @@ class TrainingMission:
         family: the family of the task.
         seed: the seed of the task.
         prompt_index: the number of the phrasing, from 0.
-        world: the number of the world. The first world follows the last one again.
+        world: the number of the world, among those where something is to be done. The first follows the last.
 
     Raises:
         UserError: the family or prompt does not exist.
@@ -76,7 +76,9 @@ class TrainingMission:
     def __post_init__(self) -> None:
         task = trained_task(self.family, self.seed)
         task.expect_prompt(self.prompt_index)
-        worlds = requirements_of(task.suite, task.name, self.prompt_index)
+        every = requirements_of(task.suite, task.name, self.prompt_index)
+        # Where all requirements hold at the start, an agent that does nothing would earn the full reward.
+        worlds = [one for one in every if not all(one[1])] or every
         self._asked = worlds[self.world % len(worlds)]
         self._mission = AgentMission(task.suite, self._asked[0])
         self._calls_left = MAX_MISSION_CALLS
