@@ -240,7 +240,7 @@ def _turn(reply: Reply, response: messages.ModelResponse) -> Reply:
     parts = [part for part in response.parts if isinstance(part, messages.ToolCallPart)]
     calls = tuple(ToolCall(one.tool_call_id, one.tool_name, one.args_as_json_str()) for one in parts)
     known = reply.no_program if reply.no_program in {"refusal", "filtered"} else None
-    has_turn = bool(calls or (response.text or "").strip())
+    has_turn = bool(calls or (response.text and reply.program.strip()))  # the text without thoughts
     why = classify_reply(reply.text, "", reply.finish_reason, has_code=has_turn, known_kind=known)
     turn = messages.ModelMessagesTypeAdapter.dump_json([response]).decode()
     fault = None if why == "tool-call" and calls else why

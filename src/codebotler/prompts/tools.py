@@ -63,13 +63,20 @@ class ToolPrompt(Prompt):
     tools: tuple[Tool, ...] = ()
 
 
-def agent_prompt(instruction: str, *, rules: Sequence[str] = (), skills: SkillTable = SKILLS) -> ToolPrompt:
+TO_END = "When everything is done, answer with a short sentence instead of a call. This ends the mission."
+"""How an agent ends its mission, unless it is told another way."""
+
+
+def agent_prompt(
+    instruction: str, *, rules: Sequence[str] = (), skills: SkillTable = SKILLS, to_end: str = TO_END
+) -> ToolPrompt:
     """Return the request to carry out an instruction by calling skills.
 
     Args:
         instruction: the robot's task, in plain words.
         rules: sentences that every mission must obey.
         skills: the skills that may be called.
+        to_end: how the mission is ended, in a sentence.
 
     Raises:
         UserError: the instruction is empty.
@@ -78,7 +85,7 @@ def agent_prompt(instruction: str, *, rules: Sequence[str] = (), skills: SkillTa
     listed = "\n".join(f"- {rule}" for rule in rules)
     about_rules = Template(_RULES_FILE.read_text(encoding="utf-8")).substitute(rules=listed) if rules else ""
     messages = (
-        PromptMessage("system", _AGENT_FILE.read_text(encoding="utf-8").strip()),
+        PromptMessage("system", f"{_AGENT_FILE.read_text(encoding='utf-8').strip()}\n- {to_end}"),
         PromptMessage("user", "\n\n".join(filter(None, (instruction, about_rules.strip())))),
     )
     return ToolPrompt(instruction, messages, instruction, (), "", tools=tools_for(skills))

@@ -85,7 +85,7 @@ def match_row(row: Mapping[str, Any], query: TraceQuery, formula: Formula | None
 def _verdicts_in_scope(row: Mapping[str, Any], query: TraceQuery) -> Iterator[tuple[int, Mapping[str, Any]]]:
     if query.task not in {None, row["task"]}:
         return
-    for number, verdict in enumerate(row["verdicts"], 1):
+    for number, verdict in enumerate(row["verdicts"], 1 + row.get("mission_world", 0)):
         if query.world in {None, str(number)} or verdict["world"].lower() == str(query.world).lower():
             yield number, verdict
 

@@ -124,6 +124,8 @@ def read_options(
         plan = missions_of(plan, mode, num_completions or 1, max_turns, max_mission_tokens, within)
     elif max_turns or max_mission_tokens or within:
         fail("--max-turns, --max-mission-tokens and --within need --mode agent or replan; add it")
+    if mode == "replan" and kind_of(chosen.name) == "recorded":
+        fail(f"{chosen.name} writes no program for the rest of a mission; name a language model")
     if mode == "agent" and kind_of(chosen.name) in NOT_CALLING:
         fail(f"{chosen.name} cannot call tools; --mode agent needs a chat model, such as openai-chat:NAME")
     return GenerationRequest(chosen.name, settings, plan, pace, suite, out)

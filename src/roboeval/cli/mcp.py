@@ -46,7 +46,10 @@ def mcp(
     limits = TurnLimits(max_turns or DEFAULT_TURNS["agent"])
     plan = AgentPlan(known, selected, num_completions, mode="agent", limits=limits)
     with open_desk(RunFolder(out), plan, ClientAgent(f"mcp:{name}")) as desk:
-        asyncio.run(serve_agent(desk))
+        try:
+            asyncio.run(serve_agent(desk))
+        finally:
+            desk.leave()
         left = len(desk.todo)
     again = command("evaluate", out, suite=suite)
     note(f"{left:,} missions are left; `{again}` judges the others")

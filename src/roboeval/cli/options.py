@@ -134,7 +134,7 @@ TurnsOption = Annotated[
         min=1,
         max=1_000,
         help="With --mode: the maximum number of replies in a mission.",
-        show_default="100 calls; 4 programs",
+        show_default="300 calls; 4 programs",
     ),
 ]
 MissionTokensOption = Annotated[

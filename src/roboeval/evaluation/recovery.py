@@ -71,9 +71,14 @@ class RecordingRobot(SimulatedRobot):
                     self.perform(skill, arguments)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Record a call and make it."""
+        """Record a call and make it. If it fails, say so in its events, which the rest of a mission reads."""
         self.calls.append((skill, arguments))
-        return super().perform(skill, arguments)
+        before = len(self.events)
+        try:
+            return super().perform(skill, arguments)
+        except RobotError as error:
+            self.events[before:] = [replace(event, failed=error.kind) for event in self.events[before:]]
+            raise
 
     def sleep_until(self, now: float) -> None:
         """Record that time passes until `now` seconds since the start."""

@@ -49,6 +49,7 @@ def row_line(completion: Completion, judgement_json: bytes) -> bytes:
         "prompt": completion.prompt,
         "index": completion.index,
         "program_sha256": completion.program_sha256,
+        **({} if completion.acted is None else {"mission_world": completion.acted.world}),
     }
     return b"%b, %b\n" % (to_line(identity).removesuffix(b"}\n"), judgement_json.removeprefix(b"{"))
 

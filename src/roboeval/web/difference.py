@@ -12,9 +12,14 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
-from roboeval.analysis.compare import compare_scores, comparison_sentence, pairs_to_compare
+from roboeval.analysis.compare import (
+    MISSIONS_COMPARED,
+    compare_scores,
+    comparison_sentence,
+    pairs_to_compare,
+)
 from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, pass_at_1
-from roboeval.analysis.missions import comparable_scores
+from roboeval.analysis.missions import comparable_scores, has_missions
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of
 from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.snapshot import Snapshot
@@ -92,6 +97,8 @@ def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Differen
     except UserError:
         return Difference((first, second), f"{names[0]} and {names[1]} have no prompt in common.")
     sentence = comparison_sentence(found, names)
+    if len({has_missions(table) for table in tables}) > 1:
+        sentence += f" {MISSIONS_COMPARED[0].upper()}{MISSIONS_COMPARED[1:]}."
     if not by_task:
         return Difference((first, second), sentence)
     overall = TaskRow("All tasks", (found.first, found.second), found.over_tasks, ())

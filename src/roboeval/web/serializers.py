@@ -85,7 +85,8 @@ def run_data(run: Snapshot) -> dict[str, Any]:
 def settings_text(about: Mapping[str, Any]) -> str:
     """Format the settings in run.json, except those that were not sent to the model."""
     settings = about.get("settings")
-    named = settings.items() if isinstance(settings, dict) else ()
+    how = {name: about[name] for name in ("mode", "max_turns") if name in about}
+    named = {**how, **(settings if isinstance(settings, dict) else {})}.items()
     return ", ".join(
         f"{name.replace('_', '-')} {value if isinstance(value, str) else json.dumps(value)}"
         for name, value in named
@@ -108,6 +109,8 @@ def notes(run: Snapshot) -> list[str]:
         found.append(f"{len(faults) - MAX_FAULTS_SHOWN:,} more lines are damaged.")
     if faults:
         found.append("All other rows are shown.")
+    if (missions := results.scope.missions_sentence) is not None:
+        found.append(f"{missions[0].upper()}{missions[1:]}.")
     if (warning := run.cut_off.warning) is not None:
         found.append(f"{warning}.")
     if stale:

@@ -138,6 +138,7 @@ def test_each_world_of_each_prompt_is_a_mission_whose_row_says_what_it_took(
         ([[("go_to", {"location": "x"})], STOP], ("RobotExecutionError", "GoToInvalidLocation")),
         ([LOOK, "She comes at noon, and I have told you so."], ("TaskCompletionError", "Location")),
         ([GO, ""], ("NoProgram", "empty")),
+        ([LOOK, "<think>She may be in the kitchen.</think>"], ("NoProgram", "empty")),
     ],
     ids=lambda one: one[1] if isinstance(one, tuple) else "",
 )
@@ -197,6 +198,24 @@ def test_a_reasoning_models_thoughts_are_kept(tmp_path: Path, small: Suite) -> N
     assert {one.more["reasoning"] for one in completions} == {"She is away."}
 
 
+def test_a_server_may_reject_what_has_become_too_long(tmp_path: Path, suite: Suite) -> None:
+    run = RunFolder(tmp_path / "run")
+    _, server = serve(lambda _: [GO, LOOK, "Done."])
+    answers = server.sends
+
+    def sends(request: Request) -> tuple[int, dict[str, str], bytes] | None:
+        if turns_before(request) == 2:
+            return 400, {"Content-Type": "application/json"}, b'{"error": {"message": "Too long."}}'
+        return answers(request)
+
+    server.sends = sends
+    with server:
+        assert act(run, suite, server).missing is None
+    completions = [*run.read(suite)]
+    assert {(one.more["ending"], one.turns) for one in completions} == {("Rejected", 2)}
+    assert all("Too long" in one.program for one in completions)
+
+
 PROGRAM = """
 ```python
 def task_program():
@@ -225,7 +244,8 @@ def test_after_a_failure_the_model_writes_the_rest(tmp_path: Path, suite: Suite)
         spoken = [event[1] for event in row["verdicts"][0]["trace"] if event[0] == "say"]
         assert spoken == ["hello", "sorry"]  # the suite lower-cases texts; the first is not said again
     second = max(server.requests, key=turns_before)
-    assert "the moon" in second.body["messages"][-1]["content"]
+    told = second.body["messages"][-1]["content"]
+    assert 'failed to go to "the moon"' in told  # rather than that the robot went there
 
 
 @pytest.mark.parametrize(
@@ -235,6 +255,7 @@ def test_after_a_failure_the_model_writes_the_rest(tmp_path: Path, suite: Suite)
         ("say(undefined)", "PythonError", "NameError"),
         ("say('x'", "PythonError", "SyntaxError"),
         ("import time\n    while True: time.sleep(1)", "PythonError", "TimeoutError"),
+        ("'x'.encode().decode('utf-16')", "PythonError", "Exception"),  # its kind takes more than a text
     ],
 )
 def test_the_last_failure_counts(tmp_path: Path, small: Suite, body: str, name: str, kind: str) -> None:
@@ -244,6 +265,15 @@ def test_the_last_failure_counts(tmp_path: Path, small: Suite, body: str, name: 
     for row in rows:
         assert row["failure"] is not None
         assert (row["failure"]["class"], row["failure"]["kind"]) == (name, kind)
+    counts = [sum(one.more["tool_errors"].values()) for one in completions]
+    assert counts == [one.turns for one in completions]
+
+
+def test_a_program_may_look_as_often_as_it_likes(tmp_path: Path, suite: Suite) -> None:
+    body = "[is_in_room('jill') for _ in range(150)]; say('hello')"
+    completions, rows, _ = replan(tmp_path, suite, [body])
+    assert {one.more["ending"] for one in completions} == {"answer"}
+    assert all(row["passed"] for row in rows)
 
 
 def test_a_run_keeps_to_one_mode(tmp_path: Path, suite: Suite) -> None:

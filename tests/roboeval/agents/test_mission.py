@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -11,12 +12,16 @@ from hypothesis import strategies as st
 from codebotler.checking.contract_file import contract_from
 from codebotler.core.errors import VIOLATION, UserError
 from codebotler.core.trace import Option, Status, outcome_data
+from codebotler.simulator.worker import Worker
 from roboeval.evaluation.agents.mission import MAX_MISTAKES, MAX_REPEATS, AgentMission
+from roboeval.evaluation.agents.plan import DEFAULT_TURNS
 from roboeval.evaluation.judge import evaluate, judge
+from roboeval.evaluation.recovery import SLEEP, RecordingRobot
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Row
+from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.house import HouseRules
-from roboeval.suites.load import Suite
+from roboeval.suites.load import Scenario, Suite, load_suite
 
 TASK, WORLD = "LunchTime", 0
 
@@ -126,6 +131,17 @@ def test_to_give_up_fails_with_the_error_that_was_the_cause(mission: AgentMissio
     failure = judged(mission, paper)["failure"]
     assert failure is not None
     assert (failure["class"], failure["kind"]) == ("RobotExecutionError", "GoToInvalidLocation")
+
+
+def test_a_mistake_after_the_error_does_not_hide_the_cause(mission: AgentMission, paper: Suite) -> None:
+    mission.call("say", {"message": "hello"})
+    mission.call("go_to", {"location": "the moon"})
+    mission.call("fly", {})
+    mission.call("give_up", {"reason": "no such room"})
+    row = judged(mission, paper)
+    assert row["failure"] is not None
+    assert row["failure"]["kind"] == "GoToInvalidLocation"
+    assert [event[0] for event in row["verdicts"][0]["trace"]] == ["say", "goto"]
 
 
 def test_to_give_up_without_an_error_is_the_agents_own_failure(mission: AgentMission, paper: Suite) -> None:
@@ -239,3 +255,29 @@ def test_a_mission_and_its_program_do_the_same(
     assert (of_program["satisfied"], of_program["status"]) == (verdict.satisfied, mission.outcome.status)
     assert of_program["failed_checks"] == [one.text for one in verdict.failed]
     assert of_program["trace"] == outcome_data(mission.outcome)["trace"]
+
+
+@pytest.mark.slow
+def test_an_agent_can_do_each_task_within_the_usual_limit_of_turns() -> None:
+    suite = load_suite("plus")
+    with closing(Worker()) as worker:
+        for one in recorded_completions("recorded:careful", suite):
+            if one.prompt == 0 and one.index == 0:
+                for scenario in suite.tasks[one.task].scenarios:
+                    assert turns_to_pass(worker, suite, one, scenario) < DEFAULT_TURNS["agent"]
+
+
+def turns_to_pass(worker: Worker, suite: Suite, one: Completion, scenario: Scenario) -> int:
+    """The number of a program's calls until its world's requirements hold; 0 if they never do."""
+    robot, asked = RecordingRobot(scenario.world, suite), scenario.asked_by(one.prompt)
+    if not judge(worker.run_alone(one.program, lambda: robot), asked).satisfied:
+        return 0
+    mission = AgentMission(suite, asked)
+    for turns, (name, arguments) in enumerate(robot.calls, 1):
+        if name == SLEEP:
+            mission.sleep_until(float(str(arguments[0])))
+        else:
+            mission.repeat(suite.skills[name], arguments)
+        if judge(mission.outcome, asked).satisfied:
+            return turns
+    raise AssertionError(one.task, scenario.world.about)

@@ -118,6 +118,15 @@ def test_a_report_has_a_table_of_missions(runs: tuple[Path, Path, str], tmp_path
     assert not (tmp_path / "plain" / "tables" / "modes.csv").exists()
 
 
+def test_a_search_in_a_world_finds_its_missions(runs: tuple[Path, Path, str]) -> None:
+    _, agents, suite = runs
+    data = json.loads(roboeval("find", str(agents), "--suite", suite, "--world", "2", "--json").out)
+    assert [(one["completion"], one["worlds"][0]["number"]) for one in data["found"]] == [
+        ("T/0/1", 2),
+        ("T/0/3", 2),
+    ]
+
+
 @pytest.mark.parametrize("name", ["resample", "clarify"])
 def test_what_needs_programs_refuses_missions(runs: tuple[Path, Path, str], name: str) -> None:
     _, agents, suite = runs

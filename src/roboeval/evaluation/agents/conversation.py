@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Protocol
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 from codebotler.models.base import Reply
 from codebotler.prompts import Prompt, PromptMessage
 from codebotler.prompts.tools import CallingMessage, ResultMessage, ToolCall, ToolPrompt
 from roboeval.evaluation.agents.mission import AgentMission
-from roboeval.evaluation.runs.endings import TOKEN_LIMIT, TURN_LIMIT
+from roboeval.evaluation.runs.endings import REJECTED, TOKEN_LIMIT, TURN_LIMIT
 
 MAX_REASONING = 200_000
 """The characters of reasoning that a row keeps; the log of turns has all of it."""
@@ -25,39 +26,52 @@ class TurnLimits:
     tokens: int | None = None  # of all turns, as far as the model counts them
 
 
-class Conversation(Protocol):
-    """A mission that goes on as long as it has a prompt."""
+class Conversation(ABC):
+    """A mission that goes on as long as it has a prompt. The same replies always lead to the same end."""
+
+    def __init__(self, mission: AgentMission, prompt: Prompt, limits: TurnLimits) -> None:
+        self.mission, self.limits = mission, limits
+        self.replies: list[Reply] = []
+        self._first = prompt
 
     @property
+    @abstractmethod
     def prompt(self) -> Prompt | None:
         """The next request to the model; None after the end."""
 
     def add(self, reply: Reply) -> None:
-        """Do what a reply says. The robot is simulated, so the same replies always lead to the same end."""
+        """Do what a reply says, or end the mission if it says nothing."""
+        self.replies.append(reply)
+        if reply.no_program is None:
+            self._act(reply)
+        else:
+            self.end(reply.no_program)
 
-    def data(self) -> dict[str, Any]:
-        """Return the mission as entries of a row of completions.jsonl."""
+    def reject(self, sentence: str) -> None:
+        """End the mission because the server rejects the conversation, as it says in a sentence."""
+        self.end(REJECTED, sentence)
 
+    @abstractmethod
+    def end(self, ending: str, why: str = "") -> None:
+        """End the mission for a reason outside of it."""
 
-@dataclass
-class Turns:
-    """The replies of one conversation."""
-
-    limits: TurnLimits
-    replies: list[Reply] = field(default_factory=list)
+    @abstractmethod
+    def _act(self, reply: Reply) -> None:
+        """Make the call of a reply, or run its program."""
 
     @property
-    def ending(self) -> str | None:
-        """The limit that is reached, or None."""
+    def limit(self) -> str | None:
+        """The ending of the limit that is reached, or None."""
         if len(self.replies) >= self.limits.turns:
             return TURN_LIMIT
         used = sum(reply.usage.total for reply in self.replies)
         return TOKEN_LIMIT if self.limits.tokens is not None and used >= self.limits.tokens else None
 
     def data(self) -> dict[str, Any]:
-        """Return what all turns together took, and the end of the conversation."""
+        """Return the mission as entries of a row: what was done, how it ended, and what all turns took."""
         last, latencies = self.replies[-1], [reply.latency_s or 0 for reply in self.replies]
         return {
+            **mission_data(self.mission),
             "no_program": last.no_program,
             "finish_reason": last.finish_reason,
             "usage": _total_usage([asdict(reply.usage) for reply in self.replies]),
@@ -68,13 +82,12 @@ class Turns:
         }
 
 
-class AgentConversation:
+class AgentConversation(Conversation):
     """Lets a model call skills. Every reply is one call, or else the end of the mission."""
 
     def __init__(self, mission: AgentMission, prompt: ToolPrompt, limits: TurnLimits) -> None:
-        self.mission = mission
+        super().__init__(mission, prompt, limits)
         self.result: str | None = None  # of the calls in the last reply
-        self._turns, self._first = Turns(limits), prompt
         self._later: list[PromptMessage] = []
 
     @property
@@ -84,24 +97,21 @@ class AgentConversation:
             return None
         return replace(self._first, messages=(*self._first.messages, *self._later))
 
-    def add(self, reply: Reply) -> None:
-        """Make the call of a reply, or end the mission."""
-        self._turns.replies.append(reply)
+    def end(self, ending: str, why: str = "") -> None:
+        """End the mission for a reason outside of it."""
         self.result = None
-        if reply.no_program is not None:
-            self.mission.end(reply.no_program)
-        elif not reply.calls:
-            self.mission.answer(reply.text)
-        else:
-            self.result = result = self._make(reply.calls)
-            self._later.append(CallingMessage("assistant", reply.text, reply.turn))
-            self._later += [ResultMessage("tool", result, call) for call in reply.calls]
-            if self.mission.ending is None and (limit := self._turns.ending) is not None:
-                self.mission.end(limit)
+        self.mission.end(ending, why)
 
-    def data(self) -> dict[str, Any]:
-        """Return the mission as entries of a row."""
-        return mission_data(self.mission) | self._turns.data()
+    def _act(self, reply: Reply) -> None:
+        self.result = None
+        if not reply.calls:
+            self.mission.answer(reply.text)
+            return
+        self.result = result = self._make(reply.calls)
+        self._later.append(CallingMessage("assistant", reply.text, reply.turn))
+        self._later += [ResultMessage("tool", result, call) for call in reply.calls]
+        if self.mission.ending is None and self.limit is not None:
+            self.mission.end(self.limit)
 
     def _make(self, calls: Sequence[ToolCall]) -> str:
         if len(calls) == 1:

@@ -17,7 +17,7 @@ from mcp_types import Tool as ClientTool
 from codebotler import __version__
 from codebotler.core.files import Appender, to_line, to_text, write_whole
 from codebotler.models.sampling import SamplingSettings
-from codebotler.prompts.tools import agent_prompt, object_schema, tools_for
+from codebotler.prompts.tools import GIVE_UP, agent_prompt, object_schema, tools_for
 from roboeval.evaluation.agents.conversation import mission_data
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.agents.plan import AgentPlan
@@ -27,6 +27,7 @@ from roboeval.evaluation.runs.endings import TURN_LIMIT
 from roboeval.evaluation.runs.folder import RunFolder
 
 NEXT, FINISH = "next_mission", "finish_mission"
+_TO_END = f"When everything is done, call {FINISH}. This ends the mission."
 _OVER = f"This mission is over; call {NEXT} for the next one."
 
 
@@ -90,13 +91,19 @@ class MissionDesk:
         self._keep(key, mission)
         return f"{told}\n{_OVER}"
 
+    def leave(self) -> None:
+        """End the mission that the client has left, so that it cannot be tried again."""
+        if self._current is not None:
+            self._call(GIVE_UP, {"reason": "the client has left"})
+
     def _begin(self) -> str:
         if not self.todo:
             return "All missions are done. Say so, and stop."
         key, self._calls = self.todo[0], 0
         self._current = key, self.plan.begin_mission(key)
+        suite = self.plan.suite
         request = agent_prompt(
-            self.plan.instruction(key), rules=self.plan.suite.house_sentences, skills=self.plan.suite.skills
+            self.plan.instruction(key), rules=suite.house_sentences, skills=suite.skills, to_end=_TO_END
         )
         left = f"({len(self.todo)} missions are left.)"
         return "\n\n".join([*(message.text for message in request.messages), left])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import builtins
 import json
-import math
 from ast import literal_eval
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -46,6 +45,9 @@ MAX_MISTAKES = 3
 MAX_REPEATS = 100
 """The number of equal calls with equal results after which a mission ends. Nobody is waited for that long."""
 
+MAX_WAIT_SECONDS = 1_000_000
+"""The longest time that one call waits."""
+
 _TASK = "def task_program():\n"
 
 
@@ -68,7 +70,7 @@ class AgentMission:
     _in_a_row: int = 0  # mistakes
     _same: tuple[object, int] = (None, 0)  # the last call with its result, and how often it was made
     _raised: tuple[str, str] | None = None  # the kind and the message of a program's Python error
-    _error: int | None = None  # the number of the last call's error, if it failed
+    _error: tuple[int, int] | None = None  # of the last call, if it failed: the error's number, and its line
 
     def __post_init__(self) -> None:
         self._robot = robot_in(self.scenario.world, self.suite, self.contracts)
@@ -98,7 +100,9 @@ class AgentMission:
                 return self.refuse(UNKNOWN_TOOL, f'there is no tool "{shortened(name)}"', name)
         except UserError as error:
             return self.refuse(WRONG_ARGUMENTS, error.sentence, name)
-        return self._perform(skill, values, [given[parameter.name] for parameter in skill.parameters])
+        text = self._perform(skill, values, [given[parameter.name] for parameter in skill.parameters])
+        self._watch_repeats((skill.name, values, text))
+        return text
 
     def refuse(self, kind: str, sentence: str, what: str) -> str:
         """Count a mistake, of which too many in a row end the mission, and return what the agent is told."""
@@ -120,17 +124,19 @@ class AgentMission:
     def answer(self, text: str) -> None:
         """End the mission with the agent's last words."""
         self.ending = FINAL_ANSWER if self._ledger.calls else NO_CALL
-        self._note(f"In the end: {text}")
+        if text:
+            self._note(f"In the end: {text}")
 
-    def end(self, ending: str) -> None:
+    def end(self, ending: str, why: str = "") -> None:
         """End the mission for a reason outside of it."""
         self.ending = ending
+        if why:
+            self._note(f"{ending}: {why}")
 
     def crash(self, kind: str, message: str) -> None:
         """End the mission with a Python error of a program that made its calls."""
         self._raised = kind, message
-        known = kind if isinstance(getattr(builtins, kind, None), type) else "Exception"
-        self._lines.append(f"raise {known}({message!r})")
+        self._lines.append(f"raise {kind if _is_raised_with_text(kind) else 'Exception'}({message!r})")
         self.ending = ERROR
 
     def repeat(self, skill: Skill, values: Sequence[Argument]) -> None:
@@ -151,7 +157,7 @@ class AgentMission:
         """The outcome so far, which is that of the program."""
         end: dict[str, object] = {"end": "finished"}
         if self._error is not None and self.ending == ERROR:
-            end = {"end": "robot-error", "number": self._error}
+            end = {"end": "robot-error", "number": self._error[0]}
         elif self._raised is not None:
             end = {"end": "python-error", "kind": self._raised[0], "message": self._raised[1]}
         return apply_ending(
@@ -169,7 +175,7 @@ class AgentMission:
             case ("error", (number, kind, message)):
                 text = f"{kind}: {message}"
                 self.mistakes[kind] += 1
-                self._error = number
+                self._error = number, len(self._lines)
                 self._lines += [
                     "try:",
                     f"    {source}",
@@ -180,16 +186,16 @@ class AgentMission:
                 broken = self._ledger.broken
                 is_outside = isinstance(broken, RuleViolationError) and broken.rule == CONTRACT
                 self._lines.append(f"# {OUTSIDE_CONTRACT}: {source}" if is_outside else source)
-                self.mistakes[TIMEOUT if broken is None else broken.kind] += 1
-                self.ending = TIMEOUT if broken is None else OUTSIDE_CONTRACT if is_outside else ERROR
+                kind = TIMEOUT if broken is None else OUTSIDE_CONTRACT if is_outside else broken.kind
+                self.mistakes[kind] += 1
+                self.ending = kind if kind in {TIMEOUT, OUTSIDE_CONTRACT} else ERROR
                 return f"the mission is over: {self._ledger.limit}"
-        self._watch_repeats((skill.name, values, text))
         return text
 
     def _watch_repeats(self, call: object) -> None:
         last, times = self._same
         self._same = (call, times + 1 if call == last else 1)
-        if self._same[1] >= MAX_REPEATS:
+        if self._same[1] >= MAX_REPEATS and self.ending is None:
             self.ending = REPEATED_CALLS
 
     def sleep_until(self, now: float) -> None:
@@ -212,8 +218,10 @@ class AgentMission:
         """End the mission: with the robot's error if the last call failed, since that is the cause."""
         self.ending = GAVE_UP if self._error is None else ERROR
         if self._error is not None:
-            self._lines[-4:] = [self._lines[-3].strip()]  # without `try`
-        self._note(f"The agent gives up: {reason}")
+            at = self._error[1]
+            self._lines[at : at + 4] = [self._lines[at + 1].strip()]  # without `try`
+        if reason:
+            self._note(f"The agent gives up: {reason}")
         return "the mission is over"
 
     def _note(self, text: str) -> None:
@@ -224,6 +232,15 @@ class AgentMission:
         if self.suite.settings.literals != "lowercase":
             return given
         return {name: _lowered(value) for name, value in given.items()}
+
+
+def _is_raised_with_text(kind: str) -> bool:
+    """Whether a kind is a built-in exception that takes one text."""
+    known = getattr(builtins, kind, None)
+    try:
+        return isinstance(known, type) and issubclass(known, Exception) and str(known("text")) != ""
+    except TypeError:
+        return False
 
 
 def _written(value: Argument) -> object:
@@ -250,15 +267,16 @@ def _read(arguments: str | Mapping[str, object]) -> Mapping[str, Any]:
     """Read the arguments of a call. Raise UserError if they are not a JSON object."""
     try:
         given = json.loads(arguments or "{}") if isinstance(arguments, str) else arguments
-    except ValueError:
-        given = None
-    if not isinstance(given, Mapping):
+    except (ValueError, RecursionError):
+        given = arguments
+    if not isinstance(given, Mapping | None):
         raise UserError("the arguments are not a JSON object")
-    return given
+    return given or {}
 
 
 def _read_seconds(given: Mapping[str, object]) -> float:
     seconds = given.get("seconds")
-    if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0 <= seconds < math.inf:
-        raise UserError("call it as wait(seconds: float), with a number of seconds from 0")
-    return float(seconds)
+    is_number = isinstance(seconds, int | float) and not isinstance(seconds, bool)
+    if not is_number or not 0 <= seconds <= MAX_WAIT_SECONDS:  # type: ignore[operator]  # a number
+        raise UserError(f"call it as wait(seconds: float), with 0 to {MAX_WAIT_SECONDS:,} seconds")
+    return float(seconds)  # type: ignore[arg-type]  # a number

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeAlias
 
 from codebotler.checking.contract_file import contract_yaml
-from codebotler.models.base import Reply
+from codebotler.models.base import ModelError, Reply
 from codebotler.prompts import Prompt, template_hash
 from codebotler.prompts.tools import ToolPrompt, agent_prompt, agent_template_hash
 from codebotler.simulator.contract import Contract
@@ -19,7 +19,7 @@ from roboeval.evaluation.requests import Ask, GenerationPlan
 from roboeval.evaluation.runs.completions import KEY, CompletionKey
 
 AgentMode: TypeAlias = Literal["agent", "replan"]
-DEFAULT_TURNS: dict[AgentMode, int] = {"agent": 100, "replan": 4}
+DEFAULT_TURNS: dict[AgentMode, int] = {"agent": 300, "replan": 4}  # some worlds need 100 looks and waits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +70,14 @@ class AgentPlan(GenerationPlan):
         for reply in earlier:
             await asyncio.to_thread(conversation.add, reply)
         while (prompt := conversation.prompt) is not None:
-            await asyncio.to_thread(conversation.add, await ask(prompt))
+            try:
+                reply = await ask(prompt)
+            except ModelError as error:
+                if not error.is_refusal or not conversation.replies:  # a server may refuse all first requests
+                    raise
+                conversation.reject(error.sentence)
+            else:
+                await asyncio.to_thread(conversation.add, reply)
         identity = {**dict(zip(KEY, key, strict=True)), "instruction": self.instruction(key), "model": model}
         return {**identity, "mode": self.mode, "world": self.world(key), **conversation.data()}
 

@@ -3,31 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from codebotler.core.errors import VIOLATION
 from codebotler.core.trace import Outcome, Status
 from codebotler.missions.past import MissionPast
 from codebotler.models.base import Reply
 from codebotler.prompts import Prompt
+from codebotler.prompts.tools import GIVE_UP
 from codebotler.simulator.pool import shared_pool
-from roboeval.evaluation.agents.conversation import TurnLimits, Turns, mission_data
+from roboeval.evaluation.agents.conversation import Conversation, TurnLimits
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.recovery import SLEEP, Call, RecordingRobot, rest_prompt
-from roboeval.evaluation.runs.endings import TIMEOUT
+from roboeval.evaluation.runs.endings import OUTSIDE_CONTRACT, TIMEOUT
 
 
-class ReplanConversation:
+class ReplanConversation(Conversation):
     """Runs a model's programs one after the other, until one of them ends without an error.
 
-    Args:
-        mission: the mission, in which the calls of all programs are made at the end.
-        prompt: the request for the first program.
-        limits: the numbers of programs and tokens at most.
+    All calls of the programs are made in the mission at its end.
     """
 
     def __init__(self, mission: AgentMission, prompt: Prompt, limits: TurnLimits) -> None:
-        self.mission, self._first, self._turns = mission, prompt, Turns(limits)
+        super().__init__(mission, prompt, limits)
         self._next: Prompt | None = prompt
         self._calls: Sequence[Call] = ()
 
@@ -36,16 +33,17 @@ class ReplanConversation:
         """The request for the next program."""
         return self._next
 
-    def add(self, reply: Reply) -> None:
-        """Run a reply's program where the last one has stopped, or end the mission."""
-        self._turns.replies.append(reply)
-        if reply.no_program is not None:
-            self._end(None)
-            self.mission.end(reply.no_program)
-            return
+    def end(self, ending: str, why: str = "") -> None:
+        """End the mission for a reason outside of it, after the calls so far."""
+        self._end(None)
+        if self.mission.ending is None:
+            self.mission.end(ending, why)
+
+    def _act(self, reply: Reply) -> None:
+        """Run a reply's program where the last one has stopped."""
         robot, outcome = _run(reply.program, self.mission, self._calls)
         self._calls = robot.calls
-        if _may_go_on(outcome) and self._turns.ending is None:
+        if _may_go_on(outcome) and self.limit is None:
             assert outcome.error is not None, "the mission may go on only after an error"
             why = f"{outcome.error.kind}: {outcome.error.message}"
             self.mission.mistakes[outcome.error.kind] += 1
@@ -54,10 +52,6 @@ class ReplanConversation:
             self._next = rest_prompt(past, self._first)
         else:
             self._end(outcome)
-
-    def data(self) -> dict[str, Any]:
-        """Return the mission as entries of a row."""
-        return mission_data(self.mission) | self._turns.data()
 
     def _end(self, outcome: Outcome | None) -> None:
         """Make all calls in the mission, and end it as the last program ended."""
@@ -69,13 +63,15 @@ class ReplanConversation:
             else:
                 mission.repeat(mission.suite.skills[name], arguments)
         mission.mistakes = mistakes
+        if outcome is not None and outcome.error is not None:
+            is_outside = mission.ending == OUTSIDE_CONTRACT
+            mission.mistakes[OUTSIDE_CONTRACT if is_outside else outcome.error.kind] += 1
         if outcome is None or mission.ending is not None:
             return
         if outcome.error is None:
             mission.answer("")
         elif outcome.status is Status.ROBOT_ERROR:
-            mission.mistakes[outcome.error.kind] += 1
-            mission.call("give_up", {"reason": outcome.error.message})
+            mission.call(GIVE_UP, {})
         elif outcome.status is Status.TIMEOUT:
             mission.end(TIMEOUT)
         else:

@@ -7,11 +7,11 @@ from types import UnionType
 from typing import Any
 
 from codebotler.core.terminal import shortened
+from codebotler.core.words import counted
 from roboeval.evaluation.runs.completions import Completion
 
 TOKENS = ("input_tokens", "output_tokens", "reasoning_tokens")
 REPLY_TEXTS = ("reasoning", "raw_reply")
-MISSION_ENTRIES = ("mode", "ending", "turns", "tool_errors")
 MAX_RECORDED = 10**12  # tokens or seconds; larger numbers cannot be measurements
 
 
@@ -36,8 +36,13 @@ def reply_data(completion: Completion | None) -> dict[str, Any] | None:
         **tokens,
         "latency_s": number_or_none(more.get("latency_s"), int | float),
         **texts,
-        **({} if completion.acted is None else {name: more.get(name) for name in MISSION_ENTRIES}),
+        **({} if completion.acted is None else _mission_data(completion)),
     }
+
+
+def _mission_data(completion: Completion) -> dict[str, Any]:
+    entries = {name: completion.more.get(name) for name in ("mode", "ending", "tool_errors")}
+    return {**entries, "turns": completion.turns}
 
 
 def reply_facts(reply: Mapping[str, Any]) -> list[str]:
@@ -48,7 +53,8 @@ def reply_facts(reply: Mapping[str, Any]) -> list[str]:
     if "ending" in reply:
         errors = reply["tool_errors"] if isinstance(reply["tool_errors"], dict) else {}
         counts = "".join(f", {shortened(str(kind), 100)} {count}" for kind, count in errors.items())
-        facts.append(f"{reply['mode']}: {reply['turns']} replies{counts}; ended by {reply['ending']}")
+        turns = counted(reply["turns"], "turn")
+        facts.append(f"{reply['mode']}: {turns}{counts}; ended by {reply['ending']}")
     if reply["finish_reason"] is not None:
         ended = shortened(reply["finish_reason"], 100)
         facts.append(f'finish reason "{ended}"{" (cut off)" if reply["cut_off"] else ""}')

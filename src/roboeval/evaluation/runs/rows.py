@@ -78,6 +78,7 @@ class Row(TypedDict):
         prompt: the number of the phrasing, from 0.
         index: the number of the sample, from 0.
         program_sha256: the hash of the program that was judged.
+        mission_world: the index of the only world in which it was judged, since an agent acted there.
         passed: whether the program satisfies the requirements in all worlds.
         failure: the first failure, or None if the program passed.
         verdicts: the judgement in each world, in order.
@@ -87,6 +88,7 @@ class Row(TypedDict):
     prompt: int
     index: int
     program_sha256: str
+    mission_world: NotRequired[int]
     passed: bool
     failure: Failure | None
     verdicts: list[WorldVerdict]

@@ -92,7 +92,7 @@ class JudgingScope:
         if not (count := sum(self.endings.values())):
             return None
         ended = ", ".join(f"{ending} {number:,}" for ending, number in Counter(self.endings).most_common())
-        turns = f"{self.turns / count:.1f} replies on average"
+        turns = f"{self.turns / count:.1f} turns on average"
         return f"each completion is one mission in one world: {turns}; how they ended: {ended}"
 
     def coverage(self, judged: int, task: str | None = None) -> Coverage:

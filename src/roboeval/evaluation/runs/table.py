@@ -42,6 +42,7 @@ COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "latency_s": pl.Float64,
     "mode": pl.String,
     "ending": pl.String,
+    "mission_world": pl.Int64,
     "turns": pl.Int64,
     "tool_errors": pl.Int64,
     "cost": pl.Float64,
@@ -196,15 +197,15 @@ def _usage(written: Completion | None) -> tuple[float | None, ...]:
 
 
 def _mission(written: Completion | None) -> tuple[str | float | None, ...]:
-    """Return how a model was used, and how a mission of an agent ended and what it took."""
+    """Return how a model was used, and how a mission of an agent ended, where, and what it took."""
     if written is None:
-        return (None,) * 4
+        return (None,) * 5
     more, acted = written.more, written.acted
     if acted is None:
-        return written.mode, None, 1, None
+        return written.mode, None, None, 1, None
     counts = more.get("tool_errors")
     errors = [number_or_none(one, int) or 0 for one in counts.values()] if isinstance(counts, dict) else []
-    return written.mode, acted.ending, written.turns, sum(errors)
+    return written.mode, acted.ending, acted.world, written.turns, sum(errors)
 
 
 def storable(text: str) -> str:

@@ -89,6 +89,7 @@ def test_each_world_of_a_completion_is_a_row() -> None:
         "latency_s": None,
         "mode": "program",
         "ending": None,
+        "mission_world": None,
         "turns": 1,
         "tool_errors": None,
         "cost": None,
@@ -149,7 +150,7 @@ def test_the_bytes_of_a_csv(tmp_path: Path) -> None:
     (line,) = (tmp_path / "t").read_bytes().splitlines()[1:]
     assert line.startswith(b"Visit,1,2,,")
     assert line.endswith(
-        b",false,RobotExecutionError,GoToInvalidLocation,0,,true,,,,,,,,,,,,,,,,0,in,true,finished,,,,,,1"
+        b",false,RobotExecutionError,GoToInvalidLocation,0,,true,,,,,,,,,,,,,,,,,0,in,true,finished,,,,,,1"
     )
 
 
