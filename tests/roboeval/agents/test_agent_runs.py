@@ -285,6 +285,15 @@ def test_a_run_keeps_to_one_mode(tmp_path: Path, suite: Suite) -> None:
             generate_run(RunFolder(tmp_path / "run"), GenerationPlan(suite, None, 9), model, Pace())
 
 
+def test_a_run_keeps_its_limits(tmp_path: Path, suite: Suite) -> None:
+    run = RunFolder(tmp_path / "run")
+    _, server = serve(lambda _: [GO, "Done."])
+    with server:
+        act(run, suite, server, limits=TurnLimits(20, tokens=5_000))
+        with pytest.raises(UserError, match="tokens"):
+            act(run, suite, server, count=2)
+
+
 SCRIPT = """
 import pathlib, sys
 from codebotler.models.open import open_model
