@@ -43,5 +43,5 @@ def test_outcomes_are_equal_by_all_that_they_hold() -> None:
 
 def test_statuses_are_spelt_as_the_rows_of_an_evaluation_spell_them() -> None:
     assert [str(status) for status in Status] == [
-        "finished", "timeout", "python-error", "robot-error", "killed",
+        "finished", "timeout", "python-error", "robot-error", "agent-error", "killed",
     ]  # fmt: skip
