@@ -46,6 +46,7 @@ MODULES = {
         "roboeval.analysis.metrics",
         "roboeval.suites.families.tasks",
         "roboeval.training.prompts",
+        "roboeval.training.missions",
         "roboeval.training.rollouts",
     ),
 }
