@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from secrets import compare_digest
 from threading import Lock
@@ -16,13 +17,15 @@ from codebotler.checking.contract_text import contract_sentence
 from codebotler.core.errors import UserError
 from codebotler.core.program import MAX_PROGRAM_LENGTH
 from codebotler.core.words import listed
+from codebotler.missions.authoring import ModelAuthor
 from codebotler.missions.log import MissionState
 from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import missing_skills
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.missions.wording import event_text
-from codebotler.prompts import prompt_for
+from codebotler.models.base import ignore_text
+from codebotler.prompts import Prompt, prompt_for
 from codebotler.web.console import Console
 
 MAX_CONTRACT_CHARACTERS = 16_000  # a check reads no program of more than 20,000
@@ -49,6 +52,7 @@ class Gatekeeper:
     _session: MissionSession | None = field(default=None, init=False)  # the latest one of an agent
     _steps: Steps | None = field(default=None, init=False)  # of that session, if it is step by step
     _checking: Lock = field(default_factory=Lock, init=False)  # held while a program of an agent is checked
+    _writing: Lock = field(default_factory=Lock, init=False)  # held while a model writes for an agent
 
     def propose(self, order: MissionOrder, steps: Steps | None = None) -> MissionSession:
         """Begin a mission that waits for approval. Raise MissionError if the console is busy with another."""
@@ -131,12 +135,8 @@ class Gatekeeper:
     def check(self, program: str) -> CheckReport:
         """Check a program without a mission, in the rooms that are known now, but only one at a time."""
         room_map, rules = self.console.view.room_map, self.console.rules
-        if not self._checking.acquire(blocking=False):  # a person's check must not wait for many others
-            raise MissionError("another check is under way; try again when it is over")
-        try:
+        with _one_at_a_time(self._checking, "check"):  # a person's check must not wait for many others
             checked = self.console.check(program, room_map, rules)
-        finally:
-            self._checking.release()
         missing = tuple(missing_skills(program, self.console.robot))
         view = SessionView(
             program=program, check=checked, missing_skills=missing, room_map=room_map, rules=rules
@@ -144,6 +144,14 @@ class Gatekeeper:
         report = report_check(view, self.contract_text(view))
         assert report is not None, "it was checked"
         return report
+
+    def write(self, author: ModelAuthor, prompt: Prompt) -> CheckReport:
+        """Have a model write a program, and check it, but only one at a time."""
+        with _one_at_a_time(self._writing, "request to the model"):
+            _, (made, *_) = author.write(prompt, 1, ignore_text)
+        if made.programless is not None:
+            raise UserError(made.programless.sentence)
+        return self.check(made.reply.program)
 
     def report(self, session: MissionSession | None, after: int = 0) -> MissionReport:
         """Return a session's mission, with its events after a position."""
@@ -192,3 +200,13 @@ class Gatekeeper:
         page = [f"on the page {self.page}, whose link with its token was printed at the start"]
         where = listed(dialog * self.may_ask_client(view) + page * bool(self.page), "or")
         return f"A person must approve this program {where}. Then call run_mission with its digest."
+
+
+@contextmanager
+def _one_at_a_time(lock: Lock, what: str) -> Iterator[None]:
+    if not lock.acquire(blocking=False):
+        raise MissionError(f"another {what} is under way; try again when it is over")
+    try:
+        yield
+    finally:
+        lock.release()

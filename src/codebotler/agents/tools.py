@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import aclosing, contextmanager, suppress
-from typing import Annotated, Any
+from threading import Thread
+from typing import Annotated, Any, ParamSpec, TypeVar
 
 import anyio
 from mcp.server.elicitation import AcceptedElicitation, CancelledElicitation, ElicitationResult
@@ -45,10 +47,11 @@ from codebotler.missions.past import MissionPast
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.missions.wording import event_text
-from codebotler.models.base import ignore_text
 from codebotler.prompts import clean_instruction
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS
 
+_Given = ParamSpec("_Given")
+_Made = TypeVar("_Made")
 _Digest = Annotated[str, Field(description="The digest of the program, from propose_mission or begin_steps.")]
 _Key = Annotated[str, Field(description="The key `steps` from begin_steps.")]
 _After = Annotated[int, Field(ge=0, description="Leave out this many earlier events.")]
@@ -79,9 +82,7 @@ async def check_program(
     It changes nothing and needs no approval. Mend all problems before you propose the program.
     """
     with as_tool_errors():
-        return await asyncio.to_thread(
-            gatekeeper_of(ctx).check, program
-        )  # not on the SDK's threads, which answer
+        return await _in_thread(gatekeeper_of(ctx).check, program)
 
 
 async def write_program(
@@ -103,10 +104,10 @@ async def write_program(
         )
         author = ModelAuthor(console.open_model, console.models[0])
         prompt = prompt_of(asked, console.robot, repair=False)
-        _, (made, *_) = await asyncio.to_thread(author.write, prompt, 1, ignore_text)
-        if made.programless is not None:
-            raise UserError(made.programless.sentence)
-        return await asyncio.to_thread(gatekeeper.check, made.reply.program)
+        try:
+            return await _in_thread(gatekeeper.write, author, prompt)
+        finally:
+            author.cancel()
 
 
 async def propose_mission(
@@ -336,6 +337,24 @@ async def _follow(
                         await ctx.report_progress(known, message=text)
                 if is_last:
                     return
+
+
+async def _in_thread(work: Callable[_Given, _Made], *given: _Given.args, **named: _Given.kwargs) -> _Made:
+    """Call a slow function on a thread of its own.
+
+    The threads of the SDK and of the event loop are few, people need them, and the process waits for them.
+    """
+    made = Future[_Made]()
+    made.set_running_or_notify_cancel()
+
+    def run() -> None:
+        try:
+            made.set_result(work(*given, **named))
+        except BaseException as error:  # noqa: BLE001 - raised again where the result is awaited
+            made.set_exception(error)
+
+    Thread(target=run, daemon=True).start()
+    return await asyncio.wrap_future(made)
 
 
 @contextmanager

@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import threading
 from collections.abc import Callable, Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,7 +26,9 @@ from codebotler.core.world import Room, World
 from codebotler.missions.log import MissionState
 from codebotler.missions.preflight import known_instructions
 from codebotler.missions.view import MissionOrder, SessionView, program_digest
+from codebotler.models.base import Reply, TextListener, ignore_text
 from codebotler.models.recorded import open_recorded
+from codebotler.prompts import Prompt
 from codebotler.robots.base import RobotLostError, RobotResult
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
@@ -675,6 +679,39 @@ def test_an_agent_checks_one_program_at_a_time(gatekeeper: Gatekeeper) -> None:
             await asyncio.sleep(0.1)
             assert "another check" in await agent.fails("check_program", program=HELLO)
         assert (await first)["accepted"]
+
+    use(gatekeeper, act)
+
+
+class Hanging(Several):
+    """A model that never replies, until its request is cancelled."""
+
+    def __init__(self) -> None:
+        super().__init__(())
+        self.is_cancelled = threading.Event()
+
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
+        try:
+            await asyncio.sleep(SOON)
+        finally:
+            self.is_cancelled.set()
+        return await super().reply(prompt, number=number, on_text=on_text)
+
+
+def test_a_model_writes_one_program_at_a_time_and_leaves_a_persons_threads_alone(
+    gatekeeper: Gatekeeper,
+) -> None:
+    model, gatekeeper.writes = Hanging(), True
+    gatekeeper.console.open_model = lambda _: model
+
+    async def act(agent: Agent) -> None:
+        asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(1))
+        first = asyncio.ensure_future(agent.call("write_program", instruction="Say hello."))
+        await asyncio.sleep(0.05)
+        assert "another request" in await agent.fails("write_program", instruction="Say hello.")
+        assert await asyncio.wait_for(asyncio.to_thread(model.is_cancelled.is_set), 1.0) is False
+        first.cancel()
+        assert await asyncio.to_thread(model.is_cancelled.wait, 1.0)
 
     use(gatekeeper, act)
 
