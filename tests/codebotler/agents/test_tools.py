@@ -19,6 +19,7 @@ from mcp_types import ElicitRequestParams, ElicitResult
 from codebotler.agents.gatekeeper import Gatekeeper
 from codebotler.agents.reports import SkillOutcome
 from codebotler.agents.server import make_server
+from codebotler.agents.steps import Steps
 from codebotler.checking.contract_file import contract_from
 from codebotler.checking.rules import read_rules
 from codebotler.core.skills.paper import SKILLS
@@ -522,6 +523,13 @@ def test_skills_are_called_one_at_a_time_and_logged_as_a_mission(gatekeeper: Gat
         assert "not running" in await agent.fails("end_steps", steps=key)
 
     use(gatekeeper, act)
+
+
+def test_no_two_proposals_of_steps_have_the_same_digest() -> None:
+    contract = contract_from(anything("go_to"), SKILLS)
+    first, second = Steps("look", contract, SKILLS), Steps("look", contract, SKILLS)
+    assert first.program == first.program
+    assert program_digest(first.program) != program_digest(second.program)
 
 
 def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
