@@ -539,6 +539,8 @@ def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
         key, _ = await began(agent, gatekeeper, "go_to", "ask")
         for wrong in ({}, {"location": 3}, {"location": ["kitchen"]}, {"location": "kitchen", "more": 1}):
             assert "go_to" in await agent.fails("call_skill", steps=key, name="go_to", arguments=wrong)
+        far = {"location": ["kitchen"] * 2_000}
+        assert "shorten" in await agent.fails("call_skill", steps=key, name="go_to", arguments=far)
         assert "may call only" in await agent.fails(
             "call_skill", steps=key, name="say", arguments={"message": "a"}
         )
