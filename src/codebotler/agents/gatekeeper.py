@@ -30,6 +30,8 @@ from codebotler.web.console import Console
 
 MAX_CONTRACT_CHARACTERS = 16_000  # a check reads no program of more than 20,000
 TOO_LONG = f"the contract is longer than {MAX_CONTRACT_CHARACTERS:,} characters; shorten it"
+MAX_REPORTED_EVENTS = 1_000  # in one report
+MAX_WAITING_CALLS = 100  # each event wakes all of them
 MAX_ASKED_CHARACTERS = 4_000
 """The limit for a program in a client's dialog. Longer programs are reviewed on the page."""
 
@@ -52,6 +54,7 @@ class Gatekeeper:
     _session: MissionSession | None = field(default=None, init=False)  # the latest one of an agent
     _steps: Steps | None = field(default=None, init=False)  # of that session, if it is step by step
     _checking: Lock = field(default_factory=Lock, init=False)  # held while a program of an agent is checked
+    _waiting: int = field(default=0, init=False)  # calls of agents that wait for a mission or a skill
     _writing: Lock = field(default_factory=Lock, init=False)  # held while a model writes for an agent
 
     def propose(self, order: MissionOrder, steps: Steps | None = None) -> MissionSession:
@@ -145,6 +148,17 @@ class Gatekeeper:
         assert report is not None, "it was checked"
         return report
 
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """Count a call that waits. Raise MissionError if too many do."""
+        if self._waiting >= MAX_WAITING_CALLS:
+            raise MissionError(f"{MAX_WAITING_CALLS} calls are waiting already; wait for their answers")
+        self._waiting += 1
+        try:
+            yield
+        finally:
+            self._waiting -= 1
+
     def write(self, author: ModelAuthor, prompt: Prompt) -> CheckReport:
         """Have a model write a program, and check it, but only one at a time."""
         with _one_at_a_time(self._writing, "request to the model"):
@@ -154,9 +168,10 @@ class Gatekeeper:
         return self.check(made.reply.program)
 
     def report(self, session: MissionSession | None, after: int = 0) -> MissionReport:
-        """Return a session's mission, with its events after a position."""
+        """Return a session's mission, with its first events after a position."""
         view = SessionView() if session is None else session.view
         events = [] if session is None else session.events()
+        seen = min(len(events), after + MAX_REPORTED_EVENTS)
         return MissionReport(
             mission=view.id,
             state=view.phase,
@@ -164,8 +179,8 @@ class Gatekeeper:
             digest=view.digest,
             check=report_check(view, self.contract_text(view)),
             remarks=[*view.unknown_rooms, *view.remarks],
-            events=[text for text in map(event_text, events[after:]) if text],
-            event_count=len(events),
+            events=[text for text in map(event_text, events[after:seen]) if text],
+            event_count=seen,
             done_before=[] if view.past is None else view.past.steps,
             is_over=view.is_over,
             next=self._next(view),

@@ -27,6 +27,9 @@ from codebotler.simulator.skill_protocol import named_arguments, named_result
 IDLE_POLL_SECONDS = 0.1
 """How often an idle mission looks whether it was stopped."""
 
+MAX_STEPS = 10_000
+"""The limit for the calls of one mission, since people and reports read its events."""
+
 NOT_RUNNING = "this mission is not running; call run_mission first, or begin_steps for a new one"
 _PROGRAM = """# Proposal {mark}
 # Step by step: an agent chooses each call after it has seen the result of the last one.
@@ -81,6 +84,8 @@ class Steps:
         try:
             while ledger.limit is None and (call := self._next(live)) is not None:
                 call[2].set_result(_perform(ledger, *call[:2]))
+                if ledger.calls >= MAX_STEPS:
+                    ledger.limit = f"the mission has made {MAX_STEPS:,} calls; begin another one"
             return ledger.outcome_at_end({"end": "finished"})
         finally:
             self._close(call)

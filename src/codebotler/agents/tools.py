@@ -33,7 +33,7 @@ from codebotler.agents.dialogs import (
     gatekeeper_of,
     read_last_past,
 )
-from codebotler.agents.gatekeeper import Gatekeeper
+from codebotler.agents.gatekeeper import MAX_REPORTED_EVENTS, Gatekeeper
 from codebotler.agents.reports import (
     CheckReport,
     MissionReport,
@@ -218,10 +218,10 @@ async def run_mission(
     cancel this call while the robot works, the robot stops.
     """
     gatekeeper = gatekeeper_of(ctx)
-    with as_tool_errors():
+    with as_tool_errors(), gatekeeper.waiting():
         _take_answer(gatekeeper, session, digest, answer, agent_name(ctx))
-    with _stopping_if_cancelled(session, agent_name(ctx)):
-        await _follow(gatekeeper, session, ctx, seconds)
+        with _stopping_if_cancelled(session, agent_name(ctx)):
+            await _follow(gatekeeper, session, ctx, seconds)
     return gatekeeper.report(session)
 
 
@@ -233,7 +233,8 @@ async def follow_mission(ctx: AgentContext, after: _After = 0, seconds: _Seconds
     gatekeeper = gatekeeper_of(ctx)
     session = gatekeeper.console.session
     if session is not None:
-        await _follow(gatekeeper, session, ctx, seconds, after)
+        with as_tool_errors(), gatekeeper.waiting():
+            await _follow(gatekeeper, session, ctx, seconds, after)
     return gatekeeper.report(session, after)
 
 
@@ -249,8 +250,8 @@ async def call_skill(
     """
     with as_tool_errors():
         session, known = gatekeeper_of(ctx).find_steps(steps)
-        called = known.call(name, arguments or {})
-        with _stopping_if_cancelled(session, agent_name(ctx)):
+        with gatekeeper_of(ctx).waiting(), _stopping_if_cancelled(session, agent_name(ctx)):
+            called = known.call(name, arguments or {})
             return await asyncio.shield(asyncio.wrap_future(called))
 
 
@@ -327,6 +328,7 @@ async def _follow(
     gatekeeper: Gatekeeper, session: MissionSession, ctx: AgentContext, seconds: float, known: int = 0
 ) -> None:
     """Report new events as progress until the mission is over, or steps may begin, for some seconds."""
+    known = max(known, len(session.events()) - MAX_REPORTED_EVENTS)
     with suppress(TimeoutError):
         async with asyncio.timeout(seconds), aclosing(gatekeeper.console.notifier.changes()) as changes:
             async for _ in changes:

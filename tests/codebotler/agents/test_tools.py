@@ -8,6 +8,7 @@ import logging
 import threading
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
 
@@ -27,6 +28,7 @@ from codebotler.core.world import Room, World
 from codebotler.missions.log import MissionState
 from codebotler.missions.preflight import known_instructions
 from codebotler.missions.view import MissionOrder, SessionView, program_digest
+from codebotler.missions.wording import event_text
 from codebotler.models.base import Reply, TextListener, ignore_text
 from codebotler.models.recorded import open_recorded
 from codebotler.prompts import Prompt
@@ -530,6 +532,39 @@ def test_no_two_proposals_of_steps_have_the_same_digest() -> None:
     first, second = Steps("look", contract, SKILLS), Steps("look", contract, SKILLS)
     assert first.program == first.program
     assert program_digest(first.program) != program_digest(second.program)
+
+
+def test_long_steps_end_and_are_reported_in_parts_to_few_waiting_calls(
+    gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("codebotler.agents.steps.MAX_STEPS", 3)
+    monkeypatch.setattr("codebotler.agents.gatekeeper.MAX_REPORTED_EVENTS", 4)
+    monkeypatch.setattr("codebotler.agents.gatekeeper.MAX_WAITING_CALLS", 1)
+
+    async def act(agent: Agent) -> None:
+        key, _ = await began(agent, gatekeeper)
+        with gatekeeper.waiting():
+            for tool, given in (
+                ("follow_mission", {}),
+                ("call_skill", {"steps": key, "name": "get_all_rooms"}),
+            ):
+                assert "are waiting" in await agent.fails(tool, **given)
+        for _ in range(3):
+            await agent.call("call_skill", steps=key, name="get_all_rooms")
+        await until(gatekeeper, lambda view: view.is_over)
+        ended = await agent.call("follow_mission")
+        assert (ended["state"], "3 calls" in ended["reason"]) == ("failed", True)
+        assert "not running" in await agent.fails("call_skill", steps=key, name="get_all_rooms")
+        parts, after = list[list[str]](), 0
+        while (part := await agent.call("follow_mission", after=after))["event_count"] > after:
+            after = part["event_count"]
+            parts.append(part["events"])
+        assert max(map(len, parts)) == 4
+        session = gatekeeper.console.session
+        assert session is not None
+        assert [*chain(*parts)] == [text for text in map(event_text, session.events()) if text]
+
+    use(gatekeeper, act)
 
 
 def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
