@@ -240,19 +240,18 @@ class _Connection(AutoHTTPProtocol):  # type: ignore[misc,valid-type]  # depends
     """
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Close the connection that has waited longest if too many wait."""
+        """Close the connections that have waited longest if too many wait, even if answers are unread."""
         super().connection_made(transport)
         self.since = time.monotonic()
         waiting = [one for one in self.connections if isinstance(one, _Connection) and one.is_waiting]
-        if len(waiting) > _MAX_WAITING_CONNECTIONS:
-            min(waiting, key=lambda one: one.since).transport.close()
+        for one in sorted(waiting, key=lambda one: one.since)[:-_MAX_WAITING_CONNECTIONS]:
+            one.transport.abort()
 
     @property
     def is_waiting(self) -> bool:
         """Whether no whole request is being answered."""
         cycle = self.cycle
-        is_idle = cycle is None or cycle.more_body or cycle.response_complete
-        return is_idle and not self.transport.is_closing()
+        return cycle is None or cycle.more_body or cycle.response_complete
 
 
 class _Server(uvicorn.Server):
