@@ -129,10 +129,10 @@ async def propose_mission(
     which waits until a person has approved exactly this program.
     """
     gatekeeper = gatekeeper_of(ctx)
-    with as_tool_errors():
+    with as_tool_errors(), gatekeeper.waiting():
         author = agent_name(ctx) if program.strip() else ""
         session = gatekeeper.propose(MissionOrder(instruction, program=program, author=author))
-    return await _prepared(gatekeeper, session)
+        return await _prepared(gatekeeper, session)
 
 
 async def choose_behaviour(
@@ -145,13 +145,13 @@ async def choose_behaviour(
     You cannot choose for them. Afterwards, the answer has the program, which still needs approval.
     """
     gatekeeper = gatekeeper_of(ctx)
-    with as_tool_errors():
+    with as_tool_errors(), gatekeeper.waiting():
         if not isinstance(answer, AcceptedElicitation) or isinstance(answer.data, NotChosen):
             raise MissionError(f"a person must choose on the page {gatekeeper.page}".rstrip())
         asked, given = session.view.question, answer.data
         if asked is not None:
             session.answer(asked.parse(given.answer), given.more)
-    return await _prepared(gatekeeper, session)
+        return await _prepared(gatekeeper, session)
 
 
 async def continue_mission(
@@ -165,7 +165,7 @@ async def continue_mission(
     `done_before` lists what the robot has done, which the rest must not repeat. Then call run_mission.
     """
     gatekeeper = gatekeeper_of(ctx)
-    with as_tool_errors():
+    with as_tool_errors(), gatekeeper.waiting():
         if isinstance(answer, AcceptedElicitation) and not isinstance(answer.data, NoWord):
             past = past.resolve(happened=answer.data.answer == "it happened")
         if past.unsure is not None:
@@ -174,7 +174,7 @@ async def continue_mission(
             raise UserError("this mission has no instruction; send a program for the rest")
         author = agent_name(ctx) if program.strip() else ""
         session = gatekeeper.propose(gatekeeper.console.rest_of(past, program, author))
-    return await _prepared(gatekeeper, session)
+        return await _prepared(gatekeeper, session)
 
 
 async def begin_steps(
@@ -198,9 +198,9 @@ async def begin_steps(
     the key `steps` as often as you need, and end_steps at the end.
     """
     gatekeeper = gatekeeper_of(ctx)
-    with as_tool_errors():
+    with as_tool_errors(), gatekeeper.waiting():
         session, steps = gatekeeper.propose_steps(purpose, contract, agent_name(ctx))
-    report = await _prepared(gatekeeper, session)
+        report = await _prepared(gatekeeper, session)
     return report.model_copy(update={"steps": steps.key})
 
 

@@ -546,6 +546,7 @@ def test_long_steps_end_and_are_reported_in_parts_to_few_waiting_calls(
         with gatekeeper.waiting():
             for tool, given in (
                 ("follow_mission", {}),
+                ("propose_mission", {"program": HELLO}),
                 ("call_skill", {"steps": key, "name": "get_all_rooms"}),
             ):
                 assert "are waiting" in await agent.fails(tool, **given)
