@@ -26,3 +26,13 @@ def test_a_contract_is_shown_and_an_edit_shows_only_what_is_new(tmp_path: Path, 
         expect(pane).to_contain_text("Less than the last program.")
         pane.get_by_text("The whole contract").click()
         expect(pane.locator("tr")).to_have_text(['go to"kitchen"at most 1 time'])
+
+
+def test_long_texts_hide_no_other_skill(tmp_path: Path, opened: OpenPage) -> None:
+    looks = "".join(f"    is_in_room('{letter * 600}')\n" for letter in "abc")
+    program = f"def task_program():\n{looks}    pick(get_current_location())\n"
+    with PageServer(tmp_path) as server:
+        page = opened(server)
+        write(page, program)
+        expect(page.locator(".contract > p")).to_contain_text("pick up")
+        expect(page.locator(".contract > p")).to_contain_text("says nothing.")

@@ -571,3 +571,18 @@ def test_a_program_that_replaces_another_needs_a_moment(server: PageServer, open
         expect(button).to_be_enabled()
     button.click()
     expect(page.locator(".headline")).to_have_text("Running")
+
+
+def test_a_new_mission_needs_a_moment_even_if_its_program_was_typed_here(
+    server: PageServer, opened: OpenPage
+) -> None:
+    page = opened(server)
+    button = page.get_by_role("button", name="Run it on the robot")
+    write(page, TEA)
+    expect(button).to_be_enabled()
+    server.call("POST", "/api/missions", {"program": TEA})
+    expect(button).to_be_disabled()
+    expect(page.get_by_text("Checked: no problems.")).to_be_visible()
+    button.evaluate("button => { button.disabled = false; button.click(); }")
+    expect(page.get_by_text("review it again")).to_be_visible()
+    expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from secrets import compare_digest
 from threading import Lock
@@ -16,17 +17,21 @@ from codebotler.checking.contract_text import contract_sentence
 from codebotler.core.errors import UserError
 from codebotler.core.program import MAX_PROGRAM_LENGTH
 from codebotler.core.words import listed
+from codebotler.missions.authoring import ModelAuthor
 from codebotler.missions.log import MissionState
 from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import missing_skills
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.missions.wording import event_text
-from codebotler.prompts import prompt_for
+from codebotler.models.base import ignore_text
+from codebotler.prompts import Prompt, prompt_for
 from codebotler.web.console import Console
 
 MAX_CONTRACT_CHARACTERS = 16_000  # a check reads no program of more than 20,000
 TOO_LONG = f"the contract is longer than {MAX_CONTRACT_CHARACTERS:,} characters; shorten it"
+MAX_REPORTED_EVENTS = 1_000  # in one report
+MAX_WAITING_CALLS = 100  # each event wakes all of them
 MAX_ASKED_CHARACTERS = 4_000
 """The limit for a program in a client's dialog. Longer programs are reviewed on the page."""
 
@@ -49,6 +54,8 @@ class Gatekeeper:
     _session: MissionSession | None = field(default=None, init=False)  # the latest one of an agent
     _steps: Steps | None = field(default=None, init=False)  # of that session, if it is step by step
     _checking: Lock = field(default_factory=Lock, init=False)  # held while a program of an agent is checked
+    _waiting: int = field(default=0, init=False)  # calls of agents that wait for a mission or a skill
+    _writing: Lock = field(default_factory=Lock, init=False)  # held while a model writes for an agent
 
     def propose(self, order: MissionOrder, steps: Steps | None = None) -> MissionSession:
         """Begin a mission that waits for approval. Raise MissionError if the console is busy with another."""
@@ -131,12 +138,8 @@ class Gatekeeper:
     def check(self, program: str) -> CheckReport:
         """Check a program without a mission, in the rooms that are known now, but only one at a time."""
         room_map, rules = self.console.view.room_map, self.console.rules
-        if not self._checking.acquire(blocking=False):  # a person's check must not wait for many others
-            raise MissionError("another check is under way; try again when it is over")
-        try:
+        with _one_at_a_time(self._checking, "check"):  # a person's check must not wait for many others
             checked = self.console.check(program, room_map, rules)
-        finally:
-            self._checking.release()
         missing = tuple(missing_skills(program, self.console.robot))
         view = SessionView(
             program=program, check=checked, missing_skills=missing, room_map=room_map, rules=rules
@@ -145,10 +148,30 @@ class Gatekeeper:
         assert report is not None, "it was checked"
         return report
 
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """Count a call that waits. Raise MissionError if too many do."""
+        if self._waiting >= MAX_WAITING_CALLS:
+            raise MissionError(f"{MAX_WAITING_CALLS} calls are waiting already; wait for their answers")
+        self._waiting += 1
+        try:
+            yield
+        finally:
+            self._waiting -= 1
+
+    def write(self, author: ModelAuthor, prompt: Prompt) -> CheckReport:
+        """Have a model write a program, and check it, but only one at a time."""
+        with _one_at_a_time(self._writing, "request to the model"):
+            _, (made, *_) = author.write(prompt, 1, ignore_text)
+        if made.programless is not None:
+            raise UserError(made.programless.sentence)
+        return self.check(made.reply.program)
+
     def report(self, session: MissionSession | None, after: int = 0) -> MissionReport:
-        """Return a session's mission, with its events after a position."""
+        """Return a session's mission, with its first events after a position."""
         view = SessionView() if session is None else session.view
         events = [] if session is None else session.events()
+        seen = min(len(events), after + MAX_REPORTED_EVENTS)
         return MissionReport(
             mission=view.id,
             state=view.phase,
@@ -156,8 +179,8 @@ class Gatekeeper:
             digest=view.digest,
             check=report_check(view, self.contract_text(view)),
             remarks=[*view.unknown_rooms, *view.remarks],
-            events=[text for text in map(event_text, events[after:]) if text],
-            event_count=len(events),
+            events=[text for text in map(event_text, events[after:seen]) if text],
+            event_count=seen,
             done_before=[] if view.past is None else view.past.steps,
             is_over=view.is_over,
             next=self._next(view),
@@ -192,3 +215,13 @@ class Gatekeeper:
         page = [f"on the page {self.page}, whose link with its token was printed at the start"]
         where = listed(dialog * self.may_ask_client(view) + page * bool(self.page), "or")
         return f"A person must approve this program {where}. Then call run_mission with its digest."
+
+
+@contextmanager
+def _one_at_a_time(lock: Lock, what: str) -> Iterator[None]:
+    if not lock.acquire(blocking=False):
+        raise MissionError(f"another {what} is under way; try again when it is over")
+    try:
+        yield
+    finally:
+        lock.release()

@@ -50,7 +50,7 @@ class MissionReport(_Report):
     digest: str = Field(description="Identifies exactly this program; run_mission needs it.")
     check: CheckReport | None = Field(description="None while the program is being checked.")
     remarks: list[str] = Field(description="Likely mistakes that are no problems.")
-    events: list[str] = Field(description="What happened since the event `after`.")
+    events: list[str] = Field(description="What happened since the event `after`, at most 1,000 events.")
     event_count: int = Field(description="Pass this as `after` to see only later events.")
     is_over: bool
     next: str = Field(description="What can be done now.")

@@ -28,6 +28,7 @@ from codebotler.agents.tools import ACTING, READING
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
 from codebotler.missions.log import EVENTS_FILE, SUMMARY_FILE
+from codebotler.missions.mission import BY_SHUTDOWN
 from codebotler.missions.store import find_mission, read_missions
 from codebotler.web.access import AGENT_PATH
 from codebotler.web.console import Console
@@ -190,10 +191,18 @@ def serve_without_page(companion: Companion, console: Console) -> None:
 
     async def main() -> None:
         task = asyncio.ensure_future(companion.run())
+
+        def end() -> None:
+            console.stop(BY_SHUTDOWN)
+            task.cancel()
+
         for number in (signal.SIGINT, signal.SIGTERM):
-            asyncio.get_running_loop().add_signal_handler(number, task.cancel)
-        with suppress(asyncio.CancelledError):
-            await task
+            asyncio.get_running_loop().add_signal_handler(number, end)
+        try:
+            with suppress(asyncio.CancelledError):
+                await task
+        finally:  # before the event loop waits for its threads
+            console.stop(BY_SHUTDOWN)
 
     with console:
         asyncio.run(main())

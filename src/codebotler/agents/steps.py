@@ -27,8 +27,12 @@ from codebotler.simulator.skill_protocol import named_arguments, named_result
 IDLE_POLL_SECONDS = 0.1
 """How often an idle mission looks whether it was stopped."""
 
+MAX_STEPS = 10_000
+"""The limit for the calls of one mission, since people and reports read its events."""
+
 NOT_RUNNING = "this mission is not running; call run_mission first, or begin_steps for a new one"
-_PROGRAM = """# Step by step: an agent chooses each call after it has seen the result of the last one.
+_PROGRAM = """# Proposal {mark}
+# Step by step: an agent chooses each call after it has seen the result of the last one.
 # It says: {purpose}
 # The check cannot foresee the calls, but each is compared with this contract and with the house rules:
 {contract}
@@ -46,6 +50,7 @@ class Steps:
     contract: Contract  # what it may call
     skills: SkillTable
     key: str = field(default_factory=lambda: secrets.token_urlsafe(12))  # so that agents are not mixed up
+    mark: str = field(default_factory=lambda: secrets.token_hex(8))  # no other program has the same text
     _calls: Queue[_Call | None] = field(default_factory=Queue)  # None ends the mission
     _is_over: bool = False
     _lock: Lock = field(default_factory=Lock)
@@ -55,7 +60,8 @@ class Steps:
         """The text that a person approves in place of a program."""
         contract = contract_yaml(self.contract).splitlines()
         purpose = visible(" ".join(self.purpose.split()))
-        return _PROGRAM.format(purpose=purpose, contract="\n".join(f"#   {line}" for line in contract))
+        lines = "\n".join(f"#   {line}" for line in contract)
+        return _PROGRAM.format(mark=self.mark, purpose=purpose, contract=lines)
 
     def call(self, name: str, arguments: Mapping[str, object]) -> Future[SkillOutcome]:
         """Call a skill of the running mission. Raise UserError for a wrong call."""
@@ -78,6 +84,8 @@ class Steps:
         try:
             while ledger.limit is None and (call := self._next(live)) is not None:
                 call[2].set_result(_perform(ledger, *call[:2]))
+                if ledger.calls >= MAX_STEPS:
+                    ledger.limit = f"the mission has made {MAX_STEPS:,} calls; begin another one"
             return ledger.outcome_at_end({"end": "finished"})
         finally:
             self._close(call)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import aclosing, contextmanager, suppress
-from typing import Annotated, Any
+from threading import Thread
+from typing import Annotated, Any, ParamSpec, TypeVar
 
 import anyio
 from mcp.server.elicitation import AcceptedElicitation, CancelledElicitation, ElicitationResult
@@ -31,7 +33,7 @@ from codebotler.agents.dialogs import (
     gatekeeper_of,
     read_last_past,
 )
-from codebotler.agents.gatekeeper import Gatekeeper
+from codebotler.agents.gatekeeper import MAX_REPORTED_EVENTS, Gatekeeper
 from codebotler.agents.reports import (
     CheckReport,
     MissionReport,
@@ -45,10 +47,11 @@ from codebotler.missions.past import MissionPast
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.missions.wording import event_text
-from codebotler.models.base import ignore_text
 from codebotler.prompts import clean_instruction
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS
 
+_Given = ParamSpec("_Given")
+_Made = TypeVar("_Made")
 _Digest = Annotated[str, Field(description="The digest of the program, from propose_mission or begin_steps.")]
 _Key = Annotated[str, Field(description="The key `steps` from begin_steps.")]
 _After = Annotated[int, Field(ge=0, description="Leave out this many earlier events.")]
@@ -79,9 +82,7 @@ async def check_program(
     It changes nothing and needs no approval. Mend all problems before you propose the program.
     """
     with as_tool_errors():
-        return await asyncio.to_thread(
-            gatekeeper_of(ctx).check, program
-        )  # not on the SDK's threads, which answer
+        return await _in_thread(gatekeeper_of(ctx).check, program)
 
 
 async def write_program(
@@ -103,10 +104,10 @@ async def write_program(
         )
         author = ModelAuthor(console.open_model, console.models[0])
         prompt = prompt_of(asked, console.robot, repair=False)
-        _, (made, *_) = await asyncio.to_thread(author.write, prompt, 1, ignore_text)
-        if made.programless is not None:
-            raise UserError(made.programless.sentence)
-        return await asyncio.to_thread(gatekeeper.check, made.reply.program)
+        try:
+            return await _in_thread(gatekeeper.write, author, prompt)
+        finally:
+            author.cancel()
 
 
 async def propose_mission(
@@ -128,10 +129,10 @@ async def propose_mission(
     which waits until a person has approved exactly this program.
     """
     gatekeeper = gatekeeper_of(ctx)
-    with as_tool_errors():
+    with as_tool_errors(), gatekeeper.waiting():
         author = agent_name(ctx) if program.strip() else ""
         session = gatekeeper.propose(MissionOrder(instruction, program=program, author=author))
-    return await _prepared(gatekeeper, session)
+        return await _prepared(gatekeeper, session)
 
 
 async def choose_behaviour(
@@ -144,13 +145,13 @@ async def choose_behaviour(
     You cannot choose for them. Afterwards, the answer has the program, which still needs approval.
     """
     gatekeeper = gatekeeper_of(ctx)
-    with as_tool_errors():
+    with as_tool_errors(), gatekeeper.waiting():
         if not isinstance(answer, AcceptedElicitation) or isinstance(answer.data, NotChosen):
             raise MissionError(f"a person must choose on the page {gatekeeper.page}".rstrip())
         asked, given = session.view.question, answer.data
         if asked is not None:
             session.answer(asked.parse(given.answer), given.more)
-    return await _prepared(gatekeeper, session)
+        return await _prepared(gatekeeper, session)
 
 
 async def continue_mission(
@@ -164,7 +165,7 @@ async def continue_mission(
     `done_before` lists what the robot has done, which the rest must not repeat. Then call run_mission.
     """
     gatekeeper = gatekeeper_of(ctx)
-    with as_tool_errors():
+    with as_tool_errors(), gatekeeper.waiting():
         if isinstance(answer, AcceptedElicitation) and not isinstance(answer.data, NoWord):
             past = past.resolve(happened=answer.data.answer == "it happened")
         if past.unsure is not None:
@@ -173,7 +174,7 @@ async def continue_mission(
             raise UserError("this mission has no instruction; send a program for the rest")
         author = agent_name(ctx) if program.strip() else ""
         session = gatekeeper.propose(gatekeeper.console.rest_of(past, program, author))
-    return await _prepared(gatekeeper, session)
+        return await _prepared(gatekeeper, session)
 
 
 async def begin_steps(
@@ -197,9 +198,9 @@ async def begin_steps(
     the key `steps` as often as you need, and end_steps at the end.
     """
     gatekeeper = gatekeeper_of(ctx)
-    with as_tool_errors():
+    with as_tool_errors(), gatekeeper.waiting():
         session, steps = gatekeeper.propose_steps(purpose, contract, agent_name(ctx))
-    report = await _prepared(gatekeeper, session)
+        report = await _prepared(gatekeeper, session)
     return report.model_copy(update={"steps": steps.key})
 
 
@@ -217,10 +218,10 @@ async def run_mission(
     cancel this call while the robot works, the robot stops.
     """
     gatekeeper = gatekeeper_of(ctx)
-    with as_tool_errors():
+    with as_tool_errors(), gatekeeper.waiting():
         _take_answer(gatekeeper, session, digest, answer, agent_name(ctx))
-    with _stopping_if_cancelled(session, agent_name(ctx)):
-        await _follow(gatekeeper, session, ctx, seconds)
+        with _stopping_if_cancelled(session, agent_name(ctx)):
+            await _follow(gatekeeper, session, ctx, seconds)
     return gatekeeper.report(session)
 
 
@@ -232,7 +233,8 @@ async def follow_mission(ctx: AgentContext, after: _After = 0, seconds: _Seconds
     gatekeeper = gatekeeper_of(ctx)
     session = gatekeeper.console.session
     if session is not None:
-        await _follow(gatekeeper, session, ctx, seconds, after)
+        with as_tool_errors(), gatekeeper.waiting():
+            await _follow(gatekeeper, session, ctx, seconds, after)
     return gatekeeper.report(session, after)
 
 
@@ -248,8 +250,8 @@ async def call_skill(
     """
     with as_tool_errors():
         session, known = gatekeeper_of(ctx).find_steps(steps)
-        called = known.call(name, arguments or {})
-        with _stopping_if_cancelled(session, agent_name(ctx)):
+        with gatekeeper_of(ctx).waiting(), _stopping_if_cancelled(session, agent_name(ctx)):
+            called = known.call(name, arguments or {})
             return await asyncio.shield(asyncio.wrap_future(called))
 
 
@@ -326,6 +328,7 @@ async def _follow(
     gatekeeper: Gatekeeper, session: MissionSession, ctx: AgentContext, seconds: float, known: int = 0
 ) -> None:
     """Report new events as progress until the mission is over, or steps may begin, for some seconds."""
+    known = max(known, len(session.events()) - MAX_REPORTED_EVENTS)
     with suppress(TimeoutError):
         async with asyncio.timeout(seconds), aclosing(gatekeeper.console.notifier.changes()) as changes:
             async for _ in changes:
@@ -336,6 +339,24 @@ async def _follow(
                         await ctx.report_progress(known, message=text)
                 if is_last:
                     return
+
+
+async def _in_thread(work: Callable[_Given, _Made], *given: _Given.args, **named: _Given.kwargs) -> _Made:
+    """Call a slow function on a thread of its own.
+
+    The threads of the SDK and of the event loop are few, people need them, and the process waits for them.
+    """
+    made = Future[_Made]()
+    made.set_running_or_notify_cancel()
+
+    def run() -> None:
+        try:
+            made.set_result(work(*given, **named))
+        except BaseException as error:  # noqa: BLE001 - raised again where the result is awaited
+            made.set_exception(error)
+
+    Thread(target=run, daemon=True).start()
+    return await asyncio.wrap_future(made)
 
 
 @contextmanager

@@ -71,6 +71,8 @@ def _read_bound(file: YamlFile, row: Skill, given: Mapping[str, Any]) -> SkillBo
         is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
         if key != AT_MOST and value != ANY and not is_list:
             raise file.wrong(f'"{key}" must be any, or a list of texts in quotes', *where)
+        if key == IN and is_list and not all(map(str.strip, value)):
+            raise file.wrong(f'"{key}" has an empty text; name a room', *where)
     missing = [name for name in names if name not in given]
     if missing:
         sentence = f'{row.name} lacks "{missing[0]}"; write a list of texts, or any'

@@ -80,13 +80,14 @@ def _texts_of(row: Skill, bound: SkillBound, show: Callable[[str], str], *, is_s
             words.append("any room" if is_goal(row, name) else f"any {name.replace('_', ' ')}")
         elif templates:
             first = sorted(templates, key=lambda one: len(one.parts) == 1)  # those with gaps
-            any_of = _any_of((GAP.join(map(show, one.parts)) for one in first), is_short=is_short)
+            empty = ANYBODY if row.recording is not None and row.recording.to == name else '""'
+            any_of = _any_of((GAP.join(map(show, one.parts)) for one in first), empty, is_short=is_short)
             words.append(f"with {any_of}" if parameter.is_options else any_of)
     return " ".join(words)
 
 
-def _any_of(texts: Iterable[str], *, is_short: bool) -> str:
-    shown = ['"{}"'.format(text.replace('"', "'")) if text else ANYBODY for text in texts]
+def _any_of(texts: Iterable[str], empty: str = '""', *, is_short: bool) -> str:
+    shown = ['"{}"'.format(text.replace('"', "'")) if text else empty for text in texts]
     few = MAX_LONG_TEXTS if any(len(text) > LONG_TEXT for text in shown) else MAX_VALUES
     most = few if is_short else MAX_IN_TABLE
     more = len(shown) - most

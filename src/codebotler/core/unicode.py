@@ -13,7 +13,7 @@ from unicodedata import combining, normalize
 MAX_ACCENTS = 30
 """The most accents in a row that are normalized, as in Unicode's Stream-Safe Text Format."""
 
-SHORT_TEXT = 1_000
+SHORT_TEXT = 100
 """Characters that are normalized quickly, whatever they are."""
 
 Composed = TypeVar("Composed")

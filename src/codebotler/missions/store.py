@@ -22,7 +22,7 @@ from codebotler.missions.log import (
     read_events,
 )
 
-_MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
+_MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d{1,6})?", re.ASCII)
 
 
 def read_missions(home: Path) -> list[MissionSummary]:

@@ -88,10 +88,10 @@ class SkillBound:
             for text in texts if allowed is not None else ():
                 if not any(template.matches(text) for template in allowed or ()):
                     return f'since its {name} may be {_some(allowed or ())}, and not "{brief(text)}"'
+        if self.places is not None and not call.place:
+            return UNKNOWN_ROOM
         if self.places is None or call.place.casefold() in map(str.casefold, self.places):
             return ""
-        if not call.place:
-            return UNKNOWN_ROOM
         return f'since it may happen in {_some(self.places)}, and not in "{brief(call.place)}"'
 
     def beyond(self, other: SkillBound) -> SkillBound | None:

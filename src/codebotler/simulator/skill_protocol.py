@@ -21,6 +21,7 @@ from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
 
 ParameterDescription: TypeAlias = tuple[str, str, tuple[Scalar, ...], str]  # name, kind, choices, words
 SkillDescriptions: TypeAlias = tuple[tuple[str, tuple[ParameterDescription, ...]], ...]
+MAX_ARGUMENT_CHARACTERS = 20_000  # of an agent's call in total, since composing them takes time
 OVERRUN = 100  # requests after a limit, such as from `finally`, until the child is killed
 
 
@@ -146,6 +147,8 @@ def _option(value: object) -> Option:
 
 def named_arguments(skill: Skill, given: Mapping[str, object]) -> list[Argument]:
     """Convert the arguments of an agent's call for the robot. Raise UserError if they do not fit."""
+    if len(str(given)) > MAX_ARGUMENT_CHARACTERS:
+        raise UserError(f"the arguments have more than {MAX_ARGUMENT_CHARACTERS:,} characters; shorten them")
     values = [compose(given.get(parameter.name)) for parameter in skill.parameters]
     for number, parameter in enumerate(skill.parameters):
         if parameter.is_options and isinstance(options := values[number], list):

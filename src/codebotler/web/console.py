@@ -82,8 +82,7 @@ class Console:
 
     def __exit__(self, *_: object) -> None:
         self.end()
-        with self._checking:
-            self._held.close()
+        self._held.close()  # ends a check that is under way
 
     def end(self) -> None:
         """Stop the current mission, and wait until it is over."""

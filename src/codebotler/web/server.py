@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import socket
+import time
 from collections.abc import Callable, Coroutine, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from fastapi.staticfiles import StaticFiles
 from nicegui import core, ui
 from starlette.routing import BaseRoute, Match, Mount
 from starlette.types import ASGIApp, Receive, Scope, Send
+from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
@@ -44,6 +46,7 @@ _HTTP_METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
 _PAGE_SOCKETS = "/_nicegui_ws/"
 """An operator's page keeps a websocket open below this path."""
 
+_MAX_WAITING_CONNECTIONS = 100
 _STREAM_END_SECONDS = 3
 """The time that streams have to end when the server stops, in seconds."""
 
@@ -87,6 +90,7 @@ def serve(
             access_log=False,
             proxy_headers=False,
             server_header=False,
+            http=_Connection,
             ws_max_size=MAX_BODY_BYTES,
             timeout_graceful_shutdown=_STREAM_END_SECONDS,
         )
@@ -227,6 +231,27 @@ class Presence:
             self._pages -= 1
             if not self._pages:
                 self._leaving = asyncio.get_running_loop().call_later(self._seconds, self._alone)
+
+
+class _Connection(AutoHTTPProtocol):  # type: ignore[misc,valid-type]  # depends on what is installed
+    """A connection that is closed for newer ones while it waits for its client.
+
+    Otherwise, clients that send nothing could take all file descriptors, and STOP could not connect.
+    """
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Close the connections that have waited longest if too many wait, even if answers are unread."""
+        super().connection_made(transport)
+        self.since = time.monotonic()
+        waiting = [one for one in self.connections if isinstance(one, _Connection) and one.is_waiting]
+        for one in sorted(waiting, key=lambda one: one.since)[:-_MAX_WAITING_CONNECTIONS]:
+            one.transport.abort()
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether no whole request is being answered."""
+        cycle = self.cycle
+        return cycle is None or cycle.more_body or cycle.response_complete
 
 
 class _Server(uvicorn.Server):

@@ -5,7 +5,10 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import threading
 from collections.abc import Callable, Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,6 +20,7 @@ from mcp_types import ElicitRequestParams, ElicitResult
 from codebotler.agents.gatekeeper import Gatekeeper
 from codebotler.agents.reports import SkillOutcome
 from codebotler.agents.server import make_server
+from codebotler.agents.steps import Steps
 from codebotler.checking.contract_file import contract_from
 from codebotler.checking.rules import read_rules
 from codebotler.core.skills.paper import SKILLS
@@ -24,7 +28,10 @@ from codebotler.core.world import Room, World
 from codebotler.missions.log import MissionState
 from codebotler.missions.preflight import known_instructions
 from codebotler.missions.view import MissionOrder, SessionView, program_digest
+from codebotler.missions.wording import event_text
+from codebotler.models.base import Reply, TextListener, ignore_text
 from codebotler.models.recorded import open_recorded
+from codebotler.prompts import Prompt
 from codebotler.robots.base import RobotLostError, RobotResult
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
@@ -520,6 +527,47 @@ def test_skills_are_called_one_at_a_time_and_logged_as_a_mission(gatekeeper: Gat
     use(gatekeeper, act)
 
 
+def test_no_two_proposals_of_steps_have_the_same_digest() -> None:
+    contract = contract_from(anything("go_to"), SKILLS)
+    first, second = Steps("look", contract, SKILLS), Steps("look", contract, SKILLS)
+    assert first.program == first.program
+    assert program_digest(first.program) != program_digest(second.program)
+
+
+def test_long_steps_end_and_are_reported_in_parts_to_few_waiting_calls(
+    gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("codebotler.agents.steps.MAX_STEPS", 3)
+    monkeypatch.setattr("codebotler.agents.gatekeeper.MAX_REPORTED_EVENTS", 4)
+    monkeypatch.setattr("codebotler.agents.gatekeeper.MAX_WAITING_CALLS", 1)
+
+    async def act(agent: Agent) -> None:
+        key, _ = await began(agent, gatekeeper)
+        with gatekeeper.waiting():
+            for tool, given in (
+                ("follow_mission", {}),
+                ("propose_mission", {"program": HELLO}),
+                ("call_skill", {"steps": key, "name": "get_all_rooms"}),
+            ):
+                assert "are waiting" in await agent.fails(tool, **given)
+        for _ in range(3):
+            await agent.call("call_skill", steps=key, name="get_all_rooms")
+        await until(gatekeeper, lambda view: view.is_over)
+        ended = await agent.call("follow_mission")
+        assert (ended["state"], "3 calls" in ended["reason"]) == ("failed", True)
+        assert "not running" in await agent.fails("call_skill", steps=key, name="get_all_rooms")
+        parts, after = list[list[str]](), 0
+        while (part := await agent.call("follow_mission", after=after))["event_count"] > after:
+            after = part["event_count"]
+            parts.append(part["events"])
+        assert max(map(len, parts)) == 4
+        session = gatekeeper.console.session
+        assert session is not None
+        assert [*chain(*parts)] == [text for text in map(event_text, session.events()) if text]
+
+    use(gatekeeper, act)
+
+
 def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
     async def act(agent: Agent) -> None:
         assert 'no skill "fly"' in await agent.fails("begin_steps", purpose="fly", contract={"fly": {}})
@@ -527,6 +575,8 @@ def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
         key, _ = await began(agent, gatekeeper, "go_to", "ask")
         for wrong in ({}, {"location": 3}, {"location": ["kitchen"]}, {"location": "kitchen", "more": 1}):
             assert "go_to" in await agent.fails("call_skill", steps=key, name="go_to", arguments=wrong)
+        far = {"location": ["kitchen"] * 2_000}
+        assert "shorten" in await agent.fails("call_skill", steps=key, name="go_to", arguments=far)
         assert "may call only" in await agent.fails(
             "call_skill", steps=key, name="say", arguments={"message": "a"}
         )
@@ -675,6 +725,39 @@ def test_an_agent_checks_one_program_at_a_time(gatekeeper: Gatekeeper) -> None:
             await asyncio.sleep(0.1)
             assert "another check" in await agent.fails("check_program", program=HELLO)
         assert (await first)["accepted"]
+
+    use(gatekeeper, act)
+
+
+class Hanging(Several):
+    """A model that never replies, until its request is cancelled."""
+
+    def __init__(self) -> None:
+        super().__init__(())
+        self.is_cancelled = threading.Event()
+
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
+        try:
+            await asyncio.sleep(SOON)
+        finally:
+            self.is_cancelled.set()
+        return await super().reply(prompt, number=number, on_text=on_text)
+
+
+def test_a_model_writes_one_program_at_a_time_and_leaves_a_persons_threads_alone(
+    gatekeeper: Gatekeeper,
+) -> None:
+    model, gatekeeper.writes = Hanging(), True
+    gatekeeper.console.open_model = lambda _: model
+
+    async def act(agent: Agent) -> None:
+        asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(1))
+        first = asyncio.ensure_future(agent.call("write_program", instruction="Say hello."))
+        await asyncio.sleep(0.05)
+        assert "another request" in await agent.fails("write_program", instruction="Say hello.")
+        assert await asyncio.wait_for(asyncio.to_thread(model.is_cancelled.is_set), 1.0) is False
+        first.cancel()
+        assert await asyncio.to_thread(model.is_cancelled.wait, 1.0)
 
     use(gatekeeper, act)
 

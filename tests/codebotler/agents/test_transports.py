@@ -10,6 +10,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
@@ -24,10 +25,16 @@ from mcp.client.session import ClientRequestContext
 from mcp.client.streamable_http import streamable_http_client
 from mcp_types import ElicitRequestParams, ElicitResult
 
+from codebotler.agents.server import serve_without_page
 from codebotler.cli.mcp import serve_agents
 from codebotler.core.errors import UserError
+from codebotler.core.world import Room, World
 from codebotler.missions.store import read_missions
+from codebotler.models.recorded import open_recorded
+from codebotler.robots.simulated import Simulated
 from codebotler.web.access import Access, Role
+from codebotler.web.console import Console
+from codebotler.web.server import Companion
 from pageserver import WORLD, PageServer
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
@@ -384,6 +391,24 @@ def test_a_running_robot_stops_with_the_server(folder: Path, page: str, ending: 
         running.wait(SOON)
     (summary,) = read_missions(folder / "home")
     assert summary.state == "stopped"
+
+
+@pytest.mark.parametrize("ending", ["signal", "closed input"])
+def test_the_robot_stops_before_the_server_waits_for_its_threads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+) -> None:
+    console = Console(Simulated(World((Room("hall"),), "hall")), tmp_path, open_recorded)
+    stopped, was_stopped = threading.Event(), list[bool]()
+    monkeypatch.setattr(console, "stop", lambda _: stopped.set())
+
+    async def run() -> None:
+        asyncio.get_running_loop().run_in_executor(None, lambda: was_stopped.append(stopped.wait(1.0)))
+        if ending == "signal":
+            signal.raise_signal(signal.SIGTERM)
+            await asyncio.sleep(SOON)
+
+    serve_without_page(Companion((), run, lambda _: None), console)
+    assert was_stopped == [True]
 
 
 def wait_for(folder: Path, event: str) -> None:

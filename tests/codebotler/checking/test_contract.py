@@ -9,7 +9,7 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.checking.contract_file import contract_yaml, read_contract
-from codebotler.checking.contract_text import contract_sentence
+from codebotler.checking.contract_text import contract_rows, contract_sentence
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.proof import hold_within
 from codebotler.core.errors import UserError
@@ -199,6 +199,7 @@ def test_a_contract_is_read_as_it_was_written(contracts: Contracts, tmp_path: Pa
         ("version: 1\nskills:\n  say:\n    message: any\n    at most: -3", 5),
         ("version: 1\nskills:\n  say:\n    message: [3]", 4),
         ("version: 1\nskills:\n  pick: {obj: any, in: kitchen}", 3),
+        ("version: 1\nskills:\n  pick:\n    obj: any\n    in: [kitchen, ' ']", 5),
     ],
 )
 def test_a_wrong_file_is_refused_with_its_line(tmp_path: Path, text: str, line: int) -> None:
@@ -267,6 +268,19 @@ def test_gaps_are_shown_first_and_never_shortened_away() -> None:
     assert "[...]" in contract_sentence(hidden, SKILLS)
     anything = Contract({"go_to": SkillBound((("location", (*many, TextTemplate((" ", "")))),))})
     assert "any room" in contract_sentence(anything, SKILLS)
+
+
+def test_an_unknown_room_is_never_allowed_by_name() -> None:
+    call = RequestedCall("pick", (("mug",),), "")
+    assert SkillBound((("obj", None),), ("",)).objection(call)
+    assert not SkillBound((("obj", None),)).objection(call)
+
+
+def test_only_an_empty_person_is_anybody() -> None:
+    nothing = (TextTemplate(("",)),)
+    asks = SkillBound((("person", nothing), ("question", nothing), ("options", nothing)))
+    (row,) = contract_rows(Contract({"ask": asks}), SKILLS)
+    assert row.texts == 'anybody "" with ""'
 
 
 def test_a_skill_without_an_event_is_beyond_a_contract_as_well(contracts: Contracts) -> None:

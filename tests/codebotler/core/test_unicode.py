@@ -23,11 +23,12 @@ def test_a_long_row_of_accents_is_kept_and_the_rest_is_composed(before: str) -> 
     assert compose(text) == normalize("NFC", before) + ROW + normalize("NFC", LONG)
 
 
-def test_a_hostile_text_takes_no_longer_than_others() -> None:
-    hostile, ordinary = "a" + "\u0315" * 50_000 + "\u0300" * 50_000, "\u0301a" * 50_000
-    spent = []
+@pytest.mark.parametrize(("size", "count"), [(100_000, 1), (998, 200)])
+def test_hostile_texts_take_no_longer_than_others(size: int, count: int) -> None:
+    hostile = ["a" + "\u0315" * (size // 2) + "\u0300" * (size // 2)] * count
+    ordinary, spent = ["\u0301a" * (size // 2)] * count, []
     for text in (ordinary, hostile):
         began = time.process_time()
         compose(text)
         spent.append(time.process_time() - began)
-    assert spent[1] < 20 * spent[0] + 0.05
+    assert spent[1] < 5 * spent[0] + 0.05

@@ -619,8 +619,12 @@ def test_missions_of_one_second_have_names_of_their_own(home: Path) -> None:
     assert find_mission(home, "last") == three.folder
 
 
-@pytest.mark.parametrize("name", ["", "..", "../..", "20260101-000000", "/", "last"])
+LONG_NAME = f"20260101-000000-{'1' * 400}"
+
+
+@pytest.mark.parametrize("name", ["", "..", "../..", "20260101-000000", LONG_NAME, "/", "last"])
 def test_mission_that_is_not_there_is_said_so(home: Path, name: str) -> None:
+    (home / "missions").mkdir(parents=True)
     with pytest.raises(UserError, match=f'"{name}"' if name else "no mission"):
         find_mission(home, name)
 

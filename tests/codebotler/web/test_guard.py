@@ -7,7 +7,9 @@ import http.client
 import json
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
+from socket import create_connection
 
 import pytest
 from starlette.types import Message, Receive, Scope, Send
@@ -65,6 +67,16 @@ def test_nothing_is_answered_without_the_token(server: PageServer) -> None:
     for method, path in (("POST", "/api/missions"), ("POST", "/api/stop"), ("POST", "/api/check")):
         assert server.ask(method, path, {}).status == 401, path
     assert socket(server, origin=origin(server)) == 403
+
+
+def test_clients_that_send_no_whole_request_give_way_to_new_ones(server: PageServer) -> None:
+    with ExitStack() as held:
+        slow = [held.enter_context(create_connection(("127.0.0.1", server.port), 10)) for _ in range(102)]
+        for each in slow[1:]:
+            each.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n")
+        assert slow[0].recv(1) == b""
+        slow[-1].sendall(b"\r\n")
+        assert slow[-1].recv(1_000).startswith(b"HTTP/1.1 401 ")
 
 
 def test_the_link_opens_the_page_and_leaves_no_token_in_it(server: PageServer) -> None:

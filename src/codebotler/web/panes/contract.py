@@ -6,12 +6,10 @@ from nicegui import ui
 
 from codebotler.checking.contract_text import contract_rows, contract_sentence
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.terminal import shortened
+from codebotler.core.terminal import shortened, visible
 from codebotler.missions.view import SessionView
 from codebotler.simulator.contract import Contract
 from codebotler.web.frame import PlainText
-
-_MAX_CHARACTERS = 1_500
 
 
 class ContractPane:
@@ -40,9 +38,9 @@ class ContractPane:
             is_narrower = bool(earlier.beyond(contract).skills)
             same = "Less than the last program." if is_narrower else "The same as the last program."
             PlainText("p", "More than the last program:" if new.skills else same)
-        sentence = contract_sentence(new, self._skills, shortened) if earlier is None else ""
-        if sentence:
-            PlainText("p", shortened(sentence, _MAX_CHARACTERS))
+        sentence = contract_sentence(new, self._skills) if earlier is None else ""
+        if sentence:  # whole, since a cut would hide a skill
+            PlainText("p", visible(sentence))
         if earlier is not None and new.skills:
             self._table(new)
         with ui.element("details"):
@@ -54,5 +52,5 @@ class ContractPane:
             for row in contract_rows(contract, self._skills, shortened):
                 with ui.element("tr"):
                     PlainText("th", row.what).props("scope=row")
-                    PlainText("td", shortened(f"{row.texts} {row.places}".strip(), _MAX_CHARACTERS))
+                    PlainText("td", f"{row.texts} {row.places}".strip())
                     PlainText("td", row.at_most, "quiet")

@@ -72,17 +72,19 @@ class ProgramPane:
             self._past = PastPane()
             self._board = ui.element("div").classes("storyboard")
         self._view = console.view
-        self._shown = console.view.program
-        self._typed_here, self._review_until = "", 0.0
+        self._shown = self._typed_here = (console.view.number, console.view.program)
+        self._review_until = 0.0
         ui.run_javascript(f"programEditor.start({self._editor.id})")
 
     def show(self, view: SessionView) -> None:
         """Update the pane for a view."""
-        if view.program and view.program != self._shown:
-            if self._shown and view.program != self._typed_here:  # a click may be meant for the one before
+        current = view.number, view.program
+        if view.program and current != self._shown:
+            if self._shown[1] and current != self._typed_here:  # a click may be meant for the one before
                 self._review_until = time.monotonic() + REVIEW_SECONDS
+                self._despite.value = False
                 ui.timer(REVIEW_SECONDS, self._ticked, once=True)
-            self._shown = view.program
+            self._shown = current
         self._view = view
         shown = _for_editor(view.arriving.code if view.is_written else view.program)
         self._send(view, shown)
@@ -133,9 +135,11 @@ class ProgramPane:
         elif event.args["base"] != current:
             self._restore("Someone else changed the program; your last edit was discarded.")
         elif typed != current:
-            self._typed_here = typed
-            self._try(lambda: self._console.edit(typed))
+            self._try(lambda: self._edit(typed))
         self.show(self._console.view)
+
+    def _edit(self, typed: str) -> None:
+        self._typed_here = self._console.edit(typed).view.number, typed
 
     def _restore(self, why: str) -> None:
         """Show the console's program again, with a warning."""
