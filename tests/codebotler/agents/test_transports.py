@@ -320,6 +320,24 @@ def wave(sim: Simulation) -> None:
 BEGUN = lines(INITIALIZE, {"jsonrpc": "2.0", "method": "notifications/initialized"})
 
 
+CLOSING = """
+import os
+from codebotler.agents.server import take_streams
+streams = take_streams()
+numbers = [one.fileno() for one in streams]
+for one in streams:
+    one.close()
+for number in numbers:
+    os.close(number)  # still open
+"""
+
+
+@pytest.mark.slow
+def test_only_the_event_loop_closes_the_descriptors_of_the_streams() -> None:
+    # Descriptors that are closed twice may be those of a mission's files, which other threads have opened.
+    subprocess.run([sys.executable, "-c", CLOSING], input=b"", stdout=subprocess.PIPE, check=True)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("page", ["--page", "--no-page"])
 def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path, page: str) -> None:
