@@ -12,7 +12,7 @@ from codebotler.models.base import Reply
 from codebotler.prompts import Prompt, PromptMessage
 from codebotler.prompts.tools import CallingMessage, ResultMessage, ToolCall, ToolPrompt
 from roboeval.evaluation.agents.mission import AgentMission
-from roboeval.evaluation.runs.endings import REJECTED, TOKEN_LIMIT, TURN_LIMIT
+from roboeval.evaluation.runs.endings import SERVER_REJECTED, TOKEN_LIMIT, TURN_LIMIT
 
 MAX_REASONING = 200_000
 """The characters of reasoning that a row keeps; the log of turns has all of it."""
@@ -49,7 +49,7 @@ class Conversation(ABC):
 
     def reject(self, sentence: str) -> None:
         """End the mission because the server rejects the conversation, as it says in a sentence."""
-        self.end(REJECTED, sentence)
+        self.end(SERVER_REJECTED, sentence)
 
     @abstractmethod
     def end(self, ending: str, why: str = "") -> None:

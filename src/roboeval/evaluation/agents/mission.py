@@ -45,7 +45,7 @@ MAX_MISTAKES = 3
 MAX_REPEATS = 100
 """The number of equal calls with equal results after which a mission ends. Nobody is waited for that long."""
 
-MAX_WAIT_SECONDS = 1_000_000
+LONGEST_WAIT = 1_000_000
 """The longest time that one call waits."""
 
 _TASK = "def task_program():\n"
@@ -277,6 +277,6 @@ def _read(arguments: str | Mapping[str, object]) -> Mapping[str, Any]:
 def _read_seconds(given: Mapping[str, object]) -> float:
     seconds = given.get("seconds")
     is_number = isinstance(seconds, int | float) and not isinstance(seconds, bool)
-    if not is_number or not 0 <= seconds <= MAX_WAIT_SECONDS:  # type: ignore[operator]  # a number
-        raise UserError(f"call it as wait(seconds: float), with 0 to {MAX_WAIT_SECONDS:,} seconds")
+    if not is_number or not 0 <= seconds <= LONGEST_WAIT:  # type: ignore[operator]  # a number
+        raise UserError(f"call it as wait(seconds: float), with 0 to {LONGEST_WAIT:,} seconds")
     return float(seconds)  # type: ignore[arg-type]  # a number

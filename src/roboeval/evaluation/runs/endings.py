@@ -14,7 +14,7 @@ FINAL_ANSWER, ERROR, TIMEOUT = "answer", "error", "TimeoutError"
 NO_CALL, GAVE_UP, OUTSIDE_CONTRACT = "NoCall", "GaveUp", "OutsideContract"
 UNKNOWN_TOOL, WRONG_ARGUMENTS, SEVERAL_CALLS = "UnknownTool", "WrongArguments", "SeveralCalls"
 REPEATED_CALLS, TURN_LIMIT, TOKEN_LIMIT = "RepeatedCalls", "TurnLimit", "TokenLimit"
-REJECTED = "Rejected"
+SERVER_REJECTED = "Rejected"
 
 AGENT_SENTENCES: Mapping[str, str] = {
     NO_CALL: "The agent answered in text and never called a skill.",
@@ -25,7 +25,7 @@ AGENT_SENTENCES: Mapping[str, str] = {
     TURN_LIMIT: "The agent reached the limit of turns.",
     TOKEN_LIMIT: "The agent reached the limit of tokens.",
     GAVE_UP: "The agent gave up.",
-    REJECTED: "The server rejected the conversation, which may have become too long.",
+    SERVER_REJECTED: "The server rejected the conversation, which may have become too long.",
     OUTSIDE_CONTRACT: "The agent wanted to do what the contract does not allow.",
 }
 """What each kind of ending means that only agents have, in a sentence."""
