@@ -61,6 +61,7 @@ def test_continue(tmp_path: Path, opened: OpenPage, shoot: Shoot, screen: Screen
         press(page, "Run it on the robot")
         expect(page.locator(".headline")).to_have_text("Done")
         expect(page.get_by_role("button", name="Continue", exact=True)).to_be_hidden()
+        expect(page.get_by_role("button", name="Prepare another run")).to_be_hidden()  # of the rest alone
         page.close()  # before the server ends, to which it would try to connect again
 
 

@@ -74,6 +74,8 @@ class CandidateClusters:
             every = counted(self.total + self.rejected, "program")
             return f"the check rejected all of {every}; took the first"
         rejected = f"; the check rejected {self.rejected}" if self.rejected else ""
+        if any(other.size == largest.size for other in self.clusters[1:]):
+            return f"took the first of the most frequent behaviours: {largest.size} of {total}{rejected}"
         return f"took the most frequent behaviour: {largest.size} of {total}{rejected}"
 
 

@@ -58,5 +58,5 @@ def choose_past(
 def past_view(past: MissionPast) -> Group:
     """Show what a mission did and saw before it ended."""
     head = Text.assemble((f"mission {past.mission}", "bold"), f" ended early: {shortened(past.why)}")
-    steps = [Text(f"  {step}", "dim") for step in past.steps] or [Text("  the robot did nothing", "dim")]
+    steps = [Text(f"  {step}", "dim") for step in past.steps] or [Text("  no step was finished", "dim")]
     return Group(head, Text("done so far:"), *steps)

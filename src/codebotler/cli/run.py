@@ -84,6 +84,8 @@ class Request:
     def order(self) -> MissionOrder:
         """The order for a mission."""
         program = read_program(self.what) if self.is_program else ""
+        if self.past is not None and self.past.is_untouched and not program:
+            return MissionOrder(self.past.instruction, self.past.model, self.past.program, past=self.past)
         if self.past is not None:
             model = "" if program else self.model
             return MissionOrder(self.past.instruction, model, program, past=self.past)

@@ -52,6 +52,7 @@ class MissionPast:
         place: where the robot was last; empty if unknown.
         unsure: a step that may have happened or not; None if there is none.
         before: the number of steps that missions did before this program.
+        has_failed: whether it failed, rather than that somebody stopped it or it was interrupted.
     """
 
     mission: str
@@ -63,6 +64,12 @@ class MissionPast:
     place: str = ""
     unsure: Event | None = None
     before: int = 0
+    has_failed: bool = False
+
+    @property
+    def is_untouched(self) -> bool:
+        """Whether nothing was done or tried, so that its program is still the whole rest."""
+        return bool(self.program) and not (self.trace or self.unsure or self.has_failed)
 
     @property
     def held(self) -> str:
@@ -161,6 +168,8 @@ def read_past(
     events = read_events(folder)
     before: LogLine = next((line for line in events if line["event"] == "past"), {})
     has_run = any(line["event"] == "state" and line["state"] == MissionState.RUNNING for line in events)
+    if not (summary.program or before):
+        raise UserError(f"mission {summary.id} ended before it had a program; give the instruction again")
     place = summary.place if has_run else before.get("place", "")
     try:
         if world is not None:
@@ -181,6 +190,7 @@ def read_past(
         robot.place,
         unsure,
         len(before.get("trace", ())) if has_run else before.get("before", 0),
+        summary.state is MissionState.FAILED,
     )
 
 
@@ -191,7 +201,7 @@ def _expect_same_map(mission: str, events: Sequence[LogLine], world: World) -> N
     lacks = next((name for name in had if name not in here), None)
     if lacks is not None:
         where = f'ran on another map, with the room "{shortened(lacks)}"'
-        raise UserError(f"mission {mission} {where}; to continue it, start with that map's --world")
+        raise UserError(f"mission {mission} {where}; to continue it, start with the --world of then, or with none if there was none")
 
 
 def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[LoggedRobot, Event | None]:

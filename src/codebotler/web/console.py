@@ -156,8 +156,9 @@ class Console:
         return ""
 
     def rest_of(self, past: MissionPast, program: str = "", author: str = "") -> MissionOrder:
-        """Return the order for the rest of a mission. Without an instruction, start from its program."""
-        program = program or ("" if past.instruction else past.program)
+        """Return the order for the rest of a mission: its own program, if nothing was done."""
+        if not program and (past.is_untouched or not past.instruction):
+            return MissionOrder(past.instruction, past.model, past.program, author, past=past)
         model = "" if program else past.model if past.model in self.models else self.models[0]
         return MissionOrder(past.instruction, model, program, author, past=past)
 

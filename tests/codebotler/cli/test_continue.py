@@ -9,8 +9,10 @@ from typing import Any
 
 import pytest
 
+from codebotler.core.world_file import read_world
 from codebotler.missions.log import EVENTS_FILE, SUMMARY_FILE
 from command_line import Ended, command
+from ended import cut, failed_mission, line_of
 from server import Request, Server
 
 WORLD = """
@@ -92,6 +94,16 @@ def test_a_program_of_a_person_does_the_rest(folder: Path) -> None:
     before, after = missions(folder)
     assert (before["state"], after["state"], after["continues"]) == ("failed", "done", before["id"])
     assert calls(folder, after["id"]) == ["ask Anne", "place mug", "say done"]
+
+
+def test_a_mission_that_did_nothing_is_continued_with_its_own_program(folder: Path) -> None:
+    world = read_world(folder / "world.yaml")
+    mission = failed_mission(folder / "home", BEGUN, world)
+    cut(mission, line_of(mission, "go_to", "skill"))
+    done = ended(folder, "continue", "last", "--yes")  # no model has a program for this instruction
+    before, after = missions(folder)
+    assert (after["continues"], after["program"]) == (before["id"], before["program"]), done.err
+    assert calls(folder, after["id"])[0] == "go_to kitchen"
 
 
 def test_a_program_that_forgets_what_is_held_is_not_run(folder: Path) -> None:

@@ -132,6 +132,22 @@ def test_a_continuation_that_never_ran_leaves_the_past_as_it_was(tmp_path: Path)
     assert MissionSummary.read(mission.folder).continues == past.mission
 
 
+def test_where_nothing_was_tried_the_program_is_still_the_rest(tmp_path: Path) -> None:
+    folder = failed(tmp_path, BRING)
+    assert read_past(folder, SKILLS).has_failed
+    cut(folder, line_of(folder, "go_to", "skill"))  # the drive has begun, and may be repeated
+    assert read_past(folder, SKILLS).is_untouched
+    folder = failed(tmp_path, "def task_program():\n    undefined()\n")
+    assert not read_past(folder, SKILLS).is_untouched  # it would fail again
+
+
+def test_a_mission_without_a_program_is_begun_again_instead(tmp_path: Path) -> None:
+    with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
+        mission.fail("the model is away")
+    with pytest.raises(UserError):
+        read_past(mission.folder, SKILLS)
+
+
 def test_the_rest_begins_after_what_earlier_missions_did(tmp_path: Path) -> None:
     past = read_past(failed(tmp_path, BRING), SKILLS)
     with Mission(tmp_path, "simulated") as mission:

@@ -121,7 +121,7 @@ class PastPane:
                     _draw_steps(earlier)
             _draw_steps(steps[-MAX_OPEN_STEPS:])
             if not steps:
-                PlainText("p", "The robot did nothing.")
+                PlainText("p", "No step was finished.")
 
 
 def _draw_steps(steps: Sequence[tuple[str, Event]]) -> None:

@@ -179,7 +179,8 @@ class ProgramPane:
         self._ticked()
 
     def _may_rerun(self, view: SessionView) -> bool:
-        return view.is_over and bool(view.program)
+        is_rest = view.past is not None and view.progress.has_begun  # alone, it would leave out what was done
+        return view.is_over and bool(view.program) and not is_rest
 
     def _ticked(self) -> None:
         view = self._console.view
