@@ -201,7 +201,9 @@ def _expect_same_map(mission: str, events: Sequence[LogLine], world: World) -> N
     lacks = next((name for name in had if name not in here), None)
     if lacks is not None:
         where = f'ran on another map, with the room "{shortened(lacks)}"'
-        raise UserError(f"mission {mission} {where}; to continue it, start with the --world of then, or with none if there was none")
+        raise UserError(
+            f"mission {mission} {where}; to continue it, start with the same --world, or without it"
+        )
 
 
 def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[LoggedRobot, Event | None]:

@@ -106,8 +106,7 @@ def _close_interrupted(folder: Path) -> list[MissionSummary]:
 
 def _interruption_reason(summary: MissionSummary, events: list[LogLine]) -> str:
     if not summary.state.is_moving:
-        at = f"while the mission was {summary.state}" if summary.program else "before the mission had a program"
-        return f"CodeBotler ended unexpectedly {at}; the robot had not moved"
+        return f"CodeBotler ended unexpectedly while the mission was {summary.state}; the robot had not moved"
     skill = find_unfinished_skill(events)
     if skill is None:
         return "CodeBotler ended unexpectedly while the robot was idle"
