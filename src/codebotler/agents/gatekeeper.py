@@ -114,8 +114,8 @@ class Gatekeeper:
     def takes_steps(self, session: MissionSession) -> bool:
         """Whether a session runs step by step now, and not a program that a person wrote in its place."""
         steps, view = self._steps, session.view
-        is_ours = steps is not None and session is self._session and view.program == steps.program
-        return is_ours and view.state is MissionState.RUNNING
+        is_running = view.state is MissionState.RUNNING and session is self._session
+        return is_running and steps is not None and view.program == steps.program
 
     def approves_alone(self, session: MissionSession) -> bool:
         """Whether the contract given at the start allows all that an agent's own proposal may do.

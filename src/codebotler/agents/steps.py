@@ -12,6 +12,7 @@ from typing import TypeAlias
 
 from codebotler.agents.reports import SkillOutcome
 from codebotler.checking.contract_file import contract_yaml
+from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.terminal import visible
@@ -55,7 +56,7 @@ class Steps:
     _is_over: bool = False
     _lock: Lock = field(default_factory=Lock)
 
-    @property
+    @cached_property
     def program(self) -> str:
         """The text that a person approves in place of a program."""
         contract = contract_yaml(self.contract).splitlines()

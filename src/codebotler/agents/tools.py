@@ -145,13 +145,14 @@ async def choose_behaviour(
     You cannot choose for them. Afterwards, the answer has the program, which still needs approval.
     """
     gatekeeper = gatekeeper_of(ctx)
-    with as_tool_errors(), gatekeeper.waiting():
+    with as_tool_errors():
         if not isinstance(answer, AcceptedElicitation) or isinstance(answer.data, NotChosen):
             raise MissionError(f"a person must choose on the page {gatekeeper.page}".rstrip())
         asked, given = session.view.question, answer.data
         if asked is not None:
             session.answer(asked.parse(given.answer), given.more)
-        return await _prepared(gatekeeper, session)
+        with gatekeeper.waiting():
+            return await _prepared(gatekeeper, session)
 
 
 async def continue_mission(
@@ -218,9 +219,9 @@ async def run_mission(
     cancel this call while the robot works, the robot stops.
     """
     gatekeeper = gatekeeper_of(ctx)
-    with as_tool_errors(), gatekeeper.waiting():
-        _take_answer(gatekeeper, session, digest, answer, agent_name(ctx))
-        with _stopping_if_cancelled(session, agent_name(ctx)):
+    with as_tool_errors():
+        _take_answer(gatekeeper, session, digest, answer, agent_name(ctx))  # even if too many calls wait
+        with gatekeeper.waiting(), _stopping_if_cancelled(session, agent_name(ctx)):
             await _follow(gatekeeper, session, ctx, seconds)
     return gatekeeper.report(session)
 

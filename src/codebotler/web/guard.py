@@ -23,6 +23,12 @@ from codebotler.web.proxy import OuterAddress, path_of, prefix_of
 MAX_BODY_BYTES = 2_000_000
 """The maximum size of a request body."""
 
+MAX_AGENT_BODY_BYTES = 200_000
+"""The maximum size of an agent's request, which has a program or a contract."""
+
+MAX_AGENT_REQUESTS = 200
+"""The number of agents' requests that are answered at a time, so that there is room for STOP."""
+
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 _FACE_PATHS = ("/face", "/api/face", "/static", "/favicon.ico")
 """The paths that faces may use, without NiceGUI's websocket, which accepts messages for any page."""
@@ -57,7 +63,7 @@ NO_PAGE = "there is no such page"
 _WRONG = "this token is wrong"
 _OTHER_SITE = "this request came from another site, which is not allowed"
 _HOST_CHANGED = "the proxy must pass on the browser's Host header unchanged"
-_BODY_TOO_LARGE = f"this request is too large; the limit is {MAX_BODY_BYTES:,} bytes"
+_TOO_MANY = f"{MAX_AGENT_REQUESTS} requests of agents are being answered already; wait for their answers"
 
 _REFUSAL_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>{brand}</title>
@@ -79,6 +85,7 @@ class Guard:
     def __init__(self, app: ASGIApp, rules: GuardRules, has_page: Callable[[str], bool]) -> None:
         self._app, self._rules, self._has_page = app, rules, has_page
         self._has_noted = False
+        self._agent_requests = 0  # that are being answered
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Accept or refuse a request."""
@@ -99,17 +106,28 @@ class Guard:
                 return
             role = self._role(request)
             _check_role(role, path_of(scope))
-            _check_length(request)
+            is_agents = path_of(scope) == AGENT_PATH
+            limit = MAX_AGENT_BODY_BYTES if is_agents else MAX_BODY_BYTES
+            _check_length(request, limit)
+            self._check_agents(is_new=is_agents)
         except RefusedError as error:
             closing = WebSocketClose(code=1008, reason=error.sentence[:100])
             await (_refusal(request, error) if is_http else closing)(scope, receive, send)
             return
         scope.setdefault("state", {})["role"] = role
         if is_http:
-            limited = _LimitedBody(scope, receive, send)
-            await self._app(scope, limited.receive, limited.send)
-        else:
+            limited = _LimitedBody(scope, receive, send, limit)
+            receive, send = limited.receive, limited.send
+        self._agent_requests += is_agents
+        try:
             await self._app(scope, receive, send)
+        finally:
+            self._agent_requests -= is_agents
+
+    def _check_agents(self, *, is_new: bool) -> None:
+        """Refuse an agent's request if too many are being answered."""
+        if is_new and self._agent_requests >= MAX_AGENT_REQUESTS:
+            raise RefusedError(HTTPStatus.SERVICE_UNAVAILABLE, _TOO_MANY)
 
     def _check_path(self, path: str) -> None:
         if _CONTROL_CHARACTERS.search(path) and not self._has_page(path):  # names of runs may contain them
@@ -246,34 +264,38 @@ def _check_role(role: Role | None, path: str) -> None:
         raise RefusedError(HTTPStatus.FORBIDDEN, f"the token of agents opens only {AGENT_PATH}")
 
 
-def _check_length(request: HTTPConnection) -> None:
+def _check_length(request: HTTPConnection, limit: int) -> None:
     length = request.headers.get("content-length", "0")
-    if not length.isascii() or not length.isdigit() or int(length) > MAX_BODY_BYTES:
-        raise RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _BODY_TOO_LARGE)
+    if not length.isascii() or not length.isdigit() or int(length) > limit:
+        raise _too_large(limit)
+
+
+def _too_large(limit: int) -> RefusedError:
+    sentence = f"this request is too large; the limit is {limit:,} bytes"
+    return RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, sentence)
 
 
 class _LimitedBody:
     """Rejects request bodies that are too large, and adds security headers to responses."""
 
-    def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    def __init__(self, scope: Scope, receive: Receive, send: Send, limit: int) -> None:
         self._scope, self._receive, self._send = scope, receive, send
-        self._length = 0
+        self._limit, self._length = limit, 0
         self._nonce = secrets.token_urlsafe(16)
         self._is_page = self._is_refused = False
 
     async def receive(self) -> Message:
         message = await self._receive()
         self._length += len(message.get("body", b""))
-        return {"type": "http.disconnect"} if self._length > MAX_BODY_BYTES else message
+        return {"type": "http.disconnect"} if self._length > self._limit else message
 
     async def send(self, message: Message) -> None:
         if self._is_refused:
             return
         if message["type"] == "http.response.start":
-            if self._length > MAX_BODY_BYTES:
+            if self._length > self._limit:
                 self._is_refused = True
-                error = RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, _BODY_TOO_LARGE)
-                answer = _refusal(HTTPConnection(self._scope), error)
+                answer = _refusal(HTTPConnection(self._scope), _too_large(self._limit))
                 answer.headers["connection"] = "close"  # the rest of the body is unread
                 await answer(self._scope, self._receive, self._send)
                 return

@@ -27,7 +27,7 @@ from codebotler.web.access import (
     Role,
     TooManyTriesError,
 )
-from codebotler.web.guard import MAX_BODY_BYTES, Guard, _is_same
+from codebotler.web.guard import MAX_AGENT_BODY_BYTES, MAX_BODY_BYTES, Guard, _is_same
 from codebotler.web.proxy import OuterAddress, proxies_in_front
 from command_line import ENVIRONMENT
 from forked import PAGE, Forked
@@ -458,6 +458,47 @@ def test_what_is_sent_without_its_length_has_the_same_limit(server: PageServer) 
     told = json.loads(answer.read())["detail"]
     assert (answer.status, "2,000,000 bytes" in told) == (413, True)
     connection.close()
+
+
+def test_agents_leave_room_for_people(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("codebotler.web.guard.MAX_AGENT_REQUESTS", 2)
+    statuses: list[int] = []
+
+    async def main() -> None:
+        released = asyncio.Event()
+
+        async def behind(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001 - as ASGI calls it
+            if scope["path"] == "/mcp":
+                await released.wait()
+            await send({"type": "http.response.start", "status": 200, "headers": []})
+
+        async def receive() -> Message:
+            return {"type": "http.request", "body": b""}
+
+        async def send(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                statuses.append(message["status"])
+
+        rules = GuardRules(Access("an operator's", "a face's", agent="an agent's"))
+        guard = Guard(behind, rules, set().__contains__)
+
+        async def ask(path: str, token: str, length: int = 0) -> None:
+            headers = [(b"host", b"localhost"), (b"authorization", f"Bearer {token}".encode())]
+            headers.append((b"content-length", str(length).encode()))
+            scope = {"type": "http", "method": "POST", "path": path, "query_string": b"", "scheme": "http"}
+            await guard({**scope, "headers": headers}, receive, send)
+
+        waiting = [asyncio.create_task(ask("/mcp", "an agent's")) for _ in range(2)]
+        await asyncio.sleep(0)
+        await ask("/mcp", "an agent's")
+        await ask("/api/stop", "an operator's")
+        released.set()
+        await asyncio.gather(*waiting)
+        await ask("/mcp", "an agent's")
+        await ask("/mcp", "an agent's", MAX_AGENT_BODY_BYTES + 1)
+
+    asyncio.run(main())
+    assert statuses == [503, 200, 200, 200, 200, 413]
 
 
 # --- roles
