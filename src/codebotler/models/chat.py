@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import inspect
-import json
 import os
 import re
 import time
@@ -21,10 +20,10 @@ from pydantic_ai.models import Model, ModelRequestParameters, infer_model, known
 from pydantic_ai.models.openai import OpenAIChatModel, OpenAIResponsesModel, OpenAIStreamedResponse
 from pydantic_ai.providers import Provider, gateway, infer_provider, infer_provider_class
 from pydantic_ai.settings import ModelSettings, ThinkingEffort
-from pydantic_ai.tools import ToolDefinition
 
 from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError, Reply, TextListener, Usage, ignore_text, make_reply
+from codebotler.models.chat_messages import definition_of, to_messages, turn_of
 from codebotler.models.http_client import (
     byte_limit,
     limit_replies,
@@ -33,7 +32,6 @@ from codebotler.models.http_client import (
     without_proxy,
 )
 from codebotler.models.keys import guard_logs, read_key, remove_keys, unset_blank
-from codebotler.models.no_program import classify_reply
 from codebotler.models.openai_stream import Chunks, make_lenient
 from codebotler.models.sampling import CHAT_MAX_TOKENS, SamplingSettings
 from codebotler.models.server_errors import (
@@ -47,8 +45,8 @@ from codebotler.models.server_errors import (
     status_error,
     timeout_error,
 )
-from codebotler.prompts import PictureMessage, Prompt, PromptMessage
-from codebotler.prompts.tools import CallingMessage, ResultMessage, Tool, ToolCall, ToolPrompt
+from codebotler.prompts import Prompt
+from codebotler.prompts.tools import ToolPrompt
 
 BASE_URL_VARIABLE = "OPENAI_BASE_URL"
 OWN_SERVER = "openai-chat"  # the protocol of vLLM, llama.cpp and similar servers
@@ -100,7 +98,7 @@ class ChatModel:
                 failed.sentence, Usage(), latency, None, known_kind="filtered", has_answer=False
             )
         reply = self._reply(response, chunks, time.monotonic() - start)
-        return _turn(reply, response) if isinstance(prompt, ToolPrompt) else reply
+        return turn_of(reply, response) if isinstance(prompt, ToolPrompt) else reply
 
     async def close(self) -> None:
         """Close the connections."""
@@ -110,7 +108,7 @@ class ChatModel:
     async def _request(
         self, prompt: Prompt, settings: ModelSettings, on_text: TextListener
     ) -> tuple[messages.ModelResponse, Chunks | None]:
-        tools = [*map(_definition, prompt.tools)] if isinstance(prompt, ToolPrompt) else []
+        tools = [*map(definition_of, prompt.tools)] if isinstance(prompt, ToolPrompt) else []
         async with model_request_stream(
             self._model,
             to_messages(prompt.messages),
@@ -198,53 +196,6 @@ def _mark_thoughts(on_text: TextListener) -> _PieceListener:
         on_text(piece)
 
     return hear
-
-
-def to_messages(conversation: tuple[PromptMessage, ...]) -> list[messages.ModelMessage]:
-    """Convert a conversation to pydantic-ai message types."""
-    found: list[messages.ModelMessage] = []
-    for message in conversation:
-        if isinstance(message, CallingMessage):
-            found += messages.ModelMessagesTypeAdapter.validate_json(message.data)
-            continue
-        if message.role == "assistant":
-            found.append(messages.ModelResponse(parts=[messages.TextPart(message.text)]))
-            continue
-        part = _request_part(message)
-        if found and isinstance(found[-1], messages.ModelRequest):
-            found[-1] = messages.ModelRequest(parts=[*found[-1].parts, part])
-        else:
-            found.append(messages.ModelRequest(parts=[part]))
-    return found
-
-
-def _request_part(message: PromptMessage) -> messages.ModelRequestPart:
-    if isinstance(message, ResultMessage):
-        return messages.ToolReturnPart(message.call.name, message.text, message.call.id)
-    if message.role == "system":
-        return messages.SystemPromptPart(message.text)
-    if not isinstance(message, PictureMessage):
-        return messages.UserPromptPart(message.text)
-    picture = messages.BinaryContent(message.jpeg, media_type="image/jpeg")
-    return messages.UserPromptPart([message.text, picture])
-
-
-def _definition(tool: Tool) -> ToolDefinition:
-    return ToolDefinition(
-        name=tool.name, description=tool.description, parameters_json_schema=json.loads(tool.schema)
-    )
-
-
-def _turn(reply: Reply, response: messages.ModelResponse) -> Reply:
-    """Return a reply to the offer of tools, with its calls in place of a program."""
-    parts = [part for part in response.parts if isinstance(part, messages.ToolCallPart)]
-    calls = tuple(ToolCall(one.tool_call_id, one.tool_name, one.args_as_json_str()) for one in parts)
-    known = reply.no_program if reply.no_program in {"refusal", "filtered"} else None
-    has_turn = bool(calls or (response.text and reply.program.strip()))  # the text without thoughts
-    why = classify_reply(reply.text, "", reply.finish_reason, has_code=has_turn, known_kind=known)
-    turn = messages.ModelMessagesTypeAdapter.dump_json([response]).decode()
-    fault = None if why == "tool-call" and calls else why
-    return replace(reply, program="", no_program=fault, calls=calls, turn=turn)
 
 
 def _is_filtered(error: Exception) -> bool:
