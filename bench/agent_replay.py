@@ -54,7 +54,7 @@ GIVE_UP: Turn = [("give_up", {"reason": "The program ended in an error."})]
 
 @dataclass(frozen=True)
 class Replay:
-    """What a program did in a world, and the turns that do the same."""
+    """The outcome of a program in a world, and the turns of an agent that makes the same calls."""
 
     outcome: Outcome
     verdict: Verdict
@@ -62,7 +62,7 @@ class Replay:
 
     @property
     def signature(self) -> tuple[object, ...]:
-        """What must be the same for an agent."""
+        """The parts of the verdict that must be equal for an agent."""
         error = self.outcome.error
         kind = error.kind if error and self.outcome.status is Status.ROBOT_ERROR else None
         return self.verdict.satisfied, [one.text for one in self.verdict.failed], kind

@@ -17,7 +17,7 @@ from codebotler.core.skills.values import ValueType
 from codebotler.prompts.rendering import Prompt, PromptMessage, clean_instruction
 
 GIVE_UP, WAIT = "give_up", "wait"
-"""The tools that every agent has besides the skills, unless a skill has the same name."""
+"""The names of the two tools that are offered in addition to the skills."""
 
 _AGENT_FILE = Path(__file__).parent / "agent.txt"
 _RULES_FILE = Path(__file__).parent / "rules.txt"

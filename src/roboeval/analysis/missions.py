@@ -23,7 +23,7 @@ from roboeval.evaluation.runs.endings import OUTSIDE_CONTRACT
 
 @dataclass(frozen=True)
 class MissionCosts:
-    """What missions took and how often they succeeded. Values that were not recorded are None."""
+    """The success rate and the costs of missions. Values that were not recorded are None."""
 
     mode: str  # `program`, `agent` or `replan`
     missions: int

@@ -253,8 +253,7 @@ def run(
     from roboeval.evaluation.evaluate import expect_same_judge
 
     what = read_options(tasks=tasks, **options)
-    if what.plan.has_turns and (repair or retries):
-        fail("--repair and --retries are for programs; leave them or --mode out")
+    expect_rounds_fit(what.plan, repair, retries, as_json=json)
     suite, plan, model = what.suite, what.plan, what.open()
     note_unsent(what.settings, model)
     first = what.run_of(model)
@@ -282,6 +281,16 @@ def run(
             )
     if with_report:
         write_report_of(paths, suite, workers)
+
+
+def expect_rounds_fit(plan: GenerationPlan, repair: int, retries: int, *, as_json: bool) -> None:
+    """Exit with status 2 if other options do not allow further rounds."""
+    if repair and retries:
+        fail("--repair and --retries cannot be combined; use one of them")
+    if as_json and (repair or retries):
+        fail("--json does not work with --repair or --retries; run `evaluate --json` on each round's folder")
+    if plan.has_turns and (repair or retries):
+        fail("--repair and --retries are for programs; leave them or --mode out")
 
 
 def write_report_of(paths: list[Path], suite: str, workers: int | None) -> None:

@@ -68,7 +68,7 @@ class MissionDesk:
         ]
 
     async def call(self, name: str, arguments: dict[str, Any]) -> str:
-        """Make one call, and return what the client is told."""
+        """Make one call, and return its result for the client."""
         async with self._lock:
             return await asyncio.to_thread(self._call, name, arguments)
 
@@ -81,15 +81,15 @@ class MissionDesk:
         self._calls += 1
         if name == FINISH:
             mission.answer(str(arguments.get("answer", "")))
-            told = "done"
+            result = "done"
         else:
-            told = mission.call(name, arguments)
+            result = mission.call(name, arguments)
         if mission.ending is None and self._calls >= self.plan.limits.turns:
             mission.end(TURN_LIMIT)
         if mission.ending is None:
-            return told
+            return result
         self._keep(key, mission)
-        return f"{told}\n{_OVER}"
+        return f"{result}\n{_OVER}"
 
     def leave(self) -> None:
         """End the mission that the client has left, so that it cannot be tried again."""
