@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from codebotler.models.recorded import Solution, open_recorded
-from roboeval.evaluation.failures import FAILURE_CLASSES, NO_PROGRAM_CLASS
+from roboeval.evaluation.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES, NO_PROGRAM_CLASS
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.source import recorded_completions
@@ -129,7 +129,8 @@ def test_careful_passes_most_and_hasty_fails_in_every_way(verdicts: Verdicts) ->
     careful = [row["passed"] for _, _, row in verdicts["careful"]]
     assert sum(careful) / len(careful) > 0.8
     failures = [row["failure"] for _, _, row in verdicts["hasty"] if not row["passed"]]
-    assert {failure["class"] for failure in failures} == {*FAILURE_CLASSES} - {NO_PROGRAM_CLASS}
+    without_programs = {NO_PROGRAM_CLASS, AGENT_ERROR_CLASS}
+    assert {failure["class"] for failure in failures} == {*FAILURE_CLASSES} - without_programs
     assert len({failure["kind"] for failure in failures}) >= 12
 
 
