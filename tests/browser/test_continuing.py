@@ -115,6 +115,7 @@ def test_missions_link_to_those_they_continue(
         second = server.call("POST", f"/api/missions/{first}/continue", {}).data["id"]
         server.rest()
         page = opened(server, "missions", size=size)
+        expect(page.locator(".rows .outcome").first).to_contain_text(f"mission {second}")
         expect(page.locator(".rows .outcome").first).to_contain_text(f"continues mission {first}")
         expect(page.locator(".rows .outcome").last).to_contain_text(f"continued by mission {second}")
         look(page, shoot, f"continue-list-{size[0]}")

@@ -122,6 +122,7 @@ def list_view(summaries: Sequence[MissionSummary]) -> RenderableType:
             Text(
                 shortened(title(summary), 100)
                 + (f"  ({shortened(summary.reason, 200)})" if summary.reason else "")
+                + (f"  continues {summary.continues}" if summary.continues else "")
             ),
         )
     return table

@@ -29,6 +29,7 @@ from codebotler.missions.log import (
     MissionSummary,
     read_events,
 )
+from codebotler.missions.progress import Progress
 from codebotler.missions.store import find_continuations
 from codebotler.robots.simulated import SIMULATION
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
@@ -75,6 +76,11 @@ class MissionPast:
     def held(self) -> str:
         """The thing in the robot's hand; empty for nothing."""
         return held_after(self.trace)
+
+    @property
+    def progress(self) -> Progress:
+        """The progress of a mission that begins with this past."""
+        return Progress(room=self.place, held=self.held)
 
     @property
     def steps(self) -> list[str]:

@@ -32,6 +32,7 @@ from codebotler.missions.preflight import (
     resume_robot,
     with_closest_here,
 )
+from codebotler.missions.progress import Progress
 from codebotler.missions.shared_view import SharedView
 from codebotler.missions.stop import StopButton
 from codebotler.missions.view import CHECKING, UNCHECKED, MissionOrder, SessionView, program_digest
@@ -81,6 +82,7 @@ class MissionSession(SharedView):
             rules=rules,
             within=within,
             past=order.past,
+            progress=Progress() if order.past is None else order.past.progress,
             is_over=False,
         )
         super().__init__(view, changed)
@@ -239,7 +241,7 @@ class MissionSession(SharedView):
         room_map, place = ask_rooms(self._robot, self._add_remark, self._world)
         if (past := self._order.past) is not None:
             room_map, place = past.add_to(room_map, place)
-            self._show(progress=replace(self._view.progress, room=place, held=past.held))
+            self._show(progress=replace(past.progress, room=place))
         self._show(room_map=limit_rooms(room_map, self._add_remark))
         rules, rooms = self._view.rules, () if room_map is None else room_map.goals
         regexes = () if room_map is None or room_map.plain else rooms

@@ -106,10 +106,10 @@ def _close_interrupted(folder: Path) -> list[MissionSummary]:
 
 def _interruption_reason(summary: MissionSummary, events: list[LogLine]) -> str:
     if not summary.state.is_moving:
-        return f"CodeBotler ended unexpectedly while the mission was {summary.state}; the robot had not moved"
+        return "CodeBotler ended unexpectedly before the robot moved"
     skill = find_unfinished_skill(events)
     if skill is None:
         return "CodeBotler ended unexpectedly while the robot was idle"
     going = written_call(skill["skill"], list(skill["arguments"].values()))
-    where = next((f" ({e['text']})" for e in reversed(events) if e["event"] == "feedback"), "")
+    where = next((f", {e['text']}" for e in reversed(events) if e["event"] == "feedback"), "")
     return f"CodeBotler ended unexpectedly during {going}{where}; {summary.if_tool_dies}"

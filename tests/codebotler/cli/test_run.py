@@ -248,7 +248,8 @@ def read_until(process: Process, text: str) -> str:
                 return lines
     finally:
         watchdog.cancel()
-    raise AssertionError(lines)
+    process.kill()
+    raise AssertionError((lines, *process.communicate()))
 
 
 def driving(folder: Path, *wrapper: str) -> Process:

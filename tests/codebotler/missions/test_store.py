@@ -51,9 +51,9 @@ THERE: dict[str, object] = {"event": "result", "number": 1, "skill": "go_to", "r
 @pytest.mark.parametrize(
     ("state", "events", "named"),
     [
-        (MissionState.DRAFTING, [], ["drafting", "not moved"]),
-        (MissionState.APPROVED, [], ["approved", "not moved"]),
-        (MissionState.RUNNING, [RUNNING, DRIVE, AT], ['go_to("kitchen")', "(at (1.0, 2.0))", IF_TOOL_DIES]),
+        (MissionState.DRAFTING, [], ["before the robot moved"]),
+        (MissionState.APPROVED, [], ["before the robot moved"]),
+        (MissionState.RUNNING, [RUNNING, DRIVE, AT], ['go_to("kitchen"), at (1.0, 2.0); ', IF_TOOL_DIES]),
         (MissionState.STOPPING, [RUNNING, DRIVE], ['go_to("kitchen"); ', IF_TOOL_DIES]),
         (MissionState.RUNNING, [RUNNING, DRIVE, AT, THERE], ["robot was idle"]),
     ],

@@ -28,6 +28,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.web import console as console_module
 from codebotler.web.console import Console
 from codebotler.web.panes.continuing import origin_text, storyboard_title
+from codebotler.web.panes.robot import map_state
 from codebotler.web.storyboard import strips
 from ended import cut, failed_mission, line_of
 
@@ -101,6 +102,7 @@ def test_the_model_of_the_program_writes_the_rest_and_a_person_approves_it(tmp_p
         before = fetch(console)
         past = console.past_of("last")
         session = console.begin(console.rest_of(past))
+        assert map_state(session.view, WORLD).room == "kitchen"  # before the robot was asked
         view = until(console, lambda view: view.may_be_approved)
         assert (view.model, view.instruction, view.program) == ("author", "Fetch the mug.", GO_BACK)
         assert view.past == past

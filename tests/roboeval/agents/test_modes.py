@@ -133,6 +133,11 @@ def test_what_needs_programs_refuses_missions(runs: tuple[Path, Path, str], name
     refused(name, str(agents), "--suite", suite)
 
 
+@pytest.mark.parametrize("mode", ["agent", "replan"])
+def test_recorded_models_drive_no_missions(mode: str) -> None:
+    refused("run", "--model", "recorded:careful", "--mode", mode)
+
+
 def test_a_summary_says_how_missions_ended(runs: tuple[Path, Path, str]) -> None:
     _, agents, suite = runs
     data = json.loads(roboeval("show", str(agents), "--suite", suite, "--json").out)

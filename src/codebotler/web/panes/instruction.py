@@ -28,7 +28,7 @@ _HOW_TO_ADD_MODEL = (
 _MAX_EXAMPLES, _MAX_RECENT, _MAX_PICK_CHARACTERS = 4, 6, 400
 _ABOUT_RECORDED = (
     "This is not a language model: people wrote its programs, so you can try everything without an API key. "
-    "It knows only a few instructions, such as the examples below."
+    "It knows only a few instructions"
 )
 
 
@@ -52,7 +52,7 @@ class InstructionPane:
                 {name: visible(name) for name in console.models}, value=console.models[0], label="Model"
             )
             self._model.props("outlined dense").on_value_change(self._about_model)
-            self._about = PlainText("p", _ABOUT_RECORDED, "quiet")
+            self._about = PlainText("p", f"{_ABOUT_RECORDED}.", "quiet")
             self._write = Button("Write the program", self._ask, "primary")
             self._error = PlainText("p", "", "trouble").props("role=alert")
             self._similar = ui.element("div").classes("picks")
@@ -65,6 +65,8 @@ class InstructionPane:
         """Add the examples and the recent instructions."""
         shown = await asyncio.to_thread(examples, self._console)
         if not self._examples.is_deleted:  # the page may have been closed in the meantime
+            some = ", such as the examples below." if shown else ", and none of them fits these rooms."
+            self._about.say(_ABOUT_RECORDED + some)
             self._fill(self._examples, "Examples", [(text, "") for text in shown])
         await self._load_recent()
 

@@ -166,6 +166,8 @@ class _MissionRow:
         )
         before = f"continues mission {summary.continues}" if summary.continues else ""
         after = f"continued by mission {later}" if later else ""
-        self._outcome.say(" · ".join(filter(None, (f"robot: {summary.robot}", reason, before, after))))
+        own = f"mission {summary.id}" if before or after else ""
+        parts = (own, f"robot: {summary.robot}", reason, before, after)
+        self._outcome.say(" · ".join(filter(None, parts)))
         self._state.say(state)
         self._state.classes(replace=f"state state-{summary.state}")

@@ -46,10 +46,11 @@ def add(console: Console, frame: Frame) -> None:
             page.show(summary, events, later)
             if summary.state in EARLY_ENDS and can_be_continued(summary):
                 obstacle = await asyncio.to_thread(console.obstacle_to, mission)
-                if not obstacle:
-                    ContinueButton(console, summary.id)
-                elif not later:  # the link to a later mission says enough
-                    PlainText("p", f"{capitalize(obstacle)}.", "quiet")
+                with page.rest:
+                    if not obstacle:
+                        ContinueButton(console, summary.id)
+                    elif not later:  # the link to a later mission says enough
+                        PlainText("p", f"{capitalize(obstacle)}.", "quiet")
             if not summary.has_ended:
                 await follow(console.notifier, partial(_update, console, page))
 
@@ -106,6 +107,7 @@ class _MissionPage:
         self._shown: object = None
         self._count = 0
         self._head = ui.element("div").classes("mission-head")
+        self.rest = ui.element("div").classes("mission-rest")
         PlainText("h2", "What happened")
         self._timeline = ui.element("ol").classes("timeline")
         self._more = PlainText("p", "", "quiet")

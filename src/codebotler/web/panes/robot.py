@@ -14,6 +14,7 @@ from codebotler.missions.log import MissionState, MissionSummary
 from codebotler.missions.progress import ANSWER, Moment, position_on_map
 from codebotler.missions.view import Phase, SessionView
 from codebotler.missions.wording import capitalize, reason_text
+from codebotler.simulator.room_map import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.floorplan import MapState, floorplan, room_at
 from codebotler.web.frame import Button, PlainText, script
@@ -135,14 +136,15 @@ def _headline(view: SessionView) -> str:
 def map_state(view: SessionView, world: World) -> MapState:
     """Return the contents of the map for a view."""
     progress, rooms = view.progress, laid_out(world).rooms
+    room_map = view.room_map or RoomMap.of(world)
 
     def room_of(words: str) -> str:
-        return (view.room_map.room(words) if view.room_map and words else None) or world.robot
+        return (room_map.room(words) if words else None) or world.robot
 
     room, finds = room_of(progress.room), defaultdict[str, list[str]](list)
     for find in progress.finds:
         finds[room_of(find.room)].append(find.name)
-    at = position_on_map(progress, world, view.room_map)
+    at = position_on_map(progress, world, room_map)
     if progress.is_between and not progress.is_driving:
         room = room_at(rooms, at) if at else ""
     return MapState(at, room, progress.is_driving, progress.trail, dict(finds), progress.held)
