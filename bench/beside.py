@@ -109,7 +109,7 @@ def renamed(completions: list[Completion]) -> list[Completion]:
         copy, variable = number // len(completions), FIRST_VARIABLE.search(one.program)
         new = rf"\g<0>_{copy}"
         if copy and variable is not None:
-            one = replace(one, program=re.sub(rf"\b{variable[1]}\b", new, one.program))  # noqa: PLW2901
+            one = replace(one, program=re.sub(rf"\b{variable[1]}\b", new, one.program))  # noqa: PLW2901 - each variable in turn
         found.append(one)
     return found
 

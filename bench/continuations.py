@@ -345,7 +345,7 @@ def crashes(worker: Worker, one: Completion, folder: Path) -> Iterator[Crash]:
     task = SUITE.tasks[one.task]
     for scenario in task.scenarios:
         robot = LoggingRobot(scenario.world)
-        outcome = worker.run_alone(one.program, lambda robot=robot: robot)  # type: ignore[misc]
+        outcome = worker.run_alone(one.program, lambda robot=robot: robot)  # type: ignore[misc]  # mypy infers no type of a default
         if outcome.error is not None or not judge(outcome, scenario.asked_by(one.prompt)).satisfied:
             continue
         calls = tuple(robot.calls)

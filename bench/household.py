@@ -167,7 +167,7 @@ def with_branch(steps: Sequence[str], chance: random.Random) -> str:
 def with_joined_texts(steps: Sequence[str], chance: random.Random) -> str:
     """Compose the texts of the program from two parts."""
     lines = body(steps)
-    for text in {text for step in steps for text in call(step)[1] if len(text) > 5 and text[0] == "'"}:  # noqa: PLR2004
+    for text in {text for step in steps for text in call(step)[1] if len(text) > 5 and text[0] == "'"}:  # noqa: PLR2004 - a text with its quotes
         at = chance.randrange(2, len(text) - 2)
         lines = lines.replace(text, f"{text[:at]}' + '{text[at:]}")
     return f"def task_program():\n{lines}\n"

@@ -51,7 +51,7 @@ def broken_in(
     some = list(samplers)
     for start in range(0, len(some), 64):
         these = some[start : start + 64]
-        worker.run_all([(program, [lambda one=one: new_robot(one) for one in these])])  # type: ignore[misc]
+        worker.run_all([(program, [lambda one=one: new_robot(one) for one in these])])  # type: ignore[misc]  # mypy infers no type of a default
     guards = [robot.guard for robot in robots if isinstance(robot.guard, ExploringGuard)]
     return set().union(*(guard.violations for guard in guards)), {tuple(robot.draws) for robot in robots}
 

@@ -231,7 +231,7 @@ def by_nav2(home: Path) -> Iterator[Times]:
         for _ in range(STOPS):
             drives.clear()
             start = stopped(open_robot("ros2", options), home, drives)
-            yield tuple(1000 * (heard[name].get() - start) for name in ("cancel", "ended"))  # type: ignore[misc]
+            yield tuple(1000 * (heard[name].get() - start) for name in ("cancel", "ended"))  # type: ignore[misc]  # of two times
         server.stdin.close()
 
 

@@ -31,7 +31,7 @@ def task_program():
 """
 
 
-async def ask(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001
+async def ask(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - the client passes it
     """Ask the person at the terminal. Never answer such a question with a model."""
     print(f"\n{params.message}\n")
     try:

@@ -115,7 +115,7 @@ def no_authorities() -> Iterator[None]:
     """Load no public certificate authorities: that takes 30 ms a client, and tests stay on this machine."""
     load = ssl.SSLContext.load_verify_locations
 
-    def load_others(context: ssl.SSLContext, cafile: Any = None, *more: Any, **named: Any) -> None:  # noqa: ANN401
+    def load_others(context: ssl.SSLContext, cafile: Any = None, *more: Any, **named: Any) -> None:  # noqa: ANN401 - as its base has it
         if not str(cafile).endswith("certifi/cacert.pem"):
             load(context, cafile, *more, **named)
 

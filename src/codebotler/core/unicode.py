@@ -24,9 +24,9 @@ def compose(value: Composed) -> Composed:
     if isinstance(value, str):
         return normalize_text("NFC", value)  # type: ignore[return-value]  # a string, too
     if isinstance(value, list):
-        return [compose(one) for one in value]  # type: ignore[return-value]
+        return [compose(one) for one in value]  # type: ignore[return-value]  # a copy has the type of the value
     if isinstance(value, tuple) and type(value) is tuple:  # the texts in a named tuple are already composed
-        return tuple(compose(one) for one in value)  # type: ignore[return-value]
+        return tuple(compose(one) for one in value)  # type: ignore[return-value]  # a copy has the type of the value
     return value
 
 

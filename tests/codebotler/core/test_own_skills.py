@@ -177,7 +177,7 @@ def test_traces_with_several_arguments_are_read_as_they_were_written() -> None:
         ("tr.Exists(returned(True, truth(True)))", False),
     ],
 )
-def test_formulas_compare_all_arguments_and_results(every: SkillTable, formula: str, expected: bool) -> None:  # noqa: FBT001
+def test_formulas_compare_all_arguments_and_results(every: SkillTable, formula: str, expected: bool) -> None:  # noqa: FBT001 - a value of pytest
     trace = (
         Event("paint", "red", more=("wall",)),
         Event("whole", "-3"),

@@ -195,7 +195,7 @@ def led(
     view = session.wait_until(lambda view: view.may_be_approved)
     for edit in edits:
         session.edit(edit)
-        view = session.wait_until(lambda view, edit=edit: view.program == edit and view.may_be_approved)  # type: ignore[misc]
+        view = session.wait_until(lambda view, edit=edit: view.program == edit and view.may_be_approved)  # type: ignore[misc]  # mypy infers no type of a default
     return session, view
 
 

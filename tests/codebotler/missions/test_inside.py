@@ -240,7 +240,7 @@ def test_the_robot_stands_still_before_the_rule_is_logged(tmp_path: Path) -> Non
 
 def knowing(*, has_pose: bool, rooms: tuple[str, ...] = ("hall", "vault")) -> Answering:
     told = {"get_all_rooms": [*rooms], "get_current_location": "hall"}
-    robot = Answering(lambda skill, _: told.get(skill))  # type: ignore[arg-type, return-value]
+    robot = Answering(lambda skill, _: told.get(skill))  # type: ignore[arg-type, return-value]  # of these skills
     robot.has_pose = has_pose
     return robot
 

@@ -367,7 +367,7 @@ def test_nothing_is_known_of_a_program_that_does_something_else() -> None:
         (Event(PICK, "mug", place="lab"), Event(PICK, "mug", place="lab"), False),
     ],
 )
-def test_equal_effects(one: Event, other: Event, is_same: bool) -> None:  # noqa: FBT001
+def test_equal_effects(one: Event, other: Event, is_same: bool) -> None:  # noqa: FBT001 - a value of pytest
     assert has_same_effect(one, other, ROOMS) is is_same
 
 
@@ -389,7 +389,7 @@ def test_an_approval_covers_the_rest_of_its_contract(
     approved: int | None,
     done: int,
     wanted: int | None,
-    allows: bool,  # noqa: FBT001
+    allows: bool,  # noqa: FBT001 - a value of pytest
 ) -> None:
     past = read_past(failed(tmp_path, BRING), SKILLS)
     object.__setattr__(past, "trace", (Event(SAY, "a", place="lab"),) * done)

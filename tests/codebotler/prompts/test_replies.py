@@ -105,7 +105,7 @@ def test_fence_in_the_docstring_of_a_program_without_fences() -> None:
     ("closing", "closes"),
     [("```", True), ("   ```", True), ("````  ", True), ("    ```", False), ("~~~", False)],
 )
-def test_what_closes_a_fence_of_code_that_was_cut_off(closing: str, closes: bool) -> None:  # noqa: FBT001
+def test_what_closes_a_fence_of_code_that_was_cut_off(closing: str, closes: bool) -> None:  # noqa: FBT001 - a value of pytest
     program = source(f"```python\n{CUT_OFF}{closing}\nx = 1\n```\n")
     assert program == CUT_OFF if closes else program == f"{CUT_OFF}{closing}\nx = 1\n"
 

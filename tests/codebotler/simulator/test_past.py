@@ -26,7 +26,7 @@ WORLDS = range(12)
 
 
 def event(kind: str, text: str, place: str = "kitchen", **more: object) -> Event:
-    return replace(Event(kind, text, place=place), **more)  # type: ignore[arg-type]
+    return replace(Event(kind, text, place=place), **more)  # type: ignore[arg-type]  # names and values of its fields
 
 
 def robots(*past: Event, rules: tuple[Rule, ...] = ()) -> list[SampledRobot]:
@@ -38,7 +38,7 @@ def robots(*past: Event, rules: tuple[Rule, ...] = ()) -> list[SampledRobot]:
 
 @pytest.mark.parametrize("found", [True, False])
 @pytest.mark.parametrize("what", ["mug", "the mug", "person", "Anne"])
-def test_a_look_finds_what_was_seen_last(what: str, found: bool) -> None:  # noqa: FBT001
+def test_a_look_finds_what_was_seen_last(what: str, found: bool) -> None:  # noqa: FBT001 - a value of pytest
     before = event(CHECK, what, found=not found)
     for robot in robots(before, event(CHECK, what, found=found)):
         assert robot.perform("is_in_room", [what]) is found

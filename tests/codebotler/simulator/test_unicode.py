@@ -75,7 +75,7 @@ def test_rule_and_instruction_are_composed(tmp_path: Path) -> None:
 
 
 def test_tree_of_a_program_has_composed_texts() -> None:
-    assert NFC in repr(parse_leniently(f"x = '{NFD}'").body[0].value.value)  # type: ignore[attr-defined]
+    assert NFC in repr(parse_leniently(f"x = '{NFD}'").body[0].value.value)  # type: ignore[attr-defined]  # of this tree
 
 
 def test_robot_is_asked_for_its_rooms_in_its_own_spelling(tmp_path: Path) -> None:

@@ -172,4 +172,4 @@ def test_a_completion_without_content_is_refused(completion: list[dict[str, Any]
 )
 def test_mistakes_are_refused_in_a_sentence(wrong: dict[str, object], sentence: str) -> None:
     with pytest.raises(UserError, match=sentence):
-        load_prompts(**wrong)  # type: ignore[arg-type]
+        load_prompts(**wrong)  # type: ignore[arg-type]  # wrong on purpose

@@ -60,7 +60,7 @@ class MissionToolset(vf.Toolset[vf.SharedToolsetConfig, MissionState]):
             Parameter(parameter, Parameter.KEYWORD_ONLY, annotation=_annotation(schema))
             for parameter, schema in properties.items()
         ]
-        call.__signature__ = Signature(parameters, return_annotation=str)  # type: ignore[attr-defined]
+        call.__signature__ = Signature(parameters, return_annotation=str)  # type: ignore[attr-defined]  # which inspect reads
         return call
 
 
