@@ -8,7 +8,7 @@ from rich.console import Group
 from rich.text import Text
 
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import confirm, is_interactive, note, print_rich, read_line, shortened
+from codebotler.core.terminal import is_interactive, note, print_rich, read_line, shortened
 from codebotler.core.world import World
 from codebotler.missions.past import MissionPast, read_past
 from codebotler.missions.recovery import ask_evidence
@@ -48,11 +48,21 @@ def choose_past(
             raise UserError(f"{past.question}; add --happened or --not-happened")
         for sentence in (past.question, *ask_evidence(robot, home, past, note)):
             note(sentence)
-        happened = confirm("did this happen?")
+        happened = _ask_whether(past)
         if happened and past.answers:
             known = " | ".join(map(shortened, past.answers))
             answer = read_line(f"what was the answer [{known}]? (Enter if you do not know) ").strip()
     return past.resolve(happened=happened, answer=answer)
+
+
+def _ask_whether(past: MissionPast) -> bool:
+    """Ask until a person says whether a step happened. Raise UserError at the end of the input."""
+    while answer := read_line("did this happen? [y/n] "):
+        word = answer.strip().lower()
+        if word in {"y", "yes", "n", "no"}:
+            return word.startswith("y")
+        note("answer y or n, or press Ctrl-C to end here")
+    raise UserError(f"{past.question}; add --happened or --not-happened")
 
 
 def past_view(past: MissionPast) -> Group:

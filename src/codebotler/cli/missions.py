@@ -10,7 +10,7 @@ from codebotler.cli.views import list_view, mission_view
 from codebotler.core.terminal import note, print_json, print_rich
 from codebotler.missions.log import MissionSummary, read_events
 from codebotler.missions.pictures import PICTURE_FOLDER, read_picture
-from codebotler.missions.store import find_mission, read_missions, recover_missions
+from codebotler.missions.store import find_mission, find_rest, read_missions, recover_missions
 
 if TYPE_CHECKING:
     from codebotler.missions.mcap import TimeSource
@@ -34,7 +34,7 @@ def show_mission(home: Path, name: str, *, json: bool) -> None:
     if json:
         print_json({**asdict(summary), "events": events})
     else:
-        print_rich(mission_view(summary, events))
+        print_rich(mission_view(summary, events, find_rest(folder)))
         if any(read_picture(folder, line) for line in events):
             note(f"the pictures are in {folder / PICTURE_FOLDER}")
 

@@ -57,7 +57,8 @@ CandidatesOption = Annotated[
     typer.Option(
         min=1,
         max=20,
-        help="Ask the model for this many programs; if they behave differently, ask which one you mean.",
+        help="Ask the model for this many programs, and ask which one you mean if fewer than three in four "
+        "behave alike.",
         metavar="K",
     ),
 ]

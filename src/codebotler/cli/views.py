@@ -13,6 +13,7 @@ from rich.text import Text
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import console, shortened, visible
 from codebotler.missions.log import LogLine, MissionState, MissionSummary
+from codebotler.missions.store import last_rest, rest_text
 from codebotler.missions.view import SessionView
 from codebotler.missions.wording import event_text, title
 from codebotler.models.chosen import ChosenModel
@@ -97,7 +98,8 @@ def ending_view(ended: MissionSummary | SessionView) -> Group:
         text.append("\nthe robot has stopped")
     again = [f"`codebotler missions {ended.id}` shows this mission again"]
     if state in {MissionState.STOPPED, MissionState.FAILED}:
-        again.append(f"`codebotler continue {ended.id}` does the rest")
+        options = "the same --world, --robot and --model"
+        again.append(f"`codebotler continue {ended.id}` does the rest, with {options}")
     return Group(text, *(Text(one, "dim", no_wrap=True, overflow="ignore") for one in again))
 
 
@@ -123,13 +125,16 @@ def list_view(summaries: Sequence[MissionSummary]) -> RenderableType:
                 shortened(title(summary), 100)
                 + (f"  ({shortened(summary.reason, 200)})" if summary.reason else "")
                 + (f"  continues {summary.continues}" if summary.continues else "")
+                + (f"  {rest}" if (rest := rest_text(last_rest(summary.id, summaries))) else "")
             ),
         )
     return table
 
 
-def mission_view(summary: MissionSummary, events: Sequence[LogLine]) -> RenderableType:
-    """Show a mission with its events."""
+def mission_view(
+    summary: MissionSummary, events: Sequence[LogLine], rest: MissionSummary | None = None
+) -> RenderableType:
+    """Show a mission with its events, and what became of its rest."""
     head = Text.assemble((f"mission {summary.id}", "bold"), f" on the robot {summary.robot}")
     if summary.instruction:
         head.append(f"\n{shortened(summary.instruction)}")
@@ -148,6 +153,8 @@ def mission_view(summary: MissionSummary, events: Sequence[LogLine]) -> Renderab
     problems = [Text(f"problem: {shortened(problem)}", "red") for problem in summary.problems]
     program = Group(Text(), source_view(summary.program))
     end = Text.assemble((state, STATE_STYLES.get(state, "bold")), _why(summary))
+    if rest is not None:
+        end.append(f"\n{rest_text(rest)}", "dim")
     return Group(head, program, *problems, table, Text(), end)
 
 

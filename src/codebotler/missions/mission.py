@@ -195,6 +195,8 @@ class Mission:
         """Add what an earlier mission did to the log, before this one does the rest."""
         self.summary.continues = past.mission
         self._write("past", **past.data())
+        if past.testimony:
+            self.note(past.testimony)
 
     def run(
         self,

@@ -30,7 +30,7 @@ from codebotler.missions.log import (
     read_events,
 )
 from codebotler.missions.progress import Progress
-from codebotler.missions.store import find_continuations
+from codebotler.missions.store import find_continuations, find_mission
 from codebotler.robots.simulated import SIMULATION
 from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.room_map import RoomMap
@@ -54,6 +54,7 @@ class MissionPast:
         unsure: a step that may have happened or not; None if there is none.
         before: the number of steps that missions did before this program.
         has_failed: whether it failed, rather than that somebody stopped it or it was interrupted.
+        testimony: what a person said of the unsure step, in a sentence.
     """
 
     mission: str
@@ -66,6 +67,7 @@ class MissionPast:
     unsure: Event | None = None
     before: int = 0
     has_failed: bool = False
+    testimony: str = ""
 
     @property
     def is_untouched(self) -> bool:
@@ -102,9 +104,13 @@ class MissionPast:
         """The question to a person whether the unsure step happened; empty if there is none."""
         if self.unsure is None:
             return ""
+        return f"the log does not say whether the robot {self._unsure_words}"
+
+    @property
+    def _unsure_words(self) -> str:
+        assert self.unsure is not None
         where = f' in "{shortened(self.unsure.place)}"' if self.unsure.place else ""
-        what = phrase(self.unsure, "past", show=shortened).removesuffix(f" → {NO_ANSWER}")
-        return f"the log does not say whether the robot {what}{where}"
+        return phrase(self.unsure, "past", show=shortened).removesuffix(f" → {NO_ANSWER}") + where
 
     @property
     def answers(self) -> tuple[str, ...]:
@@ -126,7 +132,10 @@ class MissionPast:
         if answer and answer not in self.answers:
             raise UserError(f'"{shortened(answer)}" is not one of the options: {", ".join(self.answers)}')
         done = replace(self.unsure, answer=answer or None)
-        return replace(self, trace=(*self.trace, done) if happened else self.trace, unsure=None)
+        trace = (*self.trace, done) if happened else self.trace
+        did = "happened" if happened else "did not happen"
+        testimony = f"a person said that this {did}: {self._unsure_words}"
+        return replace(self, trace=trace, unsure=None, testimony=testimony)
 
     def add_to(self, room_map: RoomMap | None, place: str) -> tuple[RoomMap, str]:
         """Return the rooms with this past, and the robot's place, which is the last one if it is unknown."""
@@ -138,11 +147,8 @@ class MissionPast:
         """Convert the past to the data of a log event."""
         return {
             "continues": self.mission,
-            "program": self.program,
             "why": self.why,
-            "place": self.place,
             "trace": placed_trace_data(self.trace),
-            "before": self.before,
         }
 
 
@@ -164,6 +170,39 @@ def read_past(
     summary = MissionSummary.read(folder)
     if robot_kind not in {"", summary.robot}:
         raise UserError(f"mission {summary.id} ran on the robot {summary.robot}, not {robot_kind}")
+    _expect_rest(summary, folder)
+    events = read_events(folder)
+    before: LogLine = next((line for line in events if line["event"] == "past"), {})
+    has_run = any(line["event"] == "state" and line["state"] == MissionState.RUNNING for line in events)
+    if before and not has_run:  # the rest is still that of the mission before it
+        return read_past(find_mission(folder.parent.parent, summary.continues), skills, robot_kind, world)
+    if not summary.program:
+        raise UserError(f"mission {summary.id} ended before it had a program; give the instruction again")
+    try:
+        if world is not None:
+            _expect_same_map(summary.id, events, world)
+        robot, unsure = _repeat(events, skills, summary.place)
+    except UserError:
+        raise
+    except (AttributeError, LookupError, TypeError, ValueError, re.error):
+        sentence = "the log does not fit the skills; name the files of own skills with --skills"
+        raise UserError(sentence, file=folder) from None
+    return MissionPast(
+        summary.id,
+        summary.instruction,
+        summary.model,
+        summary.program,
+        summary.reason,
+        robot.trace,
+        robot.place,
+        unsure,
+        len(before.get("trace", ())),
+        summary.state is MissionState.FAILED,
+    )
+
+
+def _expect_rest(summary: MissionSummary, folder: Path) -> None:
+    """Raise UserError if a mission goes on, is done, or has been continued."""
     if not summary.has_ended:
         raise UserError(f"mission {summary.id} has not ended; stop it first")
     if summary.state is MissionState.DONE:
@@ -171,33 +210,6 @@ def read_past(
     for later in find_continuations(folder):
         if later.if_tool_dies:  # it has done a part of the rest
             raise UserError(f"mission {summary.id} was continued by mission {later.id}; continue that one")
-    events = read_events(folder)
-    before: LogLine = next((line for line in events if line["event"] == "past"), {})
-    has_run = any(line["event"] == "state" and line["state"] == MissionState.RUNNING for line in events)
-    if not (summary.program or before):
-        raise UserError(f"mission {summary.id} ended before it had a program; give the instruction again")
-    place = summary.place if has_run else before.get("place", "")
-    try:
-        if world is not None:
-            _expect_same_map(summary.id, events, world)
-        robot, unsure = _repeat(events, skills, place)
-    except UserError:
-        raise
-    except (AttributeError, LookupError, TypeError, ValueError, re.error):
-        sentence = "the log does not fit the skills; name the files of own skills with --skills"
-        raise UserError(sentence, file=folder) from None
-    return MissionPast(
-        summary.id if has_run else before.get("continues", summary.id),
-        summary.instruction,
-        summary.model,
-        summary.program if has_run else before.get("program", summary.program),
-        summary.reason if has_run else before.get("why", summary.reason),
-        robot.trace,
-        robot.place,
-        unsure,
-        len(before.get("trace", ())) if has_run else before.get("before", 0),
-        summary.state is MissionState.FAILED,
-    )
 
 
 def _expect_same_map(mission: str, events: Sequence[LogLine], world: World) -> None:
@@ -207,9 +219,7 @@ def _expect_same_map(mission: str, events: Sequence[LogLine], world: World) -> N
     lacks = next((name for name in had if name not in here), None)
     if lacks is not None:
         where = f'ran on another map, with the room "{shortened(lacks)}"'
-        raise UserError(
-            f"mission {mission} {where}; to continue it, start with the same --world, or without it"
-        )
+        raise UserError(f"mission {mission} {where}; give the same --world as then, or none if it had none")
 
 
 def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[LoggedRobot, Event | None]:
@@ -239,6 +249,8 @@ def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[
 
 def _step_words(event: Event) -> str:
     words = phrase(event, "past", show=shortened)
+    if not event.failed and words.endswith(NO_ANSWER):  # a question that nobody answers fails
+        words = f"{words.removesuffix(NO_ANSWER)}answer unknown"
     if event.failed:
         words = f"failed to {phrase(event, 'base', show=shortened)} ({shortened(event.failed)})"
     return f'in "{shortened(event.place)}": {words}' if event.place else words

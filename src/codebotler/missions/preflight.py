@@ -24,11 +24,15 @@ MAX_CHECKED_ROOMS = 1_000
 """The limit for a check, which compares each drive with all rooms."""
 
 
+def is_resumable(robot: Robot) -> bool:
+    """Whether a robot is simulated, so that it can be brought to where it was after a past."""
+    return hasattr(robot, "resume")  # an optional method
+
+
 def resume_robot(robot: Robot, past: MissionPast) -> None:
     """Bring a connected robot to where it was after a past, if it is simulated."""
-    resume = getattr(robot, "resume", None)  # an optional method of simulated robots
-    if resume is not None:
-        resume(past.trace)
+    if is_resumable(robot):
+        robot.resume(past.trace)  # type: ignore[attr-defined]  # as was just found
 
 
 def ask_rooms(

@@ -12,7 +12,7 @@ from codebotler.core.terminal import shortened
 from codebotler.core.trace import Trace
 from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState
 from codebotler.missions.past import MissionPast, read_past
-from codebotler.missions.preflight import ask_rooms, resume_robot
+from codebotler.missions.preflight import ask_rooms, is_resumable
 from codebotler.missions.session import MissionSession
 from codebotler.missions.store import find_mission
 from codebotler.missions.view import SessionView
@@ -79,13 +79,14 @@ def ask_evidence(robot: Robot, home: Path, past: MissionPast, remark: Callable[[
 
     The robot is connected, unless it is in use. `remark` receives likely mistakes in its setup.
     """
+    before = [f"Before, according to the log: {past.here(past.place)}"] if past.place else []
+    if is_resumable(robot):  # it knows no more than the log
+        return [*before, "The simulated robot will begin there."]
     try:
         with Reservation(robot, home):
-            resume_robot(robot, past)
             place = ask_rooms(robot, remark)[1]
     except (NotReadyError, OSError) as error:
         remark(str(error))
         place = ""
-    before = [f"Before, according to the log: {past.here(past.place)}"] if past.place else []
     where = f'says that it is in "{shortened(place)}"' if place else "does not say where it is"
     return [*before, f"Now, the robot {where}."]

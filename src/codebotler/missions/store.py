@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import time
+from collections.abc import Sequence
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -44,11 +45,34 @@ def find_mission(home: Path, name: str) -> Path:
 
 def find_continuations(folder: Path) -> list[MissionSummary]:
     """Return the missions that continue the mission in a folder, oldest first, without damaged ones."""
+    return [one for one in _read_undamaged(folder.parent) if one.continues == folder.name]
+
+
+def find_rest(folder: Path) -> MissionSummary | None:
+    """Return the `last_rest` of the mission in a folder."""
+    return last_rest(folder.name, _read_undamaged(folder.parent))
+
+
+def _read_undamaged(missions: Path) -> list[MissionSummary]:
     found: list[MissionSummary] = []
-    for other in sorted(folder.parent.glob(f"*/{SUMMARY_FILE}")):
+    for path in sorted(missions.glob(f"*/{SUMMARY_FILE}")):
         with suppress(UserError, OSError):
-            found.append(MissionSummary.read(other.parent))
-    return [one for one in found if one.continues == folder.name]
+            found.append(MissionSummary.read(path.parent))
+    return found
+
+
+def last_rest(mission: str, known: Sequence[MissionSummary]) -> MissionSummary | None:
+    """Return the last mission that ran and did the rest of another one, directly or after others."""
+    rests = {one.continues: one for one in known if one.if_tool_dies and one.continues < one.id}
+    rest = rests.get(mission)
+    while rest is not None and rest.id in rests:
+        rest = rests[rest.id]
+    return rest
+
+
+def rest_text(rest: MissionSummary | None) -> str:
+    """Say which mission did the rest of another one, and its state; empty if none did."""
+    return "" if rest is None else f"continued by mission {rest.id} ({rest.state})"
 
 
 def recover_missions(home: Path) -> list[MissionSummary]:

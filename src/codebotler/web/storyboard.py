@@ -58,6 +58,7 @@ class RouteProgress:
     visited: tuple[str, ...] = ()  # the rooms of completed drives
     looks: tuple[tuple[str, bool], ...] = ()  # objects that were looked for, and whether they were found
     answers: tuple[str | None, ...] = ()  # the answers to questions; None for a question that failed
+    has_failed: bool = False  # whether the mission failed after that
 
 
 NO_PROGRESS = RouteProgress()
@@ -83,7 +84,8 @@ def draw_strips(
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
                 for number, scene in enumerate(strip.scenes):
                     is_reached = bool(reached.visited and number_reached) and number <= (number_reached or 0)
-                    draw_scene(scene, is_reached=is_reached)
+                    has_failed = reached.has_failed and number == number_reached
+                    draw_scene(scene, is_reached=is_reached, has_failed=has_failed)
             PlainText("p", strip.ending, "ending good" if strip.ends_well else "ending bad")
 
 
@@ -121,14 +123,24 @@ def _texts(strip: Strip, kind: str) -> list[str]:
 
 
 def draw_scene(
-    scene: Scene, wrong: Container[int] = frozenset(), *, is_reached: bool = False, anchor: str = ""
+    scene: Scene,
+    wrong: Container[int] = frozenset(),
+    *,
+    is_reached: bool = False,
+    has_failed: bool = False,
+    anchor: str = "",
 ) -> None:
-    """Draw one visit to a room, and mark wrong steps. A step's HTML ID is `anchor` followed by its number."""
+    """Draw one visit to a room, and mark wrong steps and the room in which a mission failed.
+
+    A step's HTML ID is `anchor` followed by its number.
+    """
     kinds = ["scene"] if scene.deeds or not scene.is_found else ["scene", "passing"]
     kinds += ["wrong"] * (scene.step in wrong) + ["reached"] * is_reached
     with ui.element("li").classes(" ".join(kinds)):
         _number(PlainText("b", scene.room, "room"), scene.step, anchor)
-        if is_reached:
+        if has_failed:
+            PlainText("span", "✗", "tick failed").props('role=img aria-label="failed here"')
+        elif is_reached:
             PlainText("span", "✓", "tick").props('role=img aria-label="reached"')
         if not scene.is_found:
             PlainText("span", "there is no such room", "deed missing")

@@ -94,4 +94,10 @@ def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
         *counts, passed, rejected, steps, shortest, repeated = data.values()
         shares = ("-" if share is None else f"{share:.3f}" for share in (passed, rejected))
         table.add_row(task, *map(str, counts), *shares, f"{steps} of {shortest}", str(repeated))
-    return Group(Text(title, "bold"), Text(), table)
+    lines = [
+        "handled: errors that the program handled itself; missing: missions for which the model had no rest",
+        "passed, rejected: shares of the continued missions",
+        "steps: those of the missions that passed, and the fewest possible",
+        "repeated: how often robots spoke, picked up or put down more than without an error",
+    ]
+    return Group(Text(title, "bold"), Text(), table, *(Text(line, "dim") for line in lines))

@@ -20,7 +20,7 @@ from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
-from codebotler.missions.log import MissionSummary, add_event, open_log
+from codebotler.missions.log import MissionSummary, add_event, open_log, read_events
 from codebotler.missions.map_event import map_data
 from codebotler.missions.mission import Mission
 from codebotler.missions.past import MissionPast, read_past
@@ -83,6 +83,7 @@ def test_a_step_without_a_result_is_unsure_until_a_person_says(tmp_path: Path, s
     assert past.question
     assert past.resolve(happened=True).trace == (*past.trace, past.unsure)
     assert past.resolve(happened=True).held == held
+    assert past.resolve(happened=True).testimony != past.resolve(happened=False).testimony != ""
     assert past.resolve(happened=False).trace == past.trace
     assert past.resolve(happened=False).unsure is None
 
@@ -130,6 +131,17 @@ def test_a_continuation_that_never_ran_leaves_the_past_as_it_was(tmp_path: Path)
         past.why,
     )
     assert MissionSummary.read(mission.folder).continues == past.mission
+
+
+def test_a_rest_that_did_not_run_leaves_the_question_open(tmp_path: Path) -> None:
+    folder = failed(tmp_path, BRING)
+    cut(folder, line_of(folder, "pick", "skill"))
+    past = read_past(folder, SKILLS).resolve(happened=True)
+    with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
+        mission.continue_from(past)
+        mission.fail("the model is away")
+    assert past.testimony in [line["text"] for line in read_events(mission.folder) if line["event"] == "log"]
+    assert read_past(mission.folder, SKILLS).unsure is not None
 
 
 def test_where_nothing_was_tried_the_program_is_still_the_rest(tmp_path: Path) -> None:
@@ -413,6 +425,7 @@ def test_a_person_may_know_the_answer_to_an_unsure_question(tmp_path: Path) -> N
     assert past.answers == ("yes", "no")
     assert past.resolve(happened=True, answer="no").trace[-1].answer == "no"
     assert past.resolve(happened=True).trace[-1].answer is None
+    assert past.resolve(happened=True).steps[-1].endswith("answer unknown")
     with pytest.raises(UserError):
         past.resolve(happened=True, answer="perhaps")
 

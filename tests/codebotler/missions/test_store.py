@@ -21,7 +21,7 @@ from codebotler.missions.log import (
     read_events,
 )
 from codebotler.missions.mission import Mission
-from codebotler.missions.store import read_missions, recover_missions
+from codebotler.missions.store import last_rest, read_missions, recover_missions
 
 IF_TOOL_DIES = "its worker cancelled the goal"
 
@@ -46,6 +46,19 @@ DRIVE: dict[str, object] = {
 }
 AT: dict[str, object] = {"event": "feedback", "number": 1, "skill": "go_to", "text": "at (1.0, 2.0)"}
 THERE: dict[str, object] = {"event": "result", "number": 1, "skill": "go_to", "result": None}
+
+
+def test_the_rest_of_a_mission_is_what_ran_last() -> None:
+    def one(name: str, continues: str = "", dies: str = IF_TOOL_DIES) -> MissionSummary:
+        return MissionSummary(
+            name, MissionState.DONE, "simulated", 1.0, continues=continues, if_tool_dies=dies
+        )
+
+    known = [one("1"), one("2", "1", dies=""), one("3", "1"), one("4", "3"), one("5")]
+    assert [rest and rest.id for rest in (last_rest(name, known) for name in "12345")] == [
+        *("4", None, "4", None, None)
+    ]
+    assert last_rest("1", [one("1", "1"), one("2", "1"), one("1", "2")]) == one("2", "1")
 
 
 @pytest.mark.parametrize(

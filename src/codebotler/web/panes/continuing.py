@@ -35,11 +35,8 @@ class ContinueButton(Button):
 
     def show(self, view: SessionView) -> None:
         """Offer to continue the mission of a view, if it has begun and ended early."""
-        past = "" if view.past is None else view.past.mission
-        self._mission = view.id or past
-        has_past = view.progress.has_begun or bool(past)
-        is_early = view.state in EARLY_ENDS or view.state is None  # without a state, the robot was busy
-        self.set_visibility(view.is_over and is_early and has_past)
+        self._mission = view.id or ("" if view.past is None else view.past.mission)
+        self.set_visibility(has_rest(view))
 
     async def _continue(self) -> None:
         console = self._console
@@ -55,6 +52,18 @@ class ContinueButton(Button):
         if not self.is_deleted:
             with self:
                 _ask(console, past, evidence)
+
+
+def has_rest(view: SessionView) -> bool:
+    """Return whether a mission, or one that it was to continue, has moved the robot but ended early."""
+    has_past = view.progress.has_begun or view.past is not None
+    is_early = view.state in EARLY_ENDS or view.state is None  # without a state, the robot was busy
+    return view.is_over and is_early and has_past
+
+
+def is_unfinished(view: SessionView) -> bool:
+    """Return whether the program of a view has moved the robot, but ended early."""
+    return has_rest(view) and view.progress.has_begun
 
 
 def can_be_continued(summary: MissionSummary) -> bool:
@@ -81,7 +90,8 @@ def _ask(console: Console, past: MissionPast, evidence: list[str]) -> None:
             for one in past.answers[:_MAX_ANSWERS]:
                 words = f'It happened: "{shortened(one, _MAX_STEP_CHARACTERS)}"'
                 Button(words, partial(answer, happened=True, answer=one), "plain")
-            Button("It happened", partial(answer, happened=True), "plain")
+            plainly = "It happened; nobody knows the answer" if past.answers else "It happened"
+            Button(plainly, partial(answer, happened=True), "plain")
             Button("It did not happen", partial(answer, happened=False), "plain")
             Button("Cancel", dialog.close, "plain")
     dialog.props('aria-label="Did this happen?"').on("hide", dialog.delete)
@@ -122,6 +132,7 @@ class PastPane:
             _draw_steps(steps[-MAX_OPEN_STEPS:])
             if not steps:
                 PlainText("p", "No step was finished.")
+            PlainText("p", capitalize(past.testimony), "quiet")
 
 
 def _draw_steps(steps: Sequence[tuple[str, Event]]) -> None:
@@ -143,4 +154,6 @@ def origin_text(view: SessionView) -> str:
 
 def storyboard_title(view: SessionView) -> str:
     """Return the title of the storyboard."""
-    return "What the robot would do" if view.past is None or view.is_over else "Still to do"
+    if view.is_over:
+        return "What the check expected"
+    return "What the robot would do" if view.past is None else "Still to do"

@@ -36,8 +36,8 @@ class ContractPane:
         new = contract if earlier is None else contract.beyond(earlier)
         if earlier is not None:
             is_narrower = bool(earlier.beyond(contract).skills)
-            same = "Less than the last program." if is_narrower else "The same as the last program."
-            PlainText("p", "More than the last program:" if new.skills else same)
+            same = "Less than the draft before." if is_narrower else "The same as the draft before."
+            PlainText("p", "More than the draft before:" if new.skills else same)
         sentence = contract_sentence(new, self._skills) if earlier is None else ""
         if sentence:  # whole, since a cut would hide a skill
             PlainText("p", visible(sentence))

@@ -66,7 +66,7 @@ class InstructionPane:
         shown = await asyncio.to_thread(examples, self._console)
         if not self._examples.is_deleted:  # the page may have been closed in the meantime
             some = ", such as the examples below." if shown else ", and none of them fits these rooms."
-            self._about.say(_ABOUT_RECORDED + some)
+            self._about.text = _ABOUT_RECORDED + some
             self._fill(self._examples, "Examples", [(text, "") for text in shown])
         await self._load_recent()
 
@@ -148,5 +148,6 @@ def _recent(console: Console) -> list[MissionSummary]:
         known = read_missions(console.home)
     except (UserError, OSError):
         return []
-    last = {summary.instruction: summary for summary in known if summary.instruction}
+    ran = [one for one in known if one.if_tool_dies or not one.continues]  # not what would have been a rest
+    last = {summary.instruction: summary for summary in ran if summary.instruction}
     return sorted(last.values(), key=lambda summary: -summary.created)[:_MAX_RECENT]

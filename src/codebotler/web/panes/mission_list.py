@@ -15,7 +15,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
 from codebotler.missions.log import MissionSummary
-from codebotler.missions.store import read_missions
+from codebotler.missions.store import last_rest, read_missions, rest_text
 from codebotler.missions.view import SessionView
 from codebotler.missions.wording import reason_text, title
 from codebotler.web.console import Console
@@ -109,7 +109,6 @@ class _MissionList:
         found = [summary for summary in reversed(self._known) if self._chosen.shows(summary)]
         self._count.say(_count_text(len(found), len(self._known)))
         found = found[:MAX_LISTED_MISSIONS]
-        later = {one.continues: one.id for one in self._known if one.continues}
         for gone in self._rows.keys() - {summary.id for summary in found}:
             self._rows.pop(gone).element.delete()
         for position, summary in enumerate(found):
@@ -118,7 +117,8 @@ class _MissionList:
                 with self._list:
                     row = self._rows[summary.id] = _MissionRow(summary.id)
                 row.element.move(self._list, position)
-            row.show(summary, state_words(summary, self._console.view), later.get(summary.id, ""))
+            rest = rest_text(last_rest(summary.id, self._known))
+            row.show(summary, state_words(summary, self._console.view), rest)
 
 
 def state_words(summary: MissionSummary, view: SessionView) -> str:
@@ -157,17 +157,16 @@ class _MissionRow:
                 self._outcome = PlainText("span", "", "outcome")
             self._state = PlainText("small")
 
-    def show(self, summary: MissionSummary, state: str, later: str) -> None:
-        """Update the entry for a mission. `later` is the ID of a mission that continues it, if any."""
+    def show(self, summary: MissionSummary, state: str, rest: str) -> None:
+        """Update the entry for a mission, where `rest` says what became of its rest."""
         self._time.say(f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
         self._title.say(shortened(title(summary), _MAX_TITLE))
         reason = (
             shortened(reason_text(summary.reason, summary.line), _MAX_LISTED_REASON) if summary.reason else ""
         )
         before = f"continues mission {summary.continues}" if summary.continues else ""
-        after = f"continued by mission {later}" if later else ""
-        own = f"mission {summary.id}" if before or after else ""
-        parts = (own, f"robot: {summary.robot}", reason, before, after)
+        own = f"mission {summary.id}" if before or rest else ""
+        parts = (own, f"robot: {summary.robot}", reason, before, rest)
         self._outcome.say(" · ".join(filter(None, parts)))
         self._state.say(state)
         self._state.classes(replace=f"state state-{summary.state}")

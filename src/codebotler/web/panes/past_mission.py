@@ -93,11 +93,10 @@ def timeline_text(line: LogLine, *, is_first: bool) -> str:
     return "" if event == "feedback" else capitalize(event_text(line))
 
 
-def _read(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine], list[str]]:
-    """Return the summary and the events of a mission, and the IDs of missions that continue it."""
+def _read(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine], list[MissionSummary]]:
+    """Return the summary and the events of a mission, and the missions that continue it."""
     folder = find_mission(console.home, mission)
-    later = [one.id for one in find_continuations(folder)]
-    return MissionSummary.read(folder), read_events(folder), later
+    return MissionSummary.read(folder), read_events(folder), find_continuations(folder)
 
 
 class _MissionPage:
@@ -114,7 +113,9 @@ class _MissionPage:
         PlainText("h2", "Program")
         self._source = ui.element("pre").classes("source").props("tabindex=0 dir=auto")
 
-    def show(self, summary: MissionSummary, events: Sequence[LogLine], later: Sequence[str]) -> None:
+    def show(
+        self, summary: MissionSummary, events: Sequence[LogLine], later: Sequence[MissionSummary]
+    ) -> None:
         """Show a mission, including new events, and links to the missions that continue it."""
         self.has_ended = summary.has_ended
         state = state_words(summary, self._console.view)
@@ -135,7 +136,7 @@ class _MissionPage:
         self._more.say(f"Download the events to see {more:,} more." if more > 0 else "")
 
 
-def _draw_header(summary: MissionSummary, state: str, later: Sequence[str]) -> None:
+def _draw_header(summary: MissionSummary, state: str, later: Sequence[MissionSummary]) -> None:
     began = datetime.fromtimestamp(summary.created).astimezone()
     PlainText("h1", shortened(title(summary), 300))
     with ui.element("div").classes(f"ending ending-{summary.state}"):
@@ -147,17 +148,23 @@ def _draw_header(summary: MissionSummary, state: str, later: Sequence[str]) -> N
     by_hand = " · program typed or edited by hand" if summary.program else ""
     by = f" · program by {summary.model}" if summary.model else by_hand
     PlainText("p", f"{began:%d %b %Y, %H:%M:%S} · robot: {summary.robot}{shortened(by)}", "facts")
-    for words, mission in (("Continues", summary.continues), *(("Continued by", one) for one in later)):
-        if mission:
-            with ui.element("p").classes("chain"):
-                PlainText("span", words)
-                with html.a(href=outside(f"/missions/{mission}")):
-                    PlainText("span", f"mission {mission}")
+    if summary.continues:
+        _draw_link("Continues", summary.continues, "")
+    for one in later:
+        _draw_link("Continued by", one.id, one.state if one.if_tool_dies else "did not run")
     with ui.element("p").classes("downloads"):
         for kind, name in (("jsonl", "Events (JSON lines)"), ("mcap", "MCAP, for Foxglove")):
             html.a(name, href=outside(f"/api/missions/{summary.id}/events.{kind}")).props("download")
     for problem in summary.problems:
         PlainText("p", shortened(problem), "trouble")
+
+
+def _draw_link(words: str, mission: str, state: str) -> None:
+    with ui.element("p").classes("chain"):
+        PlainText("span", words)
+        with html.a(href=outside(f"/missions/{mission}")):
+            PlainText("span", f"mission {mission}")
+        PlainText("span", state)
 
 
 def _last_line(summary: MissionSummary) -> str:

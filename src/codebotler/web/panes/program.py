@@ -17,13 +17,14 @@ from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.terminal import shortened, visible
+from codebotler.missions.log import MissionState
 from codebotler.missions.mission import MissionError
 from codebotler.missions.view import SessionView
 from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.frame import Button, PlainText, script, scroll_up, warn
 from codebotler.web.panes.candidates import CandidatesPane
-from codebotler.web.panes.continuing import PastPane, origin_text, storyboard_title
+from codebotler.web.panes.continuing import PastPane, is_unfinished, origin_text, storyboard_title
 from codebotler.web.panes.contract import ContractPane
 from codebotler.web.panes.reply import ReplyPane
 from codebotler.web.panes.rules import RulesPane
@@ -116,7 +117,7 @@ class ProgramPane:
                 *_problem_marks(view.check, shown),
                 *_current_line(view),
             ],
-            "editable": view.may_be_edited,
+            "editable": view.may_be_edited and not is_unfinished(view),
             "received": self._received,
             "force": force,
         }
@@ -175,7 +176,8 @@ class ProgramPane:
         higher = none.higher_limit if none is not None and may_again else None
         self._raise.say(f"Raise the limit to {higher:,} tokens" if higher else "")
         self._run.set_visibility(open_ or self._may_rerun(view))
-        self._run.text = "Prepare another run" if self._may_rerun(view) else "Run it on the robot"
+        again = "Start again from the beginning" if is_unfinished(view) else "Prepare another run"
+        self._run.text = again if self._may_rerun(view) else "Run it on the robot"
         self._ticked()
 
     def _may_rerun(self, view: SessionView) -> bool:
@@ -187,7 +189,8 @@ class ProgramPane:
         accepted = not view.problems or (bool(self._despite.value) and view.can_run)
         is_new = time.monotonic() < self._review_until
         self._run.allow(self._may_rerun(view) or (view.may_be_approved and accepted and not is_new))
-        self._run.classes(add="risky" if view.problems else "", remove="" if view.problems else "risky")
+        look = "plain" if is_unfinished(view) else "go risky" if view.problems else "go"
+        self._run.classes(add=look, remove="plain go risky")
 
     async def _approve(self) -> None:
         session, view = self._console.session, self._view
@@ -249,10 +252,13 @@ def route_progress(view: SessionView) -> RouteProgress:
     if not named:
         return RouteProgress()
     visited = tuple(named.room(words) or words for words in view.progress.visited)
-    return RouteProgress(visited, view.progress.looks, view.progress.answers)
+    has_failed = view.is_over and view.state is MissionState.FAILED
+    return RouteProgress(visited, view.progress.looks, view.progress.answers, has_failed=has_failed)
 
 
 def _author_text(view: SessionView) -> str:
+    if is_unfinished(view):
+        return "To change the program, continue the mission, or start again."
     if not view.author:
         return "Typed or edited by hand."
     if is_recorded(view.author):

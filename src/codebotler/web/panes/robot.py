@@ -13,7 +13,7 @@ from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.log import MissionState, MissionSummary
 from codebotler.missions.progress import ANSWER, Moment, position_on_map
 from codebotler.missions.view import Phase, SessionView
-from codebotler.missions.wording import capitalize, reason_text
+from codebotler.missions.wording import capitalize, reason_text, title
 from codebotler.simulator.room_map import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.floorplan import MapState, floorplan, room_at
@@ -30,7 +30,7 @@ _PHASE_HEADLINES: Mapping[Phase, str] = {
     MissionState.CHECKED: "Ready: waiting for your approval",
     MissionState.APPROVED: "Starting",
 }
-_MAX_LISTED_MOMENTS = 60
+_MAX_LISTED_MOMENTS, _MAX_TITLE = 60, 160
 
 
 class RobotPane:
@@ -116,7 +116,8 @@ class RobotPane:
         self._interrupted.set_visibility(bool(summaries))
         with self._interrupted:
             for summary in summaries:
-                PlainText("p", f"Mission {summary.id} was interrupted: {summary.reason}")
+                what = shortened(title(summary), _MAX_TITLE)
+                PlainText("p", f"Mission {summary.id} ({what}) was interrupted: {summary.reason}")
                 if not can_be_continued(summary):
                     continue
                 if obstacle := self._console.obstacles[summary.id]:
