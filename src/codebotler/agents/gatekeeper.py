@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from secrets import compare_digest
 from threading import Lock
 from typing import Any
@@ -16,7 +17,7 @@ from codebotler.checking.contract_file import contract_from
 from codebotler.checking.contract_text import contract_sentence
 from codebotler.core.errors import UserError
 from codebotler.core.program import MAX_PROGRAM_LENGTH
-from codebotler.core.words import listed
+from codebotler.core.words import brief, listed
 from codebotler.missions.authoring import ModelAuthor
 from codebotler.missions.log import MissionState
 from codebotler.missions.mission import MissionError
@@ -33,7 +34,7 @@ TOO_LONG = f"the contract is longer than {MAX_CONTRACT_CHARACTERS:,} characters;
 MAX_REPORTED_EVENTS = 1_000  # in one report
 MAX_WAITING_CALLS = 100  # each event wakes all of them
 MAX_ASKED_CHARACTERS = 4_000
-"""The limit for a program in a client's dialog. Longer programs are reviewed on the page."""
+"""The limit for a program and for its contract in a client's dialog. Longer ones are reviewed on the page."""
 
 
 @dataclass
@@ -128,12 +129,16 @@ class Gatekeeper:
         return is_agents and is_within and view.may_be_approved and not view.problems
 
     def contract_text(self, view: SessionView) -> str:
-        """Describe what a program can do at most, or return "" if this is unknown."""
-        return "" if view.contract is None else contract_sentence(view.contract, self.console.robot.skills)
+        """Describe all that a program can do at most, or return "" if this is unknown."""
+        if view.contract is None:
+            return ""
+        whole = partial(brief, most=MAX_PROGRAM_LENGTH)
+        return contract_sentence(view.contract, self.console.robot.skills, whole, is_short=False)
 
     def may_ask_client(self, view: SessionView) -> bool:
         """Whether a client may ask its person to approve a program, which must fit into a dialog."""
-        return self.asks_client and view.can_run and len(view.program) <= MAX_ASKED_CHARACTERS
+        is_short = max(len(view.program), len(self.contract_text(view))) <= MAX_ASKED_CHARACTERS
+        return self.asks_client and view.can_run and is_short
 
     def check(self, program: str) -> CheckReport:
         """Check a program without a mission, in the rooms that are known now, but only one at a time."""

@@ -22,7 +22,7 @@ NEVER = {
 
 ANYBODY = "anybody"  # a question to "" may be answered by any person in the room
 GAP = "[...]"
-MAX_VALUES, MAX_LONG_TEXTS, MAX_IN_TABLE = 6, 3, 60  # shown texts
+MAX_VALUES, MAX_LONG_TEXTS = 6, 3  # shown texts in a short sentence
 LONG_TEXT = 30  # characters
 
 
@@ -57,9 +57,14 @@ def contract_rows(
         yield ContractRow(what, texts, f"in {places}" if places else "", often)
 
 
-def contract_sentence(contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief) -> str:
-    """Say in a sentence or two what a program may do at most, and what it never does."""
-    rows = contract_rows(contract, skills, show, is_short=True)
+def contract_sentence(
+    contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief, *, is_short: bool = True
+) -> str:
+    """Say in a sentence or two what a program may do at most, and what it never does.
+
+    A short sentence leaves texts out and says how many, so that a person needs a table besides.
+    """
+    rows = contract_rows(contract, skills, show, is_short=is_short)
     may = [" ".join(filter(None, (row.what, row.texts, row.places))) for row in rows]
     known = {row.recording.kind: row.name for row in skills.rows if row.recording is not None}
     never = [what for kind, what in NEVER.items() if known.get(kind, "") not in {"", *contract.skills}]
@@ -89,6 +94,6 @@ def _texts_of(row: Skill, bound: SkillBound, show: Callable[[str], str], *, is_s
 def _any_of(texts: Iterable[str], empty: str = '""', *, is_short: bool) -> str:
     shown = ['"{}"'.format(text.replace('"', "'")) if text else empty for text in texts]
     few = MAX_LONG_TEXTS if any(len(text) > LONG_TEXT for text in shown) else MAX_VALUES
-    most = few if is_short else MAX_IN_TABLE
+    most = few if is_short else len(shown)
     more = len(shown) - most
     return listed([*shown[:most], *([f"{more:,} more"] if more > 0 else [])], "or")

@@ -85,7 +85,8 @@ class Request:
         """The order for a mission."""
         program = read_program(self.what) if self.is_program else ""
         if self.past is not None and self.past.is_untouched and not program:
-            return MissionOrder(self.past.instruction, self.past.model, self.past.program, past=self.past)
+            past = self.past
+            return MissionOrder(past.instruction, past.model, past.program, past.model, past=past)
         if self.past is not None:
             model = "" if program else self.model
             return MissionOrder(self.past.instruction, model, program, past=self.past)

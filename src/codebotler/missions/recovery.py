@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from codebotler.core.skills.declaration import by_event
+from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import shortened
 from codebotler.core.trace import Trace
 from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState
@@ -59,17 +60,22 @@ class PriorApproval:
         )
 
 
-def is_recoverable(view: SessionView, events: Sequence[LogLine]) -> bool:
-    """Whether a mission failed because a skill did, so that a model may be asked for the rest."""
+def is_recoverable(view: SessionView, events: Sequence[LogLine], skills: SkillTable) -> bool:
+    """Whether a mission failed because a skill did, so that a model may be asked for the rest.
+
+    Own skills that record no event must not have been called, since nothing would notice a second call.
+    """
     ends = [line for line in events if line["event"] in SKILL_END_EVENTS]
     failed = bool(ends) and ends[-1]["event"] == "error" and view.reason.startswith(f"{ends[-1]['kind']}: ")
-    return failed and view.state is MissionState.FAILED and bool(view.instruction)
+    called = (skills[line["skill"]] for line in ends)
+    is_traced = all(row.is_idle or row.recording is not None for row in called)
+    return failed and is_traced and view.state is MissionState.FAILED and bool(view.instruction)
 
 
 def past_to_recover(session: MissionSession, robot: Robot, home: Path) -> MissionPast | None:
     """Return the past of a session's mission if a skill failed, or None if a person must decide."""
     session.join()
-    if not is_recoverable(session.view, session.events()):
+    if not is_recoverable(session.view, session.events(), robot.skills):
         return None
     return read_past(find_mission(home, session.view.id), robot.skills, robot.name)
 

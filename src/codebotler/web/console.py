@@ -158,8 +158,10 @@ class Console:
     def rest_of(self, past: MissionPast, program: str = "", author: str = "") -> MissionOrder:
         """Return the order for the rest of a mission: its own program, if nothing was done."""
         if not program and (past.is_untouched or not past.instruction):
-            return MissionOrder(past.instruction, past.model, past.program, author, past=past)
-        model = "" if program else past.model if past.model in self.models else self.models[0]
+            program, author = past.program, past.model
+            model = past.model if past.model in self.models else ""
+        else:
+            model = "" if program else past.model if past.model in self.models else self.models[0]
         return MissionOrder(past.instruction, model, program, author, past=past)
 
     def _recover(self, session: MissionSession) -> None:

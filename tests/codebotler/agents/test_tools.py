@@ -332,11 +332,22 @@ def test_a_program_too_long_for_a_dialog_is_approved_on_the_page_only(gatekeeper
     answer, asked = answering("accept", approve=True)
 
     async def act(agent: Agent) -> None:
-        proposed = await agent.call("propose_mission", program=HELLO + "#" * 4_000)
-        waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
-        assert (waiting["state"], asked) == ("checked", [])
+        far = (
+            f"def task_program():\n    for one in ['a', 'b', 'c', 'd']:\n        say(one + '{'x' * 1_500}')\n"
+        )
+        for program in (HELLO + "#" * 4_000, far):
+            proposed = await agent.call("propose_mission", program=program)
+            waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
+            assert (waiting["state"], asked) == ("checked", [])
 
     use(gatekeeper, act, answer=answer)
+
+
+def test_the_dialog_names_each_room_that_a_program_may_enter(gatekeeper: Gatekeeper) -> None:
+    names = [f"room {number}" for number in range(20)]
+    drives = "".join(f"    go_to('{name}')\n" for name in names)
+    check = gatekeeper.check(f"def task_program():\n{drives}")
+    assert all(f'"{name}"' in check.contract for name in names)
 
 
 def test_problems_are_shown_to_the_person_and_a_contract_never_approves_them(gatekeeper: Gatekeeper) -> None:

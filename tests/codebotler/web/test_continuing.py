@@ -10,13 +10,16 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import UserError
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill
+from codebotler.core.skills.values import ValueType
 from codebotler.core.trace import Event
 from codebotler.core.world import Room, World
 from codebotler.missions import recovery
 from codebotler.missions.log import MissionState, MissionSummary, add_event, open_log
 from codebotler.missions.map_event import map_data
 from codebotler.missions.past import MissionPast
-from codebotler.missions.recovery import ask_evidence
+from codebotler.missions.recovery import ask_evidence, is_recoverable
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.models.base import Model, ModelError, Reply, TextListener, Usage, ignore_text
@@ -226,6 +229,20 @@ def test_a_rest_beyond_the_approval_waits_for_a_person(tmp_path: Path) -> None:
         until(console, lambda view: view.number == 2 and view.may_be_approved)
         time.sleep(0.05)
         assert console.view.state is MissionState.CHECKED
+
+
+def test_a_program_that_is_continued_keeps_its_author(console: Console) -> None:
+    order = console.rest_of(MissionPast("1", "", "agent x", TYPED, "", ()))
+    assert (order.program, order.author, order.model) == (TYPED, "agent x", "")
+
+
+def test_after_an_own_skill_without_an_event_a_person_decides() -> None:
+    silent = Skill("dispense", (), ValueType(None), "Dispense a portion.")
+    view = SessionView(state=MissionState.FAILED, reason="PickInvalidObject: no mug", instruction="Go on.")
+    failed = {"event": "error", "skill": "pick", "kind": "PickInvalidObject"}
+    table = SKILLS.with_skill(silent)
+    assert is_recoverable(view, [failed], table)
+    assert not is_recoverable(view, [{"event": "result", "skill": "dispense"}, failed], table)
 
 
 def test_recoveries_are_counted(tmp_path: Path) -> None:

@@ -43,7 +43,9 @@ class ContractPane:
             PlainText("p", visible(sentence))
         if earlier is not None and new.skills:
             self._table(new)
-        with ui.element("details"):
+        whole = contract_sentence(contract, self._skills, is_short=False)
+        is_cut = sentence not in {"", whole}
+        with ui.element("details").props("open" if is_cut else ""):
             PlainText("summary", "The whole contract")
             self._table(contract)
 
