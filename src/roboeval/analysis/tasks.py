@@ -65,9 +65,10 @@ def prompt_counts(completions: pl.DataFrame, condition: pl.Expr) -> pl.DataFrame
 
 
 def _reason(results: Results, key: CompletionKey) -> dict[str, Any]:
-    if key not in results.failed:
+    row = results.row(key)
+    if row["passed"]:
         return {"passed": True, "failure": None}
-    return reason(results.failed_row(key), results.suite, ablated=results.is_ablated)
+    return reason(row, results.suite, ablated=results.is_ablated)
 
 
 def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:

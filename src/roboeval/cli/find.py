@@ -64,14 +64,15 @@ def find(
     results = open_current(run, suite, ablated=ablation, on_line=lines.append).results
     every = list(show_progress(search(lines, query, workers=workers or cores()), "searching", len(lines)))
     found = [one for one in every if one.worlds]
-    failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
+    passed = {*results.passed}
+    failed = [results.row(one.key) for one in found if one.key not in passed]
     together = group_failures(failed, results.programs)
     shown = together if json else together[:most]
     described = list(show_progress(describe_groups(shown, results), "comparing", len(shown)))
     undecided = [one for one in every if one.cut]
     if undecided:
         note(f"undecided because their traces were too long to save: {how_many(len(undecided))}")
-    total, passed = count_searched(results.table, task), {*results.passed}
+    total = count_searched(results.table, task)
     if json:
         data = {
             "looked_at": total,

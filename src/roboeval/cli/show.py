@@ -103,7 +103,7 @@ def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: 
     key = evaluation_key(suite.with_house_rules(None), ablated=ablated)
     if run is None or not run.rows(key).is_file():
         return count_broken_rules(table)
-    return count_broken_rules(table, read_results(run, key, suite, keep_failed=False).table)
+    return count_broken_rules(table, read_results(run, key, suite).table)
 
 
 def print_summary(

@@ -92,9 +92,9 @@ def with_cost(table: pl.DataFrame, price: Price) -> pl.DataFrame:
     return table.with_columns(cost=price.of(pl.col("input_tokens"), pl.col("output_tokens")))
 
 
-def keys_where(table: pl.DataFrame, column: str) -> list[CompletionKey]:
-    """Return the keys of the completions for which a column is true."""
-    return [*table.filter(pl.col(column), pl.col("world_number") == 0).select(KEY).iter_rows()]
+def keys_where(table: pl.DataFrame, condition: pl.Expr) -> list[CompletionKey]:
+    """Return the keys of the completions that meet a condition."""
+    return [*table.filter(condition, pl.col("world_number") == 0).select(KEY).iter_rows()]
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
