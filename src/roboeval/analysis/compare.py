@@ -37,11 +37,7 @@ class TaskDifference:
     second: float
     share: float  # contribution to the difference over all prompts
     prompts: int  # common prompts
-
-    @property
-    def difference(self) -> float:
-        """The pass@1 of the second model minus that of the first."""
-        return self.second - self.first
+    difference: Estimate  # second minus first, with its interval over prompts
 
 
 @dataclass(frozen=True)
@@ -92,7 +88,8 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
     for task, pairs in by_task.items():
         n = len(pairs)
         first, second = mean_of([[a for a, _ in pairs]]), mean_of([[b for _, b in pairs]])
-        yield TaskDifference(task, first, second, (second - first) * n / total, n)
+        difference = by_formula([[b - a] for a, b in pairs], within=DIFFERENCE)
+        yield TaskDifference(task, first, second, (second - first) * n / total, n, difference)
 
 
 def pairs_to_compare(
@@ -215,7 +212,7 @@ def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str,
         },
         "p": {"prompts": comparison.p_prompts, "tasks": comparison.p_tasks},
         "needed": asdict(comparison.sample_sizes),
-        "tasks": [{**asdict(task), "difference": task.difference} for task in comparison.tasks],
+        "tasks": [{**asdict(task), "difference": task.second - task.first} for task in comparison.tasks],
     }
 
 
