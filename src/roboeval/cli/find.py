@@ -60,8 +60,8 @@ def find(
     task = None if task is None else known.task(task).name
     query = TraceQuery(formula, negated, task, world)
     expect_query(query, known, ablated=ablation)
-    lines: list[bytes] = []
-    results = open_current(run, suite, ablated=ablation, on_line=lines.append).results
+    results = open_current(run, suite, ablated=ablation).results
+    lines = results.lines
     every = list(show_progress(search(lines, query, workers=workers or cores()), "searching", len(lines)))
     found = [one for one in every if one.worlds]
     passed = {*results.passed}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -88,11 +88,10 @@ def open_run(
     rules: Path | None = None,
     completion: str | None = None,
     reuse_from: Results | None = None,
-    on_line: Callable[[bytes], None] | None = None,
 ) -> Opened:
     """Read a judged run. If a completion is given, read only the rows of its task.
 
-    `on_line` is called with each line of verdicts. `reuse_from` is another evaluation of the same run.
+    `reuse_from` is another evaluation of the same run.
     """
     from codebotler.core.errors import UserError
     from roboeval.evaluation.runs.folder import evaluation_of
@@ -107,7 +106,6 @@ def open_run(
         suite,
         task=parse_selection(completion, suite).task,
         reuse_from=reuse_from,
-        on_line=on_line,
         progress=lambda lines, total: show_progress(lines, "reading", total),
     )
     if suite.house is not None and rules is not None:
@@ -130,12 +128,11 @@ def open_current(
     ablated: bool,
     rules: Path | None = None,
     reuse_from: Results | None = None,
-    on_line: Callable[[bytes], None] | None = None,
 ) -> Opened:
     """Read a judged run with `open_run`. Raise UserError if verdicts are absent or outdated."""
     from codebotler.core.errors import UserError
 
-    opened = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from, on_line=on_line)
+    opened = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from)
     if (complaint := stale_sentence(opened.results)) is not None:
         raise UserError(f"{complaint}; `{opened.again} --redo` judges the current programs")
     if opened.results.table.is_empty():

@@ -117,6 +117,12 @@ class Results:
         stale = set(self.stale)
         return {key: c.program for key, c in self.completions.items() if key not in stale}
 
+    @property
+    def lines(self) -> list[bytes]:
+        """Read the lines of all rows."""
+        content = self.run.rows(self.key or "").read_bytes()
+        return [content[at : at + size] for at, size in self.places.values()]
+
     def row(self, key: CompletionKey) -> Row:
         """Read a row from the file, with all its traces. Raise UserError if the file was replaced."""
         at, size = self.places[key]
@@ -144,7 +150,6 @@ def read_results(
     task: str | None = None,
     reuse_from: Results | None = None,
     faults: list[UserError] | None = None,
-    on_line: Callable[[bytes], None] | None = None,
     progress: ShowProgress = lambda lines, _: lines,
 ) -> Results:
     """Read an evaluation of a run. Each file is read once.
@@ -156,7 +161,6 @@ def read_results(
         task: the only task whose rows are read, by default all tasks.
         reuse_from: another evaluation of the same run whose completions can be reused.
         faults: a list that collects errors in files, which are raised by default.
-        on_line: a function that is called with the line of each row.
         progress: a function that passes rows through and shows progress.
     """
     if reuse_from:
@@ -169,9 +173,7 @@ def read_results(
     builder = TableBuilder(completions, _categories(suite), _accepted(run, key, faults))
     places: dict[CompletionKey, tuple[int, int]] = {}
     rows = run.rows(key or "")
-    lines = (
-        iter(()) if key is None else read_lines_of(rows, manifest, task=task, on_line=on_line, faults=faults)
-    )
+    lines = iter(()) if key is None else read_lines_of(rows, manifest, task=task, faults=faults)
     for line in progress(lines, total):
         builder.add(line.row)
         places[key_of(line.row)] = line.at, line.size
