@@ -17,6 +17,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import counted
 from codebotler.core.yaml_files import YamlFile
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.settings import SimulationSettings
 from roboeval.suites.house import HouseRules
 from roboeval.suites.installed import installed_folder, installed_suites
@@ -62,9 +63,14 @@ class Suite:
         return f"Suite({self.name!r}, {counted(len(self.tasks), 'task')})"
 
     @property
+    def house_rules(self) -> tuple[Rule, ...]:
+        """Return the house rules, or none."""
+        return () if self.house is None else self.house.rules
+
+    @property
     def house_sentences(self) -> list[str]:
         """Return the house rules as sentences for the prompt."""
-        return [] if self.house is None else [rule.says for rule in self.house.rules]
+        return [rule.says for rule in self.house_rules]
 
     def with_house_rules(self, house: HouseRules | None) -> Suite:
         """Return the suite with these house rules instead of its own, or without house rules if None."""
