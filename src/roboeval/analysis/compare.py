@@ -13,7 +13,7 @@ import polars as pl
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.counts import completions_of, tally_of
+from roboeval.analysis.counts import tally_of
 from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of
 from roboeval.analysis.statistics import SampleSizes, by_bootstrap, p_by_signs, sample_sizes
 from roboeval.analysis.summary import cut_off_replies, failures
@@ -188,8 +188,7 @@ class ComparedRun:
         """Collect the coverage, cut-off replies and failure classes of a run, by default of its own table."""
         found = failures(tally_of(results.table if table is None else table))
         shares = {one.name: one.share for one in found}
-        scope, judged = results.scope, completions_of(results.table).height
-        return cls(name, scope.coverage(judged), cut_off_replies(found, scope), shares)
+        return cls(name, results.coverage, cut_off_replies(found, results.scope), shares)
 
     @property
     def data(self) -> dict[str, Any]:

@@ -9,15 +9,7 @@ from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from roboeval.analysis.metrics import (
-    Estimate,
-    PromptScore,
-    TaskScore,
-    judged_count,
-    overall,
-    passed_count,
-    prompts_of,
-)
+from roboeval.analysis.metrics import Estimate, PromptScore, TaskScore, overall, prompts_of
 from roboeval.analysis.tally import Tally
 from roboeval.evaluation.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES, NO_PROGRAM_CLASS
 from roboeval.evaluation.runs.completions import how_many
@@ -53,9 +45,14 @@ class EvaluationSummary:
         return prompts_of(self.tasks)
 
     @property
+    def judged(self) -> int:
+        """The number of judged completions."""
+        return sum(task.n for task in self.tasks)
+
+    @property
     def coverage(self) -> Coverage:
         """The numbers of judged, existing and requested completions."""
-        return self.scope.coverage(judged_count(self.prompts))
+        return self.scope.coverage(self.judged)
 
     @property
     def cut_off(self) -> CutOff:
@@ -160,13 +157,14 @@ def summary_data(summary: EvaluationSummary) -> dict[str, Any]:
     estimates = zip(summary.k, summary.overall, strict=True)
     return {
         "models": sorted(model for model in summary.scope.models if model is not None),
-        "judged": judged_count(summary.prompts),
+        "judged": summary.judged,
         "to_judge": summary.scope.total,
         "requested": summary.coverage.requested,
         "cut_off": summary.cut_off.replies,
         "max_tokens": summary.scope.limit,
         **({"endings": dict(ends), "turns": summary.scope.turns} if (ends := summary.scope.endings) else {}),
-        **_counts(summary.prompts),
+        "completions": summary.judged,
+        "passed": sum(task.c for task in summary.tasks),
         **{f"pass@{k}": asdict(estimate) for k, estimate in estimates},
         "tasks": [_task_score_data(task, summary) for task in summary.tasks],
         "failures": [
@@ -184,16 +182,15 @@ def _task_score_data(task: TaskScore, summary: EvaluationSummary) -> dict[str, A
         for k in ks
     }
     prompts = [
-        {"prompt": prompt.prompt, **_counts([prompt]), **{f"pass@{k}": prompt.pass_at(k) for k in ks}}
+        {"prompt": prompt.prompt, **_counts(prompt), **{f"pass@{k}": prompt.pass_at(k) for k in ks}}
         for prompt in task.prompts
     ]
-    counts = _counts(task.prompts)
-    requested = summary.scope.coverage(counts["completions"], task.task).requested
-    return {"task": task.task, **counts, "requested": requested, **spreads, "prompts": prompts}
+    requested = summary.scope.coverage(task.n, task.task).requested
+    return {"task": task.task, **_counts(task), "requested": requested, **spreads, "prompts": prompts}
 
 
-def _counts(prompts: Sequence[PromptScore]) -> dict[str, int]:
-    return {"completions": judged_count(prompts), "passed": passed_count(prompts)}
+def _counts(score: TaskScore | PromptScore) -> dict[str, int]:
+    return {"completions": score.n, "passed": score.c}
 
 
 def _failure_data(failures: Failures, what: str) -> dict[str, Any]:

@@ -145,7 +145,7 @@ def resample(
             fail(f"{run}: holds missions of an agent, which cannot be checked; name a run of programs")
         checker = engine_for(len(results.places))
         prompts = trials_by_prompt(check_run(results, samples=samples, seed=seed, engine=checker))
-    coverage = results.scope.coverage(len(results.places))
+    coverage = results.coverage
     limits = sorted(set(retries)) if retries else LIMITS
     if json:
         of = {"suite": results.manifest["suite"], "samples": samples, "seed": seed, **asdict(coverage)}

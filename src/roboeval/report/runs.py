@@ -17,7 +17,6 @@ from roboeval.analysis.metrics import TaskScore, overall, pass_at_1
 from roboeval.analysis.missions import comparable_scores
 from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.scope import Coverage
 from roboeval.report.drawing import short_name
 from roboeval.suites.load import Suite
 
@@ -76,15 +75,10 @@ class JudgedRun:
         return pass_at_1(self.scores)
 
     @property
-    def coverage(self) -> Coverage:
-        """The numbers of judged, existing and requested completions."""
-        return self.results.scope.coverage(self.completions.height)
-
-    @property
     def coverage_sentence(self) -> str:
         """A description of the coverage of completions, prompts and tasks."""
         prompts = counted(len(self.by_prompt), "prompt")
-        return f"{self.coverage}, {prompts} of {counted(len(self.scores), 'task')}"
+        return f"{self.results.coverage}, {prompts} of {counted(len(self.scores), 'task')}"
 
     @property
     def mean(self) -> float:

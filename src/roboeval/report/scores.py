@@ -16,7 +16,6 @@ from roboeval.analysis.compare import (
 from roboeval.analysis.metrics import (
     TaskScore,
     by_formula,
-    judged_count,
     overall,
     prompts_of,
     share_at_least,
@@ -46,7 +45,7 @@ def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         over_prompts = by_formula([[prompt.pass_at(1)] for prompt in prompts_of(run.scores)])
         found = [overall(run.scores, 1), over_prompts, by_bootstrap(tasks, over="tasks")]
         ends = [end for estimate in found for end in (estimate.low, estimate.high)]
-        coverage = run.coverage
+        coverage = run.results.coverage
         counts = coverage.judged, coverage.total, len(run.by_prompt), len(tasks)
         rows.append([run.name, *counts, found[0].mean, *ends])
     missions = [note("missions")] if any(has_missions(run.table) for run in runs) else []
@@ -73,9 +72,9 @@ def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
 
 def _unfinished(runs: Sequence[JudgedRun]) -> list[str]:
     return [
-        f"{run.name}: {run.coverage}; only judged completions count."
+        f"{run.name}: {run.results.coverage}; only judged completions count."
         for run in runs
-        if not run.coverage.is_whole
+        if not run.results.coverage.is_whole
     ]
 
 
@@ -96,7 +95,7 @@ def task_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
-    passed, coverage = score.pass_at(1), run.results.scope.coverage(judged_count(score.prompts), score.task)
+    passed, coverage = score.pass_at(1), run.results.scope.coverage(score.n, score.task)
     ends = (passed.low, passed.high) if passed.is_known else (None, None)
     counts = coverage.judged, coverage.total
     return [score.task, run.name, what, *counts, passed.mean, *ends, score.lowest(1), score.highest(1)]

@@ -24,13 +24,9 @@ def shade(share: float | None, *, bad: bool) -> str:
     """Return the CSS class of a cell. Its share is from 0 to 1, or None if it is unknown."""
     if share is None:
         return "waits"
-    step = (
-        0
-        if share == 0
-        else SHADE_STEPS
-        if share == 1
-        else max(1, min(SHADE_STEPS - 1, round(share * SHADE_STEPS)))
-    )
+    step = round(share * SHADE_STEPS)
+    if 0 < share < 1:
+        step = max(1, min(SHADE_STEPS - 1, step))
     return f"{'f' if bad else 's'}{step}"
 
 

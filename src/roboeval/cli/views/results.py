@@ -15,7 +15,6 @@ from rich.text import Text
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.metrics import judged_count
 from roboeval.analysis.summary import EvaluationSummary, Failures, Missing
 from roboeval.cli.views.completions import kind_view, prompt_lines
 from roboeval.evaluation.failures import classes_to_show, plural_of
@@ -40,7 +39,7 @@ def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
     head = Text(visible(title) + recorded_suffix(summary.scope.models), style="bold")
     if summary.ablated:
         head.append(" (ablation: only common sense was required)", style="not bold")
-    n, failed = judged_count(summary.prompts), sum(each.count for each in summary.failures)
+    n, failed = summary.judged, sum(each.count for each in summary.failures)
     parts: list[RenderableType] = [head, Text(), _TaskTable(summary), Text()]
     parts += [*_overall(summary), *_missed(summary.missing)]
     if (warning := summary.cut_off.warning) is not None:
@@ -114,7 +113,7 @@ class _TaskTable:
             shares |= {"worst prompt": task.lowest(first), "best prompt": task.highest(first)}
             styles: dict[float, str] = {0: "red", 1: "green"}
             cells = {name: Text(f"{share:.2f}", styles.get(share, "")) for name, share in shares.items()}
-            coverage = self.summary.scope.coverage(judged_count(task.prompts), task.task)
+            coverage = self.summary.scope.coverage(task.n, task.task)
             of = "" if coverage.is_whole else f" of {coverage.total:,}"
             cells["completions"] = Text(f"{coverage.judged:,}{of}")
             table.add_row(Text(visible(task.task)), *(cells[name.replace("\n", " ")] for name in columns))

@@ -18,7 +18,7 @@ from roboeval.evaluation.requests import requested_tasks
 from roboeval.evaluation.runs.completions import Completion, CompletionKey, read_completions
 from roboeval.evaluation.runs.folder import RunFolder, evaluation_of, load_json_object, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, add_or_raise, key_of, read_checks, read_lines_of
-from roboeval.evaluation.runs.scope import JudgingScope
+from roboeval.evaluation.runs.scope import Coverage, JudgingScope
 from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_cost
 from roboeval.suites.load import ABLATED, Suite, load_suite
 
@@ -101,10 +101,15 @@ class Results:
             return selected
         return None if requested is None else selected | requested
 
-    @property
+    @cached_property
     def scope(self) -> JudgingScope:
         """Return the completions that the evaluation should judge."""
         return JudgingScope.of(self.completions.values(), self.tasks, self.about, self.suite)
+
+    @property
+    def coverage(self) -> Coverage:
+        """Return the numbers of judged, existing and requested completions."""
+        return self.scope.coverage(len(self.places))
 
     @property
     def is_ablated(self) -> bool:
