@@ -71,15 +71,14 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
     from roboeval.cli.views.comparison import comparison_view
 
     opened = [open_current(path, suite, ablated=ablated) for path in paths]
-    expect_same_suite(opened)
-    tables = comparable_tables(*(one.results.table for one in opened))
+    expect_same_suite(opened, suite)
+    tables = comparable_tables(*(one.table for one in opened))
     result = compare_scores(*(pass_at_1(task_scores(table)) for table in tables))
-    warnings = other_differences(*(one.results for one in opened))
+    warnings = other_differences(*opened)
     for warning in warnings:
         note(f"warning: {warning}")
     first, second = (
-        ComparedRun.of(str(path), one.results, table)
-        for path, one, table in zip(paths, opened, tables, strict=True)
+        ComparedRun.of(str(path), one, table) for path, one, table in zip(paths, opened, tables, strict=True)
     )
     if as_json:
         data = comparison_data(result, (first.name, second.name))
@@ -102,8 +101,8 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
         fail(f'--suites takes two suites separated by a comma, such as paper,plus, not "{suites}"')
     found = []
     for path in paths:
-        first = open_current(path, names[0], ablated=ablated).results
-        second = open_current(path, names[1], ablated=ablated, reuse_from=first).results
+        first = open_current(path, names[0], ablated=ablated)
+        second = open_current(path, names[1], ablated=ablated, reuse_from=first)
         found.append(verdict_changes(str(path), first, second))
     for one in found:
         if one.left_out:
@@ -140,7 +139,7 @@ def resample(
     from roboeval.cli.views.groups import resample_view
 
     with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
-        results = open_current(run, suite, ablated=False, rules=rules).results
+        results = open_current(run, suite, ablated=False, rules=rules)
         if has_missions(results.table):
             fail(f"{run}: holds missions of an agent, which cannot be checked; name a run of programs")
         checker = engine_for(len(results.places))

@@ -60,7 +60,7 @@ def find(
     task = None if task is None else known.task(task).name
     query = TraceQuery(formula, negated, task, world)
     expect_query(query, known, ablated=ablation)
-    results = open_current(run, suite, ablated=ablation).results
+    results = open_current(run, suite, ablated=ablation)
     lines = results.lines
     every = list(show_progress(search(lines, query, workers=workers or cores()), "searching", len(lines)))
     found = [one for one in every if one.worlds]

@@ -112,6 +112,11 @@ def shipped_suites() -> tuple[str, ...]:
     return tuple(sorted(path.parent.name for path in SUITES.glob("*/suite.yaml")))
 
 
+def known_suites() -> tuple[str, ...]:
+    """Return the names of the suites that ship with RoboEval or with installed packages."""
+    return tuple(dict.fromkeys([*shipped_suites(), *(suite.name for suite in installed_suites())]))
+
+
 def suite_folder(name: str) -> Path:
     """Return the folder of a built-in or installed suite, or a folder's path. Otherwise, raise UserError."""
     if name in shipped_suites():
@@ -120,7 +125,7 @@ def suite_folder(name: str) -> Path:
         return installed.resolve()
     folder = Path(name)
     if not (folder / "suite.yaml").is_file():
-        known = ", ".join(dict.fromkeys([*shipped_suites(), *(suite.name for suite in installed_suites())]))
+        known = ", ".join(known_suites())
         raise UserError(f'unknown suite "{name}"; use one of {known}, or a folder with a suite.yaml')
     return folder.resolve()
 
