@@ -36,7 +36,7 @@ from roboeval.evaluation.requests import (
     timestamp,
     with_batch,
 )
-from roboeval.evaluation.runs.completions import CompletionKey, how_many, reply_row
+from roboeval.evaluation.runs.completions import CompletionKey, how_many, row_for
 from roboeval.evaluation.runs.folder import RunFolder, load_json_object
 from roboeval.evaluation.runs.source import MAX_ANSWER_BYTES
 from roboeval.suites.load import Suite
@@ -191,7 +191,7 @@ class _Replies:
                     self._keep(key, reply_of_refusal(error))
 
     def _keep(self, key: CompletionKey, reply: Reply) -> None:
-        row = reply_row(key, self.plan.instruction(key), self.model.name, reply)
+        row = row_for(key, self.plan.instruction(key), self.model.name, reply.data())
         line = to_line(row)
         if len(line) > MAX_ROW:
             raise ModelError(f"the reply is too long to save: {len(line):,} bytes", may_pass=False)

@@ -23,7 +23,7 @@ from roboeval.evaluation.runs.completions import (
     CompletionKey,
     name_of,
     read_completions,
-    reply_row,
+    row_for,
 )
 from roboeval.evaluation.runs.folder import RunFolder, load_json_object
 from roboeval.suites.load import Suite
@@ -89,7 +89,7 @@ class GenerationPlan:
     ) -> dict[str, Any]:
         """Request a completion from the model of this name, unless it replied earlier, and return its row."""
         reply = earlier[-1] if earlier else await ask(self.prompt(key))
-        return reply_row(key, self.instruction(key), model, reply)
+        return row_for(key, self.instruction(key), model, reply.data())
 
     def mark(self) -> Mapping[str, int]:
         """Return extra entries to add to each row of completions.jsonl."""

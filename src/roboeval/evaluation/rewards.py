@@ -109,7 +109,7 @@ def total(shares: Sequence[Share]) -> float:
 
 
 class RewardCache(Generic[Judged]):
-    """Caches results by name, so that equal programs are judged once. A full cache is emptied.
+    """Caches results by name, so that equal programs are judged once.
 
     Each operation on the dictionary is atomic, so that threads and forks need no lock.
     """
@@ -122,7 +122,7 @@ class RewardCache(Generic[Judged]):
         return {name: found for name in names if (found := self._known.get(name)) is not None}
 
     def add(self, results: Mapping[bytes, Judged]) -> None:
-        """Add results."""
+        """Add results. A full cache is emptied first."""
         if len(self._known) >= MAX_CACHED_REWARDS:
             self._known.clear()
         self._known.update(results)

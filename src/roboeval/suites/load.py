@@ -8,7 +8,7 @@ from pathlib import Path
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.yaml_files import YamlFile
-from roboeval.suites.families.suite import family_tasks_named
+from roboeval.suites.families.suite import family_suite, family_tasks_named
 from roboeval.suites.suite import (
     ABLATED,
     SUITES,
@@ -56,7 +56,7 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     """
     name = str(name)
     if (which := family_tasks_named(name)) is not None:
-        return which.suite(skills)
+        return family_suite(which, skills)
     folder = suite_folder(name)
     suite = read_suite(folder, skills)
     if suite.name != name and not (Path(name) / "suite.yaml").is_file():

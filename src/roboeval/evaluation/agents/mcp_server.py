@@ -22,7 +22,7 @@ from roboeval.evaluation.agents.conversation import mission_data
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.agents.plan import AgentPlan
 from roboeval.evaluation.requests import run_metadata, with_batch
-from roboeval.evaluation.runs.completions import KEY, CompletionKey
+from roboeval.evaluation.runs.completions import CompletionKey, row_for
 from roboeval.evaluation.runs.endings import TURN_LIMIT
 from roboeval.evaluation.runs.folder import RunFolder
 
@@ -109,10 +109,10 @@ class MissionDesk:
         return "\n\n".join([*(message.text for message in request.messages), left])
 
     def _keep(self, key: CompletionKey, mission: AgentMission) -> None:
-        identity = {**dict(zip(KEY, key, strict=True)), "instruction": self.plan.instruction(key)}
-        more = {"model": self.agent.name, "mode": "agent", "world": self.plan.world(key)}
+        where = {"mode": "agent", "world": self.plan.world(key)}
         ended = {**mission_data(mission), "no_program": None, "turns": self._calls, "usage": None}
-        self.file.append(to_line({**identity, **more, **ended}))
+        row = row_for(key, self.plan.instruction(key), self.agent.name, where | ended)
+        self.file.append(to_line(row))
         self.file.sync()
         self.todo.remove(key)
         self._current = None

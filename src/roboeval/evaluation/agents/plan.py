@@ -16,7 +16,7 @@ from roboeval.evaluation.agents.conversation import AgentConversation, Conversat
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.agents.replan import ReplanConversation
 from roboeval.evaluation.requests import Ask, GenerationPlan
-from roboeval.evaluation.runs.completions import KEY, CompletionKey
+from roboeval.evaluation.runs.completions import CompletionKey, row_for
 from roboeval.evaluation.runs.endings import SERVER_REJECTED
 
 AgentMode: TypeAlias = Literal["agent", "replan"]
@@ -79,8 +79,8 @@ class AgentPlan(GenerationPlan):
                 conversation.end(SERVER_REJECTED, error.sentence)
             else:
                 await asyncio.to_thread(conversation.add, reply)
-        identity = {**dict(zip(KEY, key, strict=True)), "instruction": self.instruction(key), "model": model}
-        return {**identity, "mode": self.mode, "world": self.world(key), **conversation.data()}
+        where = {"mode": self.mode, "world": self.world(key)}
+        return row_for(key, self.instruction(key), model, where | conversation.data())
 
     def begin(self, key: CompletionKey) -> Conversation:
         """Begin the conversation about a mission."""

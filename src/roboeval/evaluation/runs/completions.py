@@ -12,7 +12,6 @@ from typing import Any, NamedTuple, TypeAlias
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parse_row, read_lines, to_line
 from codebotler.core.words import counted
-from codebotler.models.base import Reply
 from codebotler.models.no_program import NO_PROGRAM_KINDS, NoProgram, classify_reply, is_cut_off
 from codebotler.prompts.extract import read_reply
 from roboeval.evaluation.runs.endings import ENDINGS
@@ -151,10 +150,9 @@ class Completion:
         return hashlib.sha256(self.program.encode(errors="surrogatepass")).hexdigest()
 
 
-def reply_row(key: CompletionKey, instruction: str, model: str, reply: Reply) -> dict[str, Any]:
-    """Return the row of completions.jsonl for a model's reply."""
-    identity = {**dict(zip(KEY, key, strict=True)), "instruction": instruction, "model": model}
-    return {**identity, **reply.data()}
+def row_for(key: CompletionKey, instruction: str, model: str, more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a row of completions.jsonl: what was asked of which model, and what came of it."""
+    return {**dict(zip(KEY, key, strict=True)), "instruction": instruction, "model": model, **more}
 
 
 def read_completions(
