@@ -61,7 +61,7 @@ def write_requests(
     """
     expect_replaceable(path, BEGINNING)
     with run.writing():
-        about, keys = run_metadata(run, plan, model), plan.keys()
+        about, keys = run_metadata(run, plan, model.name, model.settings), plan.keys()
         done = {one.key for one in plan.completed(run)}
         todo = [key for key in keys if key not in done]
         if not todo:

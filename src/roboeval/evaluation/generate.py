@@ -79,7 +79,7 @@ def generate_run(
 ) -> GenerationProgress:
     """Request the missing completions of a run, save each as it arrives, and close the model."""
     with run.writing():
-        metadata = run_metadata(run, plan, model)
+        metadata = run_metadata(run, plan, model.name, model.settings)
         with contextlib.closing(Appender(run.completions)) as file:
             done, usage = set(), no_usage()
             for completion in plan.completed(run):
