@@ -51,19 +51,6 @@ def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
     }
 
 
-def prompt_counts(completions: pl.DataFrame, condition: pl.Expr) -> pl.DataFrame:
-    """Count the completions of each prompt: `written`, `judged`, and `counted` if they meet a condition.
-
-    The input has the columns `written` and `passed` (null if not judged). `share` is the share of judged
-    completions that meet the condition, or null if none was judged.
-    """
-    judged = pl.col("judged")
-    counts = completions.group_by("task", "prompt", maintain_order=True).agg(
-        written=pl.col("written").sum(), judged=pl.col("passed").count(), counted=condition.sum()
-    )
-    return counts.with_columns(share=pl.col("counted") / pl.when(judged > 0).then(judged))
-
-
 def _reason(results: Results, key: CompletionKey) -> dict[str, Any]:
     row = results.row(key)
     if row["passed"]:

@@ -15,7 +15,6 @@ from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from roboeval.analysis.counts import tally_of, task_scores
 from roboeval.analysis.metrics import Estimate, TaskScore, overall
 from roboeval.analysis.summary import Failures, cut_off_replies, failures
-from roboeval.analysis.tasks import prompt_counts
 from roboeval.evaluation.failures import NO_PROGRAM_CLASS
 from roboeval.evaluation.runs.completions import KEY, CompletionKey
 from roboeval.evaluation.runs.results import Results
@@ -146,8 +145,18 @@ class Snapshot:
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
     def prompts(self, chosen: CompletionFilter) -> list[dict[str, Any]]:
-        """Count the completions of each prompt: `written`, `judged`, and `counted` (matching the filter)."""
-        return prompt_counts(self.completions, chosen.verdict.condition).to_dicts()
+        """Count the completions of each prompt: `written`, `judged`, and `counted` (matching the filter).
+
+        `share` is the share of judged completions that match, or None if none was judged.
+        """
+        judged = pl.col("judged")
+        counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
+            written=pl.col("written").sum(),
+            judged=pl.col("passed").count(),
+            counted=chosen.verdict.condition.sum(),
+        )
+        share = pl.col("counted") / pl.when(judged > 0).then(judged)
+        return counts.with_columns(share=share).to_dicts()
 
     @property
     def judged(self) -> int:
