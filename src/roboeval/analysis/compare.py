@@ -13,8 +13,9 @@ import polars as pl
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.counts import tally_of
-from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of
+from roboeval.analysis.counts import tally_of, task_scores
+from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of, pass_at_1
+from roboeval.analysis.missions import comparable_tables
 from roboeval.analysis.statistics import SampleSizes, by_bootstrap, p_by_signs, sample_sizes
 from roboeval.analysis.summary import cut_off_replies, failures
 from roboeval.evaluation.runs.completions import how_many
@@ -81,6 +82,11 @@ def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
         sample_sizes=sample_sizes(pairs),
         tasks=tuple(sorted(_by_task(by_task), key=lambda one: (-abs(one.share), one.task))),
     )
+
+
+def compare_tables(first: pl.DataFrame, second: pl.DataFrame) -> Comparison:
+    """Compare two runs with `compare_scores`, by missions if an agent carried out those of any run."""
+    return compare_scores(*(pass_at_1(task_scores(table)) for table in comparable_tables(first, second)))
 
 
 def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[TaskDifference]:

@@ -64,16 +64,14 @@ _PAIR = 2
 
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
     """Print how much better the second of two runs is."""
-    from roboeval.analysis.compare import ComparedRun, compare_scores, comparison_data, other_differences
-    from roboeval.analysis.counts import task_scores
-    from roboeval.analysis.metrics import pass_at_1
+    from roboeval.analysis.compare import ComparedRun, compare_tables, comparison_data, other_differences
     from roboeval.analysis.missions import comparable_tables
     from roboeval.cli.views.comparison import comparison_view
 
     opened = [open_current(path, suite, ablated=ablated) for path in paths]
     expect_same_suite(opened, suite)
     tables = comparable_tables(*(one.table for one in opened))
-    result = compare_scores(*(pass_at_1(task_scores(table)) for table in tables))
+    result = compare_tables(*(one.table for one in opened))
     warnings = other_differences(*opened)
     for warning in warnings:
         note(f"warning: {warning}")

@@ -14,7 +14,6 @@ from codebotler.core.errors import UserError
 from codebotler.core.words import counted
 from roboeval.analysis.counts import completions_of, task_scores
 from roboeval.analysis.metrics import TaskScore, overall, pass_at_1
-from roboeval.analysis.missions import comparable_scores
 from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
 from roboeval.evaluation.runs.results import Results
 from roboeval.report.drawing import short_name
@@ -95,11 +94,6 @@ class JudgedRun:
     def trials(self) -> tuple[CheckedPrompt, ...]:
         """The checked completions of each prompt. Empty unless all completions were checked."""
         return () if self.table["accepted"].null_count() else trials_by_prompt(self.table)
-
-
-def by_prompt_of(*runs: JudgedRun) -> list[dict[tuple[str, int], float]]:
-    """Return the pass@1 of each prompt: of missions, if any of the runs has missions of an agent."""
-    return [pass_at_1(scores) for scores in comparable_scores(*(run.table for run in runs))]
 
 
 def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:

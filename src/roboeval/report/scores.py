@@ -8,7 +8,7 @@ from itertools import chain
 from codebotler.core.errors import UserError
 from roboeval.analysis.compare import (
     MAX_PAIRS,
-    compare_scores,
+    compare_tables,
     comparison_sentence,
     other_differences,
     pairs_to_compare,
@@ -25,7 +25,7 @@ from roboeval.analysis.missions import has_missions
 from roboeval.analysis.statistics import MIN_CLUSTERS, by_bootstrap
 from roboeval.report import figures, paper
 from roboeval.report.curves import draw_thresholds
-from roboeval.report.runs import JudgedRun, by_prompt_of, coverage_of, tasks_of
+from roboeval.report.runs import JudgedRun, coverage_of, tasks_of
 from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, note, section, sheet
 
 
@@ -121,7 +121,7 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
     notes: list[str] = []
     for first, second in pairs_to_compare(runs, lambda run: run.mean):
         try:
-            found = compare_scores(*by_prompt_of(first, second))
+            found = compare_tables(first.table, second.table)
         except UserError:  # no prompt in common
             continue
         if len(sentences) < MAX_PAIRS:
@@ -146,7 +146,8 @@ def leader(runs: Sequence[JudgedRun]) -> list[str]:
         return []
     best, second, *_ = sorted(runs, key=lambda run: -run.mean)
     try:
-        return [comparison_sentence(compare_scores(*by_prompt_of(second, best)), (second.name, best.name))]
+        found = compare_tables(second.table, best.table)
+        return [comparison_sentence(found, (second.name, best.name))]
     except UserError:  # no prompt in common
         return []
 

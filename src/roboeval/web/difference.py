@@ -14,12 +14,12 @@ from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
 from roboeval.analysis.compare import (
     MISSIONS_COMPARED,
-    compare_scores,
+    compare_tables,
     comparison_sentence,
     pairs_to_compare,
 )
-from roboeval.analysis.metrics import Estimate, pass_at_1
-from roboeval.analysis.missions import comparable_scores, has_missions
+from roboeval.analysis.metrics import Estimate
+from roboeval.analysis.missions import has_missions
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of
 from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.snapshot import Snapshot
@@ -73,7 +73,7 @@ def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Differen
     names = shortened(first.name, MAX_NAME), shortened(second.name, MAX_NAME)
     try:
         tables = first.results.table, second.results.table
-        found = compare_scores(*map(pass_at_1, comparable_scores(*tables)))
+        found = compare_tables(*tables)
     except UserError:
         return Difference((first, second), f"{names[0]} and {names[1]} have no prompt in common.")
     sentence = comparison_sentence(found, names)
