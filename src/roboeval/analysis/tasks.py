@@ -12,7 +12,6 @@ from roboeval.analysis.counts import completions_of, prompt_scores
 from roboeval.evaluation.explanation import reason, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, Completion, CompletionKey
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.scope import requested_of_prompts
 
 
 def task_data(results: Results, task: str) -> dict[str, Any]:
@@ -61,15 +60,16 @@ def _reason(results: Results, key: CompletionKey) -> dict[str, Any]:
 def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
     keys = [*of_prompt.filter(~pl.col("stale")).select(KEY).iter_rows()]
     written = [results.completions[key] for key in keys]
-    requested = requested_of_prompts(results.about, results.suite)
     ((task, prompt, n, c, share),) = prompt_scores(of_prompt).iter_rows()
+    requested = results.scope.requested
+    prompts = () if results.suite is None else results.suite.task(task).prompts
     return {
         "prompt": prompt,
         "instructions": _distinct(written, "instruction"),
         "suite_instruction": suite_instruction(results.suite, task, prompt),
         "models": _distinct(written, "model"),
         "completions": n,
-        "requested": None if requested is None else requested.get(task, 0),
+        "requested": None if requested is None else requested.get(task, 0) // len(prompts),
         "gone": n - len(written),
         "passed": c,
         "pass@1": share,
