@@ -75,7 +75,7 @@ def evaluate(
 
         judged_by = load(suite, rules, skills)
         if worlds is not None or seed is not None:
-            judged_by = judged_by.with_worlds(worlds, seed).with_house_rules(judged_by.house)
+            judged_by = judged_by.with_worlds(worlds, seed)
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
         if left:
             note(f"not judged because they have no ablation: {', '.join(left)}")

@@ -74,10 +74,10 @@ class Suite:
 
     def with_house_rules(self, house: HouseRules | None) -> Suite:
         """Return the suite with these house rules instead of its own, or without house rules if None."""
-        return replace(self, house=house)
+        return self if house == self.house else replace(self, house=house)
 
     def with_worlds(self, count: int | None = None, seed: int | None = None) -> Suite:
-        """Return the suite with other worlds, sampled from the same descriptions.
+        """Return the suite with the same house rules and other worlds, sampled from the same descriptions.
 
         Args:
             count: the number of worlds per task, 1 to 10,000; by default the current number.
@@ -91,7 +91,8 @@ class Suite:
             raise UserError(f'the worlds of the suite "{self.name}" {why}; leave out --worlds and --seed')
         if count is not None and not 1 <= count <= MAX_WORLDS:
             raise UserError(f"the number of worlds is {count}, but it must be from 1 to {MAX_WORLDS:,}")
-        return read_suite(self.folder, self.skills, count or self.worlds, self.seed if seed is None else seed)
+        seed = self.seed if seed is None else seed
+        return read_suite(self.folder, self.skills, count or self.worlds, seed).with_house_rules(self.house)
 
     def with_own_worlds(self) -> Suite:
         """Return the suite with the worlds that its file specifies."""
