@@ -22,6 +22,8 @@ from roboeval.evaluation.runs.scope import Coverage, JudgingScope
 from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_cost
 from roboeval.suites.load import ABLATED, Suite, load_suite
 
+REPLACED = "was replaced in the meantime; try again"
+
 
 def load_results(
     run: str | PathLike[str],
@@ -124,9 +126,13 @@ class Results:
 
     @property
     def lines(self) -> list[bytes]:
-        """Read the lines of all rows."""
-        content = self.run.rows(self.key or "").read_bytes()
-        return [content[at : at + size] for at, size in self.places.values()]
+        """Read the lines of all rows. Raise UserError if the file was replaced."""
+        path = self.run.rows(self.key or "")
+        content = path.read_bytes() if path.exists() else b""
+        lines = [content[at : at + size] for at, size in self.places.values()]
+        if not all(line.endswith(b"\n") for line in lines[:-1]) or not all(lines):
+            raise UserError(REPLACED, file=path)
+        return lines
 
     def row(self, key: CompletionKey) -> Row:
         """Read a row from the file, with all its traces. Raise UserError if the file was replaced."""
@@ -140,7 +146,7 @@ class Results:
                 return row
         except (OSError, ValueError, LookupError, TypeError, RecursionError):
             pass
-        raise UserError("was replaced in the meantime; try again", file=path)
+        raise UserError(REPLACED, file=path)
 
 
 ShowProgress: TypeAlias = Callable[[Iterator[LocatedRow], int], Iterable[LocatedRow]]

@@ -75,6 +75,16 @@ def test_only_the_rows_of_a_named_task_are_read(run: RunFolder) -> None:
     assert (len(others.table), others.lines) == (0, [])
 
 
+@pytest.mark.parametrize("content", [b"", b"another row\n" * 500])
+def test_lines_of_a_file_that_was_replaced_are_not_taken_for_those_read(
+    run: RunFolder, content: bytes
+) -> None:
+    found = read(run)
+    run.rows("paper").write_bytes(content)
+    with pytest.raises(UserError, match="replaced"):
+        assert found.lines
+
+
 def test_no_flipped_bit_is_overlooked(run: RunFolder, paper: Suite) -> None:
     path = run.rows("paper")
     content = path.read_bytes()
