@@ -36,7 +36,7 @@ class EvaluationSummary:
     overall: tuple[Estimate, ...]  # pass@k for each value of k
     failures: tuple[Failures, ...]
     scope: JudgingScope
-    missing: Missing  # tasks of the suite without a score
+    missing: Mapping[str, Sequence[str]]  # tasks of the suite without a score, by reason
     ablated: bool = False  # judged by common-sense requirements only
 
     @property
@@ -67,15 +67,6 @@ def cut_off_replies(failures: Iterable[Failures], scope: JudgingScope) -> CutOff
     return CutOff(max(scope.cut_off, without), without, scope.total, scope.limit)
 
 
-@dataclass(frozen=True)
-class Missing:
-    """The tasks of a suite that have no score, grouped by reason."""
-
-    no_completions: tuple[str, ...] = ()
-    not_judged: tuple[str, ...] = ()
-    not_selected: tuple[str, ...] = ()
-
-
 def summarise(
     tally: Tally, suite: Suite, scope: JudgingScope, *, k: Sequence[int] = (1,), ablated: bool = False
 ) -> EvaluationSummary:
@@ -94,13 +85,13 @@ def summarise(
     return EvaluationSummary(tuple(k), tasks, estimates, failures(tally), scope, missing, ablated)
 
 
-def _missing(tasks: Sequence[str], scope: JudgingScope) -> Missing:
+def _missing(tasks: Sequence[str], scope: JudgingScope) -> dict[str, list[str]]:
     selected = [task for task in tasks if scope.selects(task)]
-    return Missing(
-        no_completions=tuple(task for task in selected if not scope.completions.get(task)),
-        not_judged=tuple(task for task in selected if scope.completions.get(task)),
-        not_selected=tuple(task for task in tasks if not scope.selects(task)),
-    )
+    return {
+        "no_completions": [task for task in selected if not scope.completions.get(task)],
+        "not_judged": [task for task in selected if scope.completions.get(task)],
+        "not_selected": [task for task in tasks if not scope.selects(task)],
+    }
 
 
 def failures(tally: Tally) -> tuple[Failures, ...]:
@@ -171,7 +162,7 @@ def summary_data(summary: EvaluationSummary) -> dict[str, Any]:
             {**_failure_data(each, "class"), "kinds": [_failure_data(kind, "kind") for kind in each.kinds]}
             for each in summary.failures
         ],
-        "missing": {name: list(tasks) for name, tasks in asdict(summary.missing).items()},
+        "missing": summary.missing,
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from rich.text import Text
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.summary import EvaluationSummary, Failures, Missing
+from roboeval.analysis.summary import EvaluationSummary, Failures
 from roboeval.cli.views.completions import kind_view, prompt_lines
 from roboeval.evaluation.failures import classes_to_show, plural_of
 from roboeval.evaluation.runs.completions import how_many, recorded_suffix
@@ -70,19 +70,22 @@ def house_view(found: BrokenRules) -> RenderableType:
     return Group(*parts)
 
 
-def _missed(missing: Missing) -> Iterator[Text]:
-    for reason, tasks in [
-        ("no completions for", missing.no_completions),
-        ("not judged yet:", missing.not_judged),
-        ("not selected:", missing.not_selected),
-    ]:
+MISSING_REASONS = {
+    "no_completions": "no completions for",
+    "not_judged": "not judged yet:",
+    "not_selected": "not selected:",
+}
+
+
+def _missed(missing: Mapping[str, Sequence[str]]) -> Iterator[Text]:
+    for reason, tasks in missing.items():
         if tasks:
             named = (
                 ", ".join(map(visible, tasks))
                 if len(tasks) <= MAX_TASKS_NAMED
                 else counted(len(tasks), "task")
             )
-            yield Text(f"{reason} {named}", style="dim")
+            yield Text(f"{MISSING_REASONS[reason]} {named}", style="dim")
 
 
 @dataclass(frozen=True)
