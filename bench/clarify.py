@@ -26,7 +26,7 @@ from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.mutation.mutants import Original, mutants, sample_mutants
 from roboeval.mutation.operator import Context
-from roboeval.suites.families.suite import FamilyTasks
+from roboeval.suites.families.suite import FamilyTasks, family_suite
 from roboeval.suites.load import Suite, load_suite
 from roboeval.suites.solutions import solutions
 from roboeval.suites.task import Task
@@ -57,7 +57,7 @@ class TaskPrograms:
 def every_task() -> Iterator[tuple[Suite, Task, list[str]]]:
     """Yield each task with its own programs."""
     for seed in range(4):
-        suite = FamilyTasks("train", seed).suite()
+        suite = family_suite(FamilyTasks("train", seed))
         for task in suite.tasks.values():
             recorded = [one for one in suite.recorded if one.instruction == task.prompts[0]]
             yield suite, task, [each.program for one in recorded for each in (*one.careful, *one.hasty)]

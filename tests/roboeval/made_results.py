@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,9 @@ from codebotler.core.world import World
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.evaluation.runs.completions import Completion, CompletionKey
 from roboeval.evaluation.runs.folder import RunFolder
-from roboeval.evaluation.runs.results import Results, without_other_traces
+from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import Row, decode_row, key_of
-from roboeval.evaluation.runs.table import TableBuilder, keys_where
+from roboeval.evaluation.runs.table import TableBuilder
 from roboeval.evaluation.serialization import row_line
 from roboeval.suites.load import Suite
 
@@ -77,6 +77,16 @@ def table_of(rows: Iterable[Mapping[str, Any]]) -> pl.DataFrame:
     return builder.table()
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MadeResults(Results):
+    """Results without a file."""
+
+    rows: Mapping[CompletionKey, Row]
+
+    def row(self, key: CompletionKey) -> Row:
+        return self.rows[key]
+
+
 def results_of(
     rows: Iterable[Mapping[str, Any]],
     suite: Suite | None = None,
@@ -101,22 +111,16 @@ def results_of(
         written[task, prompt, index] = Completion(task=task, prompt=prompt, index=index, program=program)
     judged = judged_rows(rows, {key: one.program for key, one in written.items()})
     builder = TableBuilder(written)
-    failed = {}
     for row in judged:
         builder.add(row)
-        if (failure := row["failure"]) is not None:
-            failed[key_of(row)] = without_other_traces(row, failure["world"])
-    table = builder.table()
-    return Results(
+    return MadeResults(
         run=RunFolder(Path("nowhere")),
         key=f"paper{'-ablation' * ablated}",
         suite=suite,
         manifest=head,
         about={},
         completions=written,
-        table=table,
-        passed=keys_where(table, "passed"),
-        stale=keys_where(table, "stale"),
-        failed=failed,
+        table=builder.table(),
         places={key_of(row): (0, 0) for row in judged},
+        rows={key_of(row): row for row in judged},
     )

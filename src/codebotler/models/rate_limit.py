@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 
 from tenacity import (
@@ -91,8 +93,17 @@ class RateLimited:
         """The settings of the model."""
         return self.model.settings
 
-    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
+    async def reply(
+        self,
+        prompt: Prompt,
+        *,
+        number: int,
+        on_text: TextListener = ignore_text,
+        around: Callable[[], AbstractContextManager[None]] = nullcontext,
+    ) -> Reply:
         """Request one reply, with retries. Each try passes the reply to `on_text` from the beginning.
+
+        `around` returns a context for each try, which is entered as soon as the try may start.
 
         Raises:
             ModelError: the last try failed.
@@ -108,7 +119,7 @@ class RateLimited:
         )
         async with self._free:
             try:
-                return await tries(self._try, prompt, number, on_text)
+                return await tries(self._try, prompt, number, on_text, around)
             except ModelError as error:
                 if (times := tries.statistics["attempt_number"]) > 1:
                     error.sentence += f" (tried {times} times)"
@@ -119,7 +130,13 @@ class RateLimited:
         """Close the model."""
         await self.model.close()
 
-    async def _try(self, prompt: Prompt, number: int, on_text: TextListener) -> Reply:
+    async def _try(
+        self,
+        prompt: Prompt,
+        number: int,
+        on_text: TextListener,
+        around: Callable[[], AbstractContextManager[None]],
+    ) -> Reply:
         self._check_budget()
         await self._wait_for_turn()
         self._check_budget()  # other requests may have used up the budget by now
@@ -132,7 +149,8 @@ class RateLimited:
             on_text(piece)
 
         try:
-            reply = await self.model.reply(prompt, number=number, on_text=count)
+            with around():
+                reply = await self.model.reply(prompt, number=number, on_text=count)
         except BaseException:  # the received pieces cost tokens
             if length:
                 self.tokens_used += _estimate(prompt, length)

@@ -53,7 +53,7 @@ def compare_report_back(results: Results) -> pl.DataFrame:
     table = results.table.with_columns(reports=reports)
     scores = prompt_scores(table).group_by(reports=reports)
     counts = scores.agg("pass@1", completions=pl.col("n").sum(), failed=(pl.col("n") - pl.col("c")).sum())
-    away = [(*key, never_returned(results.failed_row(key))) for key in results.failed]
+    away = [(*key, never_returned(results.row(key))) for key in results.failed]
     keys = {name: table.schema[name] for name in KEY}
     returns = pl.DataFrame(away, schema={**keys, "away": pl.Boolean}, orient="row")
     found = (

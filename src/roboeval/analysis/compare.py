@@ -13,8 +13,9 @@ import polars as pl
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.counts import completions_of, tally_of
-from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of
+from roboeval.analysis.counts import tally_of, task_scores
+from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of, pass_at_1
+from roboeval.analysis.missions import comparable_tables
 from roboeval.analysis.statistics import SampleSizes, by_bootstrap, p_by_signs, sample_sizes
 from roboeval.analysis.summary import cut_off_replies, failures
 from roboeval.evaluation.runs.completions import how_many
@@ -37,11 +38,7 @@ class TaskDifference:
     second: float
     share: float  # contribution to the difference over all prompts
     prompts: int  # common prompts
-
-    @property
-    def difference(self) -> float:
-        """The pass@1 of the second model minus that of the first."""
-        return self.second - self.first
+    difference: Estimate  # second minus first, with its interval over prompts
 
 
 @dataclass(frozen=True)
@@ -87,12 +84,18 @@ def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
     )
 
 
+def compare_tables(first: pl.DataFrame, second: pl.DataFrame) -> Comparison:
+    """Compare two runs with `compare_scores`, by missions if an agent carried out those of any run."""
+    return compare_scores(*(pass_at_1(task_scores(table)) for table in comparable_tables(first, second)))
+
+
 def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[TaskDifference]:
     total = sum(map(len, by_task.values()))
     for task, pairs in by_task.items():
         n = len(pairs)
         first, second = mean_of([[a for a, _ in pairs]]), mean_of([[b for _, b in pairs]])
-        yield TaskDifference(task, first, second, (second - first) * n / total, n)
+        difference = by_formula([[b - a] for a, b in pairs], within=DIFFERENCE)
+        yield TaskDifference(task, first, second, (second - first) * n / total, n, difference)
 
 
 def pairs_to_compare(
@@ -191,8 +194,7 @@ class ComparedRun:
         """Collect the coverage, cut-off replies and failure classes of a run, by default of its own table."""
         found = failures(tally_of(results.table if table is None else table))
         shares = {one.name: one.share for one in found}
-        scope, judged = results.scope, completions_of(results.table).height
-        return cls(name, scope.coverage(judged), cut_off_replies(found, scope), shares)
+        return cls(name, results.coverage, cut_off_replies(found, results.scope), shares)
 
     @property
     def data(self) -> dict[str, Any]:
@@ -215,7 +217,7 @@ def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str,
         },
         "p": {"prompts": comparison.p_prompts, "tasks": comparison.p_tasks},
         "needed": asdict(comparison.sample_sizes),
-        "tasks": [{**asdict(task), "difference": task.difference} for task in comparison.tasks],
+        "tasks": [{**asdict(task), "difference": task.second - task.first} for task in comparison.tasks],
     }
 
 

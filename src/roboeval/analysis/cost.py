@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import polars as pl
 
-from roboeval.analysis.counts import completions_of, task_scores
-from roboeval.analysis.metrics import passed_count, prompts_of
+from roboeval.analysis.counts import completions_of
 from roboeval.analysis.resample import LIMITS, final_chances, mean_requests, rejected_share, trials_by_prompt
 from roboeval.evaluation.runs.table import MILLION, Price
 
@@ -32,7 +31,7 @@ class RunCost(NamedTuple):
 def cost_of(table: pl.DataFrame, price: Price | None = None) -> RunCost:
     """Compute the cost of the completions of a run."""
     completions = completions_of(table)
-    passed = passed_count(prompts_of(task_scores(table)))
+    passed = int(completions["passed"].sum())
     sent, received = _tokens(completions)
     seconds = math.fsum(completions["latency_s"].drop_nulls()) or None
     tokens = None if sent is None or received is None else sent + received

@@ -101,6 +101,16 @@ class TaskScore:
     task: str
     prompts: tuple[PromptScore, ...]
 
+    @property
+    def n(self) -> int:
+        """The number of judged completions."""
+        return sum(prompt.n for prompt in self.prompts)
+
+    @property
+    def c(self) -> int:
+        """The number of completions that passed."""
+        return sum(prompt.c for prompt in self.prompts)
+
     def pass_at(self, k: int) -> Estimate:
         """Return the mean pass@k. Raise ValueError if a prompt has fewer than k completions."""
         return by_formula([[prompt.pass_at(k)] for prompt in self.prompts])
@@ -112,16 +122,6 @@ class TaskScore:
     def highest(self, k: int) -> float:
         """Return pass@k of the best prompt, the upper end of the error bars in the paper."""
         return max(prompt.pass_at(k) for prompt in self.prompts)
-
-
-def judged_count(prompts: Iterable[PromptScore]) -> int:
-    """Count the judged completions."""
-    return sum(prompt.n for prompt in prompts)
-
-
-def passed_count(prompts: Iterable[PromptScore]) -> int:
-    """Count the completions that passed."""
-    return sum(prompt.c for prompt in prompts)
 
 
 def prompts_of(tasks: Iterable[TaskScore]) -> list[PromptScore]:

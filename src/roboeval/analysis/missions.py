@@ -10,7 +10,7 @@ import polars as pl
 from codebotler.core.errors import VIOLATION
 from codebotler.core.trace import Status
 from roboeval.analysis.counts import completions_of, task_scores
-from roboeval.analysis.metrics import Estimate, TaskScore, overall
+from roboeval.analysis.metrics import Estimate, overall
 from roboeval.evaluation.failures import (
     AGENT_ERROR_CLASS,
     NO_PROGRAM_CLASS,
@@ -63,11 +63,6 @@ def per_mission(table: pl.DataFrame) -> pl.DataFrame:
 def comparable_tables(*tables: pl.DataFrame) -> Sequence[pl.DataFrame]:
     """Return the tables of runs: of missions, if an agent carried out those of any run."""
     return [*map(per_mission, tables)] if any(map(has_missions, tables)) else tables
-
-
-def comparable_scores(*tables: pl.DataFrame) -> list[tuple[TaskScore, ...]]:
-    """Return the scores of runs: of missions, if an agent carried out those of any run."""
-    return [task_scores(table) for table in comparable_tables(*tables)]
 
 
 def mission_costs(table: pl.DataFrame) -> MissionCosts:

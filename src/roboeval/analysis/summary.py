@@ -9,15 +9,7 @@ from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from roboeval.analysis.metrics import (
-    Estimate,
-    PromptScore,
-    TaskScore,
-    judged_count,
-    overall,
-    passed_count,
-    prompts_of,
-)
+from roboeval.analysis.metrics import Estimate, PromptScore, TaskScore, overall, prompts_of
 from roboeval.analysis.tally import Tally
 from roboeval.evaluation.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES, NO_PROGRAM_CLASS
 from roboeval.evaluation.runs.completions import how_many
@@ -44,7 +36,7 @@ class EvaluationSummary:
     overall: tuple[Estimate, ...]  # pass@k for each value of k
     failures: tuple[Failures, ...]
     scope: JudgingScope
-    missing: Missing  # tasks of the suite without a score
+    missing: Mapping[str, Sequence[str]]  # tasks of the suite without a score, by reason
     ablated: bool = False  # judged by common-sense requirements only
 
     @property
@@ -53,9 +45,14 @@ class EvaluationSummary:
         return prompts_of(self.tasks)
 
     @property
+    def judged(self) -> int:
+        """The number of judged completions."""
+        return sum(task.n for task in self.tasks)
+
+    @property
     def coverage(self) -> Coverage:
         """The numbers of judged, existing and requested completions."""
-        return self.scope.coverage(judged_count(self.prompts))
+        return self.scope.coverage(self.judged)
 
     @property
     def cut_off(self) -> CutOff:
@@ -68,15 +65,6 @@ def cut_off_replies(failures: Iterable[Failures], scope: JudgingScope) -> CutOff
     kinds = (kind for one in failures if one.name == NO_PROGRAM_CLASS for kind in one.kinds)
     without = sum(kind.count for kind in kinds if kind.name == "cut-off")
     return CutOff(max(scope.cut_off, without), without, scope.total, scope.limit)
-
-
-@dataclass(frozen=True)
-class Missing:
-    """The tasks of a suite that have no score, grouped by reason."""
-
-    no_completions: tuple[str, ...] = ()
-    not_judged: tuple[str, ...] = ()
-    not_selected: tuple[str, ...] = ()
 
 
 def summarise(
@@ -97,13 +85,13 @@ def summarise(
     return EvaluationSummary(tuple(k), tasks, estimates, failures(tally), scope, missing, ablated)
 
 
-def _missing(tasks: Sequence[str], scope: JudgingScope) -> Missing:
+def _missing(tasks: Sequence[str], scope: JudgingScope) -> dict[str, list[str]]:
     selected = [task for task in tasks if scope.selects(task)]
-    return Missing(
-        no_completions=tuple(task for task in selected if not scope.completions.get(task)),
-        not_judged=tuple(task for task in selected if scope.completions.get(task)),
-        not_selected=tuple(task for task in tasks if not scope.selects(task)),
-    )
+    return {
+        "no_completions": [task for task in selected if not scope.completions.get(task)],
+        "not_judged": [task for task in selected if scope.completions.get(task)],
+        "not_selected": [task for task in tasks if not scope.selects(task)],
+    }
 
 
 def failures(tally: Tally) -> tuple[Failures, ...]:
@@ -160,20 +148,21 @@ def summary_data(summary: EvaluationSummary) -> dict[str, Any]:
     estimates = zip(summary.k, summary.overall, strict=True)
     return {
         "models": sorted(model for model in summary.scope.models if model is not None),
-        "judged": judged_count(summary.prompts),
+        "judged": summary.judged,
         "to_judge": summary.scope.total,
         "requested": summary.coverage.requested,
         "cut_off": summary.cut_off.replies,
         "max_tokens": summary.scope.limit,
         **({"endings": dict(ends), "turns": summary.scope.turns} if (ends := summary.scope.endings) else {}),
-        **_counts(summary.prompts),
+        "completions": summary.judged,
+        "passed": sum(task.c for task in summary.tasks),
         **{f"pass@{k}": asdict(estimate) for k, estimate in estimates},
         "tasks": [_task_score_data(task, summary) for task in summary.tasks],
         "failures": [
             {**_failure_data(each, "class"), "kinds": [_failure_data(kind, "kind") for kind in each.kinds]}
             for each in summary.failures
         ],
-        "missing": {name: list(tasks) for name, tasks in asdict(summary.missing).items()},
+        "missing": summary.missing,
     }
 
 
@@ -184,16 +173,15 @@ def _task_score_data(task: TaskScore, summary: EvaluationSummary) -> dict[str, A
         for k in ks
     }
     prompts = [
-        {"prompt": prompt.prompt, **_counts([prompt]), **{f"pass@{k}": prompt.pass_at(k) for k in ks}}
+        {"prompt": prompt.prompt, **_counts(prompt), **{f"pass@{k}": prompt.pass_at(k) for k in ks}}
         for prompt in task.prompts
     ]
-    counts = _counts(task.prompts)
-    requested = summary.scope.coverage(counts["completions"], task.task).requested
-    return {"task": task.task, **counts, "requested": requested, **spreads, "prompts": prompts}
+    requested = summary.scope.coverage(task.n, task.task).requested
+    return {"task": task.task, **_counts(task), "requested": requested, **spreads, "prompts": prompts}
 
 
-def _counts(prompts: Sequence[PromptScore]) -> dict[str, int]:
-    return {"completions": judged_count(prompts), "passed": passed_count(prompts)}
+def _counts(score: TaskScore | PromptScore) -> dict[str, int]:
+    return {"completions": score.n, "passed": score.c}
 
 
 def _failure_data(failures: Failures, what: str) -> dict[str, Any]:

@@ -12,7 +12,6 @@ from roboeval.analysis.counts import completions_of, prompt_scores
 from roboeval.evaluation.explanation import reason, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, Completion, CompletionKey
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.scope import requested_of_prompts
 
 
 def task_data(results: Results, task: str) -> dict[str, Any]:
@@ -51,37 +50,26 @@ def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
     }
 
 
-def prompt_counts(completions: pl.DataFrame, condition: pl.Expr) -> pl.DataFrame:
-    """Count the completions of each prompt: `written`, `judged`, and `counted` if they meet a condition.
-
-    The input has the columns `written` and `passed` (null if not judged). `share` is the share of judged
-    completions that meet the condition, or null if none was judged.
-    """
-    judged = pl.col("judged")
-    counts = completions.group_by("task", "prompt", maintain_order=True).agg(
-        written=pl.col("written").sum(), judged=pl.col("passed").count(), counted=condition.sum()
-    )
-    return counts.with_columns(share=pl.col("counted") / pl.when(judged > 0).then(judged))
-
-
 def _reason(results: Results, key: CompletionKey) -> dict[str, Any]:
-    if key not in results.failed:
+    row = results.row(key)
+    if row["passed"]:
         return {"passed": True, "failure": None}
-    return reason(results.failed_row(key), results.suite, ablated=results.is_ablated)
+    return reason(row, results.suite, ablated=results.is_ablated)
 
 
 def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
     keys = [*of_prompt.filter(~pl.col("stale")).select(KEY).iter_rows()]
     written = [results.completions[key] for key in keys]
-    requested = requested_of_prompts(results.about, results.suite)
     ((task, prompt, n, c, share),) = prompt_scores(of_prompt).iter_rows()
+    requested = results.scope.requested
+    prompts = () if results.suite is None else results.suite.task(task).prompts
     return {
         "prompt": prompt,
         "instructions": _distinct(written, "instruction"),
         "suite_instruction": suite_instruction(results.suite, task, prompt),
         "models": _distinct(written, "model"),
         "completions": n,
-        "requested": None if requested is None else requested.get(task, 0),
+        "requested": None if requested is None else requested.get(task, 0) // len(prompts),
         "gone": n - len(written),
         "passed": c,
         "pass@1": share,

@@ -67,8 +67,8 @@ def verdict_changes(name: str, first: Results, second: Results) -> VerdictChange
         suites=(first.known_suite.name, second.known_suite.name),
         comparison=compare_scores(_pass_at_1(first, second), _pass_at_1(second, first)),
         tasks=tuple(_by_task(both, first.known_suite.tasks)),
-        first_only=tuple(describe_groups(group_failures(map(second.failed_row, lost), programs), second)),
-        second_only=tuple(describe_groups(group_failures(map(first.failed_row, won), programs), first)),
+        first_only=tuple(describe_groups(group_failures(map(second.row, lost), programs), second)),
+        second_only=tuple(describe_groups(group_failures(map(first.row, won), programs), first)),
         programs=len({(key[0], programs.get(key)) for key in lost + won}),
         left_out=one.height + other.height - 2 * both.height,
     )

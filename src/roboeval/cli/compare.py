@@ -64,22 +64,19 @@ _PAIR = 2
 
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
     """Print how much better the second of two runs is."""
-    from roboeval.analysis.compare import ComparedRun, compare_scores, comparison_data, other_differences
-    from roboeval.analysis.counts import task_scores
-    from roboeval.analysis.metrics import pass_at_1
+    from roboeval.analysis.compare import ComparedRun, compare_tables, comparison_data, other_differences
     from roboeval.analysis.missions import comparable_tables
     from roboeval.cli.views.comparison import comparison_view
 
     opened = [open_current(path, suite, ablated=ablated) for path in paths]
-    expect_same_suite(opened)
-    tables = comparable_tables(*(one.results.table for one in opened))
-    result = compare_scores(*(pass_at_1(task_scores(table)) for table in tables))
-    warnings = other_differences(*(one.results for one in opened))
+    expect_same_suite(opened, suite)
+    tables = comparable_tables(*(one.table for one in opened))
+    result = compare_tables(*(one.table for one in opened))
+    warnings = other_differences(*opened)
     for warning in warnings:
         note(f"warning: {warning}")
     first, second = (
-        ComparedRun.of(str(path), one.results, table)
-        for path, one, table in zip(paths, opened, tables, strict=True)
+        ComparedRun.of(str(path), one, table) for path, one, table in zip(paths, opened, tables, strict=True)
     )
     if as_json:
         data = comparison_data(result, (first.name, second.name))
@@ -102,8 +99,8 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
         fail(f'--suites takes two suites separated by a comma, such as paper,plus, not "{suites}"')
     found = []
     for path in paths:
-        first = open_current(path, names[0], ablated=ablated).results
-        second = open_current(path, names[1], ablated=ablated, reuse_from=first).results
+        first = open_current(path, names[0], ablated=ablated)
+        second = open_current(path, names[1], ablated=ablated, reuse_from=first)
         found.append(verdict_changes(str(path), first, second))
     for one in found:
         if one.left_out:
@@ -140,12 +137,12 @@ def resample(
     from roboeval.cli.views.groups import resample_view
 
     with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
-        results = open_current(run, suite, ablated=False, rules=rules).results
+        results = open_current(run, suite, ablated=False, rules=rules)
         if has_missions(results.table):
             fail(f"{run}: holds missions of an agent, which cannot be checked; name a run of programs")
         checker = engine_for(len(results.places))
         prompts = trials_by_prompt(check_run(results, samples=samples, seed=seed, engine=checker))
-    coverage = results.scope.coverage(len(results.places))
+    coverage = results.coverage
     limits = sorted(set(retries)) if retries else LIMITS
     if json:
         of = {"suite": results.manifest["suite"], "samples": samples, "seed": seed, **asdict(coverage)}

@@ -7,11 +7,9 @@ import typer
 
 def suite_names(incomplete: str) -> list[str]:
     """Return the names of built-in and installed suites. The shell itself completes folders."""
-    from roboeval.suites.installed import installed_suites
-    from roboeval.suites.load import shipped_suites
+    from roboeval.suites.load import known_suites
 
-    names = {*shipped_suites(), *(suite.name for suite in installed_suites())}
-    return sorted(name for name in names if name.startswith(incomplete))
+    return sorted(name for name in known_suites() if name.startswith(incomplete))
 
 
 def task_names(context: typer.Context, incomplete: str) -> list[str]:

@@ -75,7 +75,7 @@ def evaluate(
 
         judged_by = load(suite, rules, skills)
         if worlds is not None or seed is not None:
-            judged_by = judged_by.with_worlds(worlds, seed).with_house_rules(judged_by.house)
+            judged_by = judged_by.with_worlds(worlds, seed)
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
         if left:
             note(f"not judged because they have no ablation: {', '.join(left)}")
@@ -108,10 +108,9 @@ def evaluate(
 
 def _expect_all_judged(summary: EvaluationSummary, total: int, *, is_kept: bool) -> None:
     """Exit with status 1 if some completions could not be judged."""
-    from roboeval.analysis.metrics import judged_count
     from roboeval.evaluation.runs.completions import how_many
 
-    if (left_out := total - judged_count(summary.prompts)) > 0:
+    if (left_out := total - summary.judged) > 0:
         again = "run the same command to try again" if is_kept else "all others are judged"
         note(f"roboeval: not judged: {how_many(left_out)} of {total:,}; {again}")
         raise SystemExit(1)

@@ -60,18 +60,19 @@ def find(
     task = None if task is None else known.task(task).name
     query = TraceQuery(formula, negated, task, world)
     expect_query(query, known, ablated=ablation)
-    lines: list[bytes] = []
-    results = open_current(run, suite, ablated=ablation, on_line=lines.append).results
+    results = open_current(run, suite, ablated=ablation)
+    lines = results.lines
     every = list(show_progress(search(lines, query, workers=workers or cores()), "searching", len(lines)))
     found = [one for one in every if one.worlds]
-    failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
+    passed = {*results.passed}
+    failed = [results.row(one.key) for one in found if one.key not in passed]
     together = group_failures(failed, results.programs)
     shown = together if json else together[:most]
     described = list(show_progress(describe_groups(shown, results), "comparing", len(shown)))
     undecided = [one for one in every if one.cut]
     if undecided:
         note(f"undecided because their traces were too long to save: {how_many(len(undecided))}")
-    total, passed = count_searched(results.table, task), {*results.passed}
+    total = count_searched(results.table, task)
     if json:
         data = {
             "looked_at": total,

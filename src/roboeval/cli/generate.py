@@ -244,10 +244,6 @@ def run(
 
     The tables are also printed. If the command is interrupted, the same command continues.
     """
-    if repair and retries:
-        fail("--repair and --retries cannot be combined; use one of them")
-    if json and (repair or retries):
-        fail("--json does not work with --repair or --retries; run `evaluate --json` on each round's folder")
     if with_report and find_spec("matplotlib") is None:  # check this before requests cost money
         fail(f"the report needs matplotlib; {install_command('matplotlib')}, or use --no-report")
     from roboeval.evaluation.evaluate import expect_same_judge

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from codebotler.core.words import counted
 from roboeval.cli.output import note, show_progress
@@ -48,13 +48,6 @@ def command(
     return shlex.join(words)
 
 
-class Opened(NamedTuple):
-    """A judged run, with its suite and the command that continues its evaluation."""
-
-    results: Results
-    again: str  # the command that continues its evaluation
-
-
 def note_houses(runs: Iterable[RunFolder], suite: str) -> None:
     """Tell the user if runs were also judged with house rules, and which option shows those verdicts."""
     if houses := dict.fromkeys(house for run in runs for house in run.houses(suite)):
@@ -62,21 +55,21 @@ def note_houses(runs: Iterable[RunFolder], suite: str) -> None:
         note(f"also judged with house rules; {files} shows those verdicts")
 
 
-def expect_same_suite(opened: Sequence[Opened]) -> None:
+def expect_same_suite(opened: Sequence[Results], suite: str) -> None:
     """Raise UserError if runs were judged by suites with different content."""
     from codebotler.core.errors import UserError
 
-    digests = [str(one.results.manifest.get("digest")) for one in opened]
+    digests = [str(one.manifest.get("digest")) for one in opened]
     if len({*digests}) == 1:
         return
-    now = opened[0].results.known_suite.digest
+    now = opened[0].known_suite.digest
     stale = next(at for at, digest in enumerate(digests) if digest != now)
     other = next(at for at, digest in enumerate(digests) if digest != digests[stale])
-    paths = " and ".join(str(opened[at].results.run.path) for at in (stale, other))
+    paths = " and ".join(str(opened[at].run.path) for at in (stale, other))
     hashes = " and ".join(digests[at][:8] for at in (stale, other))
     raise UserError(
         f"{paths} were judged by different versions of a suite ({hashes}); "
-        f"`{opened[stale].again} --redo` judges with the current suite"
+        f"`{evaluate_again(opened[stale], suite)} --redo` judges with the current suite"
     )
 
 
@@ -88,11 +81,10 @@ def open_run(
     rules: Path | None = None,
     completion: str | None = None,
     reuse_from: Results | None = None,
-    on_line: Callable[[bytes], None] | None = None,
-) -> Opened:
+) -> Results:
     """Read a judged run. If a completion is given, read only the rows of its task.
 
-    `on_line` is called with each line of verdicts. `reuse_from` is another evaluation of the same run.
+    `reuse_from` is another evaluation of the same run.
     """
     from codebotler.core.errors import UserError
     from roboeval.evaluation.runs.folder import evaluation_of
@@ -107,7 +99,6 @@ def open_run(
         suite,
         task=parse_selection(completion, suite).task,
         reuse_from=reuse_from,
-        on_line=on_line,
         progress=lambda lines, total: show_progress(lines, "reading", total),
     )
     if suite.house is not None and rules is not None:
@@ -119,8 +110,7 @@ def open_run(
             )
     if results.manifest.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
-    more = _continue_options(results, suite)
-    return Opened(results, command("evaluate", run, *more, suite=suite_name, ablated=ablated, rules=rules))
+    return results
 
 
 def open_current(
@@ -130,19 +120,19 @@ def open_current(
     ablated: bool,
     rules: Path | None = None,
     reuse_from: Results | None = None,
-    on_line: Callable[[bytes], None] | None = None,
-) -> Opened:
+) -> Results:
     """Read a judged run with `open_run`. Raise UserError if verdicts are absent or outdated."""
     from codebotler.core.errors import UserError
 
-    opened = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from, on_line=on_line)
-    if (complaint := stale_sentence(opened.results)) is not None:
-        raise UserError(f"{complaint}; `{opened.again} --redo` judges the current programs")
-    if opened.results.table.is_empty():
-        raise UserError(f"no completion has been judged; `{opened.again}` continues", file=run)
-    if (unfinished := unfinished_sentence(opened.results)) is not None:
-        note(f"{unfinished}, and only these are counted; `{opened.again}` continues")
-    return opened
+    results = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from)
+    again = evaluate_again(results, suite_name, rules)
+    if (complaint := stale_sentence(results)) is not None:
+        raise UserError(f"{complaint}; `{again} --redo` judges the current programs")
+    if results.table.is_empty():
+        raise UserError(f"no completion has been judged; `{again}` continues", file=run)
+    if (unfinished := unfinished_sentence(results)) is not None:
+        note(f"{unfinished}, and only these are counted; `{again}` continues")
+    return results
 
 
 def stale_sentence(results: Results) -> str | None:
@@ -164,13 +154,14 @@ def unfinished_sentence(results: Results) -> str | None:
     return None if count >= total else f"{count:,} of {how_many(total)} judged"
 
 
-def _continue_options(results: Results, suite: Suite) -> list[str]:
+def evaluate_again(results: Results, suite_name: str, rules: Path | None = None) -> str:
+    """Return the command that continues an evaluation."""
     from roboeval.evaluation.runs.folder import tasks_to_judge
 
-    words = []
-    every = tasks_to_judge(suite, None, ablated=bool(results.manifest.get("ablation")))[0]
+    words, suite, ablated = [], results.known_suite, results.is_ablated
+    every = tasks_to_judge(suite, None, ablated=ablated)[0]
     if results.tasks is not None and results.tasks != every:
         words += ["--tasks", ",".join(sorted(results.tasks))]
     if suite.with_own_worlds().digest != suite.digest:
         words += ["--worlds", str(suite.worlds), "--seed", str(suite.seed)]
-    return words
+    return command("evaluate", results.run.path, *words, suite=suite_name, ablated=ablated, rules=rules)

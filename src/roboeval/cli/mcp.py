@@ -34,7 +34,7 @@ def mcp(
     import asyncio
 
     with installed():
-        from roboeval.evaluation.agents.mcp_server import ClientAgent, open_desk, serve_agent
+        from roboeval.evaluation.agents.mcp_server import open_desk, serve_agent
     from roboeval.evaluation.agents.conversation import TurnLimits
     from roboeval.evaluation.agents.plan import DEFAULT_TURNS, AgentPlan
     from roboeval.evaluation.runs.folder import RunFolder, tasks_to_judge
@@ -45,7 +45,7 @@ def mcp(
     selected = tasks_to_judge(known, tasks, ablated=False)[0]
     limits = TurnLimits(max_turns or DEFAULT_TURNS["agent"])
     plan = AgentPlan(known, selected, num_completions, mode="agent", limits=limits)
-    with open_desk(RunFolder(out), plan, ClientAgent(f"mcp:{name}")) as desk:
+    with open_desk(RunFolder(out), plan, f"mcp:{name}") as desk:
         try:
             asyncio.run(serve_agent(desk))
         finally:

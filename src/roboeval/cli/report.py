@@ -61,10 +61,10 @@ def report(
     if beside == suite:
         fail(f'--beside names "{suite}", which the report itself uses; name a different suite')
     opened = [open_current(run, suite, ablated=False) for run in runs]
-    expect_same_suite(opened)
+    expect_same_suite(opened, suite)
     engine = Local(workers or cores()) if check else None
     read = name_runs(
-        [judged_run(one.results, suite, beside=beside, rules=rules, engine=engine) for one in opened],
+        [judged_run(one, suite, beside=beside, rules=rules, engine=engine) for one in opened],
         labels,
     )
     expect_known(prices, read)
@@ -81,7 +81,7 @@ def report(
     for _ in show_progress(written, "writing", pieces(parts)):
         pass
     if rules is None:
-        note_houses([one.results.run for one in opened], suite)
+        note_houses([one.run for one in opened], suite)
     note(f"the report is in {out / 'index.html'}")
 
 
@@ -100,13 +100,13 @@ def judged_run(
     run = results.run
     ablated = other = house = None
     if run.rows(evaluation_key(results.known_suite, ablated=True)).is_file():
-        ablated = open_current(run.path, suite, ablated=True, reuse_from=results).results
+        ablated = open_current(run.path, suite, ablated=True, reuse_from=results)
     if engine is None:
         table = results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))
     else:
         table = check_run(results, engine=engine)
     if beside is not None:
-        other = open_current(run.path, beside, ablated=False, reuse_from=results).results
+        other = open_current(run.path, beside, ablated=False, reuse_from=results)
     if rules is not None:
-        house = open_current(run.path, suite, ablated=False, rules=rules, reuse_from=results).results
+        house = open_current(run.path, suite, ablated=False, rules=rules, reuse_from=results)
     return JudgedRun(results, table, ablated=ablated, other_suite=other, house=house)

@@ -19,6 +19,7 @@ from codebotler.cli.options import (
 from roboeval.cli.completion_names import task_names
 from roboeval.cli.inputs import (
     command,
+    evaluate_again,
     load,
     note_houses,
     open_current,
@@ -77,7 +78,7 @@ def show(
     if not is_one and (in_full or with_reply):
         option = "--all" if in_full else "--reply"
         fail(f"{option} applies to one completion; give TASK/PROMPT/INDEX, or leave out {option}")
-    judged, again = open_run(run, suite, ablated=ablation, rules=rules, completion=what if is_one else None)
+    judged = open_run(run, suite, ablated=ablation, rules=rules, completion=what if is_one else None)
     selection = parse_selection(what, judged.known_suite)
     if selection.task is None:
         show_run(judged, k or [], title=str(run), has_rules=rules is not None, as_json=json)
@@ -88,6 +89,7 @@ def show(
     else:
         selection.expect_judged(judged)
         show_part(judged, selection.task, selection.prompt, as_json=json)
+    again = evaluate_again(judged, suite, rules)
     if (complaint := stale_sentence(judged)) is not None:
         note(f"{complaint}; `{again} --redo` judges the current programs")
     if not is_one and (unfinished := unfinished_sentence(judged)) is not None:
@@ -103,7 +105,7 @@ def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: 
     key = evaluation_key(suite.with_house_rules(None), ablated=ablated)
     if run is None or not run.rows(key).is_file():
         return count_broken_rules(table)
-    return count_broken_rules(table, read_results(run, key, suite, keep_failed=False).table)
+    return count_broken_rules(table, read_results(run, key, suite).table)
 
 
 def print_summary(
@@ -211,7 +213,7 @@ def export(
         cost = None if price is None else Price.read(price)
     except ValueError:
         fail(f'"{price}" is not a price; write INPUT/OUTPUT, the prices per million tokens')
-    results = open_current(run, suite, ablated=ablation).results
+    results = open_current(run, suite, ablated=ablation)
     table = results.table if cost is None else with_cost(results.table, cost)
     path = out or results.run.rows(str(results.key)).with_suffix(f".{kind}")
     expect_replaceable(path, *TABLE_BEGINNINGS)

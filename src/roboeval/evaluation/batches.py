@@ -36,7 +36,7 @@ from roboeval.evaluation.requests import (
     timestamp,
     with_batch,
 )
-from roboeval.evaluation.runs.completions import CompletionKey, how_many, reply_row
+from roboeval.evaluation.runs.completions import CompletionKey, how_many, row_for
 from roboeval.evaluation.runs.folder import RunFolder, load_json_object
 from roboeval.evaluation.runs.source import MAX_ANSWER_BYTES
 from roboeval.suites.load import Suite
@@ -61,7 +61,7 @@ def write_requests(
     """
     expect_replaceable(path, BEGINNING)
     with run.writing():
-        about, keys = run_metadata(run, plan, model), plan.keys()
+        about, keys = run_metadata(run, plan, model.name, model.settings), plan.keys()
         done = {one.key for one in plan.completed(run)}
         todo = [key for key in keys if key not in done]
         if not todo:
@@ -96,13 +96,7 @@ class ImportResult:
     unanswered: Sequence[CompletionKey] = field(repr=False)  # requests with neither a completion nor an error
 
 
-@dataclass(frozen=True)
-class _Answer:
-    """A batch endpoint's answer to one request."""
-
-    key: CompletionKey
-    status: int
-    body: object
+BatchAnswer: TypeAlias = tuple[CompletionKey, int, object]  # to which request, the status, and the body
 
 
 def import_answers(
@@ -126,8 +120,8 @@ def import_answers(
         settings = SamplingSettings(**batches(about)[-1]["settings"])
         with closing(BatchModel(about["model"], settings)) as model:
             found = _Replies(model, plans[0], there)
-            for number, answer in enumerate(_answers(path, ids), 1):
-                found.add(answer)
+            for number, (key, status, body) in enumerate(_answers(path, ids), 1):
+                found.add(key, status, body)
                 progress(number)
             found.keep_refused()
         new = [found.lines[key] for key in expected if key in found.lines]
@@ -165,19 +159,13 @@ class _Replies:
     failed: dict[CompletionKey, str] = field(default_factory=dict)
     refused: dict[CompletionKey, ModelError] = field(default_factory=dict)
 
-    def add(self, answer: _Answer) -> None:
+    def add(self, key: CompletionKey, status: int, body: object) -> None:
         """Add an answer, unless its request already has a reply."""
-        key = answer.key
         if key in self.there or key in self.lines:
             return
         try:
-            prompt = self.plan.prompt(key)
-            self._keep(
-                key,
-                self.model.reply(
-                    prompt, number=self.plan.sample(key), status=answer.status, body=answer.body
-                ),
-            )
+            prompt, number = self.plan.prompt(key), self.plan.sample(key)
+            self._keep(key, self.model.reply(prompt, number=number, status=status, body=body))
         except ModelError as error:
             self.failed[key] = error.sentence
             if error.is_refusal:
@@ -191,7 +179,7 @@ class _Replies:
                     self._keep(key, reply_of_refusal(error))
 
     def _keep(self, key: CompletionKey, reply: Reply) -> None:
-        row = reply_row(key, self.plan.instruction(key), self.model.name, reply)
+        row = row_for(key, self.plan.instruction(key), self.model.name, reply.data())
         line = to_line(row)
         if len(line) > MAX_ROW:
             raise ModelError(f"the reply is too long to save: {len(line):,} bytes", may_pass=False)
@@ -219,7 +207,7 @@ def _plan(suite: Suite, batch: Mapping[str, Any]) -> GenerationPlan:
     return GenerationPlan(suite, None if tasks is None else frozenset(tasks), batch["num_completions"])
 
 
-def _answers(path: Path, ids: Mapping[str, CompletionKey]) -> Iterator[_Answer]:
+def _answers(path: Path, ids: Mapping[str, CompletionKey]) -> Iterator[BatchAnswer]:
     for number, line in read_lines(path, limit=MAX_ANSWER_BYTES):
         if not line.strip():
             continue
@@ -229,7 +217,7 @@ def _answers(path: Path, ids: Mapping[str, CompletionKey]) -> Iterator[_Answer]:
             raise UserError(error.sentence, file=path, line=number) from None
 
 
-def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> _Answer:
+def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> BatchAnswer:
     row = parse_row(line)
     if row is None:
         raise UserError("this line is not JSON; the file may be incomplete")
@@ -243,6 +231,6 @@ def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> _Answer:
         raise UserError(f"this line answers a request {whose}: {name!r}")
     response, error = row.get("response"), row.get("error")
     if not isinstance(response, dict):
-        return _Answer(ids[name], 200, error)
+        return ids[name], 200, error
     status, body = response.get("status_code"), response.get("body")
-    return _Answer(ids[name], status if isinstance(status, int) else 200, error if body is None else body)
+    return ids[name], status if isinstance(status, int) else 200, error if body is None else body

@@ -62,7 +62,7 @@ def check_programs(
             seed=seed,
             simulation=suite.settings,
             skills=suite.skills,
-            house_rules=() if suite.house is None else suite.house.rules,
+            house_rules=suite.house_rules,
         )
         check = partial(_check, plans, settings)
         works = ((task, program) for (task, _), program in new.items())

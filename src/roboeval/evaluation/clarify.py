@@ -82,8 +82,7 @@ def clarify(
     every = [one for some in by_prompt.values() for one in some]
     passed = {key_of(row): bool(row["passed"]) for row in evaluate(every, suite, engine=Local(pool))}
     groups = {key: _draw_groups(key, some, settings) for key, some in by_prompt.items()}
-    house_rules = () if suite.house is None else suite.house.rules
-    how = CheckSettings(seed=settings.seed, skills=suite.skills, house_rules=house_rules)
+    how = CheckSettings(seed=settings.seed, skills=suite.skills, house_rules=suite.house_rules)
     offers = pool.map_distinct(
         lambda some: [_offer(pool, how, programs) for programs in some],
         [tuple(one.program for one in group) for some in groups.values() for group in some],

@@ -7,24 +7,13 @@ import contextlib
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextvars import ContextVar
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
 
 from codebotler.core.files import MAX_ROW, Appender, to_line, to_text, write_whole
-from codebotler.models.base import (
-    BudgetSpentError,
-    Model,
-    ModelError,
-    Reply,
-    TextListener,
-    Usage,
-    ignore_text,
-    make_reply,
-)
+from codebotler.models.base import BudgetSpentError, Model, ModelError, Reply, Usage, make_reply
 from codebotler.models.rate_limit import RateLimited
-from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from roboeval.evaluation.requests import (
     GenerationPlan,
@@ -90,7 +79,7 @@ def generate_run(
 ) -> GenerationProgress:
     """Request the missing completions of a run, save each as it arrives, and close the model."""
     with run.writing():
-        metadata = run_metadata(run, plan, model)
+        metadata = run_metadata(run, plan, model.name, model.settings)
         with contextlib.closing(Appender(run.completions)) as file:
             done, usage = set(), no_usage()
             for completion in plan.completed(run):
@@ -141,36 +130,6 @@ def reply_of_refusal(error: ModelError) -> Reply:
     return make_reply(error.sentence, Usage(), None, None, known_kind="refusal", has_answer=False)
 
 
-_KEY: ContextVar[CompletionKey] = ContextVar("_KEY")
-
-
-@dataclass(frozen=True)
-class _LoggedModel:
-    """Wraps a model and logs each request, including each retry, before sending it."""
-
-    model: Model
-    log: RequestLog
-
-    @property
-    def name(self) -> str:
-        return self.model.name
-
-    @property
-    def settings(self) -> SamplingSettings:
-        return self.model.settings
-
-    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
-        self.log.sent(_KEY.get())
-        try:
-            return await self.model.reply(prompt, number=number, on_text=on_text)
-        except ModelError:
-            self.log.failed(_KEY.get())
-            raise
-
-    async def close(self) -> None:
-        await self.model.close()
-
-
 @dataclass
 class _Generation:
     """Requests completions concurrently and saves each as it arrives."""
@@ -189,7 +148,7 @@ class _Generation:
     _refused: dict[CompletionKey, ModelError] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._paced = RateLimited(_LoggedModel(self.model, self.log), **asdict(self.pace))
+        self._paced = RateLimited(self.model, **asdict(self.pace))
 
     async def generate(self, keys: list[CompletionKey]) -> None:
         waiting = iter(keys)
@@ -212,7 +171,6 @@ class _Generation:
                 await self._request(key)
 
     async def _request(self, key: CompletionKey) -> None:
-        _KEY.set(key)
         try:
             row = await self.plan.complete(key, self.model.name, partial(self._ask, key), self._earlier(key))
             await self._keep(key, row)
@@ -229,11 +187,22 @@ class _Generation:
                 self.progress.stopped = error.sentence
 
     async def _ask(self, key: CompletionKey, prompt: Prompt) -> Reply:
-        reply = await self._paced.reply(prompt, number=self.plan.sample(key))
+        logged = partial(self._logged, key)
+        reply = await self._paced.reply(prompt, number=self.plan.sample(key), around=logged)
         if self.turns is not None:
             await self.turns.keep(key, reply)
             self.log.answered(key)
         return reply
+
+    @contextlib.contextmanager
+    def _logged(self, key: CompletionKey) -> Iterator[None]:
+        """Log a request, including each retry, before it is sent."""
+        self.log.sent(key)
+        try:
+            yield
+        except ModelError:
+            self.log.failed(key)
+            raise
 
     def _earlier(self, key: CompletionKey) -> list[Reply]:
         return [] if self.turns is None else self.turns.replies(key)

@@ -114,7 +114,8 @@ def judgements(
             _expect_judgeable(completion, suite, ablated=ablated)
             waiting.append(completion)
             acted = completion.acted
-            yield (completion.task, completion.program, *(() if acted is None else (acted.text,)))
+            where = () if acted is None else (str(acted.world), acted.ending)
+            yield completion.task, completion.program, *where
 
     with engine as opened:
         running = partial(run_in_worlds, suite, ablated=ablated)
@@ -167,7 +168,8 @@ class Ran:
 def run_in_worlds(suite: Suite, worker: Worker, works: Sequence[Work], *, ablated: bool) -> list[Ran]:
     """Run programs in the worlds of their tasks, and missions of agents in the worlds where they acted."""
     planned = [
-        (program, Ran(task, Acted.parse(where[0]) if where else None, ())) for task, program, *where in works
+        (program, Ran(task, Acted(int(where[0]), where[1]) if where else None, ()))
+        for task, program, *where in works
     ]
     jobs = [
         (program, [partial(robot_in, one.world, suite) for one in ran.scenarios(suite, ablated=ablated)])
@@ -192,7 +194,15 @@ def guard_of(suite: Suite, contracts: Sequence[Contract] = ()) -> RuleGuard | No
     """Return what holds calls against the house rules of a suite and some contracts, or None without any."""
     if suite.house is None and not contracts:
         return None
-    return RuleGuard(() if suite.house is None else suite.house.rules, contracts=contracts)
+    return RuleGuard(suite.house_rules, contracts=contracts)
+
+
+def run_in(
+    worker: Worker, programs: Sequence[str], scenarios: Iterable[Scenario], suite: Suite
+) -> list[list[Outcome]]:
+    """Run each program in each of some worlds."""
+    robots = [partial(robot_in, scenario.world, suite) for scenario in scenarios]
+    return worker.run_all([(program, robots) for program in programs])
 
 
 def judge_outcomes(suite: Suite, ran: Ran, *, ablated: bool) -> tuple[bytes, ...] | None:

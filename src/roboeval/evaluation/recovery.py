@@ -136,11 +136,9 @@ class Interruption:
 
     def prompt(self, suite: Suite) -> Prompt:
         """Return the request for the rest of the mission."""
-        rules = [] if suite.house is None else [rule.says for rule in suite.house.rules]
-        rooms = self.room_map.described
-        return rest_prompt(
-            self.past, prompt_for(self.past.instruction, rooms=rooms, rules=rules, skills=suite.skills)
-        )
+        rules, rooms = suite.house_sentences, self.room_map.described
+        whole = prompt_for(self.past.instruction, rooms=rooms, rules=rules, skills=suite.skills)
+        return rest_prompt(self.past, whole)
 
 
 def rest_prompt(past: MissionPast, request: Prompt) -> Prompt:
@@ -189,8 +187,7 @@ def find_first_right(
 
 def check_rest(worker: Worker, suite: Suite, program: str, room_map: RoomMap, begun: str) -> CheckResult:
     """Check a program for the rest of a mission as `codebotler continue` does."""
-    rules = () if suite.house is None else suite.house.rules
-    settings = CheckSettings(skills=suite.skills, house_rules=rules)
+    settings = CheckSettings(skills=suite.skills, house_rules=suite.house_rules)
     left = remaining_outcomes(begun, room_map, suite.skills, worker=worker)
     return hold_to_past(check_on(worker, program, room_map, settings), begun, left)
 

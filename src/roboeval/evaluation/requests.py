@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Se
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, Self, TypeAlias
+from typing import Any, ClassVar, Self, TypeAlias
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
@@ -23,7 +23,7 @@ from roboeval.evaluation.runs.completions import (
     CompletionKey,
     name_of,
     read_completions,
-    reply_row,
+    row_for,
 )
 from roboeval.evaluation.runs.folder import RunFolder, load_json_object
 from roboeval.suites.load import Suite
@@ -33,18 +33,6 @@ Ask: TypeAlias = Callable[[Prompt], Awaitable[Reply]]
 
 WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change a model's replies
 OPTIONAL_SETTINGS = ("reasoning_effort", "extra_body")  # left out of run.json if unset
-
-
-class NamedModel(Protocol):
-    """A model with a name and settings, to which a run belongs."""
-
-    @property
-    def name(self) -> str:
-        """The name of the model."""
-
-    @property
-    def settings(self) -> SamplingSettings:
-        """The settings of the model."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +77,7 @@ class GenerationPlan:
     ) -> dict[str, Any]:
         """Request a completion from the model of this name, unless it replied earlier, and return its row."""
         reply = earlier[-1] if earlier else await ask(self.prompt(key))
-        return reply_row(key, self.instruction(key), model, reply)
+        return row_for(key, self.instruction(key), model, reply.data())
 
     def mark(self) -> Mapping[str, int]:
         """Return extra entries to add to each row of completions.jsonl."""
@@ -119,15 +107,12 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
         total[name] += (usage or {}).get(name) or 0
 
 
-def run_metadata(run: RunFolder, plan: GenerationPlan, model: NamedModel) -> dict[str, Any]:
+def run_metadata(
+    run: RunFolder, plan: GenerationPlan, model: str, settings: SamplingSettings
+) -> dict[str, Any]:
     """Return the content of run.json. Raise UserError if existing completions have other settings."""
     suite = plan.suite
-    fixed = {
-        "model": model.name,
-        "settings": _recorded(model.settings),
-        **plan.describe(),
-        "suite": suite.name,
-    }
+    fixed = {"model": model, "settings": _recorded(settings), **plan.describe(), "suite": suite.name}
     families = {}
     if suite.families is not None:
         families["families"] = {**suite.families, "version": suite.version, "digest": suite.digest}

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import threading
-from collections import OrderedDict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -16,7 +13,7 @@ from codebotler.core.errors import UserError, expect_list
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import shared_pool
-from roboeval.evaluation.judge import are_met, is_met, may_satisfy, robot_in
+from roboeval.evaluation.judge import are_met, is_met, may_satisfy, run_in
 from roboeval.evaluation.runs.completions import find_key_fault
 from roboeval.suites.load import Scenario, Suite, load_suite
 
@@ -112,27 +109,23 @@ def total(shares: Sequence[Share]) -> float:
 
 
 class RewardCache(Generic[Judged]):
-    """Caches the most recently used results by name, so that equal programs are judged once."""
+    """Caches results by name, so that equal programs are judged once.
+
+    Each operation on the dictionary is atomic, so that threads and forks need no lock.
+    """
 
     def __init__(self) -> None:
-        self._known: OrderedDict[bytes, Judged] = OrderedDict()
-        self._lock = threading.Lock()
-        release = self._lock.release
-        os.register_at_fork(before=self._lock.acquire, after_in_parent=release, after_in_child=release)
+        self._known: dict[bytes, Judged] = {}
 
     def among(self, names: Iterable[bytes]) -> dict[bytes, Judged]:
         """Return the cached results for these names."""
-        with self._lock:
-            return {name: self._known[name] for name in names if name in self._known}
+        return {name: found for name in names if (found := self._known.get(name)) is not None}
 
-    def add(self, judge_programs: Mapping[bytes, Judged]) -> None:
-        """Add results, or mark them as recently used."""
-        with self._lock:
-            self._known |= judge_programs
-            for name in judge_programs:
-                self._known.move_to_end(name)
-            while len(self._known) > MAX_CACHED_REWARDS:
-                self._known.popitem(last=False)
+    def add(self, results: Mapping[bytes, Judged]) -> None:
+        """Add results. A full cache is emptied first."""
+        if len(self._known) >= MAX_CACHED_REWARDS:
+            self._known.clear()
+        self._known.update(results)
 
 
 REWARD_CACHE: RewardCache[float] = RewardCache()
@@ -153,8 +146,7 @@ def rewards_of(suite: Suite, task: str, prompt: int, programs: Sequence[str]) ->
 def judge_programs(suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
     """Compute the rewards of programs. The calling thread must have a worker."""
     asked = requirements_of(suite, task, prompt)
-    robots = [partial(robot_in, scenario.world, suite) for scenario, _ in asked]
-    ran = shared_pool().here().run_all([(program, robots) for program in programs])
+    ran = run_in(shared_pool().here(), programs, [scenario for scenario, _ in asked], suite)
     return [
         total([Share.of(outcome, *one) for outcome, one in zip(outcomes, asked, strict=True)])
         for outcomes in ran

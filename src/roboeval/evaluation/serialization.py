@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections import Counter
+from bisect import bisect_right
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,13 +13,12 @@ from codebotler.core.trace import outcome_data
 from roboeval.evaluation.failures import AGENT_ERROR_CLASS, NO_PROGRAM_CLASS, Verdict, failure_of_verdicts
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.endings import NO_CALL
-from roboeval.evaluation.runs.traces import CIRCUMSTANCES, circumstances, first_events
+from roboeval.evaluation.runs.traces import circumstances, first_events
 
 ROW_BYTES = 1_000_000  # limit for a row, unless it has very many worlds
 WORLD_BYTES = 20_000  # limit per world in that case
 ROW_HEADER_BYTES = 2_000  # space for the key and the hash
-SEPARATOR_BYTES = 2  # the separator between two events
-HASH_PLACEHOLDER = "0" * 64
+SEPARATOR_BYTES = 2  # the separator between two verdicts
 
 FAILED_PREFIX = b'{"passed": false, '  # how `judgement` starts a failed judgement
 
@@ -100,33 +99,23 @@ def limit_size(judgement: Mapping[str, Any]) -> bytes:
     most = max(ROW_BYTES, WORLD_BYTES * len(verdicts)) - ROW_HEADER_BYTES
     if not verdicts or len(whole) < most:
         return whole
-    longest_cuts = ({"events": len(verdict["trace"]), "sha256": HASH_PLACEHOLDER} for verdict in verdicts)
-    bare = [
-        {**first_events(verdict, 0), "cut": cut} for verdict, cut in zip(verdicts, longest_cuts, strict=True)
-    ]
-    share = (most - len(to_line({**judgement, "verdicts": bare}))) // len(verdicts)
+    left = most - len(_json({**judgement, "verdicts": []}))
+    share = left // len(verdicts) - SEPARATOR_BYTES
     return _json({**judgement, "verdicts": [_within(share, verdict) for verdict in verdicts]})
 
 
 def _within(share: int, verdict: dict[str, Any]) -> dict[str, Any]:
+    """Return a verdict with as many of the first events as fit."""
+    if len(_json(verdict)) <= share:
+        return verdict
     trace = verdict["trace"]
-    circumstance_sizes = _circumstance_sizes(verdict)
-    size = 0
-    for kept, event in enumerate(trace):
-        size += len(_json(event)) + SEPARATOR_BYTES + circumstance_sizes[kept + 1]
-        if size > share:
-            whole = hashlib.sha256(_json(trace)).hexdigest()
-            cut = {"events": len(trace) - kept, "sha256": whole}
-            return {**first_events(verdict, kept), "cut": cut}
-    return verdict
+    digest = hashlib.sha256(_json(trace)).hexdigest()
 
+    def cut(kept: int) -> dict[str, Any]:
+        return {**first_events(verdict, kept), "cut": {"events": len(trace) - kept, "sha256": digest}}
 
-def _circumstance_sizes(verdict: Mapping[str, Any]) -> Counter[int]:
-    sizes: Counter[int] = Counter()
-    for name in CIRCUMSTANCES:
-        for entry in verdict.get(name, ()):
-            sizes[max(1, entry[0] - (name == "places"))] += len(_json(entry)) + SEPARATOR_BYTES
-    return sizes
+    too_many = bisect_right(range(len(trace)), share, key=lambda kept: len(_json(cut(kept))))
+    return cut(max(0, too_many - 1))
 
 
 def _json(data: object) -> bytes:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import TypeAlias
 
 from codebotler.core.trace import Outcome
 from codebotler.simulator.pool import WorkerPool
 from roboeval.evaluation.failures import Verdict
-from roboeval.evaluation.judge import judge, robot_in
+from roboeval.evaluation.judge import judge, run_in
 from roboeval.suites.load import Scenario, Suite, Task
 from roboeval.suites.solutions import solutions
 
@@ -23,8 +22,7 @@ def judge_solutions(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdi
     with WorkerPool(workers) as pool:
 
         def outcomes(program: str, worlds: Sequence[Scenario]) -> list[Outcome]:
-            robots = [partial(robot_in, scenario.world, suite) for scenario in worlds]
-            return pool.here().run_all([(program, robots)])[0]
+            return run_in(pool.here(), [program], worlds, suite)[0]
 
         ran = [pool.submit(outcomes, *each) for each in runs]
         return [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
 from typing import Any, TypeAlias
 
 from codebotler.core.errors import UserError
@@ -11,7 +10,7 @@ from codebotler.core.trace import Outcome, Status
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool
 from roboeval.evaluation.failures import Verdict
-from roboeval.evaluation.judge import judge, robot_in
+from roboeval.evaluation.judge import judge, run_in
 from roboeval.mutation.mutants import Mutant, Original, mutants, originals, sample_mutants
 from roboeval.mutation.operator import Context
 from roboeval.mutation.score import MutantResult, MutantStatus, MutationScore, TriedMutant
@@ -42,11 +41,11 @@ def mutation_score(
     original satisfies. Raises UserError if `worlds` is given but the suite does not sample its worlds.
     """
     scenarios = mutation_worlds(suite, task, worlds, seed)
-    robots = [partial(robot_in, scenario.world, suite) for scenario in scenarios]
 
     def run(program: str) -> Iterator[Outcome]:
-        for start in range(0, len(robots), WORLDS_PER_BATCH):
-            yield from pool.here().run_all([(program, robots[start : start + WORLDS_PER_BATCH])])[0]
+        for start in range(0, len(scenarios), WORLDS_PER_BATCH):
+            some = scenarios[start : start + WORLDS_PER_BATCH]
+            yield from run_in(pool.here(), [program], some, suite)[0]
 
     def outcomes(some: Sequence[Original]) -> list[tuple[Outcome, ...]]:
         return [tuple(run(original.program)) for original in some]

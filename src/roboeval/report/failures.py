@@ -88,7 +88,7 @@ def failures_section(runs: Sequence[JudgedRun]) -> Section:
     shown: list[tuple[str, FailureGroup]] = []
     notes: list[str] = []
     for run in runs:
-        groups = group_failures(map(run.results.failed_row, run.results.failed), run.results.programs)
+        groups = group_failures(map(run.results.row, run.results.failed), run.results.programs)
         named = [(run.name, one) for one in describe_groups(groups, run.results)]
         every += named
         shown += named[:most]

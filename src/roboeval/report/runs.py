@@ -14,10 +14,8 @@ from codebotler.core.errors import UserError
 from codebotler.core.words import counted
 from roboeval.analysis.counts import completions_of, task_scores
 from roboeval.analysis.metrics import TaskScore, overall, pass_at_1
-from roboeval.analysis.missions import comparable_scores
 from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.scope import Coverage
 from roboeval.report.drawing import short_name
 from roboeval.suites.load import Suite
 
@@ -76,15 +74,10 @@ class JudgedRun:
         return pass_at_1(self.scores)
 
     @property
-    def coverage(self) -> Coverage:
-        """The numbers of judged, existing and requested completions."""
-        return self.results.scope.coverage(self.completions.height)
-
-    @property
     def coverage_sentence(self) -> str:
         """A description of the coverage of completions, prompts and tasks."""
         prompts = counted(len(self.by_prompt), "prompt")
-        return f"{self.coverage}, {prompts} of {counted(len(self.scores), 'task')}"
+        return f"{self.results.coverage}, {prompts} of {counted(len(self.scores), 'task')}"
 
     @property
     def mean(self) -> float:
@@ -101,11 +94,6 @@ class JudgedRun:
     def trials(self) -> tuple[CheckedPrompt, ...]:
         """The checked completions of each prompt. Empty unless all completions were checked."""
         return () if self.table["accepted"].null_count() else trials_by_prompt(self.table)
-
-
-def by_prompt_of(*runs: JudgedRun) -> list[dict[tuple[str, int], float]]:
-    """Return the pass@1 of each prompt: of missions, if any of the runs has missions of an agent."""
-    return [pass_at_1(scores) for scores in comparable_scores(*(run.table for run in runs))]
 
 
 def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:

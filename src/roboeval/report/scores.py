@@ -8,7 +8,7 @@ from itertools import chain
 from codebotler.core.errors import UserError
 from roboeval.analysis.compare import (
     MAX_PAIRS,
-    compare_scores,
+    compare_tables,
     comparison_sentence,
     other_differences,
     pairs_to_compare,
@@ -16,7 +16,6 @@ from roboeval.analysis.compare import (
 from roboeval.analysis.metrics import (
     TaskScore,
     by_formula,
-    judged_count,
     overall,
     prompts_of,
     share_at_least,
@@ -26,7 +25,7 @@ from roboeval.analysis.missions import has_missions
 from roboeval.analysis.statistics import MIN_CLUSTERS, by_bootstrap
 from roboeval.report import figures, paper
 from roboeval.report.curves import draw_thresholds
-from roboeval.report.runs import JudgedRun, by_prompt_of, coverage_of, tasks_of
+from roboeval.report.runs import JudgedRun, coverage_of, tasks_of
 from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, note, section, sheet
 
 
@@ -46,7 +45,7 @@ def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         over_prompts = by_formula([[prompt.pass_at(1)] for prompt in prompts_of(run.scores)])
         found = [overall(run.scores, 1), over_prompts, by_bootstrap(tasks, over="tasks")]
         ends = [end for estimate in found for end in (estimate.low, estimate.high)]
-        coverage = run.coverage
+        coverage = run.results.coverage
         counts = coverage.judged, coverage.total, len(run.by_prompt), len(tasks)
         rows.append([run.name, *counts, found[0].mean, *ends])
     missions = [note("missions")] if any(has_missions(run.table) for run in runs) else []
@@ -73,9 +72,9 @@ def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
 
 def _unfinished(runs: Sequence[JudgedRun]) -> list[str]:
     return [
-        f"{run.name}: {run.coverage}; only judged completions count."
+        f"{run.name}: {run.results.coverage}; only judged completions count."
         for run in runs
-        if not run.coverage.is_whole
+        if not run.results.coverage.is_whole
     ]
 
 
@@ -96,7 +95,7 @@ def task_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
-    passed, coverage = score.pass_at(1), run.results.scope.coverage(judged_count(score.prompts), score.task)
+    passed, coverage = score.pass_at(1), run.results.scope.coverage(score.n, score.task)
     ends = (passed.low, passed.high) if passed.is_known else (None, None)
     counts = coverage.judged, coverage.total
     return [score.task, run.name, what, *counts, passed.mean, *ends, score.lowest(1), score.highest(1)]
@@ -122,7 +121,7 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
     notes: list[str] = []
     for first, second in pairs_to_compare(runs, lambda run: run.mean):
         try:
-            found = compare_scores(*by_prompt_of(first, second))
+            found = compare_tables(first.table, second.table)
         except UserError:  # no prompt in common
             continue
         if len(sentences) < MAX_PAIRS:
@@ -147,7 +146,8 @@ def leader(runs: Sequence[JudgedRun]) -> list[str]:
         return []
     best, second, *_ = sorted(runs, key=lambda run: -run.mean)
     try:
-        return [comparison_sentence(compare_scores(*by_prompt_of(second, best)), (second.name, best.name))]
+        found = compare_tables(second.table, best.table)
+        return [comparison_sentence(found, (second.name, best.name))]
     except UserError:  # no prompt in common
         return []
 

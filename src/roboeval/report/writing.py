@@ -41,7 +41,7 @@ GENERATOR_WITHIN = 4_000  # bytes at the start of a page that are searched for i
 def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
     """Return the title of a report and its introductory paragraphs."""
     title = runs[0].name if len(runs) == 1 else _models(runs)
-    each = [run.coverage for run in runs]
+    each = [run.results.coverage for run in runs]
     count = Coverage(
         *(sum(counts) for counts in zip(*((c.judged, c.there, c.total) for c in each), strict=True))
     )

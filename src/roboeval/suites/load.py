@@ -8,12 +8,12 @@ from pathlib import Path
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.yaml_files import YamlFile
-from roboeval.suites.families.suite import family_tasks_named
-from roboeval.suites.installed import installed_suites
+from roboeval.suites.families.suite import family_suite, family_tasks_named
 from roboeval.suites.suite import (
     ABLATED,
     SUITES,
     Suite,
+    known_suites,
     read_suite,
     rooms_in,
     shipped_suites,
@@ -32,6 +32,7 @@ __all__ = [
     "Task",
     "TaskCheck",
     "has_suite",
+    "known_suites",
     "load_suite",
     "read_task",
     "rooms_in",
@@ -55,7 +56,7 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     """
     name = str(name)
     if (which := family_tasks_named(name)) is not None:
-        return which.suite(skills)
+        return family_suite(which, skills)
     folder = suite_folder(name)
     suite = read_suite(folder, skills)
     if suite.name != name and not (Path(name) / "suite.yaml").is_file():
@@ -68,5 +69,4 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
 
 def has_suite(name: str) -> bool:
     """Whether a suite is built in, installed or generated from families. Folders do not count."""
-    known = {*shipped_suites(), *(suite.name for suite in installed_suites())}
-    return name in known or family_tasks_named(name) is not None
+    return name in known_suites() or family_tasks_named(name) is not None

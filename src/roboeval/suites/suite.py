@@ -17,6 +17,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.words import counted
 from codebotler.core.yaml_files import YamlFile
+from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.settings import SimulationSettings
 from roboeval.suites.house import HouseRules
 from roboeval.suites.installed import installed_folder, installed_suites
@@ -62,16 +63,21 @@ class Suite:
         return f"Suite({self.name!r}, {counted(len(self.tasks), 'task')})"
 
     @property
+    def house_rules(self) -> tuple[Rule, ...]:
+        """Return the house rules, or none."""
+        return () if self.house is None else self.house.rules
+
+    @property
     def house_sentences(self) -> list[str]:
         """Return the house rules as sentences for the prompt."""
-        return [] if self.house is None else [rule.says for rule in self.house.rules]
+        return [rule.says for rule in self.house_rules]
 
     def with_house_rules(self, house: HouseRules | None) -> Suite:
         """Return the suite with these house rules instead of its own, or without house rules if None."""
-        return replace(self, house=house)
+        return self if house == self.house else replace(self, house=house)
 
     def with_worlds(self, count: int | None = None, seed: int | None = None) -> Suite:
-        """Return the suite with other worlds, sampled from the same descriptions.
+        """Return the suite with the same house rules and other worlds, sampled from the same descriptions.
 
         Args:
             count: the number of worlds per task, 1 to 10,000; by default the current number.
@@ -85,7 +91,8 @@ class Suite:
             raise UserError(f'the worlds of the suite "{self.name}" {why}; leave out --worlds and --seed')
         if count is not None and not 1 <= count <= MAX_WORLDS:
             raise UserError(f"the number of worlds is {count}, but it must be from 1 to {MAX_WORLDS:,}")
-        return read_suite(self.folder, self.skills, count or self.worlds, self.seed if seed is None else seed)
+        seed = self.seed if seed is None else seed
+        return read_suite(self.folder, self.skills, count or self.worlds, seed).with_house_rules(self.house)
 
     def with_own_worlds(self) -> Suite:
         """Return the suite with the worlds that its file specifies."""
@@ -106,6 +113,11 @@ def shipped_suites() -> tuple[str, ...]:
     return tuple(sorted(path.parent.name for path in SUITES.glob("*/suite.yaml")))
 
 
+def known_suites() -> tuple[str, ...]:
+    """Return the names of the suites that ship with RoboEval or with installed packages."""
+    return tuple(dict.fromkeys([*shipped_suites(), *(suite.name for suite in installed_suites())]))
+
+
 def suite_folder(name: str) -> Path:
     """Return the folder of a built-in or installed suite, or a folder's path. Otherwise, raise UserError."""
     if name in shipped_suites():
@@ -114,7 +126,7 @@ def suite_folder(name: str) -> Path:
         return installed.resolve()
     folder = Path(name)
     if not (folder / "suite.yaml").is_file():
-        known = ", ".join(dict.fromkeys([*shipped_suites(), *(suite.name for suite in installed_suites())]))
+        known = ", ".join(known_suites())
         raise UserError(f'unknown suite "{name}"; use one of {known}, or a folder with a suite.yaml')
     return folder.resolve()
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from statistics import fmean
 
 from codebotler.core.errors import VIOLATION
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import shared_pool
-from roboeval.evaluation.judge import are_met, may_satisfy, robot_in
+from roboeval.evaluation.judge import are_met, may_satisfy, robot_in, run_in
 from roboeval.evaluation.rewards import RewardCache, Share, requirements_of, total
 from roboeval.suites.families.tasks import TRAINING_WORLDS, trained_task
 from roboeval.suites.house import HouseRules
@@ -110,13 +109,13 @@ def _judge_batch(worlds: int, house: HouseRules | None, batch: Sequence[Rollout]
     task.expect_prompt(first.prompt_index)
     suite = task.suite.with_house_rules(house)
     asked = requirements_of(task.suite, task.name, first.prompt_index)
-    robots = [partial(robot_in, scenario.world, suite) for scenario, _ in asked]
     worker = shared_pool().here()
-    ran = worker.run_all([(one.program, robots) for one in batch])
+    scenarios = [scenario for scenario, _ in asked]
+    ran = run_in(worker, [one.program for one in batch], scenarios, suite)
     components = []
     for one, outcomes in zip(batch, ran, strict=True):
         has_run = any(outcome.trace or outcome.error is None for outcome in outcomes)
-        parses = has_run or worker.compiles(one.program, robots[0]())
+        parses = has_run or worker.compiles(one.program, robot_in(scenarios[0].world, suite))
         components.append(components_of(outcomes, asked, parses=parses))
     return components
 

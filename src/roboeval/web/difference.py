@@ -14,12 +14,12 @@ from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
 from roboeval.analysis.compare import (
     MISSIONS_COMPARED,
-    compare_scores,
+    compare_tables,
     comparison_sentence,
     pairs_to_compare,
 )
-from roboeval.analysis.metrics import DIFFERENCE, Estimate, by_formula, pass_at_1
-from roboeval.analysis.missions import comparable_scores, has_missions
+from roboeval.analysis.metrics import Estimate
+from roboeval.analysis.missions import has_missions
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of
 from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.snapshot import Snapshot
@@ -42,26 +42,6 @@ class TaskRow:
     differing: tuple[tuple[CompletionKey, bool], ...]  # pass in one run only, True for the second run
 
 
-def task_rows(first: Snapshot, second: Snapshot) -> list[TaskRow]:
-    """Compare the tasks that two runs have in common, and return the largest differences first."""
-    scores = [*map(pass_at_1, comparable_scores(first.results.table, second.results.table))]
-    prompts: dict[str, list[tuple[float, float]]] = {}
-    for key in scores[0]:
-        if key in scores[1]:
-            prompts.setdefault(key[0], []).append((scores[0][key], scores[1][key]))
-    differing = _find_differing(first, second)
-    rows = [
-        TaskRow(
-            task,
-            (sum(a for a, _ in pairs) / len(pairs), sum(b for _, b in pairs) / len(pairs)),
-            by_formula([[b - a] for a, b in pairs], within=DIFFERENCE),
-            tuple(differing.get(task, ())),
-        )
-        for task, pairs in prompts.items()
-    ]
-    return sorted(rows, key=lambda row: (-abs(row.difference.mean), row.task))
-
-
 def _find_differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[CompletionKey, bool]]]:
     judged = [run.completions.drop_nulls("passed").select(*KEY, "passed") for run in (first, second)]
     both = judged[0].join(judged[1], on=KEY, how="inner", suffix="_second", maintain_order="left")
@@ -80,7 +60,7 @@ class Difference:
     runs: tuple[Snapshot, Snapshot]
     sentence: str  # states which run is better, and how significant the difference is
     overall: TaskRow | None = None  # over all tasks; None if they have no prompt in common
-    rows: tuple[TaskRow, ...] = ()
+    rows: tuple[TaskRow, ...] = ()  # by task, the largest differences first
 
 
 def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
@@ -93,7 +73,7 @@ def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Differen
     names = shortened(first.name, MAX_NAME), shortened(second.name, MAX_NAME)
     try:
         tables = first.results.table, second.results.table
-        found = compare_scores(*map(pass_at_1, comparable_scores(*tables)))
+        found = compare_tables(*tables)
     except UserError:
         return Difference((first, second), f"{names[0]} and {names[1]} have no prompt in common.")
     sentence = comparison_sentence(found, names)
@@ -102,7 +82,13 @@ def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Differen
     if not by_task:
         return Difference((first, second), sentence)
     overall = TaskRow("All tasks", (found.first, found.second), found.over_tasks, ())
-    return Difference((first, second), sentence, overall, tuple(task_rows(first, second)[:MAX_PAIR_TASKS]))
+    differing = _find_differing(first, second)
+    rows = [
+        TaskRow(one.task, (one.first, one.second), one.difference, tuple(differing.get(one.task, ())))
+        for one in found.tasks
+    ]
+    rows.sort(key=lambda row: (-abs(row.difference.mean), row.task))
+    return Difference((first, second), sentence, overall, tuple(rows[:MAX_PAIR_TASKS]))
 
 
 def draw_differences(found: Sequence[Difference]) -> None:

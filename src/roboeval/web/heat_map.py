@@ -24,13 +24,9 @@ def shade(share: float | None, *, bad: bool) -> str:
     """Return the CSS class of a cell. Its share is from 0 to 1, or None if it is unknown."""
     if share is None:
         return "waits"
-    step = (
-        0
-        if share == 0
-        else SHADE_STEPS
-        if share == 1
-        else max(1, min(SHADE_STEPS - 1, round(share * SHADE_STEPS)))
-    )
+    step = round(share * SHADE_STEPS)
+    if 0 < share < 1:
+        step = max(1, min(SHADE_STEPS - 1, step))
     return f"{'f' if bad else 's'}{step}"
 
 
@@ -56,6 +52,13 @@ def failure_text(chosen: CompletionFilter) -> str | None:
     return None if chosen.failure_class is None else shortened(ending_of(chosen.failure_class), MAX_NAME)
 
 
+def verb_of(chosen: CompletionFilter) -> str:
+    """Say in a verb what the completions that a filter selects have done; by default, they passed."""
+    if (by := failure_text(chosen)) is not None:
+        return f"ended {by}"
+    return "failed" if chosen.passed is False else "passed"
+
+
 class TaskCells:
     """Computes the cells of a run in a heat map of tasks by prompts, and marks the selected cell."""
 
@@ -63,8 +66,7 @@ class TaskCells:
         self._run, self._filter, self._evaluation = run, chosen, evaluation
         counted = CompletionFilter(passed=True) if chosen.verdict == CompletionFilter() else chosen
         self._bad = not counted.passed
-        by = failure_text(counted)
-        self._verb = "passed" if counted.passed else "failed" if by is None else f"ended {by}"
+        self._verb = verb_of(counted)
         self.tasks: dict[str, dict[int, dict[str, Any]]] = {}
         for prompt in run.prompts(counted):
             self.tasks.setdefault(prompt["task"], {})[prompt["prompt"]] = prompt

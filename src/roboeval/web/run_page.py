@@ -13,7 +13,7 @@ from codebotler.core.terminal import shortened
 from codebotler.web.frame import Button, PlainText, outside
 from roboeval.analysis.metrics import percent
 from roboeval.evaluation.failures import plural_of
-from roboeval.web.heat_map import MAX_NAME, MISSING, TaskCells, failure_text, models_of, run_address
+from roboeval.web.heat_map import MAX_NAME, MISSING, TaskCells, models_of, run_address, verb_of
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import CompletionFilter, Snapshot
@@ -102,7 +102,7 @@ class _RunPage:
         cells = TaskCells(run, chosen, self._evaluation)
         rows = [{"name": shortened(task, MAX_NAME), "cells": cells.row(task)} for task in cells.tasks]
         self._heat.show(groups=[{"name": "", "columns": cells.columns}], rows=rows)
-        self._title.say(f"Share that {_verb(chosen)}")
+        self._title.say(f"Share that {verb_of(chosen)}")
         self._which.say(_heading(chosen))
         self._all.set_visibility(chosen != CompletionFilter())
         source = f"/api/runs/{quote(run.name, safe='')}/completions{chosen.query(run.results.key) or '?'}"
@@ -180,12 +180,6 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
                 link.props('aria-current="true"')
 
 
-def _verb(chosen: CompletionFilter) -> str:
-    if (by := failure_text(chosen)) is not None:
-        return f"ended {by}"
-    return "failed" if chosen.passed is False else "passed"
-
-
 def _heading(chosen: CompletionFilter) -> str:
     parts = []
     if chosen.task is not None:
@@ -193,5 +187,5 @@ def _heading(chosen: CompletionFilter) -> str:
     if chosen.prompt is not None:
         parts.append(f"prompt {chosen.prompt}")
     if chosen.verdict != CompletionFilter():
-        parts.append(f"that {_verb(chosen)}")
+        parts.append(f"that {verb_of(chosen)}")
     return f"Completions {', '.join(parts)}".rstrip()

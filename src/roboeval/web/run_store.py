@@ -160,7 +160,7 @@ class _Reader:
 
     def _read_files(self) -> Results:
         faults: list[UserError] = []
-        results = read_results(self._run, self._key, keep_failed=False, faults=faults)
+        results = read_results(self._run, self._key, faults=faults)
         existing = tuple(fault for fault in faults if Path(str(fault.file)).exists())  # new runs lack files
         name = results.manifest.get("suite") or results.about.get("suite")
         suite = self._store.suite(name if isinstance(name, str) else "paper")

@@ -41,7 +41,7 @@ class RunState(StrEnum):
 
 def state_of(run: Snapshot) -> RunState:
     """Determine the progress of a run."""
-    written, coverage = len(run.results.completions), run.coverage
+    written, coverage = len(run.results.completions), run.results.coverage
     lacks = coverage.there < coverage.total
     unjudged = run.judged < run.results.scope.total
     stages = (
@@ -57,7 +57,7 @@ def state_of(run: Snapshot) -> RunState:
 
 def run_data(run: Snapshot) -> dict[str, Any]:
     """Summarise a run as plain data."""
-    results, mean, coverage = run.results, run.pass_at_1, run.coverage
+    results, mean, coverage = run.results, run.pass_at_1, run.results.coverage
     return {
         "run": run.name,
         "models": run.models,

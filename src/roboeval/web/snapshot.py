@@ -13,13 +13,12 @@ from fastapi import Query
 from codebotler.core.cachedproperty import cached_property
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from roboeval.analysis.counts import tally_of, task_scores
-from roboeval.analysis.metrics import Estimate, TaskScore, judged_count, overall, passed_count, prompts_of
+from roboeval.analysis.metrics import Estimate, TaskScore, overall
 from roboeval.analysis.summary import Failures, cut_off_replies, failures
-from roboeval.analysis.tasks import prompt_counts
 from roboeval.evaluation.failures import NO_PROGRAM_CLASS
 from roboeval.evaluation.runs.completions import KEY, CompletionKey
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.scope import Coverage, CutOff, JudgingScope
+from roboeval.evaluation.runs.scope import CutOff
 from roboeval.evaluation.runs.table import storable
 from roboeval.suites.load import Suite
 from roboeval.suites.task import check_label
@@ -146,33 +145,33 @@ class Snapshot:
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
     def prompts(self, chosen: CompletionFilter) -> list[dict[str, Any]]:
-        """Count the completions of each prompt: `written`, `judged`, and `counted` (matching the filter)."""
-        return prompt_counts(self.completions, chosen.verdict.condition).to_dicts()
+        """Count the completions of each prompt: `written`, `judged`, and `counted` (matching the filter).
+
+        `share` is the share of judged completions that match, or None if none was judged.
+        """
+        judged = pl.col("judged")
+        counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
+            written=pl.col("written").sum(),
+            judged=pl.col("passed").count(),
+            counted=chosen.verdict.condition.sum(),
+        )
+        share = pl.col("counted") / pl.when(judged > 0).then(judged)
+        return counts.with_columns(share=share).to_dicts()
 
     @property
     def judged(self) -> int:
         """The number of judged completions."""
-        return judged_count(prompts_of(self.scores))
+        return len(self.results.places)
 
     @property
     def passed(self) -> int:
         """The number of judged completions that passed."""
-        return passed_count(prompts_of(self.scores))
-
-    @cached_property
-    def scope(self) -> JudgingScope:
-        """The completions that were selected for judging."""
-        return self.results.scope
-
-    @property
-    def coverage(self) -> Coverage:
-        """The numbers of judged, existing and requested completions."""
-        return self.scope.coverage(self.judged)
+        return len(self.results.passed)
 
     @property
     def cut_off(self) -> CutOff:
         """The replies that were cut off."""
-        return cut_off_replies(self.failures, self.scope)
+        return cut_off_replies(self.failures, self.results.scope)
 
     @cached_property
     def scores(self) -> tuple[TaskScore, ...]:

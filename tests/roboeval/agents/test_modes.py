@@ -9,8 +9,8 @@ import pytest
 
 from codebotler.core.files import to_line
 from command_line import refused, roboeval
-from roboeval.analysis.metrics import pass_at_1
-from roboeval.analysis.missions import comparable_scores, has_missions, mission_costs
+from roboeval.analysis.compare import compare_tables
+from roboeval.analysis.missions import has_missions, mission_costs
 from roboeval.evaluation.runs.results import load_results
 from small_suite import a_suite
 
@@ -68,14 +68,13 @@ def tables(runs: tuple[Path, Path, str]) -> list[pl.DataFrame]:
 def test_both_are_counted_by_missions(runs: tuple[Path, Path, str]) -> None:
     programs, agents = tables(runs)
     assert (has_missions(programs), has_missions(agents)) == (False, True)
-    first, second = map(pass_at_1, comparable_scores(programs, agents))
-    assert (first, second) == ({("T", 0): 0.5}, {("T", 0): 0.75})
+    found = compare_tables(programs, agents)
+    assert (found.first, found.second) == (0.5, 0.75)
 
 
 def test_two_runs_of_programs_are_counted_by_programs(runs: tuple[Path, Path, str]) -> None:
     programs, _ = tables(runs)
-    (scores, _) = comparable_scores(programs, programs)
-    assert pass_at_1(scores) == {("T", 0): 0.0}
+    assert compare_tables(programs, programs).first == 0.0
 
 
 def test_costs_are_those_of_a_mission(runs: tuple[Path, Path, str]) -> None:

@@ -21,7 +21,7 @@ from roboeval.analysis.compare import (
     pairs_to_compare,
     sample_size_sentences,
 )
-from roboeval.cli.inputs import Opened, expect_same_suite
+from roboeval.cli.inputs import expect_same_suite
 from roboeval.cli.views.comparison import comparison_view
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import Results
@@ -150,13 +150,12 @@ def test_what_is_unlike() -> None:
 
 
 def test_other_suites_are_refused() -> None:
-    def opened(name: str, digest: str) -> Opened:
-        results = replace(a_run({}, {"digest": digest}), run=RunFolder(Path(name)))
-        return Opened(results, f"roboeval evaluate {name} --suite mine")
+    def opened(name: str, digest: str) -> Results:
+        return replace(a_run({}, {"digest": digest}), run=RunFolder(Path(name)))
 
-    expect_same_suite([opened("a", "1"), opened("b", "1")])
+    expect_same_suite([opened("a", "1"), opened("b", "1")], "mine")
     with pytest.raises(UserError, match=r"\bb and a\b.* \(1 and 0\)") as e:
-        expect_same_suite([opened("a", SUITE.digest), opened("b", "1")])
+        expect_same_suite([opened("a", SUITE.digest), opened("b", "1")], "mine")
     assert "`roboeval evaluate b --suite mine --redo`" in str(e.value)
 
 

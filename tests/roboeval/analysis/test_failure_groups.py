@@ -114,7 +114,7 @@ def told(program: str = GOES.format("lab")) -> Any:  # noqa: ANN401 - one group
     programs = {("Visit", 0, 0): "pass", ("Visit", 0, 1): program, ("Visit", 0, 2): program}
     programs["Visit", 4, 0] = RIGHT
     results = results_of([*rows, {**row(4, 0), "passed": True}], SUITE, programs)
-    (one,) = describe_groups([[*map(results.failed_row, results.failed)]], results)
+    (one,) = describe_groups([[*map(results.row, results.failed)]], results)
     return one
 
 
@@ -143,13 +143,8 @@ def test_a_group_for_people_shows_what_models_write_as_it_is() -> None:
 def test_programs_that_are_gone() -> None:
     rows = [failed(0, 0), failed(0, 1)]
     results = results_of(rows, SUITE)
-    (group,) = group_failures(map(results.failed_row, results.failed), results.programs)
+    (group,) = group_failures(map(results.row, results.failed), results.programs)
     (one,) = describe_groups([group], results)
     assert one.program is None
     assert one.fix is None
     assert "no longer in this run" in printed(failure_group_view(one), width=200)
-
-
-def test_only_the_world_that_decides_keeps_its_trace() -> None:
-    kept = results_of([failed(0, 0)]).failed_row(("Visit", 0, 0))
-    assert [verdict["trace"] for verdict in kept["verdicts"]] == [[], [["goto", "hall"]]]

@@ -108,7 +108,7 @@ def test_an_interval_of_what_is_alike_everywhere_is_unknown(folder: Path) -> Non
     shown = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder).out
     assert "100.0% of a prompt's programs" in shown
     assert "(95% interval over tasks unknown: no variation between tasks)" in " ".join(shown.split())
-    results = open_current(folder / "run", "paper", ablated=False).results
+    results = open_current(folder / "run", "paper", ablated=False)
     run = judged_run(results, "paper", beside=None, rules=folder / "house.yaml", engine=None)
     assert "the interval of the share that breaks a rule is unknown: no variation between tasks." in page(
         "a report", [], [house([run])], {}

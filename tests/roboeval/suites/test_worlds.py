@@ -11,6 +11,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from roboeval.suites.expression import ExpressionError, evaluate, iterate_loop, parse_cached
+from roboeval.suites.house import HouseRules
 from roboeval.suites.load import load_suite
 from roboeval.suites.pairwise import cover_pairs, sample_combinations
 from roboeval.suites.schema import MAX_WORLDS
@@ -131,6 +132,11 @@ def test_the_same_seed_draws_the_same_worlds_and_another_draws_others(tmp_path: 
     assert more.with_own_worlds().digest == mine.digest
     assert other.tasks["Tea"].scenarios[2:] != mine.tasks["Tea"].scenarios[2:]
     assert other.tasks["Tea"].scenarios[:2] == mine.tasks["Tea"].scenarios[:2]
+
+
+def test_other_worlds_keep_the_house_rules(tmp_path: Path) -> None:
+    ruled = load_suite(suite(tmp_path)).with_house_rules(HouseRules("quiet", (), "0"))
+    assert ruled.with_worlds(seed=4).house == ruled.house
 
 
 def test_worlds_of_other_seeds_are_not_held_for_ever(tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
         cells = (
             f"{task.first:.3f}",
             f"{task.second:.3f}",
-            f"{task.difference:+.3f}",
+            f"{task.second - task.first:+.3f}",
             f"{round(task.share, 9):+.3f}",
         )
         table.add_row(Text(visible(task.task)), *cells, str(task.prompts))

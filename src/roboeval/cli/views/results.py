@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +15,7 @@ from rich.text import Text
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
-from roboeval.analysis.metrics import judged_count
-from roboeval.analysis.summary import EvaluationSummary, Failures, Missing
+from roboeval.analysis.summary import EvaluationSummary, Failures
 from roboeval.cli.views.completions import kind_view, prompt_lines
 from roboeval.evaluation.failures import classes_to_show, plural_of
 from roboeval.evaluation.runs.completions import how_many, recorded_suffix
@@ -40,7 +39,7 @@ def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
     head = Text(visible(title) + recorded_suffix(summary.scope.models), style="bold")
     if summary.ablated:
         head.append(" (ablation: only common sense was required)", style="not bold")
-    n, failed = judged_count(summary.prompts), sum(each.count for each in summary.failures)
+    n, failed = summary.judged, sum(each.count for each in summary.failures)
     parts: list[RenderableType] = [head, Text(), _TaskTable(summary), Text()]
     parts += [*_overall(summary), *_missed(summary.missing)]
     if (warning := summary.cut_off.warning) is not None:
@@ -71,19 +70,22 @@ def house_view(found: BrokenRules) -> RenderableType:
     return Group(*parts)
 
 
-def _missed(missing: Missing) -> Iterator[Text]:
-    for reason, tasks in [
-        ("no completions for", missing.no_completions),
-        ("not judged yet:", missing.not_judged),
-        ("not selected:", missing.not_selected),
-    ]:
+MISSING_REASONS = {
+    "no_completions": "no completions for",
+    "not_judged": "not judged yet:",
+    "not_selected": "not selected:",
+}
+
+
+def _missed(missing: Mapping[str, Sequence[str]]) -> Iterator[Text]:
+    for reason, tasks in missing.items():
         if tasks:
             named = (
                 ", ".join(map(visible, tasks))
                 if len(tasks) <= MAX_TASKS_NAMED
                 else counted(len(tasks), "task")
             )
-            yield Text(f"{reason} {named}", style="dim")
+            yield Text(f"{MISSING_REASONS[reason]} {named}", style="dim")
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ class _TaskTable:
             shares |= {"worst prompt": task.lowest(first), "best prompt": task.highest(first)}
             styles: dict[float, str] = {0: "red", 1: "green"}
             cells = {name: Text(f"{share:.2f}", styles.get(share, "")) for name, share in shares.items()}
-            coverage = self.summary.scope.coverage(judged_count(task.prompts), task.task)
+            coverage = self.summary.scope.coverage(task.n, task.task)
             of = "" if coverage.is_whole else f" of {coverage.total:,}"
             cells["completions"] = Text(f"{coverage.judged:,}{of}")
             table.add_row(Text(visible(task.task)), *(cells[name.replace("\n", " ")] for name in columns))

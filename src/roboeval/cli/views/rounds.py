@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from roboeval.analysis.metrics import judged_count
 from roboeval.cli.views.results import ruled
 
 if TYPE_CHECKING:
@@ -33,12 +32,12 @@ def rounds_view(rounds: Sequence[Round], *, repairs: bool) -> RenderableType:
     requests = tokens = 0
     for one in rounds:
         requests, tokens = requests + one.requests, tokens + one.tokens
-        judged, [estimate] = judged_count(one.summary.prompts), one.summary.overall
+        [estimate] = one.summary.overall
         table.add_row(
             _name(one.number, repairs=repairs),
             f"{estimate.mean:.3f}",
             estimate.ends(),
-            f"{judged:,} of {one.summary.scope.total:,}",
+            f"{one.summary.judged:,} of {one.summary.scope.total:,}",
             f"{one.accepted:,}",
             f"{requests:,}",
             f"{tokens:,}" if tokens else "unknown",

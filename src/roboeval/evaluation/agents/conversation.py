@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from codebotler.models.base import Reply
-from codebotler.prompts import Prompt, PromptMessage
-from codebotler.prompts.tools import CallingMessage, ResultMessage, ToolCall, ToolPrompt
+from codebotler.prompts import Prompt
+from codebotler.prompts.tools import CallingMessage, ResultMessage, ToolCall
 from roboeval.evaluation.agents.mission import AgentMission
-from roboeval.evaluation.runs.endings import SERVER_REJECTED, TOKEN_LIMIT, TURN_LIMIT
+from roboeval.evaluation.runs.endings import TOKEN_LIMIT, TURN_LIMIT
 
 MAX_REASONING = 200_000
 """The characters of reasoning that a row keeps; the log of turns has all of it."""
@@ -31,33 +30,27 @@ class Conversation(ABC):
 
     def __init__(self, mission: AgentMission, prompt: Prompt, limits: TurnLimits) -> None:
         self.mission, self.limits = mission, limits
+        self.prompt: Prompt | None = prompt  # the next request to the model; None after the end
         self.replies: list[Reply] = []
-        self._first = prompt
-
-    @property
-    @abstractmethod
-    def prompt(self) -> Prompt | None:
-        """The next request to the model; None after the end."""
+        self.result: str | None = None  # of the calls in the last reply
 
     def add(self, reply: Reply) -> None:
         """Do what a reply says, or end the mission if it says nothing."""
         self.replies.append(reply)
+        self.result = None
         if reply.no_program is None:
-            self._act(reply)
+            self.prompt = self._act(reply)
         else:
             self.end(reply.no_program)
 
-    def reject(self, sentence: str) -> None:
-        """End the mission because the server rejects the conversation, as it says in a sentence."""
-        self.end(SERVER_REJECTED, sentence)
-
-    @abstractmethod
     def end(self, ending: str, why: str = "") -> None:
         """End the mission for a reason outside of it."""
+        self.prompt = None
+        self.mission.end(ending, why)
 
     @abstractmethod
-    def _act(self, reply: Reply) -> None:
-        """Make the call of a reply, or run its program."""
+    def _act(self, reply: Reply) -> Prompt | None:
+        """Make the call of a reply, or run its program. Return the next request, or None after the end."""
 
     @property
     def limit(self) -> str | None:
@@ -85,33 +78,19 @@ class Conversation(ABC):
 class AgentConversation(Conversation):
     """Lets a model call skills. Every reply is one call, or else the end of the mission."""
 
-    def __init__(self, mission: AgentMission, prompt: ToolPrompt, limits: TurnLimits) -> None:
-        super().__init__(mission, prompt, limits)
-        self.result: str | None = None  # of the calls in the last reply
-        self._later: list[PromptMessage] = []
-
-    @property
-    def prompt(self) -> Prompt | None:
-        """The request for the next call."""
-        if self.mission.ending is not None:
-            return None
-        return replace(self._first, messages=(*self._first.messages, *self._later))
-
-    def end(self, ending: str, why: str = "") -> None:
-        """End the mission for a reason outside of it."""
-        self.result = None
-        self.mission.end(ending, why)
-
-    def _act(self, reply: Reply) -> None:
-        self.result = None
+    def _act(self, reply: Reply) -> Prompt | None:
         if not reply.calls:
             self.mission.answer(reply.text)
-            return
+            return None
         self.result = result = self._make(reply.calls)
-        self._later.append(CallingMessage("assistant", reply.text, reply.turn))
-        self._later += [ResultMessage("tool", result, call) for call in reply.calls]
         if self.mission.ending is None and self.limit is not None:
             self.mission.end(self.limit)
+        if self.mission.ending is not None:
+            return None
+        assert self.prompt is not None, "a reply answers a prompt"
+        said = CallingMessage("assistant", reply.text, reply.turn)
+        results = [ResultMessage("tool", result, call) for call in reply.calls]
+        return replace(self.prompt, messages=(*self.prompt.messages, said, *results))
 
     def _make(self, calls: Sequence[ToolCall]) -> str:
         if len(calls) == 1:
@@ -129,8 +108,5 @@ def mission_data(mission: AgentMission) -> dict[str, Any]:
 
 
 def _total_usage(usages: list[Mapping[str, int | None]]) -> dict[str, int | None]:
-    total: Counter[str] = Counter()
-    known = {name for usage in usages for name, count in usage.items() if count is not None}
-    for usage in usages:
-        total.update({name: count or 0 for name, count in usage.items()})
-    return {name: total[name] if name in known else None for name in usages[0]}
+    known = {name: [n for usage in usages if (n := usage[name]) is not None] for name in usages[0]}
+    return {name: sum(counts) if counts else None for name, counts in known.items()}

@@ -22,7 +22,7 @@ from roboeval.evaluation.agents.conversation import mission_data
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.agents.plan import AgentPlan
 from roboeval.evaluation.requests import run_metadata, with_batch
-from roboeval.evaluation.runs.completions import KEY, CompletionKey
+from roboeval.evaluation.runs.completions import CompletionKey, row_for
 from roboeval.evaluation.runs.endings import TURN_LIMIT
 from roboeval.evaluation.runs.folder import RunFolder
 
@@ -31,15 +31,7 @@ _TO_END = f"When everything is done, call {FINISH}. This ends the mission."
 _OVER = f"This mission is over; call {NEXT} for the next one."
 
 
-UNKNOWN_SETTINGS = SamplingSettings(temperature=None, top_p=None)
-
-
-@dataclass(frozen=True)
-class ClientAgent:
-    """A model behind an MCP client, which has settings of its own."""
-
-    name: str
-    settings: SamplingSettings = UNKNOWN_SETTINGS
+UNKNOWN_SETTINGS = SamplingSettings(temperature=None, top_p=None)  # a client has settings of its own
 
 
 @dataclass
@@ -47,7 +39,7 @@ class MissionDesk:
     """Hands out the missions of a run that are not done, one at a time, and saves each at its end."""
 
     plan: AgentPlan
-    agent: ClientAgent
+    model: str  # the name of the model behind the client
     file: Appender
     todo: list[CompletionKey]
     _current: tuple[CompletionKey, AgentMission] | None = None
@@ -109,25 +101,25 @@ class MissionDesk:
         return "\n\n".join([*(message.text for message in request.messages), left])
 
     def _keep(self, key: CompletionKey, mission: AgentMission) -> None:
-        identity = {**dict(zip(KEY, key, strict=True)), "instruction": self.plan.instruction(key)}
-        more = {"model": self.agent.name, "mode": "agent", "world": self.plan.world(key)}
+        where = {"mode": "agent", "world": self.plan.world(key)}
         ended = {**mission_data(mission), "no_program": None, "turns": self._calls, "usage": None}
-        self.file.append(to_line({**identity, **more, **ended}))
+        row = row_for(key, self.plan.instruction(key), self.model, where | ended)
+        self.file.append(to_line(row))
         self.file.sync()
         self.todo.remove(key)
         self._current = None
 
 
 @contextlib.contextmanager
-def open_desk(run: RunFolder, plan: AgentPlan, agent: ClientAgent) -> Iterator[MissionDesk]:
+def open_desk(run: RunFolder, plan: AgentPlan, model: str) -> Iterator[MissionDesk]:
     """Open a run whose missions an MCP client carries out. Those that are done stay as they are."""
     with run.writing():
-        about = run_metadata(run, plan, agent)
+        about = run_metadata(run, plan, model, UNKNOWN_SETTINGS)
         done = {completion.key for completion in plan.completed(run)}
-        about["batches"] = with_batch(about["batches"], plan, agent.settings)
+        about["batches"] = with_batch(about["batches"], plan, UNKNOWN_SETTINGS)
         write_whole(run.about, to_text(about))
         with contextlib.closing(Appender(run.completions)) as file:
-            yield MissionDesk(plan, agent, file, [key for key in plan.keys() if key not in done])  # noqa: SIM118 - a plan is no mapping
+            yield MissionDesk(plan, model, file, [key for key in plan.keys() if key not in done])  # noqa: SIM118 - a plan is no mapping
 
 
 async def serve_agent(desk: MissionDesk) -> None:

@@ -10,13 +10,14 @@ from typing import Any, ClassVar, Literal, TypeAlias
 from codebotler.checking.contract_file import contract_yaml
 from codebotler.models.base import ModelError, Reply
 from codebotler.prompts import Prompt, template_hash
-from codebotler.prompts.tools import ToolPrompt, agent_prompt, agent_template_hash
+from codebotler.prompts.tools import agent_prompt, agent_template_hash
 from codebotler.simulator.contract import Contract
 from roboeval.evaluation.agents.conversation import AgentConversation, Conversation, TurnLimits
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.agents.replan import ReplanConversation
 from roboeval.evaluation.requests import Ask, GenerationPlan
-from roboeval.evaluation.runs.completions import KEY, CompletionKey
+from roboeval.evaluation.runs.completions import CompletionKey, row_for
+from roboeval.evaluation.runs.endings import SERVER_REJECTED
 
 AgentMode: TypeAlias = Literal["agent", "replan"]
 DEFAULT_TURNS: dict[AgentMode, int] = {"agent": 300, "replan": 4}  # some worlds need 100 looks and waits
@@ -75,17 +76,16 @@ class AgentPlan(GenerationPlan):
             except ModelError as error:
                 if not error.is_refusal or not conversation.replies:  # a server may refuse all first requests
                     raise
-                conversation.reject(error.sentence)
+                conversation.end(SERVER_REJECTED, error.sentence)
             else:
                 await asyncio.to_thread(conversation.add, reply)
-        identity = {**dict(zip(KEY, key, strict=True)), "instruction": self.instruction(key), "model": model}
-        return {**identity, "mode": self.mode, "world": self.world(key), **conversation.data()}
+        where = {"mode": self.mode, "world": self.world(key)}
+        return row_for(key, self.instruction(key), model, where | conversation.data())
 
     def begin(self, key: CompletionKey) -> Conversation:
         """Begin the conversation about a mission."""
-        if self.mode == "replan":
-            return ReplanConversation(self.begin_mission(key), self.prompt(key), self.limits)
-        return AgentConversation(self.begin_mission(key), self._agent_prompt(key), self.limits)
+        kind = AgentConversation if self.mode == "agent" else ReplanConversation
+        return kind(self.begin_mission(key), self.prompt(key), self.limits)
 
     def begin_mission(self, key: CompletionKey) -> AgentMission:
         """Begin a mission without a conversation."""
@@ -94,7 +94,10 @@ class AgentPlan(GenerationPlan):
 
     def prompt(self, key: CompletionKey) -> Prompt:
         """Return the first request of a mission."""
-        return self._agent_prompt(key) if self.mode == "agent" else super().prompt(key)
+        if self.mode == "replan":
+            return super().prompt(key)
+        rules, skills = self.suite.house_sentences, self.suite.skills
+        return agent_prompt(self.instruction(key), rules=rules, skills=skills)
 
     def world(self, key: CompletionKey) -> int:
         """Return the index of the world of a mission."""
@@ -102,7 +105,3 @@ class AgentPlan(GenerationPlan):
 
     def _worlds(self, task: str) -> int:
         return len(self.suite.tasks[task].scenarios)
-
-    def _agent_prompt(self, key: CompletionKey) -> ToolPrompt:
-        rules, skills = self.suite.house_sentences, self.suite.skills
-        return agent_prompt(self.instruction(key), rules=rules, skills=skills)

@@ -25,48 +25,48 @@ class ReplanConversation(Conversation):
 
     def __init__(self, mission: AgentMission, prompt: Prompt, limits: TurnLimits) -> None:
         super().__init__(mission, prompt, limits)
-        self._next: Prompt | None = prompt
+        self._first = prompt
         self._calls: Sequence[Call] = ()
-
-    @property
-    def prompt(self) -> Prompt | None:
-        """The request for the next program."""
-        return self._next
 
     def end(self, ending: str, why: str = "") -> None:
         """End the mission for a reason outside of it, after the calls so far."""
-        self._end(None)
+        self._make_calls()
+        self.prompt = None
         if self.mission.ending is None:
             self.mission.end(ending, why)
 
-    def _act(self, reply: Reply) -> None:
+    def _act(self, reply: Reply) -> Prompt | None:
         """Run a reply's program where the last one has stopped."""
         robot, outcome = _run(reply.program, self.mission, self._calls)
         self._calls = robot.calls
-        if _may_go_on(outcome) and self.limit is None:
-            assert outcome.error is not None, "the mission may go on only after an error"
-            why = f"{outcome.error.kind}: {outcome.error.message}"
-            self.mission.mistakes[outcome.error.kind] += 1
-            instruction = self._first.instruction
-            past = MissionPast("", instruction, "", reply.program, why, outcome.trace, robot.place)
-            self._next = rest_prompt(past, self._first)
-        else:
-            self._end(outcome)
+        if not _may_go_on(outcome) or self.limit is not None:
+            self._end_like(outcome)
+            return None
+        assert outcome.error is not None, "the mission may go on only after an error"
+        why = f"{outcome.error.kind}: {outcome.error.message}"
+        self.mission.mistakes[outcome.error.kind] += 1
+        instruction = self._first.instruction
+        past = MissionPast("", instruction, "", reply.program, why, outcome.trace, robot.place)
+        return rest_prompt(past, self._first)
 
-    def _end(self, outcome: Outcome | None) -> None:
-        """Make all calls in the mission, and end it as the last program ended."""
-        self._next, mission = None, self.mission
-        mistakes = mission.mistakes.copy()
+    def _make_calls(self) -> None:
+        """Make all calls in the mission. Their errors are counted already."""
+        mission, mistakes = self.mission, self.mission.mistakes.copy()
         for name, arguments in self._calls:
             if name == SLEEP:
                 mission.sleep_until(float(arguments[0]))  # type: ignore[arg-type]  # a number of seconds
             else:
                 mission.repeat(mission.suite.skills[name], arguments)
         mission.mistakes = mistakes
-        if outcome is not None and outcome.error is not None:
+
+    def _end_like(self, outcome: Outcome) -> None:
+        """Make all calls in the mission, and end it as the last program ended."""
+        self._make_calls()
+        mission = self.mission
+        if outcome.error is not None:
             is_outside = mission.ending == OUTSIDE_CONTRACT
             mission.mistakes[OUTSIDE_CONTRACT if is_outside else outcome.error.kind] += 1
-        if outcome is None or mission.ending is not None:
+        if mission.ending is not None:
             return
         if outcome.error is None:
             mission.answer("")

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple, TypeAlias
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parse_row, read_lines, to_line
 from codebotler.core.words import counted
-from codebotler.models.base import Reply
 from codebotler.models.no_program import NO_PROGRAM_KINDS, NoProgram, classify_reply, is_cut_off
 from codebotler.prompts.extract import read_reply
 from roboeval.evaluation.runs.endings import ENDINGS
@@ -35,17 +34,6 @@ class Acted(NamedTuple):
 
     world: int  # the index of the world in its task
     ending: str  # one of `ENDINGS`
-
-    @property
-    def text(self) -> str:
-        """Write it as a text, which `parse` reads."""
-        return f"{self.world} {self.ending}"
-
-    @classmethod
-    def parse(cls, text: str) -> Acted:
-        """Read a text that `text` wrote."""
-        world, _, ending = text.partition(" ")
-        return cls(int(world), ending)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,10 +150,9 @@ class Completion:
         return hashlib.sha256(self.program.encode(errors="surrogatepass")).hexdigest()
 
 
-def reply_row(key: CompletionKey, instruction: str, model: str, reply: Reply) -> dict[str, Any]:
-    """Return the row of completions.jsonl for a model's reply."""
-    identity = {**dict(zip(KEY, key, strict=True)), "instruction": instruction, "model": model}
-    return {**identity, **reply.data()}
+def row_for(key: CompletionKey, instruction: str, model: str, more: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a row of completions.jsonl: what was asked of which model, and what came of it."""
+    return {**dict(zip(KEY, key, strict=True)), "instruction": instruction, "model": model, **more}
 
 
 def read_completions(
@@ -173,7 +160,6 @@ def read_completions(
     suite: Suite | None = None,
     *,
     growing: bool = False,
-    name: Path | str | None = None,
     faults: list[UserError] | None = None,
 ) -> Iterator[Completion]:
     """Read completions from a file of JSON lines.
@@ -182,27 +168,25 @@ def read_completions(
         path: the file.
         suite: the suite whose tasks and prompts are allowed; any by default.
         growing: whether to ignore an incomplete last line, because the file is still being written.
-        name: the file name for error messages; by default its path.
         faults: a list that collects errors while invalid lines are skipped; by default, errors are raised.
 
     Raises:
         UserError: the file is missing or empty, or a row is invalid, unknown to the suite, or a duplicate.
     """
     path = Path(path)
-    name = name or path
     seen: dict[CompletionKey, int] = {}  # line numbers
     try:
-        for number, line in read_lines(path, name=name):
+        for number, line in read_lines(path):
             try:
                 if line.strip() and (completion := _completion(line, suite, growing=growing)) is not None:
                     _expect_new(completion.key, seen, number)
                     yield completion
             except UserError as error:
-                add_or_raise(UserError(error.sentence, file=name, line=number), faults)
+                add_or_raise(UserError(error.sentence, file=path, line=number), faults)
     except UserError as error:
         add_or_raise(error, faults)
     if not seen and faults is None:
-        raise UserError("contains no completion", file=name)
+        raise UserError("contains no completion", file=path)
 
 
 def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completion | None:
@@ -239,11 +223,10 @@ def _expect_new(key: CompletionKey, seen: dict[CompletionKey, int], number: int)
         raise UserError(f"duplicates {name_of(key)} on line {first_line}; remove one of the two")
 
 
-def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:
+def check_length(row: Mapping[str, Any], file: str | None) -> None:
     """Raise UserError if a row is too long to be copied into a run."""
     if len(to_line(row)) > MAX_ROW:
-        sentence = f"this row is longer than {MAX_ROW:,} bytes; shorten the program"
-        raise UserError(sentence, file=str(file), line=line)
+        raise UserError(f"this row is longer than {MAX_ROW:,} bytes; shorten the program", file=file)
 
 
 def find_key_fault(key: CompletionKey, suite: Suite) -> str | None:

@@ -233,7 +233,7 @@ def with_judged_worlds(run: RunFolder, suite: Suite, *, ablated: bool) -> Suite:
         return suite
     match load_json_object(path):
         case {"worlds": int(worlds), "seed": int(seed)} if worlds > 0 and (worlds, seed) != drawn:
-            return suite.with_worlds(worlds, seed).with_house_rules(suite.house)
+            return suite.with_worlds(worlds, seed)
     return suite
 
 

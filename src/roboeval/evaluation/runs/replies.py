@@ -26,18 +26,23 @@ def reply_data(completion: Completion | None) -> dict[str, Any] | None:
     is_recorded = any(more.get(name) for name in ("finish_reason", "raw_reply", "reasoning", "ending"))
     if completion is None or not is_recorded:
         return None
-    usage = more.get("usage")
-    usage = usage if isinstance(usage, dict) else {}
-    tokens = {name: number_or_none(usage.get(name), int) for name in TOKENS}
     texts = {name: text if isinstance(text := more.get(name), str) else None for name in REPLY_TEXTS}
     return {
         "finish_reason": completion.finish_reason,
         "cut_off": completion.is_cut_off,
-        **tokens,
-        "latency_s": number_or_none(more.get("latency_s"), int | float),
+        **reply_numbers(completion),
         **texts,
         **({} if completion.acted is None else _mission_data(completion)),
     }
+
+
+def reply_numbers(completion: Completion | None) -> dict[str, float | None]:
+    """Return the token counts of a reply and its latency in seconds. Each is None if it was not recorded."""
+    more = {} if completion is None else completion.more
+    usage = more.get("usage")
+    usage = usage if isinstance(usage, dict) else {}
+    tokens = {name: number_or_none(usage.get(name), int) for name in TOKENS}
+    return {**tokens, "latency_s": number_or_none(more.get("latency_s"), int | float)}
 
 
 def _mission_data(completion: Completion) -> dict[str, Any]:

@@ -10,18 +10,19 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import msgspec
 import polars as pl
 
+from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import UserError
 from roboeval.evaluation.requests import requested_tasks
 from roboeval.evaluation.runs.completions import Completion, CompletionKey, read_completions
 from roboeval.evaluation.runs.folder import RunFolder, evaluation_of, load_json_object, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, add_or_raise, key_of, read_checks, read_lines_of
-from roboeval.evaluation.runs.scope import JudgingScope
+from roboeval.evaluation.runs.scope import Coverage, JudgingScope
 from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_cost
-from roboeval.evaluation.runs.traces import without_trace
 from roboeval.suites.load import ABLATED, Suite, load_suite
+
+REPLACED = "was replaced in the meantime; try again"
 
 
 def load_results(
@@ -53,7 +54,7 @@ def load_results(
         UserError: the run or suite does not exist, the suite has not judged the run, or a file is damaged.
     """
     known = load_suite(suite)
-    table = read_results(*evaluation_of(Path(run), known, ablated=ablation), keep_failed=False).table
+    table = read_results(*evaluation_of(Path(run), known, ablated=ablation)).table
     return table if price is None else with_cost(table, Price(*price))
 
 
@@ -70,11 +71,23 @@ class Results:
     places: Mapping[CompletionKey, tuple[int, int]] = field(
         repr=False
     )  # the offset and size of each row in the file, in bytes
-    passed: Sequence[CompletionKey] = field(repr=False)
-    stale: Sequence[CompletionKey]  # completions whose programs have changed since the evaluation
     table: pl.DataFrame  # the table that `load_results` returns
-    failed: Mapping[CompletionKey, bytes] = field(repr=False)  # failed rows as JSON, for `failed_row`
     faults: tuple[UserError, ...] = ()
+
+    @cached_property
+    def passed(self) -> Sequence[CompletionKey]:
+        """Return the completions that passed."""
+        return keys_where(self.table, pl.col("passed"))
+
+    @cached_property
+    def failed(self) -> Sequence[CompletionKey]:
+        """Return the completions that failed."""
+        return keys_where(self.table, ~pl.col("passed"))
+
+    @cached_property
+    def stale(self) -> Sequence[CompletionKey]:
+        """Return the completions whose programs have changed since the evaluation."""
+        return keys_where(self.table, pl.col("stale"))
 
     @property
     def known_suite(self) -> Suite:
@@ -90,10 +103,15 @@ class Results:
             return selected
         return None if requested is None else selected | requested
 
-    @property
+    @cached_property
     def scope(self) -> JudgingScope:
         """Return the completions that the evaluation should judge."""
         return JudgingScope.of(self.completions.values(), self.tasks, self.about, self.suite)
+
+    @property
+    def coverage(self) -> Coverage:
+        """Return the numbers of judged, existing and requested completions."""
+        return self.scope.coverage(len(self.places))
 
     @property
     def is_ablated(self) -> bool:
@@ -105,6 +123,16 @@ class Results:
         """Return the judged programs that are still in the run."""
         stale = set(self.stale)
         return {key: c.program for key, c in self.completions.items() if key not in stale}
+
+    @property
+    def lines(self) -> list[bytes]:
+        """Read the lines of all rows. Raise UserError if the file was replaced."""
+        path = self.run.rows(self.key or "")
+        content = path.read_bytes() if path.exists() else b""
+        lines = [content[at : at + size] for at, size in self.places.values()]
+        if not all(line.endswith(b"\n") for line in lines[:-1]) or not all(lines):
+            raise UserError(REPLACED, file=path)
+        return lines
 
     def row(self, key: CompletionKey) -> Row:
         """Read a row from the file, with all its traces. Raise UserError if the file was replaced."""
@@ -118,12 +146,7 @@ class Results:
                 return row
         except (OSError, ValueError, LookupError, TypeError, RecursionError):
             pass
-        raise UserError("was replaced in the meantime; try again", file=path)
-
-    def failed_row(self, key: CompletionKey) -> Row:
-        """Return the row of a failed completion, with only the trace of the first failing world."""
-        row: Row = json.loads(self.failed[key])
-        return row
+        raise UserError(REPLACED, file=path)
 
 
 ShowProgress: TypeAlias = Callable[[Iterator[LocatedRow], int], Iterable[LocatedRow]]
@@ -137,9 +160,7 @@ def read_results(
     *,
     task: str | None = None,
     reuse_from: Results | None = None,
-    keep_failed: bool = True,
     faults: list[UserError] | None = None,
-    on_line: Callable[[bytes], None] | None = None,
     progress: ShowProgress = lambda lines, _: lines,
 ) -> Results:
     """Read an evaluation of a run. Each file is read once.
@@ -150,9 +171,7 @@ def read_results(
         suite: the suite that judged the run, or None if it is not available.
         task: the only task whose rows are read, by default all tasks.
         reuse_from: another evaluation of the same run whose completions can be reused.
-        keep_failed: whether to keep the failed rows, which may need much memory.
         faults: a list that collects errors in files, which are raised by default.
-        on_line: a function that is called with the line of each row.
         progress: a function that passes rows through and shows progress.
     """
     if reuse_from:
@@ -163,19 +182,12 @@ def read_results(
     selected = selected_tasks(manifest) if task is None else {task}
     total = sum(selected is None or name in selected for name, _, _ in completions)
     builder = TableBuilder(completions, _categories(suite), _accepted(run, key, faults))
-    failed: dict[CompletionKey, bytes] = {}
     places: dict[CompletionKey, tuple[int, int]] = {}
     rows = run.rows(key or "")
-    lines = (
-        iter(()) if key is None else read_lines_of(rows, manifest, task=task, on_line=on_line, faults=faults)
-    )
+    lines = iter(()) if key is None else read_lines_of(rows, manifest, task=task, faults=faults)
     for line in progress(lines, total):
-        row = line.row
-        builder.add(row)
-        if keep_failed and row["failure"] is not None:
-            failed[key_of(row)] = without_other_traces(row, row["failure"]["world"])
-        places[key_of(row)] = line.at, line.size
-    table = builder.table()
+        builder.add(line.row)
+        places[key_of(line.row)] = line.at, line.size
     return Results(
         run=run,
         key=key,
@@ -184,21 +196,9 @@ def read_results(
         about=about,
         completions=completions,
         places=places,
-        passed=keys_where(table, "passed"),
-        stale=keys_where(table, "stale"),
         faults=tuple(faults or ()),
-        table=table,
-        failed=failed,
+        table=builder.table(),
     )
-
-
-def without_other_traces(row: Row, world: int) -> bytes:
-    """Encode a row with the trace of a single world, to save memory."""
-    verdicts = [
-        verdict if number == world else without_trace(verdict)
-        for number, verdict in enumerate(row["verdicts"])
-    ]
-    return msgspec.json.encode({**row, "verdicts": verdicts})
 
 
 def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:

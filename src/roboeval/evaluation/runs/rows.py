@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NotRequired, TypeAlias, TypedDict
@@ -175,7 +175,6 @@ def read_lines_of(
     *,
     seal: Seal | None = None,
     task: str | None = None,
-    on_line: Callable[[bytes], None] | None = None,
     faults: list[UserError] | None = None,
 ) -> Iterator[LocatedRow]:
     """Read the rows of all tasks, or of one task. Ignore an incomplete last line, and add or raise faults."""
@@ -186,10 +185,7 @@ def read_lines_of(
         seal.add(line)
         try:
             if name in line and line.strip():
-                row = decode_row(line, check_kinds=not is_sealed(manifest))
-                if on_line is not None:
-                    on_line(line)
-                yield LocatedRow(number, at, len(line), row)
+                yield LocatedRow(number, at, len(line), decode_row(line, check_kinds=not is_sealed(manifest)))
         except UserError as error:
             if not line.endswith(b"\n"):
                 break

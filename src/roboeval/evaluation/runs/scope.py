@@ -107,14 +107,6 @@ class JudgingScope:
 
 def requested_of(about: Mapping[str, Any], suite: Suite | None) -> dict[str, int] | None:
     """Return the number of requested completions of each task, or None if it was not recorded."""
-    each = requested_of_prompts(about, suite)
-    if each is None or suite is None:
-        return None
-    return {name: count * len(suite.tasks[name].prompts) for name, count in each.items()}
-
-
-def requested_of_prompts(about: Mapping[str, Any], suite: Suite | None) -> dict[str, int] | None:
-    """Return the number of requested completions per prompt for each task, or None if not recorded."""
     found = batches(about)
     if not found or suite is None:
         return None
@@ -126,7 +118,8 @@ def requested_of_prompts(about: Mapping[str, Any], suite: Suite | None) -> dict[
         each |= Counter(dict.fromkeys(tasks if isinstance(tasks, list) else suite.tasks, count))
     # An agent has a mission in each world.
     worlds = {name: len(task.scenarios) if "mode" in about else 1 for name, task in suite.tasks.items()}
-    return {name: count * worlds[name] for name, count in each.items() if name in suite.tasks}
+    sizes = {name: len(task.prompts) * worlds[name] for name, task in suite.tasks.items()}
+    return {name: count * sizes[name] for name, count in each.items() if name in sizes}
 
 
 def limit_of(about: Mapping[str, Any]) -> int | None:

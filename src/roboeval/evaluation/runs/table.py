@@ -12,7 +12,7 @@ import polars as pl
 from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
 from roboeval.evaluation.runs.completions import KEY, NO_PROGRAM_COLUMN, Completion, CompletionKey
-from roboeval.evaluation.runs.replies import TOKENS, number_or_none
+from roboeval.evaluation.runs.replies import number_or_none, reply_numbers
 from roboeval.evaluation.runs.rows import Row, event_count, key_of
 
 Tokens = TypeVar("Tokens", float, pl.Expr)
@@ -92,9 +92,9 @@ def with_cost(table: pl.DataFrame, price: Price) -> pl.DataFrame:
     return table.with_columns(cost=price.of(pl.col("input_tokens"), pl.col("output_tokens")))
 
 
-def keys_where(table: pl.DataFrame, column: str) -> list[CompletionKey]:
-    """Return the keys of the completions for which a column is true."""
-    return [*table.filter(pl.col(column), pl.col("world_number") == 0).select(KEY).iter_rows()]
+def keys_where(table: pl.DataFrame, condition: pl.Expr) -> list[CompletionKey]:
+    """Return the keys of the completions that meet a condition."""
+    return [*table.filter(condition, pl.col("world_number") == 0).select(KEY).iter_rows()]
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
@@ -145,7 +145,7 @@ class TableBuilder:
                 *why,
                 is_stale,
                 *((None,) * 5 if written is None or is_stale else _texts(written)),
-                *_usage(written),
+                *reply_numbers(written).values(),
                 *_mission(written),
                 None,
                 self._accepted.get((row["task"], row["program_sha256"])),
@@ -186,14 +186,6 @@ def _texts(written: Completion) -> tuple[str | bool | None, ...]:
     said = written.instruction, written.program, written.more.get(NO_PROGRAM_COLUMN), written.finish_reason
     is_cut_off = None if written.finish_reason is None else written.is_cut_off
     return *(None if text is None else storable(text) for text in said), is_cut_off
-
-
-def _usage(written: Completion | None) -> tuple[float | None, ...]:
-    more = {} if written is None else written.more
-    usage = more.get("usage")
-    usage = usage if isinstance(usage, dict) else {}
-    tokens = [number_or_none(usage.get(name), int) for name in TOKENS]
-    return *tokens, number_or_none(more.get("latency_s"), int | float)
 
 
 def _mission(written: Completion | None) -> tuple[str | float | None, ...]:

@@ -63,11 +63,6 @@ def first_events(verdict: Mapping[str, Any], count: int) -> dict[str, Any]:
     return {**verdict, "trace": verdict["trace"][:count], **kept}
 
 
-def without_trace(verdict: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a verdict, given as data, without its events and their circumstances."""
-    return {name: value for name, value in verdict.items() if name not in CIRCUMSTANCES} | {"trace": []}
-
-
 def trace_of(verdict: Mapping[str, Any]) -> Trace:
     """Restore the trace of a verdict from a row, with everything that formulas refer to."""
     places, holding, to, destinations = (dict(verdict.get(name, ())) for name in CIRCUMSTANCES)

@@ -70,10 +70,6 @@ class FamilyTasks:
         usual = self.count == len(family_names())
         return f"families-{self.split}-{self.seed}" + ("" if usual else f"-{self.count}")
 
-    def suite(self, skills: SkillTable = SKILLS) -> Suite:
-        """Build a suite from these tasks. The result is reproducible."""
-        return _build_suite(self, skills)
-
     def seeds(self) -> Iterator[tuple[str, str, int]]:
         """Yield the name of each task (`BringThing`, then `BringThing-2`), its family and its seed."""
         first = first_seed(self.split, self.seed, self.count, "task")
@@ -96,7 +92,8 @@ def family_tasks_named(name: str) -> FamilyTasks | None:
 
 
 @lru_cache(maxsize=8)
-def _build_suite(which: FamilyTasks, skills: SkillTable) -> Suite:
+def family_suite(which: FamilyTasks, skills: SkillTable = SKILLS) -> Suite:
+    """Build a suite from generated tasks. The result is reproducible."""
     head = suite_file()
     made = {name: trained_task(family, seed) for name, family, seed in sorted(which.seeds())}
     digests = [f"{name} {one.suite.digest}" for name, one in made.items()]

@@ -68,10 +68,21 @@ def test_a_finished_evaluation_says_how_many_rows_it_has_and_their_hash(run: Run
 
 
 def test_only_the_rows_of_a_named_task_are_read(run: RunFolder) -> None:
-    lines: list[bytes] = []
-    assert (len(read(run, task="LunchTime", on_line=lines.append).places), len(lines)) == (3, 3)
-    assert len(read(run, task="SayGoodDay", on_line=lines.append).table) == 0
-    assert len(lines) == 3
+    found = read(run, task="LunchTime")
+    assert b"".join(found.lines) == run.rows("paper").read_bytes()
+    assert len(found.places) == 3
+    others = read(run, task="SayGoodDay")
+    assert (len(others.table), others.lines) == (0, [])
+
+
+@pytest.mark.parametrize("content", [b"", b"another row\n" * 500])
+def test_lines_of_a_file_that_was_replaced_are_not_taken_for_those_read(
+    run: RunFolder, content: bytes
+) -> None:
+    found = read(run)
+    run.rows("paper").write_bytes(content)
+    with pytest.raises(UserError, match="replaced"):
+        assert found.lines
 
 
 def test_no_flipped_bit_is_overlooked(run: RunFolder, paper: Suite) -> None:
@@ -80,7 +91,6 @@ def test_no_flipped_bit_is_overlooked(run: RunFolder, paper: Suite) -> None:
     readers: dict[str, Callable[[], object]] = {
         "results": lambda: read(run),
         "another task": lambda: read(run, task="SayGoodDay"),
-        "find": lambda: read(run, on_line=len),
         "evaluate": lambda: judged(run, paper),
     }
     for number in range(PLACES):
