@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from codebotler.core.words import counted
 from roboeval.cli.inputs import load
 from roboeval.cli.options import (
     HouseRulesOption,
@@ -57,5 +58,7 @@ def clarify(
         print_json(data)
     else:
         print_rich(clarify_view(data, source, candidates))
+    if left_out := count - len(prompts):
+        note(f"left out, with fewer than {candidates} completions: {counted(left_out, 'prompt')} of {count}")
     if opened.run is not None and rules is None:
         note(f"the result is in {store_measurement(opened.run, known, data)}")

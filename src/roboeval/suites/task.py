@@ -112,9 +112,13 @@ def check_label(text: str) -> str:
     )
 
 
-def world_title(number: int, of: str, about: str) -> str:
-    """Return the title of a world, without the number that starts a sampled world's description."""
-    return f"World {number}{of}: {about.removeprefix(f'{number}: ')}"
+def world_title(number: int, total: int | None, about: str) -> str:
+    """Return the title of a world, without the number that starts a sampled world's description.
+
+    An only world has no number, since that of an agent's mission may be any of its task.
+    """
+    which = "" if total == 1 else f" {number}" if total is None else f" {number} of {total}"
+    return f"World{which}: {about.removeprefix(f'{number}: ')}"
 
 
 def describe_contents(world: World, room: Room) -> list[str]:

@@ -170,7 +170,7 @@ def _draw_worlds(completion: Mapping[str, Any], worlds: Mapping[str, World]) -> 
 
 
 def _draw_world_head(data: Mapping[str, Any], number: int, of: int) -> None:
-    title = world_title(number, f" of {of}", shortened(data["world"], 300))
+    title = world_title(number, of, shortened(data["world"], 300))
     PlainText("h2", title).props(f"id=h-world-{number}")
     state = ("satisfied", "done") if data["satisfied"] else ("not satisfied", "failed")
     PlainText("small", state[0], f"state state-{state[1]}")

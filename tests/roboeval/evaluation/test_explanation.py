@@ -155,7 +155,7 @@ def test_a_completion_is_shown_world_by_world() -> None:
     text = printed(completion_view(row(written, Outcome(Status.FINISHED, trace)), written, SUITE), 110)
     assert text.startswith("Visit/0/0  failed check: Location\nwritten by m\nVisit her.\n\n")
     assert "  1 go_to('office')\n  2 say('hello')\n" in text
-    story = """World 1 of 1: amy is in
+    story = """World: amy is in
 not satisfied, finished
      in start
   1      looked for "amy": not found

@@ -84,7 +84,7 @@ def completion_view(
         parts += [Text(), Text(LOWERCASED_NOTE, "dim")]
     satisfied = []
     for number, world in failing_first(worlds):
-        title = Text(world_title(number, f" of {len(worlds)}", visible(world["world"])), "bold")
+        title = Text(world_title(number, len(worlds), visible(world["world"])), "bold")
         if in_full or not world["satisfied"]:
             parts += [Text(), title, _ending(world), *_world(world)]
         else:

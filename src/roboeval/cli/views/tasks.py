@@ -41,7 +41,7 @@ def suite_task_view(task: Task) -> RenderableType:
     phrases = [Text.assemble((f"{{{name}}}", "bold"), f"  {', '.join(each)}") for name, each in task.phrases]
     parts += _section("Phrases in checks", phrases) if phrases else []
     for number, scenario in enumerate(task.scenarios, 1):
-        parts += _section(world_title(number, "", scenario.world.about), _world_lines(scenario))
+        parts += _section(world_title(number, None, scenario.world.about), _world_lines(scenario))
     return Group(*parts)
 
 
