@@ -17,6 +17,7 @@ from codebotler.checking.check import check_on
 from codebotler.checking.problems import Sample
 from codebotler.checking.sampled import CheckSettings, SampledRuns, first_samplers, unexplored_samplers
 from codebotler.checking.static import read_rooms
+from codebotler.core.errors import UserError
 from codebotler.core.words import counted
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.matching import contains, normalized
@@ -80,7 +81,11 @@ class CandidateClusters:
 
 
 def cluster_candidates(
-    worker: Worker, programs: Sequence[str], settings: CheckSettings, room_map: RoomMap | None = None
+    worker: Worker,
+    programs: Sequence[str],
+    settings: CheckSettings,
+    room_map: RoomMap | None = None,
+    refused: Sequence[str] = (),
 ) -> CandidateClusters:
     """Check candidates, and group the accepted ones by behaviour in imagined worlds.
 
@@ -89,6 +94,10 @@ def cluster_candidates(
         programs: the candidates, at least one; equal ones count separately.
         settings: the settings of the check and of the runs.
         room_map: the rooms; by default all rooms that the programs name.
+        refused: programs that a person did not mean, so that no other one may do the same.
+
+    Raises:
+        UserError: all accepted candidates do what a person did not mean.
     """
     counts = Counter(programs)
     checks = {program: check_on(worker, program, room_map, settings) for program in counts}
@@ -96,16 +105,21 @@ def cluster_candidates(
     if not accepted:
         return CandidateClusters((CandidateCluster((programs[0],), 1, (), ()),), len(programs) - 1)
     rooms = room_map or shared_rooms(accepted, [checks[one].room_map for one in accepted], settings)
-    runs = run_in_shared_worlds(worker, accepted, rooms, settings)
+    runs = run_in_shared_worlds(worker, [*accepted, *refused], rooms, settings)
     traces = [sample.outcome.trace for samples in runs for sample in samples]
     names, several = names_in((*rooms.rooms, *rooms.people), traces), rooms_with_several(traces)
     behaviours = [
         tuple(behaviour_of(sample.outcome, rooms.start, names, several) for sample in samples)
         for samples in runs
     ]
+    unwanted = behaviours[len(accepted) :]
     together: dict[tuple[Behaviour, ...], list[int]] = {}
-    for number, seen in enumerate(behaviours):
-        together.setdefault(seen, []).append(number)
+    for number, seen in enumerate(behaviours[: len(accepted)]):
+        if seen not in unwanted:
+            together.setdefault(seen, []).append(number)
+    if not together:
+        again = counted(len(accepted), "program")
+        raise UserError(f"{again} would do again what was not meant; give the instruction in other words")
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
     rejected = len(programs) - sum(counts[one] for one in accepted)
     return CandidateClusters(tuple(sorted(clusters, key=lambda one: -one.size)), rejected)

@@ -47,7 +47,12 @@ def examine_draft(
     }
 
 
-def compare_drafts(programs: Sequence[str], view: SessionView, robot: Robot) -> CandidateClusters:
-    """Group several programs for one instruction by what they do in imagined worlds."""
+def compare_drafts(
+    programs: Sequence[str], view: SessionView, robot: Robot, refused: Sequence[str] = ()
+) -> CandidateClusters:
+    """Group several programs for one instruction by what they do in imagined worlds.
+
+    Raise UserError if all of them do the same as programs that were refused before.
+    """
     settings, pool = CheckSettings(skills=robot.skills, house_rules=view.rules_in_force), shared_pool()
-    return pool.call(lambda: cluster_candidates(pool.here(), programs, settings, view.room_map))
+    return pool.call(lambda: cluster_candidates(pool.here(), programs, settings, view.room_map, refused))

@@ -22,6 +22,7 @@ from doubles import Several
 HOUSE = World((Room("hall"), Room("kitchen", ("mug",))), "hall")
 STAY = 'def task_program():\n    say("hello")\n'
 GO = 'def task_program():\n    go_to("kitchen")\n    say("hello")\n'
+CARRY = 'def task_program():\n    go_to("kitchen")\n    pick("mug")\n'
 FETCH = 'def task_program():\n    go_to("kitchen")\n    pick("mug")\n    go_to("hall")\n    place("mug")\n'
 
 
@@ -80,6 +81,7 @@ def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_pa
         question = waited(session).question
         assert question is not None
         assert not question.why_last
+        model.programs = [CARRY, GO]
         session.answer("none", "But  quietly.")
         view = session.wait_until(lambda now: now.waits_for_answer)
         assert view.question is not None
@@ -91,6 +93,20 @@ def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_pa
         assert view.state is MissionState.FAILED
         summary = MissionSummary.read(tmp_path / "missions" / view.id)
         assert summary.instruction == "Do it. But quietly."
+
+
+def test_what_a_person_did_not_mean_is_not_taken_again(tmp_path: Path) -> None:
+    with asking(tmp_path, STAY, FETCH, STAY) as (session, model):
+        waited(session)
+        model.programs = [FETCH, GO, STAY]
+        session.answer("none", "But quietly.")
+        assert session.wait_until(lambda view: view.may_be_approved).program == GO
+    with asking(tmp_path, STAY, FETCH) as (session, _):
+        waited(session)
+        session.answer("none", "But quietly.")
+        view = session.wait_until(lambda _: False)
+        assert (view.state, view.program) == (MissionState.FAILED, "")
+        assert view.error
 
 
 def test_a_recorded_model_is_not_asked_again(tmp_path: Path) -> None:
