@@ -6,7 +6,6 @@ import importlib
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import cast
 
 from codebotler.core.errors import UserError, install_command, missing_package
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness, Robot
@@ -36,12 +35,12 @@ def open_robot(name: str, options: Options | None = None) -> Robot:
         UserError: the kind or class does not exist, or an option is missing or invalid.
     """
     if is_own(name):
-        return cast("Robot", SpellingRobot(OwnRobot(name, options or Options())))
+        return SpellingRobot(OwnRobot(name, options or Options()))
     if name not in ROBOT_MODULES:
         own = "or your own class, such as lab_robot.py:Spot"
         raise UserError(f'unknown robot "{name}"; choose one of {", ".join(ROBOT_MODULES)}, {own}')
     robot: Robot = _import_kind(name).robot(options or Options())
-    return robot if name == "sim" else cast("Robot", SpellingRobot(robot))
+    return robot if name == "sim" else SpellingRobot(robot)
 
 
 def open_with_face(name: str, options: Options, face: Face) -> Robot:
