@@ -1,4 +1,4 @@
-"""Robots on ROS, which perform skills through a worker process that talks to ROS."""
+"""Call skills on ROS through a worker process that talks to ROS."""
 
 from __future__ import annotations
 
@@ -19,10 +19,8 @@ from codebotler.robots.base import (
     NotReadyError,
     Options,
     Readiness,
-    RobotArgument,
     RobotLostError,
     RobotResult,
-    ignore_feedback,
 )
 from codebotler.robots.clock import Clock
 from codebotler.robots.reservation import robot_file
@@ -44,8 +42,8 @@ class Timeouts:
     longest: float = 600.0  # the limit for a whole skill
 
 
-class RosRobot:
-    """Performs skills on ROS, by default with one action server per skill.
+class RosCaller:
+    """Calls actions, services and topics on ROS, by default an action for each skill.
 
     Args:
         name: the kind of robot, such as ros2.
@@ -58,7 +56,7 @@ class RosRobot:
     """
 
     if_tool_dies = "the worker then cancels the robot's goal, unless it was killed as well"
-    rooms_are_regexes = has_pose = False
+    rooms_are_regexes = False
 
     def __init__(
         self,
@@ -84,18 +82,13 @@ class RosRobot:
         self._stopped, self._number = True, 0
         self._send_lock = threading.Lock()  # ensures that no request is sent after a stop
         self._rescue_lock = threading.RLock()
-        self._prepare()
-
-    def _prepare(self) -> None:
-        """Set additional attributes in a subclass."""
 
     def connect(self) -> None:
-        """Start a worker, wait for the action servers, and set the clock to 0.
+        """Start a worker after `disconnect`, wait for the action servers, and set the clock to 0.
 
         Raises:
             NotReadyError: ROS, the master or all servers are missing, or another process uses the robot.
         """
-        self.disconnect()
         worker = self._start(cancel_all=self._in_doubt)
         self.missing = worker.about["missing"]
         if self.missing and self.missing.keys() == self.connection.calls.keys():
@@ -104,21 +97,14 @@ class RosRobot:
         self._worker, self._stopped, self._in_doubt = worker, False, False
         self.clock.restart()
 
-    def perform(
-        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
-    ) -> RobotResult:
-        """Perform a skill on the robot and wait until it ends.
+    def _call(self, skill: str, values: Values, feedback: Feedback) -> RobotResult:
+        """Perform a skill through its ROS call, with values for the variables in the call.
 
         Raises:
             RobotError: the server rejected or aborted the goal.
             CancelledError: this or another client cancelled the goal.
             RobotLostError: the server or the worker died, or does not respond.
         """
-        names = (parameter.name for parameter in self.skills[skill].parameters)
-        return self._call(skill, dict(zip(names, arguments, strict=True)), feedback)
-
-    def _call(self, skill: str, values: Values, feedback: Feedback) -> RobotResult:
-        """Perform a skill through its ROS call, with values for the variables in the call."""
         call = self.connection.calls.get(skill)
         if call is None:
             raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")

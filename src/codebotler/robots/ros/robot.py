@@ -1,4 +1,4 @@
-"""A robot on ROS whose calls, places, poses and cameras are defined by a connection file."""
+"""A robot on ROS, with the calls, places, poses and cameras of a connection file, if there is one."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from typing import Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.world import Point
-from codebotler.perception import Detector, PerceptionError, boxed, image_from_ros, jpeg_of, open_detector
 from codebotler.robots.base import (
     STOP_BY_HAND,
     CameraPicture,
@@ -23,33 +23,40 @@ from codebotler.robots.base import (
     ignore_feedback,
 )
 from codebotler.robots.places import NamedPlace, Places
-from codebotler.robots.ros.connection import SkillCall
+from codebotler.robots.ros.caller import RosCaller
+from codebotler.robots.ros.connection import SkillCall, Values
 from codebotler.robots.ros.keepout import keepout_messages
 from codebotler.robots.ros.motion import Pose
-from codebotler.robots.ros.robot import RosRobot
 from codebotler.simulator.house_rule import Rule
+
+if TYPE_CHECKING:
+    from codebotler.perception import Detector
 
 POLL_SECONDS = 0.05  # the interval for checking conditions while waiting
 CLOSE_SECONDS = 1.0  # how long to wait for detectors to close; a busy detector closes later
 
 
-class ConnectedRobot(RosRobot):
-    """Performs skills with the calls, places and cameras of `options.connection`.
+class RosRobot(RosCaller):
+    """Performs skills with the calls, places and cameras of `options.connection`, or else with actions.
 
     After a stop, the robot's pose or velocity shows whether it really stands still.
     """
 
-    def _prepare(self) -> None:
-        self.has_pose = self.connection.pose is not None
-        self._detectors: dict[str, Detector] = {}
-        self._looking = threading.Lock()  # held while a detector runs
+    _detectors: Mapping[str, Detector] = MappingProxyType({})  # by model, while the robot is connected
+
+    @property
+    def has_pose(self) -> bool:
+        """Whether the connection names a topic with the robot's poses."""
+        return self.connection.pose is not None
 
     def connect(self) -> None:
         """Open the detectors and connect. Raise NotReadyError if poses are missing or in the wrong frame."""
         self.disconnect()
-        for _, model in self.connection.cameras.values():
-            if model not in self._detectors:
-                self._detectors[model] = open_detector(model)
+        if cameras := self.connection.cameras.values():
+            from codebotler.perception import open_detector  # noqa: PLC0415 - slow, and optional
+
+            self._looking = threading.Lock()  # held while a detector runs
+            self._detectors = {model: open_detector(model) for model in {model for _, model in cameras}}
         super().connect()
         places, pose = self.connection.places, self._pose() if self.has_pose else None
         sentence = ""
@@ -113,10 +120,9 @@ class ConnectedRobot(RosRobot):
 
     def disconnect(self) -> None:
         """Have the worker cancel its goal and exit, and close the detectors."""
-        was_connected = self._worker is not None
         super().disconnect()
-        if was_connected:
-            detectors, self._detectors = self._detectors, {}
+        detectors, self._detectors = self._detectors, {}
+        if detectors:
             closing = threading.Thread(target=self._close, args=(detectors,), daemon=True)
             closing.start()
             closing.join(CLOSE_SECONDS)
@@ -165,33 +171,31 @@ class ConnectedRobot(RosRobot):
         """Return whether a detector finds something in a camera's next picture."""
         call = SkillCall("topic", topic, "", failure="IsInRoomFailed")
         image = self._request(call, {"do": "look", "topic": topic}, ignore_feedback)
-        found, detector = Future[tuple[bool, bytes]](), self._detectors[model]
-
-        def look() -> None:
-            try:
-                with self._looking:
-                    found.set_result(_detect(detector, image, label, topic))
-            except Exception as error:  # noqa: BLE001 - `result` raises it again below
-                found.set_exception(error)
-
-        threading.Thread(target=look, daemon=True).start()
-        while not found.done():
+        seen = Future[tuple[bool, bytes]]()
+        threading.Thread(target=self._see, args=(seen, model, image, label, topic), daemon=True).start()
+        while not seen.done():
             if self._stopped:
                 raise CancelledError
             time.sleep(POLL_SECONDS)
-        try:
-            is_there, picture = found.result()
-        except (UserError, PerceptionError) as error:
-            raise RobotError(call.failure, str(error)) from None
+        is_there, picture = seen.result()
         feedback(CameraPicture(picture))
         return is_there
 
+    def _see(
+        self, seen: Future[tuple[bool, bytes]], model: str, message: Values, label: str, topic: str
+    ) -> None:
+        """Set whether something is in a picture, and the picture with a box around what was found."""
+        from codebotler.perception import PerceptionError, boxed, image_from_ros, jpeg_of  # noqa: PLC0415 - slow
 
-def _detect(detector: Detector, message: Mapping[str, Any], label: str, topic: str) -> tuple[bool, bytes]:
-    """Return whether something is in a picture, and the picture with a box around what was found."""
-    image = image_from_ros(message, f"the picture on {topic}")
-    sighting = detector.look(image, label)
-    return sighting.found, jpeg_of(boxed(image, sighting))
+        try:
+            image = image_from_ros(message, f"the picture on {topic}")
+            with self._looking:
+                sighting = self._detectors[model].look(image, label)
+            seen.set_result((sighting.found, jpeg_of(boxed(image, sighting))))
+        except (UserError, PerceptionError) as error:
+            seen.set_exception(RobotError("IsInRoomFailed", str(error)))
+        except Exception as error:  # noqa: BLE001 - raised again where the result is used
+            seen.set_exception(error)
 
 
 def _place_values(places: Places, text: str) -> dict[str, Any]:

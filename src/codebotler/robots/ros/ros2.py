@@ -11,8 +11,8 @@ from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness
-from codebotler.robots.ros.classes import class_for
-from codebotler.robots.ros.robot import RosRobot, Timeouts, ros_readiness
+from codebotler.robots.ros.caller import Timeouts, ros_readiness
+from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import find_missing
 
 ROS2_MODULES = ("rclpy", "action_msgs", "sensor_msgs")
@@ -24,7 +24,7 @@ def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
     domain = domain_of(options.address)
     options = replace(options, ros_python=choose_python(options.ros_python))
     variables = {"ROS_DOMAIN_ID": domain}
-    return class_for(options)("ros2", domain, "ros2_worker.py", options, variables, waits=waits)
+    return RosRobot("ros2", domain, "ros2_worker.py", options, variables, waits=waits)
 
 
 def domain_of(address: str = "") -> str:
