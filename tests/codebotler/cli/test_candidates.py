@@ -7,7 +7,7 @@ import pytest
 
 import command_line
 from codebotler.checking.sampled import CheckSettings
-from codebotler.cli.candidates import CandidateSearch, choose_candidate, line_reader
+from codebotler.cli.candidates import choose_candidate, line_reader
 from codebotler.core.errors import UserError
 from codebotler.generation.generate import Attempt
 from codebotler.generation.no_program import describe_programless
@@ -45,26 +45,26 @@ class Terminal:
         self.asked.append(question)
         return self.lines.pop(0)
 
-    def chosen(self, *, asks: bool = True) -> tuple[str, str] | None:
-        search = CandidateSearch(self.request, CheckSettings(), None, self.read if asks else None, self.model)
-        return choose_candidate(search, "Count the mugs.")
+    def chosen(self, *, asks: bool = True) -> str | None:
+        ask = self.read if asks else None
+        return choose_candidate(self.request, "Count the mugs.", CheckSettings(), ask=ask, model=self.model)
 
 
 def test_without_a_terminal_the_largest_cluster_is_taken(capsys: pytest.CaptureFixture[str]) -> None:
     person = Terminal([TWO, ONE, ONE])
-    assert person.chosen(asks=False) == ("Count the mugs.", ONE)
+    assert person.chosen(asks=False) == ONE
     assert "2 of 3 programs" in capsys.readouterr().err
 
 
 def test_nothing_is_asked_if_all_do_the_same() -> None:
     person = Terminal([ONE, ONE])
-    assert person.chosen() == ("Count the mugs.", ONE)
+    assert person.chosen() == ONE
     assert person.asked == []
 
 
 def test_the_person_chooses_an_option(capsys: pytest.CaptureFixture[str]) -> None:
     person = Terminal([ONE, ONE, TWO], "5\n", "2\n")
-    assert person.chosen() == ("Count the mugs.", TWO)
+    assert person.chosen() == TWO
     assert len(person.asked) == 2, "the question is repeated after an unusable line"
     shown = capsys.readouterr()
     assert 'says "2 mugs"' in shown.err
@@ -73,7 +73,7 @@ def test_the_person_chooses_an_option(capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_none_of_these_adds_a_sentence_for_a_second_round() -> None:
     person = Terminal([ONE, TWO], "none\n", "Only clean ones.\n", "1\n")
-    assert person.chosen() == ("Count the mugs. Only clean ones.", ONE)
+    assert person.chosen() == ONE
     assert person.instructions == ["Count the mugs.", "Count the mugs. Only clean ones."]
 
 
@@ -102,7 +102,7 @@ def test_the_end_of_the_input_is_no_answer() -> None:
 
 
 def test_replies_without_a_program_do_not_count() -> None:
-    assert Terminal(["", "", ONE]).chosen() == ("Count the mugs.", ONE)
+    assert Terminal(["", "", ONE]).chosen() == ONE
     assert Terminal(["", ""]).chosen() is None
 
 
