@@ -5,15 +5,8 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+import random
 from dataclasses import dataclass, field
-
-from tenacity import (
-    AsyncRetrying,
-    RetryCallState,
-    retry_if_exception,
-    stop_after_attempt,
-    wait_exponential_jitter,
-)
 
 from codebotler.core.errors import UserError
 from codebotler.models.base import (
@@ -98,22 +91,20 @@ class RateLimited:
             ModelError: the last try failed.
             BudgetSpentError: the budget is used up, so no request was made.
         """
-        tries = AsyncRetrying(
-            sleep=asyncio.sleep,
-            stop=stop_after_attempt(self.retries + 1),
-            wait=self._wait,
-            retry=retry_if_exception(_is_retryable),
-            before_sleep=self._before_sleep,
-            reraise=True,
-        )
+        tries, wait = 0, self.first_wait
         async with self._free:
-            try:
-                return await tries(self._try, prompt, number, on_text)
-            except ModelError as error:
-                if (times := tries.statistics["attempt_number"]) > 1:
-                    error.sentence += f" (tried {times} times)"
-                    error.args = (error.sentence,)
-                raise
+            while True:
+                tries += 1
+                try:
+                    return await self._try(prompt, number, on_text)
+                except ModelError as error:
+                    if tries > self.retries or not _is_retryable(error):
+                        if tries > 1:
+                            error.sentence += f" (tried {tries} times)"
+                            error.args = (error.sentence,)
+                        raise
+                    await self._pause(error, wait)
+                    wait = min(2 * wait, MAX_WAIT)
 
     async def close(self) -> None:
         """Close the model."""
@@ -154,26 +145,20 @@ class RateLimited:
             if self.requests_per_minute is not None:
                 self._next_start = now() + 60 / self.requests_per_minute
 
-    def _wait(self, state: RetryCallState) -> float:
-        wait = wait_exponential_jitter(self.first_wait, MAX_WAIT, jitter=self.first_wait / 2)(state)
-        return max(wait, _retry_after(state))
-
-    def _before_sleep(self, state: RetryCallState) -> None:
+    async def _pause(self, error: ModelError, wait: float) -> None:
+        """Wait about as many seconds before another try, or as long as the server asks for."""
         self.retry_count += 1
-        if not self._has_replied and self.retry_count == 1 and state.outcome is not None:
-            MODELS_LOG.warning("trying again, up to %d times: %s", self.retries, state.outcome.exception())
+        if not self._has_replied and self.retry_count == 1:
+            MODELS_LOG.warning("trying again, up to %d times: %s", self.retries, error)
         # A delay that a server asks for applies to all requests, not only to the rejected request.
-        now = asyncio.get_running_loop().time()
-        self._deferred_until = max(self._deferred_until, now + _retry_after(state))
+        asked, now = error.retry_after or 0.0, asyncio.get_running_loop().time()
+        self._deferred_until = max(self._deferred_until, now + asked)
+        spread = random.uniform(0, self.first_wait / 2)  # noqa: S311 - so that not all try at once
+        await asyncio.sleep(max(wait + spread, asked))
 
 
-def _retry_after(state: RetryCallState) -> float:
-    error = None if state.outcome is None else state.outcome.exception()
-    return (error.retry_after or 0.0) if isinstance(error, ModelError) else 0.0
-
-
-def _is_retryable(error: BaseException) -> bool:
-    return isinstance(error, ModelError) and error.may_pass and (error.retry_after or 0) <= MAX_RETRY_AFTER
+def _is_retryable(error: ModelError) -> bool:
+    return error.may_pass and (error.retry_after or 0) <= MAX_RETRY_AFTER
 
 
 def _estimate(prompt: Prompt, length: int) -> int:
