@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import re
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -216,10 +216,8 @@ class RosCaller:
             return "another worker has cancelled all goals"
 
 
-def ros_readiness(
-    name: str, python: Path, needs: Sequence[str], mend: Callable[[Sequence[str]], str], note: str
-) -> Readiness:
-    """Check whether an interpreter has a worker's modules. `mend` returns the fix for missing ones."""
+def ros_readiness(name: str, python: Path, needs: Sequence[str], mend: str, note: str) -> Readiness:
+    """Check whether an interpreter has a worker's modules. `mend` is the fix for missing ones."""
     missing = find_missing(python, needs)
     if missing is None:
         return Readiness(
@@ -227,7 +225,7 @@ def ros_readiness(
         )
     if missing:
         lacking = f"{python} lacks {', '.join(missing)}"
-        return Readiness(name, works=False, missing=lacking, mend=mend(missing), note=note)
+        return Readiness(name, works=False, missing=lacking, mend=mend, note=note)
     return Readiness(name, works=True, note=note)
 
 

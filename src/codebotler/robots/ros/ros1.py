@@ -42,4 +42,4 @@ def readiness(python: Path = ROS_PYTHON) -> Readiness:
     """Check whether the interpreter has rospy and the other modules that the worker needs."""
     mend = INSTALL_ROS1 if python == ROS_PYTHON else USE_OTHER_PYTHON
     note = f"with {python}; needs a master, see ROS_MASTER_URI"
-    return ros_readiness("ros1", python, ROS1_MODULES, lambda _: mend, note)
+    return ros_readiness("ros1", python, ROS1_MODULES, mend, note)
