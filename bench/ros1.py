@@ -20,8 +20,8 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.robots.base import ROS_PYTHON, Options, Robot
 from codebotler.robots.open import open_robot
+from codebotler.robots.ros.caller import calls_data
 from codebotler.robots.ros.connection import default_connection
-from codebotler.robots.ros.robot import calls_data
 from codebotler.robots.ros.virtual import VirtualRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 

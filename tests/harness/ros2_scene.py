@@ -11,7 +11,8 @@ from typing import Any
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.robots.base import Options
 from codebotler.robots.ros import ros2
-from codebotler.robots.ros.robot import RosRobot, Timeouts
+from codebotler.robots.ros.caller import Timeouts
+from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros_graph import Process
 

@@ -18,7 +18,8 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.robots.base import ROS_PYTHON, Options
 from codebotler.robots.ros import ros1
-from codebotler.robots.ros.robot import RosRobot, Timeouts
+from codebotler.robots.ros.caller import Timeouts
+from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 
 HERE = Path(__file__).parent

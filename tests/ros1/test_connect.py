@@ -16,9 +16,9 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, Options, RobotLostError
 from codebotler.robots.ros import ros1, rosbridge
-from codebotler.robots.ros.connected import ConnectedRobot
+from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.connection_file import read_connection
-from codebotler.robots.ros.robot import RosRobot, Timeouts
+from codebotler.robots.ros.robot import RosRobot
 from ros_graph import HERE, LONG, Graph, Process, started
 
 CONNECTION = """\
@@ -64,7 +64,7 @@ class Robots:
         process.expect("ready")
         return process
 
-    def robot(self, kind: str = "ros1", text: str = CONNECTION) -> ConnectedRobot:
+    def robot(self, kind: str = "ros1", text: str = CONNECTION) -> RosRobot:
         files = {"robot.yaml": text.replace("robot: ros1", f"robot: {kind}"), "places.yaml": PLACES}
         for name, content in {**files, "door.py": SKILLS}.items():
             (self.folder / name).write_text(content)
@@ -79,7 +79,6 @@ class Robots:
             double = self._end.enter_context(bridge(over_ros(self.graph.uri, ())))
             robot = rosbridge.robot(Options(address=double.address, **options), WAITS)
         self._end.callback(robot.disconnect)
-        assert isinstance(robot, ConnectedRobot)
         return robot
 
 

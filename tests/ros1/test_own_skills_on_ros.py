@@ -17,8 +17,9 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import Room, World
 from codebotler.robots.base import ROS_PYTHON, Options
 from codebotler.robots.ros import rosbridge
+from codebotler.robots.ros.caller import Timeouts, calls_data
 from codebotler.robots.ros.connection import default_connection
-from codebotler.robots.ros.robot import RosRobot, Timeouts, calls_data
+from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.virtual import VirtualRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros_graph import Graph

@@ -26,8 +26,9 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.missions.log import read_events
 from codebotler.robots.base import CameraPicture, CancelledError, Options
 from codebotler.robots.ros import ros1, rosbridge
+from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.connection_file import read_connection
-from codebotler.robots.ros.robot import RosRobot, Timeouts
+from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from halves import encoded, has_frame, rows, sees
 from ros_graph import HERE, LONG, Graph, Process, started

@@ -28,7 +28,8 @@ from codebotler.robots.base import (
     RobotLostError,
 )
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros.robot import RosRobot, Timeouts
+from codebotler.robots.ros.caller import Timeouts
+from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros_graph import FEW, GO_TO, LONG, SAY, Graph, free_port, installed, started
 

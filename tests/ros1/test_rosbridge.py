@@ -26,7 +26,8 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, Options, RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros import rosbridge
-from codebotler.robots.ros.robot import RosRobot, Timeouts
+from codebotler.robots.ros.caller import Timeouts
+from codebotler.robots.ros.robot import RosRobot
 from processes import are_gone, children_of
 from ros_graph import FEW, GO_TO, SAY, Graph, free_port, started
 

@@ -17,9 +17,9 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
 from codebotler.missions.progress import POSITION_FEEDBACK
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, RobotLostError
-from codebotler.robots.ros.connected import ConnectedRobot
+from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.connection_file import read_connection
-from codebotler.robots.ros.robot import Timeouts
+from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros2_scene import ROS2_PYTHON, SHORT, Scene
 from ros_graph import LONG, Process, started
@@ -69,14 +69,12 @@ class Robots:
         process.expect("ready")
         return process
 
-    def robot(self, connection: str = CONNECTION, waits: Timeouts = SHORT) -> ConnectedRobot:
+    def robot(self, connection: str = CONNECTION, waits: Timeouts = SHORT) -> RosRobot:
         for name, text in {"robot.yaml": connection, "places.yaml": PLACES, "door.py": SKILLS}.items():
             (self.folder / name).write_text(text)
         table = skills_from(self.folder / "door.py")
         read = read_connection(self.folder / "robot.yaml", table)
-        robot = self.scene.robot(waits, skills=table, connection=read)
-        assert isinstance(robot, ConnectedRobot)
-        return robot
+        return self.scene.robot(waits, skills=table, connection=read)
 
 
 def told(process: Process, what: str) -> list[object]:

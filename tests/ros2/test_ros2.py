@@ -18,7 +18,8 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, Options, RobotLostError
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros.robot import RosRobot, Timeouts
+from codebotler.robots.ros.caller import Timeouts
+from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros2_scene import ROS2_PYTHON, Scene, installed
 from ros_graph import GO_TO, SAY, started

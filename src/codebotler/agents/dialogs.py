@@ -28,18 +28,16 @@ MAX_ARGUMENT = 10_000
 AgentContext: TypeAlias = Context[Gatekeeper, Any]
 
 
+class NotAsked(BaseModel):
+    """The answer to a question that nobody was asked."""
+
+
 class Consent(BaseModel):
     """The form in which a client asks its person."""
 
     approve: bool = Field(
         title="Run it on the robot", description="Tick this to let the robot do exactly this."
     )
-
-
-class NotAsked(Consent):
-    """The answer to a question that nobody was asked."""
-
-    approve: bool = False
 
 
 class Choice(BaseModel):
@@ -49,18 +47,10 @@ class Choice(BaseModel):
     more: str = Field(default="", max_length=MAX_ARGUMENT, title="If none: what should be different?")
 
 
-class NotChosen(Choice):
-    """The answer to a question about behaviours that nobody was asked."""
-
-
 class StepWord(BaseModel):
     """The form in which a client asks its person about an unsure step."""
 
     answer: Literal["it happened", "it did not happen"] = Field(title="Did this happen?")
-
-
-class NoWord(StepWord):
-    """The answer to a question about a step that nobody was asked."""
 
 
 # --- who is asked, and what about
@@ -77,11 +67,11 @@ async def find_question(ctx: AgentContext) -> MissionSession:
 
 def ask_which_behaviour(
     session: Annotated[MissionSession, Resolve(find_question)], ctx: AgentContext
-) -> Elicit[Choice] | NotChosen:
+) -> Elicit[Choice] | NotAsked:
     """Have the client ask its person which behaviour they mean, if it can."""
     asked = session.view.question
     if asked is None or not gatekeeper_of(ctx).asks_client or not _has_dialogs(ctx):
-        return NotChosen(answer="none")
+        return NotAsked()
     return Elicit(which_question(asked), Choice)
 
 
@@ -96,11 +86,11 @@ async def read_last_past(ctx: AgentContext) -> MissionPast:
 
 async def ask_whether(
     past: Annotated[MissionPast, Resolve(read_last_past)], ctx: AgentContext
-) -> Elicit[StepWord] | NoWord:
+) -> Elicit[StepWord] | NotAsked:
     """Have the client ask its person whether an unsure step happened, beside what the robot says."""
     gatekeeper = gatekeeper_of(ctx)
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
-        return NoWord(answer="it did not happen")
+        return NotAsked()
     robot, home = gatekeeper.console.robot, gatekeeper.console.home
     evidence = await asyncio.to_thread(ask_evidence, robot, home, past, ignore_text)
     return Elicit("\n".join((past.question, *evidence)), StepWord)

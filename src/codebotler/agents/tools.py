@@ -10,7 +10,7 @@ from threading import Thread
 from typing import Annotated, Any, ParamSpec, TypeVar
 
 import anyio
-from mcp.server.elicitation import AcceptedElicitation, CancelledElicitation, ElicitationResult
+from mcp.server.elicitation import AcceptedElicitation, DeclinedElicitation, ElicitationResult
 from mcp.server.mcpserver.resolve import Resolve
 from pydantic import Field
 
@@ -20,8 +20,6 @@ from codebotler.agents.dialogs import (
     Choice,
     Consent,
     NotAsked,
-    NotChosen,
-    NoWord,
     StepWord,
     agent_name,
     as_tool_errors,
@@ -138,7 +136,7 @@ async def propose_mission(
 async def choose_behaviour(
     ctx: AgentContext,
     session: Annotated[MissionSession, Resolve(find_question)],
-    answer: Annotated[ElicitationResult[Choice], Resolve(ask_which_behaviour)],
+    answer: Annotated[ElicitationResult[Choice | NotAsked], Resolve(ask_which_behaviour)],
 ) -> MissionReport:
     """Let the person say which of several behaviours they mean, if a proposed mission waits for that.
 
@@ -146,7 +144,7 @@ async def choose_behaviour(
     """
     gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors():
-        if not isinstance(answer, AcceptedElicitation) or isinstance(answer.data, NotChosen):
+        if not isinstance(answer, AcceptedElicitation) or isinstance(answer.data, NotAsked):
             raise MissionError(f"a person must choose on the page {gatekeeper.page}".rstrip())
         asked, given = session.view.question, answer.data
         if asked is not None:
@@ -158,7 +156,7 @@ async def choose_behaviour(
 async def continue_mission(
     ctx: AgentContext,
     past: Annotated[MissionPast, Resolve(read_last_past)],
-    answer: Annotated[ElicitationResult[StepWord], Resolve(ask_whether)],
+    answer: Annotated[ElicitationResult[StepWord | NotAsked], Resolve(ask_whether)],
     program: Annotated[str, Field(description="The rest; if empty, CodeBotler's model writes it.")] = "",
 ) -> MissionReport:
     """Propose the rest of the last mission, which failed or was stopped. The robot does not move.
@@ -167,7 +165,7 @@ async def continue_mission(
     """
     gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors(), gatekeeper.waiting():
-        if isinstance(answer, AcceptedElicitation) and not isinstance(answer.data, NoWord):
+        if isinstance(answer, AcceptedElicitation) and not isinstance(answer.data, NotAsked):
             past = past.resolve(happened=answer.data.answer == "it happened")
         if past.unsure is not None:
             raise UserError(f"{past.question}; a person must say so, on the page {gatekeeper.page}")
@@ -209,7 +207,7 @@ async def run_mission(
     digest: _Digest,
     ctx: AgentContext,
     session: Annotated[MissionSession, Resolve(find_session)],
-    answer: Annotated[ElicitationResult[Consent], Resolve(ask_person)],
+    answer: Annotated[ElicitationResult[Consent | NotAsked], Resolve(ask_person)],
     seconds: _Seconds = 45,
 ) -> MissionReport:
     """Run a proposed mission on the robot as soon as a person has approved it, and follow it to its end.
@@ -295,19 +293,20 @@ def _take_answer(
     gatekeeper: Gatekeeper,
     session: MissionSession,
     digest: str,
-    answer: ElicitationResult[Consent],
+    answer: ElicitationResult[Consent | NotAsked],
     client: str,
 ) -> None:
     """Approve the program if a person or a contract accepts it. End the mission if a person declines."""
     view, person = session.view, f"a person, asked by {client}"
-    if isinstance(answer, AcceptedElicitation) and isinstance(answer.data, NotAsked):
-        if gatekeeper.approves_alone(session):
-            session.approve(digest, by="the contract given at the start")
-    elif isinstance(answer, AcceptedElicitation) and answer.data.approve:
-        if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
-            session.approve(digest, despite_problems=bool(view.problems), by=person)
-    elif not isinstance(answer, CancelledElicitation):
-        session.stop_soon(person)
+    match answer:
+        case AcceptedElicitation(data=NotAsked()):
+            if gatekeeper.approves_alone(session):
+                session.approve(digest, by="the contract given at the start")
+        case AcceptedElicitation(data=Consent(approve=True)):
+            if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
+                session.approve(digest, despite_problems=bool(view.problems), by=person)
+        case AcceptedElicitation() | DeclinedElicitation():
+            session.stop_soon(person)
 
 
 async def _prepared(gatekeeper: Gatekeeper, session: MissionSession) -> MissionReport:

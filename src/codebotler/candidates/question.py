@@ -69,6 +69,11 @@ class ClarifyingQuestion:
     why_last: str = ""
 
     @property
+    def programs(self) -> tuple[str, ...]:
+        """The programs of the options."""
+        return tuple(one.program for one in self.options)
+
+    @property
     def rejections(self) -> list[str]:
         """Sentences for a model about what a person did not mean by any option."""
         return [f"the person did not mean a robot that {one.difference}" for one in self.options]

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from codebotler.candidates.clusters import CandidateClusters, cluster_candidates
+from codebotler.candidates.clusters import cluster_candidates
 from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
 from codebotler.checking.check import check
 from codebotler.checking.sampled import CheckSettings
 from codebotler.checking.storyboard import storyboard
 from codebotler.cli.generate import note_programless, open_recorder
 from codebotler.core.errors import UserError
-from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import (
     busy,
     console,
@@ -36,30 +34,10 @@ from codebotler.missions.preflight import with_closest_here
 from codebotler.models.base import Model
 from codebotler.models.recorded import UnknownInstructionError
 from codebotler.prompts import Prompt
-from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.room_map import RoomMap
 
 ADD_SENTENCE = "What should be different? (Enter to give up) "
-
-
-@dataclass(frozen=True)
-class CandidateSearch:
-    """The way to get candidates and answers.
-
-    Args:
-        request: requests candidates for an instruction.
-        settings: the settings for runs in imagined worlds.
-        room_map: the rooms; by default those that the programs name.
-        read_line: asks the person for a line, which is empty at the end; None if nobody can answer.
-        model: the name of the model.
-    """
-
-    request: Callable[[str], Sequence[Attempt]]
-    settings: CheckSettings
-    room_map: RoomMap | None
-    read_line: Callable[[str], str] | None
-    model: str = ""
 
 
 def line_reader(*, is_allowed: bool) -> Callable[[str], str] | None:
@@ -93,61 +71,65 @@ def expect_no_retries(retries: int | None, *, repair: bool) -> None:
         raise UserError("--candidates cannot be combined with --retries or --repair")
 
 
-def write_candidates(
-    request: Callable[[str], list[Attempt]],
+def choose_candidate(
+    request: Callable[[str], Sequence[Attempt]],
     instruction: str,
-    house_rules: tuple[Rule, ...],
-    skills: SkillTable,
-    room_map: RoomMap | None,
-    model: str,
+    settings: CheckSettings,
+    room_map: RoomMap | None = None,
     *,
-    asks: bool,
-) -> bool:
-    """Print the candidate that a person means, and return whether the check accepts it."""
-    how = CheckSettings(skills=skills, house_rules=house_rules)
-    found = choose_candidate(
-        CandidateSearch(request, how, room_map, line_reader(is_allowed=asks), model), instruction
-    )
-    if found is None:
-        return False
-    print_source(found[1])
-    problems = check(found[1], room_map=room_map, skills=skills, house_rules=house_rules).problems
-    for problem in problems:
-        note(visible(problem.sentence))
-    return not problems
+    ask: Callable[[str], str] | None,
+    model: str = "",
+) -> str | None:
+    """Return the program that a person means, or None if they want none of them.
 
-
-def choose_candidate(search: CandidateSearch, instruction: str) -> tuple[str, str] | None:
-    """Return the instruction and the program that a person means, or None if they want none of them.
+    Raise UserError if all programs of the second round do what they did not mean.
 
     After the first "none of these", they may add a sentence to the instruction for a second round.
+
+    Args:
+        request: requests candidates for an instruction.
+        instruction: the instruction.
+        settings: the settings for runs in imagined worlds.
+        room_map: the rooms; by default those that the programs name.
+        ask: asks the person for a line, which is empty at the end; None if nobody can answer.
+        model: the name of the model.
     """
+    refused: tuple[str, ...] = ()
     for is_second in (False, True):
-        attempts = search.request(instruction)
+        attempts = request(instruction)
         programs = [one.reply.program for one in attempts if one.programless is None]
         if not programs:
             assert attempts[0].programless is not None
             note_programless(attempts[0].programless)
             return None
-        groups = _group(programs, search)
-        question = question_about(groups, model=search.model, is_second=is_second)
-        if question is None or search.read_line is None:
+        with busy("comparing the programs"), WorkerPool(1) as pool:
+            groups = pool.call(
+                lambda: cluster_candidates(pool.here(), programs, settings, room_map, refused)  # noqa: B023 - called at once
+            )
+        question = question_about(groups, model=model, is_second=is_second)
+        if question is None or ask is None:
             note(groups.summary)
-            return instruction, groups.clusters[0].program
-        chosen = question.chosen(ask_which(question, search.read_line))
+            return groups.clusters[0].program
+        chosen = question.chosen(ask_which(question, ask))
         if chosen is not None:
-            return instruction, chosen.program
-        more = "" if question.why_last else search.read_line(ADD_SENTENCE).strip()
+            return chosen.program
+        more = "" if question.why_last else ask(ADD_SENTENCE).strip()
         if not more:
             break
+        refused = question.programs
         instruction = f"{instruction.rstrip()} {more}"
     note("no program chosen")
     return None
 
 
-def _group(programs: Sequence[str], search: CandidateSearch) -> CandidateClusters:
-    with busy("comparing the programs"), WorkerPool(1) as pool:
-        return pool.call(lambda: cluster_candidates(pool.here(), programs, search.settings, search.room_map))
+def print_candidate(program: str, settings: CheckSettings, room_map: RoomMap | None) -> bool:
+    """Print the chosen program and its problems, and return whether the check accepts it."""
+    print_source(program)
+    rules, skills = settings.house_rules, settings.skills
+    problems = check(program, room_map=room_map, skills=skills, house_rules=rules).problems
+    for problem in problems:
+        note(visible(problem.sentence))
+    return not problems
 
 
 def question_view(question: ClarifyingQuestion) -> RenderableType:

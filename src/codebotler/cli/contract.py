@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from rich.console import Group
-from rich.table import Table
 from rich.text import Text
 
 from codebotler.checking.contract_file import contract_yaml
@@ -21,18 +20,13 @@ from codebotler.simulator.contract import Contract
 
 
 def contract_view(contract: Contract, skills: SkillTable) -> Group:
-    """Show what a program may do at most: in a sentence or two, and as a table."""
+    """Show what a program may do at most: in a sentence or two, and in a table with a row for each skill."""
     sentence = contract_sentence(contract, skills, shortened)
     head = Text.assemble(("\nwhat it may do at most", "bold"), f"\n{sentence}\n")
-    return Group(head, contract_table(contract, skills))
-
-
-def contract_table(contract: Contract, skills: SkillTable) -> Table:
-    """Show a contract with a row for each skill."""
     table = grid("left", "left", "left", "left")
     for row in contract_rows(contract, skills, shortened):
         table.add_row(Text(row.what, "bold"), Text(row.texts), Text(row.places), Text(row.at_most, "dim"))
-    return table
+    return Group(head, table)
 
 
 def write_contract(file: Path | None, contract: Contract | None) -> None:

@@ -110,12 +110,12 @@ def _lines(rows: Sequence[Skill], skills: SkillTable) -> Iterator[RenderableType
         yield Text("\n" if number else "", end="")
         yield Syntax(stub(row), "python", theme="ansi_dark", background_color="default", word_wrap=True)
         trials = try_skill(row, skills)
-        bandom_trials = [one for one in trials if one.outcome.startswith("returns ") and not one.facts]
-        if len(bandom_trials) > 1:
-            values = listed([one.outcome.removeprefix("returns ") for one in bandom_trials], "or")
+        random_trials = [one for one in trials if one.outcome.startswith("returns ") and not one.facts]
+        if len(random_trials) > 1:
+            values = listed([one.outcome.removeprefix("returns ") for one in random_trials], "or")
             trials = [
-                replace(bandom_trials[0], outcome=f"returns {values}"),
-                *(t for t in trials if t not in bandom_trials),
+                replace(random_trials[0], outcome=f"returns {values}"),
+                *(t for t in trials if t not in random_trials),
             ]
         for trial in trials:
             where = f", where {listed(trial.facts)}" if trial.facts else ""

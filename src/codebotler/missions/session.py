@@ -316,7 +316,7 @@ class MissionSession(SharedView):
     def _choose(self, mission: Mission, programs: Sequence[str]) -> None:
         """Take one of several programs, or ask the person which one is meant if they differ."""
         self._show(busy="comparing the programs")
-        refused = () if self._rejected is None else tuple(one.program for one in self._rejected.options)
+        refused = () if self._rejected is None else self._rejected.programs
         groups = compare_drafts(programs, self._view, self._robot, refused)
         is_second = self._rejected is not None
         question = question_about(groups, model=self._view.model, is_second=is_second)

@@ -9,7 +9,7 @@ import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Protocol, cast, get_args
+from typing import Any, cast, get_args
 from urllib.parse import urlsplit
 
 import openai
@@ -118,17 +118,14 @@ class ChatModel:
             chunks = None
             if isinstance(stream, OpenAIStreamedResponse):
                 chunks = stream._response = Chunks(stream._response)  # type: ignore[assignment]  # noqa: SLF001 - no public way
-            hear = _mark_thoughts(on_text)
+            was_thought = False
             async for event in stream:
-                match event:
-                    case messages.PartStartEvent(part=messages.TextPart() as part):
-                        hear(part.content, is_thought=False)
-                    case messages.PartDeltaEvent(delta=messages.TextPartDelta() as delta):
-                        hear(delta.content_delta, is_thought=False)
-                    case messages.PartStartEvent(part=messages.ThinkingPart() as part):
-                        hear(part.content, is_thought=True)
-                    case messages.PartDeltaEvent(delta=messages.ThinkingPartDelta() as delta):
-                        hear(delta.content_delta or "", is_thought=True)
+                piece, is_thought = _piece_of(event)
+                if piece and is_thought != was_thought:
+                    on_text("<think>\n" if is_thought else "\n</think>\n")
+                    was_thought = is_thought
+                if piece:
+                    on_text(piece)
             response = stream.get()
         # A stream that ends early without an error can be noticed only by its missing finish reason, but for
         # chat completions pydantic-ai makes up a reason.
@@ -178,24 +175,16 @@ class ChatModel:
         return model_error(self.name, f"{type(error).__name__}: {error_text(error)}", may_pass=is_transport)
 
 
-class _PieceListener(Protocol):
-    def __call__(self, piece: str, *, is_thought: bool) -> None: ...
-
-
-def _mark_thoughts(on_text: TextListener) -> _PieceListener:
-    """Return a listener that passes on pieces of a reply, with tags around separately sent reasoning."""
-    was_thought = False
-
-    def hear(piece: str, *, is_thought: bool) -> None:
-        nonlocal was_thought
-        if not piece:
-            return
-        if is_thought != was_thought:
-            on_text("<think>\n" if is_thought else "\n</think>\n")
-        was_thought = is_thought
-        on_text(piece)
-
-    return hear
+def _piece_of(event: object) -> tuple[str, bool]:
+    """Return the text that an event of a stream adds to a reply, and whether it is reasoning."""
+    match event:
+        case messages.PartStartEvent(part=messages.TextPart() | messages.ThinkingPart() as part):
+            return part.content, isinstance(part, messages.ThinkingPart)
+        case messages.PartDeltaEvent(delta=messages.TextPartDelta() as delta):
+            return delta.content_delta, False
+        case messages.PartDeltaEvent(delta=messages.ThinkingPartDelta() as delta):
+            return delta.content_delta or "", True
+    return "", False
 
 
 def _is_filtered(error: Exception) -> bool:

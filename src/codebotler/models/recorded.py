@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
@@ -15,6 +14,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.errors import UserError
+from codebotler.core.words import brief
 from codebotler.core.yaml_files import YamlFile
 from codebotler.models.base import ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.sampling import SamplingSettings
@@ -77,11 +77,10 @@ class UnknownInstructionError(ModelError):
     """Raised if a recorded model has no program for an instruction. The message suggests similar ones."""
 
     def __init__(self, model: str, instruction: str, closest: Sequence[str]) -> None:
-        similar = " or ".join(f'"{_short(known)}"' for known in closest)
-        super().__init__(
-            f'{model} has no program for "{_short(instruction)}"; similar instructions: {similar}',
-            may_pass=False,
-        )
+        short = partial(brief, most=MAX_SHOWN_CHARACTERS)
+        similar = " or ".join(f'"{short(known)}"' for known in closest)
+        sentence = f'{model} has no program for "{short(instruction)}"; similar instructions: {similar}'
+        super().__init__(sentence, may_pass=False)
         self.model, self.instruction, self.closest = model, instruction, tuple(closest)
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -143,10 +142,6 @@ def find_closest(instruction: str, known: Iterable[str]) -> list[str]:
 
 def _words(text: str) -> tuple[str, ...]:
     return tuple(text.lower().rstrip(". \n").split())
-
-
-def _short(text: str) -> str:
-    return textwrap.shorten(text, MAX_SHOWN_CHARACTERS, placeholder=" ...")
 
 
 def is_recorded(name: str) -> bool:

@@ -8,12 +8,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Any
 
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Recording, Skill, SkillTable
 from codebotler.core.words import counted
-from codebotler.core.world import Point
 from codebotler.robots.base import (
     AnswerError,
     CancelledError,
@@ -23,7 +23,6 @@ from codebotler.robots.base import (
     RobotResult,
     ignore_feedback,
 )
-from codebotler.robots.clock import Clock
 
 ANSWER_SECONDS = 60.0  # the default time limit for an answer, in real seconds
 ASK_TIMEOUT = "AskTimeout"  # the kind of error that programs see when nobody answers
@@ -184,12 +183,13 @@ def _speech_of(skill: Skill) -> Recording | None:
 
 
 class RobotWithFace:
-    """Wraps a robot so that a face performs the spoken skills, and the robot performs all others."""
+    """Wraps a robot so that a face performs the spoken skills, and the robot does everything else."""
 
     def __init__(self, robot: Robot, face: Face, skills: SkillTable = SKILLS) -> None:
         self._robot, self._face, self.skills = robot, face, skills
-        self.name, self.address, self.if_tool_dies = robot.name, robot.address, robot.if_tool_dies
-        self.rooms_are_regexes, self.has_pose = robot.rooms_are_regexes, robot.has_pose
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute of the robot
+        return getattr(self._robot, name)
 
     @property
     def missing(self) -> Mapping[str, str]:
@@ -197,11 +197,6 @@ class RobotWithFace:
         return {
             skill: why for skill, why in self._robot.missing.items() if _speech_of(self.skills[skill]) is None
         }
-
-    @property
-    def clock(self) -> Clock:
-        """The clock of the wrapped robot."""
-        return self._robot.clock
 
     def connect(self) -> None:
         """Connect the wrapped robot and clear the face."""
@@ -228,16 +223,6 @@ class RobotWithFace:
         assert isinstance(offered, tuple), "a mission checks the arguments of a program"
         options = tuple(map(str, offered))
         return options[self._face.ask(", ".join(map(str, given.values())), text, options)]
-
-    @property
-    def failed_stop(self) -> str:
-        """Why the wrapped robot did not stop, or "" if it stopped or cannot report failed stops."""
-        return str(getattr(self._robot, "failed_stop", ""))
-
-    def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
-        """Report the wrapped robot's position to a callback. Return False if its position is never known."""
-        watch = getattr(self._robot, "watch", None)
-        return watch is not None and bool(watch(on_pose))
 
     def cancel(self) -> None:
         """Withdraw the open question and stop the wrapped robot."""

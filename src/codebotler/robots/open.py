@@ -6,9 +6,8 @@ import importlib
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import cast
 
-from codebotler.core.errors import UserError, install_command, missing_package
+from codebotler.core.errors import UserError, install_command, installed, missing_package
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness, Robot
 from codebotler.robots.face import Face, RobotWithFace, without_speech
 from codebotler.robots.own import OwnRobot, is_own
@@ -33,15 +32,16 @@ def open_robot(name: str, options: Options | None = None) -> Robot:
     `name` is a kind (sim, pyrobosim, ros1, rosbridge or ros2) or a class in a file, as in lab_robot.py:Spot.
 
     Raises:
-        UserError: the kind or class does not exist, or an option is missing or invalid.
+        UserError: the kind or class does not exist, a package is missing, or an option is invalid.
     """
     if is_own(name):
-        return cast("Robot", SpellingRobot(OwnRobot(name, options or Options())))
+        return SpellingRobot(OwnRobot(name, options or Options()))
     if name not in ROBOT_MODULES:
         own = "or your own class, such as lab_robot.py:Spot"
         raise UserError(f'unknown robot "{name}"; choose one of {", ".join(ROBOT_MODULES)}, {own}')
-    robot: Robot = _import_kind(name).robot(options or Options())
-    return robot if name == "sim" else cast("Robot", SpellingRobot(robot))
+    with installed():
+        robot: Robot = _import_kind(name).robot(options or Options())
+    return robot if name == "sim" else SpellingRobot(robot)
 
 
 def open_with_face(name: str, options: Options, face: Face) -> Robot:

@@ -7,7 +7,7 @@ import pytest
 
 import command_line
 from codebotler.checking.sampled import CheckSettings
-from codebotler.cli.candidates import CandidateSearch, choose_candidate, line_reader
+from codebotler.cli.candidates import choose_candidate, line_reader
 from codebotler.core.errors import UserError
 from codebotler.generation.generate import Attempt
 from codebotler.generation.no_program import describe_programless
@@ -19,7 +19,7 @@ from command_line import Ended, Refusal, command
 from roboeval.suites.load import Suite
 
 SAYS = 'def task_program():\n    say("{} mugs")\n'
-ONE, TWO = SAYS.format(1), SAYS.format(2)
+ONE, TWO, THREE, FOUR = map(SAYS.format, range(1, 5))
 STAPLER = next(one for one in open_recorded("recorded").replies if one.startswith("Check every printer"))
 
 
@@ -32,39 +32,42 @@ def attempt(program: str, number: int) -> Attempt:
 class Terminal:
     """A person who answers with the given lines, and a model that writes the given programs."""
 
-    def __init__(self, programs: Sequence[str], *lines: str, model: str = "") -> None:
-        self.programs, self.lines, self.model = programs, list(lines), model
+    def __init__(
+        self, programs: Sequence[str], *lines: str, model: str = "", later: Sequence[str] = ()
+    ) -> None:
+        self.programs, self.lines, self.model, self.later = programs, list(lines), model, later
         self.instructions: list[str] = []
         self.asked: list[str] = []
 
     def request(self, instruction: str) -> list[Attempt]:
+        programs = self.later if self.later and self.instructions else self.programs
         self.instructions.append(instruction)
-        return [attempt(program, number) for number, program in enumerate(self.programs)]
+        return [attempt(program, number) for number, program in enumerate(programs)]
 
     def read(self, question: str) -> str:
         self.asked.append(question)
         return self.lines.pop(0)
 
-    def chosen(self, *, asks: bool = True) -> tuple[str, str] | None:
-        search = CandidateSearch(self.request, CheckSettings(), None, self.read if asks else None, self.model)
-        return choose_candidate(search, "Count the mugs.")
+    def chosen(self, *, asks: bool = True) -> str | None:
+        ask = self.read if asks else None
+        return choose_candidate(self.request, "Count the mugs.", CheckSettings(), ask=ask, model=self.model)
 
 
 def test_without_a_terminal_the_largest_cluster_is_taken(capsys: pytest.CaptureFixture[str]) -> None:
     person = Terminal([TWO, ONE, ONE])
-    assert person.chosen(asks=False) == ("Count the mugs.", ONE)
+    assert person.chosen(asks=False) == ONE
     assert "2 of 3 programs" in capsys.readouterr().err
 
 
 def test_nothing_is_asked_if_all_do_the_same() -> None:
     person = Terminal([ONE, ONE])
-    assert person.chosen() == ("Count the mugs.", ONE)
+    assert person.chosen() == ONE
     assert person.asked == []
 
 
 def test_the_person_chooses_an_option(capsys: pytest.CaptureFixture[str]) -> None:
     person = Terminal([ONE, ONE, TWO], "5\n", "2\n")
-    assert person.chosen() == ("Count the mugs.", TWO)
+    assert person.chosen() == TWO
     assert len(person.asked) == 2, "the question is repeated after an unusable line"
     shown = capsys.readouterr()
     assert 'says "2 mugs"' in shown.err
@@ -72,15 +75,20 @@ def test_the_person_chooses_an_option(capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_none_of_these_adds_a_sentence_for_a_second_round() -> None:
-    person = Terminal([ONE, TWO], "none\n", "Only clean ones.\n", "1\n")
-    assert person.chosen() == ("Count the mugs. Only clean ones.", ONE)
+    person = Terminal([ONE, TWO], "none\n", "Only clean ones.\n", "1\n", later=[THREE, FOUR, ONE])
+    assert person.chosen() == THREE
     assert person.instructions == ["Count the mugs.", "Count the mugs. Only clean ones."]
 
 
 def test_there_is_no_third_round() -> None:
-    person = Terminal([ONE, TWO], "none\n", "Only clean ones.\n", "none\n")
+    person = Terminal([ONE, TWO], "none\n", "Only clean ones.\n", "none\n", later=[THREE, FOUR])
     assert person.chosen() is None
     assert len(person.instructions) == 2
+
+
+def test_what_was_not_meant_is_not_taken_again() -> None:
+    with pytest.raises(UserError, match="not meant"):
+        Terminal([ONE, TWO], "none\n", "Only clean ones.\n").chosen()
 
 
 def test_nobody_writes_a_sentence_for_a_recorded_model(capsys: pytest.CaptureFixture[str]) -> None:
@@ -102,7 +110,7 @@ def test_the_end_of_the_input_is_no_answer() -> None:
 
 
 def test_replies_without_a_program_do_not_count() -> None:
-    assert Terminal(["", "", ONE]).chosen() == ("Count the mugs.", ONE)
+    assert Terminal(["", "", ONE]).chosen() == ONE
     assert Terminal(["", ""]).chosen() is None
 
 

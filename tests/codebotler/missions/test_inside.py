@@ -7,7 +7,6 @@ import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
 
 import pytest
 
@@ -200,7 +199,7 @@ def test_a_robot_is_stopped_where_its_pose_enters_a_forbidden_room(
 ) -> None:
     robot: Robot = Simulated(WORLD, speed=speed)
     if wrapped:
-        robot = RobotWithFace(robot, Face()) if wrapped == "face" else SpellingRobot(robot)
+        robot = with_face(robot) if wrapped == "face" else spelling(robot)
     assert robot.has_pose
     mission, lines = ran(tmp_path, robot, THROUGH, NEVER)
     assert (mission.state, mission.summary.line) == (MissionState.STOPPED, 3)
@@ -326,7 +325,7 @@ class Followed(Simulated):
 
 
 def spelling(robot: Robot) -> Robot:
-    return cast("Robot", SpellingRobot(robot))
+    return SpellingRobot(robot)
 
 
 def with_face(robot: Robot) -> Robot:

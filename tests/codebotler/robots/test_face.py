@@ -15,10 +15,12 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Recording, Skill
 from codebotler.core.skills.values import NO_VALUE, TEXT_TYPE, ValueType
+from codebotler.core.trace import Event
 from codebotler.core.world import Room, World
 from codebotler.missions.log import MissionState, read_events
 from codebotler.missions.mission import Mission
-from codebotler.missions.preflight import missing_skills
+from codebotler.missions.past import MissionPast
+from codebotler.missions.preflight import missing_skills, resume_robot
 from codebotler.robots.base import AnswerError, CancelledError, Options, RobotArgument
 from codebotler.robots.face import (
     ASK_TIMEOUT,
@@ -124,6 +126,14 @@ def test_what_the_face_has_the_robot_may_lack() -> None:
     assert robot.missing == {"pick": "no arm"}
     assert missing_skills(TEA, robot) == []
     assert len(missing_skills(f"{TEA}    pick('mug')\n", robot)) == 1
+
+
+def test_a_robot_with_a_face_resumes_a_mission_as_without() -> None:
+    robot, _ = faced()
+    robot.connect()
+    gone = Event("goto", "kitchen", place="hall")
+    resume_robot(robot, MissionPast("1", "", "", TEA, "it failed", (gone,)))
+    assert robot.perform("get_current_location", []) == "kitchen"
 
 
 @pytest.mark.parametrize("kind", [kind for kind in ROBOT_MODULES if kind != "pyrobosim"])

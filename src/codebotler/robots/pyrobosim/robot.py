@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from codebotler.core.errors import UserError, install_command
+from codebotler.core.errors import UserError
 from codebotler.robots.base import (
     ROS_PYTHON,
     Feedback,
@@ -23,8 +23,6 @@ from codebotler.simulator.entities import Thing
 
 if TYPE_CHECKING:
     from codebotler.robots.pyrobosim.world import DrivableWorld
-
-NOT_INSTALLED, INSTALL_PYROBOSIM = "pyrobosim is not installed", install_command("pyrobosim")
 
 
 class Pyrobosim(Simulated):
@@ -82,16 +80,15 @@ class Pyrobosim(Simulated):
 
 
 def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
-    """Check whether pyrobosim is installed."""
+    """Report pyrobosim as available, or raise ModuleNotFoundError if it is not installed."""
     if importlib.util.find_spec("pyrobosim") is None:
-        return Readiness("pyrobosim", works=False, missing=NOT_INSTALLED, mend=INSTALL_PYROBOSIM)
+        raise ModuleNotFoundError("pyrobosim is not installed", name="pyrobosim")
     return Readiness("pyrobosim", works=True, note="plans and drives through --world FILE, without a window")
 
 
 def robot(options: Options) -> Pyrobosim:
-    """Create the robot, or raise UserError if the options contain no world or pyrobosim is missing."""
+    """Create the robot, or raise UserError if the options contain no world."""
     if options.world is None:
         raise UserError("the robot in pyrobosim needs a world; name one with --world FILE")
-    if importlib.util.find_spec("pyrobosim") is None:
-        raise UserError(f"{NOT_INSTALLED}; to install it, run `{INSTALL_PYROBOSIM}`")
+    readiness()
     return Pyrobosim(options.world, speed=options.speed, skills=options.skills)

@@ -1,264 +1,212 @@
-"""Robots on ROS, which perform skills through a worker process that talks to ROS."""
+"""A robot on ROS, with the calls, places, poses and cameras of a connection file, if there is one."""
 
 from __future__ import annotations
 
-import base64
-import re
+import math
 import threading
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from concurrent.futures import Future
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
-from codebotler.core.errors import RobotError
+from codebotler.core.errors import RobotError, UserError
+from codebotler.core.world import Point
 from codebotler.robots.base import (
-    ROS_PYTHON,
     STOP_BY_HAND,
     CameraPicture,
     CancelledError,
     Feedback,
     NotReadyError,
-    Options,
-    Readiness,
     RobotArgument,
-    RobotLostError,
     RobotResult,
     ignore_feedback,
 )
-from codebotler.robots.clock import Clock
-from codebotler.robots.reservation import robot_file
-from codebotler.robots.ros.connection import Connection, SkillCall, Values, default_connection
-from codebotler.robots.ros.worker import RosWorker, WorkerMessage, find_missing
+from codebotler.robots.places import NamedPlace, Places
+from codebotler.robots.ros.caller import RosCaller
+from codebotler.robots.ros.connection import SkillCall, Values
+from codebotler.robots.ros.keepout import keepout_messages
+from codebotler.robots.ros.motion import Pose
+from codebotler.simulator.house_rule import Rule
 
-USE_OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
-NOT_CANCELLED = f"its goals could not be cancelled: {STOP_BY_HAND}"
-CANCEL_SECONDS = 1.0  # the time limit for the worker to send a cancel
-NAMED_ERROR = re.compile(r"([A-Z][A-Za-z]+): (.+)", re.DOTALL)
+if TYPE_CHECKING:
+    from codebotler.perception import Detector
 
-
-@dataclass(frozen=True)
-class Timeouts:
-    """Time limits in seconds, above 0."""
-
-    patience: float = 5.0  # the limit for a server to appear, accept a goal, confirm a stop, or send a result
-    silence: float = 3.0  # the time without a status message after which a server counts as dead
-    longest: float = 600.0  # the limit for a whole skill
+POLL_SECONDS = 0.05  # the interval for checking conditions while waiting
+CLOSE_SECONDS = 1.0  # how long to wait for detectors to close; a busy detector closes later
 
 
-class RosRobot:
-    """Performs skills on ROS, by default with one action server per skill.
+class RosRobot(RosCaller):
+    """Performs skills with the calls, places and cameras of `options.connection`, or else with actions.
 
-    Args:
-        name: the kind of robot, such as ros2.
-        address: the robot's address, such as the URI of a ROS master.
-        script: the worker's script: the name of a file in `workers/`, or a path.
-        options: the options for opening the robot. A speed other than 1 must match the virtual robot's.
-        environment: additional environment variables for the worker.
-        waits: the time limits.
-        node: the name of the worker's node, which must be unique on the ROS graph.
+    After a stop, the robot's pose or velocity shows whether it really stands still.
     """
 
-    if_tool_dies = "the worker then cancels the robot's goal, unless it was killed as well"
-    rooms_are_regexes = has_pose = False
+    _detectors: Mapping[str, Detector] = MappingProxyType({})  # by model, while the robot is connected
 
-    def __init__(
-        self,
-        name: str,
-        address: str,
-        script: str,
-        options: Options,
-        environment: Mapping[str, str],
-        *,
-        waits: Timeouts | None = None,
-        node: str = "codebotler",
-    ) -> None:
-        self.connection = options.connection or default_connection(options.skills)
-        self.name, self.address = name, address
-        self.skills = options.skills if options.connection is None else self.connection.skills(options.skills)
-        self.clock = Clock(options.speed)
-        self.missing: Mapping[str, str] = {}
-        self._script, self._python, self._environment = script, options.ros_python, environment
-        self._node = node
-        self._waits = waits or Timeouts()
-        self._worker: RosWorker | None = None
-        self._in_doubt = False  # whether a goal may still be running without a worker that watches it
-        self._stopped, self._number = True, 0
-        self._send_lock = threading.Lock()  # ensures that no request is sent after a stop
-        self._rescue_lock = threading.RLock()
-        self._prepare()
-
-    def _prepare(self) -> None:
-        """Set additional attributes in a subclass."""
+    @property
+    def has_pose(self) -> bool:
+        """Whether the connection names a topic with the robot's poses."""
+        return self.connection.pose is not None
 
     def connect(self) -> None:
-        """Start a worker, wait for the action servers, and set the clock to 0.
-
-        Raises:
-            NotReadyError: ROS, the master or all servers are missing, or another process uses the robot.
-        """
+        """Open the detectors and connect. Raise NotReadyError if poses are missing or in the wrong frame."""
         self.disconnect()
-        worker = self._start(cancel_all=self._in_doubt)
-        self.missing = worker.about["missing"]
-        if self.missing and self.missing.keys() == self.connection.calls.keys():
-            worker.leave()
-            raise NotReadyError(f"the robot offers no skills: {next(iter(self.missing.values()))}")
-        self._worker, self._stopped, self._in_doubt = worker, False, False
-        self.clock.restart()
+        if cameras := self.connection.cameras.values():
+            from codebotler.perception import open_detector  # noqa: PLC0415 - slow, and optional
+
+            self._looking = threading.Lock()  # held while a detector runs
+            self._detectors = {model: open_detector(model) for model in {model for _, model in cameras}}
+        super().connect()
+        places, pose = self.connection.places, self._pose() if self.has_pose else None
+        sentence = ""
+        if self.has_pose and pose is None:
+            sentence = f"no pose arrived on {self._topic}; start its publisher, or correct its name"
+        elif places is not None and pose is not None and pose.frame not in {"", places.frame}:
+            sentence = (
+                f'the poses on {self._topic} are in the frame "{pose.frame}", but the places are in '
+                f'"{places.frame}"; name another topic, or tf, under pose'
+            )
+        if sentence:
+            self.disconnect()
+            raise NotReadyError(sentence)
 
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Perform a skill on the robot and wait until it ends.
+        """Perform a skill by examining a picture, looking up places and the pose, or calling the robot."""
+        connection = self.connection
+        if skill in connection.cameras:
+            topic, model = connection.cameras[skill]
+            return self._look(topic, model, str(arguments[0]), feedback)
+        if skill not in connection.calls and (places := connection.places) is not None:
+            names = [place.name for place in places.places]
+            return names if skill == "get_all_rooms" else self._place(places, feedback).name
+        names = [parameter.name for parameter in self.skills[skill].parameters]
+        values: dict[str, Any] = dict(zip(names, arguments, strict=True))
+        if connection.places is not None and arguments and self.skills[skill].is_drive:
+            values |= _place_values(connection.places, str(arguments[0]))
+        return self._call(skill, values, feedback)
 
-        Raises:
-            RobotError: the server rejected or aborted the goal.
-            CancelledError: this or another client cancelled the goal.
-            RobotLostError: the server or the worker died, or does not respond.
-        """
-        names = (parameter.name for parameter in self.skills[skill].parameters)
-        return self._call(skill, dict(zip(names, arguments, strict=True)), feedback)
+    @property
+    def failed_stop(self) -> str:
+        """A message if the robot is known to move after a stop, otherwise ""."""
+        worker, until = self._worker, time.monotonic() + self._waits.patience * 0.8
+        if worker is None or (self.connection.pose is None and self.connection.velocity is None):
+            return ""
+        motion = worker.motion
+        while not motion.is_still and not motion.is_silent and time.monotonic() < until:
+            time.sleep(POLL_SECONDS)
+        return f"it was told to stop but is still moving: {STOP_BY_HAND}" if motion.is_moving else ""
 
-    def _call(self, skill: str, values: Values, feedback: Feedback) -> RobotResult:
-        """Perform a skill through its ROS call, with values for the variables in the call."""
-        call = self.connection.calls.get(skill)
-        if call is None:
-            raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
-        request = {"do": "perform", "skill": skill, "fields": call.fields(values)}
-        result: RobotResult = call.answer(self._request(call, request, feedback))
-        return result
+    def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
+        """Report positions (None if unknown) to a callback until `disconnect`. Return False without poses."""
+        worker = self._worker
 
-    def _request(self, call: SkillCall, request: WorkerMessage, feedback: Feedback) -> Values:
-        """Send a request to the worker and return the robot's answer, or raise an error if it failed."""
-        message = self._await_end(request, feedback)
-        match message:
-            case {"is": "result", "values": dict(values)}:
-                return values
-            case {"is": "error", "text": str(text), "state": str(state)}:
-                raise to_robot_error(call, text or call.why(message.get("values", {})), state)
-            case {"is": "cancelled"}:
-                raise CancelledError
-        self._in_doubt = self._in_doubt or message["is"] == "lost"
-        raise RobotLostError(message["text"])
+        def watch() -> None:
+            last: Pose | None = None
+            while worker is not None and worker is self._worker:
+                pose = worker.motion.pose
+                if worker.motion.is_unseen:
+                    on_pose(None)
+                elif pose is not None and pose is not last:
+                    on_pose((pose.x, pose.y))
+                    last = pose
+                time.sleep(POLL_SECONDS)
 
-    def _await_end(self, request: WorkerMessage, feedback: Feedback) -> WorkerMessage:
-        """Send a request, pass on feedback, and return the worker's final message for the request."""
-        worker, number = self._send(request)
-        at = ""
-        while True:
-            match worker.receive(self._waits.patience * 2):
-                case None:
-                    raise RobotLostError(f"the {self.name} worker does not answer; {self._rescue(worker)}")
-                case {"is": "ended"}:
-                    how = worker.describe_end()
-                    raise RobotLostError(f"the {self.name} worker has died ({how}); {self._rescue(worker)}")
-                case {"is": "gone", "text": str(text)}:
-                    self._in_doubt = True
-                    raise RobotLostError(text)
-                case {"id": int(goal), "is": "feedback", "text": str(text)} if goal == number:
-                    feedback(text)
-                case {"id": int(goal), "is": "picture", "data": str(data)} if goal == number:
-                    feedback(CameraPicture(base64.b64decode(data)))
-                case {"is": "pose", "x": float(x), "y": float(y)}:
-                    before, at = at, f"at ({x:z.2f}, {y:z.2f})"
-                    if at != before:
-                        feedback(at)
-                case {"id": int(goal)} as message if goal == number:
-                    return message
-
-    def _send(self, request: WorkerMessage) -> tuple[RosWorker, int]:
-        """Send a request and return the worker and the request's number. Raise CancelledError if stopped."""
-        with self._send_lock:
-            if self._stopped:
-                raise CancelledError
-            assert self._worker is not None, "the robot is not connected"
-            self._number += 1
-            self._worker.send({**request, "id": self._number})
-            return self._worker, self._number
-
-    def cancel(self) -> None:
-        """Have the worker cancel the goal. If the worker hangs, start a new one that cancels all goals."""
-        has_lock = self._send_lock.acquire(timeout=CANCEL_SECONDS)  # a hanging worker can block its owner
-        try:
-            self._stopped = True
-            worker = self._worker
-            self.clock.stop()
-            if worker is None or (has_lock and worker.cancel(CANCEL_SECONDS)):
-                return
-        finally:
-            if has_lock:
-                self._send_lock.release()
-        self._rescue(worker)
+        if self.has_pose:
+            threading.Thread(target=watch, daemon=True).start()
+        return self.has_pose
 
     def disconnect(self) -> None:
-        """Have the worker cancel its goal and exit."""
-        with self._send_lock:
-            self._stopped = True
-            worker, self._worker = self._worker, None
-        self.clock.stop()
-        if worker is not None and not worker.leave():
-            self._in_doubt = True
+        """Have the worker cancel its goal and exit, and close the detectors."""
+        super().disconnect()
+        detectors, self._detectors = self._detectors, {}
+        if detectors:
+            closing = threading.Thread(target=self._close, args=(detectors,), daemon=True)
+            closing.start()
+            closing.join(CLOSE_SECONDS)
 
-    def _start(self, *, cancel_all: bool) -> RosWorker:
-        start: WorkerMessage = {
-            "address": self.address,
-            "node": self._node,
-            "calls": calls_data(self.connection),
-            "packages": self.connection.packages,
-            "pose": self.connection.pose and vars(self.connection.pose),
-            "velocity": self.connection.velocity and vars(self.connection.velocity),
-            "keepout": self.connection.keepout or [],
-            "cancel_all": cancel_all,
-            "sign": str(robot_file(self.name, self.address, f"{self._node}.goal")),
-            **vars(self._waits),
-        }
-        return RosWorker(self._python, self._script, start, self._environment)
+    def _close(self, detectors: Mapping[str, Detector]) -> None:
+        with self._looking:
+            for detector in detectors.values():
+                detector.close()
 
-    def _rescue(self, worker: RosWorker) -> str:
-        """Replace a lost worker with one that cancels all goals, and return a clause on the outcome."""
-        with self._rescue_lock:
-            if self._worker is not worker:
-                return NOT_CANCELLED if self._in_doubt else "all goals were cancelled"
-            worker.kill()
-            self._worker, self._in_doubt = None, True
-            try:
-                other = self._start(cancel_all=True)
-            except NotReadyError as error:
-                return f"its goals could not be cancelled ({error.sentence}): {STOP_BY_HAND}"
-            other.leave()
-            if not other.about["cancelled_all"]:
-                return NOT_CANCELLED
-            self._in_doubt = False
-            return "another worker has cancelled all goals"
+    def keep_out(self, rules: Sequence[Rule]) -> None:
+        """Make the robot's planner avoid the rooms that rules forbid, if there is a keepout filter."""
+        places, topics = self.connection.places, self.connection.keepout
+        if places is None or topics is None:
+            return
+        messages = keepout_messages(rules, places.world().rooms, places.frame, topics[0])
+        for topic, message in zip(topics, messages, strict=True):
+            self._send({"do": "publish", "topic": topic, "fields": message})
+
+    @property
+    def _topic(self) -> str:
+        return "" if self.connection.pose is None else self.connection.pose.topic
+
+    def _pose(self) -> Pose | None:
+        """Return the last pose, or wait for the first one. Return None if no pose arrives in time."""
+        worker, until = self._worker, time.monotonic() + self._waits.patience
+        while worker is not None and worker.motion.pose is None and time.monotonic() < until:
+            if self._stopped:
+                raise CancelledError
+            time.sleep(POLL_SECONDS)
+        return None if worker is None else worker.motion.pose
+
+    def _place(self, places: Places, feedback: Feedback) -> NamedPlace:
+        """Return the place that the robot is in, or else the nearest place, whose distance is reported."""
+        pose = self._pose()
+        if pose is None or (self._worker is not None and self._worker.motion.is_unseen):
+            raise RobotError("UnknownPose", f"no pose has arrived on {self._topic} since the robot moved")
+        within = places.room_at(pose.x, pose.y)
+        if within is not None:
+            return within
+        nearest = places.nearest(pose.x, pose.y)
+        away = math.dist((pose.x, pose.y), (nearest.x, nearest.y))
+        feedback(f"the robot is {away:.1f} m from {nearest.name}, the nearest place")
+        return nearest
+
+    def _look(self, topic: str, model: str, label: str, feedback: Feedback) -> bool:
+        """Return whether a detector finds something in a camera's next picture."""
+        call = SkillCall("topic", topic, "", failure="IsInRoomFailed")
+        image = self._request(call, {"do": "look", "topic": topic}, ignore_feedback)
+        seen = Future[tuple[bool, bytes]]()
+        threading.Thread(target=self._see, args=(seen, model, image, label, topic), daemon=True).start()
+        while not seen.done():
+            if self._stopped:
+                raise CancelledError
+            time.sleep(POLL_SECONDS)
+        is_there, picture = seen.result()
+        feedback(CameraPicture(picture))
+        return is_there
+
+    def _see(
+        self, seen: Future[tuple[bool, bytes]], model: str, message: Values, label: str, topic: str
+    ) -> None:
+        """Set whether something is in a picture, and the picture with a box around what was found."""
+        from codebotler.perception import PerceptionError, boxed, image_from_ros, jpeg_of  # noqa: PLC0415 - slow
+
+        try:
+            image = image_from_ros(message, f"the picture on {topic}")
+            with self._looking:
+                sighting = self._detectors[model].look(image, label)
+            seen.set_result((sighting.found, jpeg_of(boxed(image, sighting))))
+        except (UserError, PerceptionError) as error:
+            seen.set_exception(RobotError("IsInRoomFailed", str(error)))
+        except Exception as error:  # noqa: BLE001 - raised again where the result is used
+            seen.set_exception(error)
 
 
-def ros_readiness(
-    name: str, python: Path, needs: Sequence[str], mend: Callable[[Sequence[str]], str], note: str
-) -> Readiness:
-    """Check whether an interpreter has a worker's modules. `mend` returns the fix for missing ones."""
-    missing = find_missing(python, needs)
-    if missing is None:
-        return Readiness(
-            name, works=False, missing=f"{python} cannot be run", mend=USE_OTHER_PYTHON, note=note
-        )
-    if missing:
-        lacking = f"{python} lacks {', '.join(missing)}"
-        return Readiness(name, works=False, missing=lacking, mend=mend(missing), note=note)
-    return Readiness(name, works=True, note=note)
-
-
-def calls_data(connection: Connection) -> WorkerMessage:
-    """Return the calls of a connection by skill, as plain data for a worker."""
-    return {
-        skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
-        for skill, call in connection.calls.items()
-    }
-
-
-def to_robot_error(call: SkillCall, text: str, state: str) -> RobotError:
-    """Return the exception for a rejected or aborted goal (see `state`), with the server's message.
-
-    The message may start with a kind of error, as in `PickInvalidObject: there is no mug`.
-    """
-    named = NAMED_ERROR.fullmatch(text)
-    if named is not None:
-        return RobotError(named[1], named[2])
-    return RobotError(call.failure, text or f"{call.name} {state} the goal without a reason")
+def _place_values(places: Places, text: str) -> dict[str, Any]:
+    """Return a place's values for variables such as `$place.x`, or raise RobotError if it is unknown."""
+    place = places.named(text)
+    if place is None:
+        known = ", ".join(one.name for one in places.places)
+        raise RobotError("GoToInvalidLocation", f'unknown place "{text}"; the known places are: {known}')
+    half = place.yaw / 2
+    turn = {"x": 0.0, "y": 0.0, "z": math.sin(half), "w": math.cos(half)}
+    pose = {"position": {"x": place.x, "y": place.y, "z": 0.0}, "orientation": turn}
+    stamped = {"header": {"frame_id": places.frame}, "pose": pose}
+    numbers = {"place.x": place.x, "place.y": place.y, "place.yaw": place.yaw}
+    return {"place": stamped, "place.pose": pose, **numbers}

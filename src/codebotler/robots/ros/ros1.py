@@ -8,8 +8,8 @@ from urllib.parse import urlsplit
 
 from codebotler.core.errors import UserError
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness
-from codebotler.robots.ros.classes import class_for
-from codebotler.robots.ros.robot import USE_OTHER_PYTHON, RosRobot, Timeouts, ros_readiness
+from codebotler.robots.ros.caller import USE_OTHER_PYTHON, Timeouts, ros_readiness
+from codebotler.robots.ros.robot import RosRobot
 
 MASTER_URI = "http://localhost:11311"
 ROS1_MODULES = ("rospy", "actionlib", "actionlib_msgs", "genpy", "genmsg", "netifaces")
@@ -22,7 +22,7 @@ INSTALL_ROS1 = (
 def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
     """Create a robot on ROS 1. Its address is the URI of a master, by default ROS_MASTER_URI."""
     uri = master_uri(options.address)
-    return class_for(options)("ros1", uri, "ros1_worker.py", options, {"ROS_MASTER_URI": uri}, waits=waits)
+    return RosRobot("ros1", uri, "ros1_worker.py", options, {"ROS_MASTER_URI": uri}, waits=waits)
 
 
 def master_uri(address: str = "") -> str:
@@ -42,4 +42,4 @@ def readiness(python: Path = ROS_PYTHON) -> Readiness:
     """Check whether the interpreter has rospy and the other modules that the worker needs."""
     mend = INSTALL_ROS1 if python == ROS_PYTHON else USE_OTHER_PYTHON
     note = f"with {python}; needs a master, see ROS_MASTER_URI"
-    return ros_readiness("ros1", python, ROS1_MODULES, lambda _: mend, note)
+    return ros_readiness("ros1", python, ROS1_MODULES, mend, note)

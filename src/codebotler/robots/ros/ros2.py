@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness
-from codebotler.robots.ros.classes import class_for
-from codebotler.robots.ros.robot import RosRobot, Timeouts, ros_readiness
+from codebotler.robots.ros.caller import Timeouts, ros_readiness
+from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import find_missing
 
 ROS2_MODULES = ("rclpy", "action_msgs", "sensor_msgs")
@@ -24,7 +23,7 @@ def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
     domain = domain_of(options.address)
     options = replace(options, ros_python=choose_python(options.ros_python))
     variables = {"ROS_DOMAIN_ID": domain}
-    return class_for(options)("ros2", domain, "ros2_worker.py", options, variables, waits=waits)
+    return RosRobot("ros2", domain, "ros2_worker.py", options, variables, waits=waits)
 
 
 def domain_of(address: str = "") -> str:
@@ -45,10 +44,10 @@ def choose_python(named: Path = ROS_PYTHON) -> Path:
 def readiness(python: Path = ROS_PYTHON) -> Readiness:
     """Check whether the interpreter has rclpy. Missing message types are built later."""
     python = choose_python(python)
-    return ros_readiness("ros2", python, ROS2_MODULES, find_fix, f"with {python}; see ROS_DOMAIN_ID")
+    return ros_readiness("ros2", python, ROS2_MODULES, find_fix(), f"with {python}; see ROS_DOMAIN_ID")
 
 
-def find_fix(_missing: Sequence[str], installed: Path = Path("/opt/ros")) -> str:
+def find_fix(installed: Path = Path("/opt/ros")) -> str:
     """Return the command that makes ROS 2 available: sourcing an installed ROS 2, or else installing it."""
     setups = sorted(path for path in installed.glob("*/setup.bash") if (path.parent / "share/rclpy").is_dir())
     return f"source {setups[-1]}" if setups else INSTALL_ROS2

@@ -8,8 +8,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness
-from codebotler.robots.ros.classes import class_for
-from codebotler.robots.ros.robot import RosRobot, Timeouts
+from codebotler.robots.ros.caller import Timeouts
+from codebotler.robots.ros.robot import RosRobot
 
 ROSBRIDGE_ADDRESS = "ws://localhost:9090"
 ROSBRIDGE_NOTE = "with ROS 2, tested only against a simulated rosbridge"
@@ -20,7 +20,7 @@ def robot(options: Options, waits: Timeouts | None = None) -> RosRobot:
     readiness()
     options = replace(options, ros_python=Path(sys.executable))
     address = options.address or ROSBRIDGE_ADDRESS
-    return class_for(options)("rosbridge", address, "rosbridge_worker.py", options, {}, waits=waits)
+    return RosRobot("rosbridge", address, "rosbridge_worker.py", options, {}, waits=waits)
 
 
 def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
