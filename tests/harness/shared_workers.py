@@ -31,8 +31,6 @@ class SharedWorker(Worker):
     def __init__(self, *, is_live: bool = False) -> None:
         self.is_running = self.is_leaving = self.was_stopped = False
         super().__init__(is_live=is_live)
-        start = self._preparer.start
-        self._preparer.start = lambda: lasting(start)  # type: ignore[method-assign]  # so does its process
 
     def run_tame(
         self, jobs: Sequence[Job], meanwhile: Meanwhile = DO_NOTHING

@@ -111,7 +111,6 @@ def check_on(
 ) -> CheckResult:
     """Check one program on a worker that no other thread uses."""
     how = settings or CheckSettings()
-    worker.begin_to_prepare(program, how.skills, how.simulation)
     room_map = room_map or room_map_for(program, skills=how.skills)
     run = _runner_after(worker, SampledRuns(program, room_map, (), how), {})
     with worker.one_child():

@@ -21,7 +21,7 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any, Generic, NoReturn, ParamSpec, TypeVar
 
-from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.errors import EngineError, LostProcessError, ProtocolError
 from codebotler.simulator.process.exit_status import cause_of_death
 from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.process.spawn import START_LOCK
@@ -77,8 +77,6 @@ class IsolatedFunction(Generic[_Arguments, _Result]):
                 return self._call(ClosedProcess(self.__module__), call)
             return self._call(ClosedProcess(self.__module__), call)
         except (LostProcessError, OSError) as error:
-            from codebotler.simulator.worker import EngineError  # noqa: PLC0415 - too large for these processes
-
             raise EngineError(f"an isolated process was lost twice: {error}") from None
 
     def _call(self, process: ClosedProcess, call: tuple[str, bytes]) -> _Result:
@@ -134,15 +132,17 @@ class ClosedProcess:
         self._channel.send((name, arguments), at_once=True)
         try:
             answer = self._channel.receive_bytes(len(RESULT) + MAX_RESULT)
-        except (TimeoutError, ProtocolError) as silence:
-            raise IsolatedCallError(type(silence).__name__, "the process did not answer") from None
+        except TimeoutError:  # our own functions never wait, so the machine is to blame
+            raise LostProcessError("it did not answer") from None
+        except ProtocolError as error:
+            raise IsolatedCallError("MemoryError", f"the result is too large: {error}") from None
         self._channel.reset_patience()
         if not answer:
             status = self._channel.end_gently()
             if status == -signal.SIGKILL:
                 raise LostProcessError("it was killed from outside")
-            _, error = cause_of_death(status)
-            raise IsolatedCallError(error.kind, error.message)
+            _, fault = cause_of_death(status)
+            raise IsolatedCallError(fault.kind, fault.message)
         data = json.loads(answer[1:])
         if answer[:1] == FAILURE:
             raise IsolatedCallError(*data)

@@ -535,7 +535,7 @@ def test_a_child_that_is_not_believed_ends_at_once(monkeypatch: pytest.MonkeyPat
 
     def receive(child: IsolatedProcess, most: int) -> bytes | None:
         frame = honest(child, most)
-        if most != MAX_FRAME:  # from the preparer
+        if most != MAX_FRAME:  # from a process that compiles
             return frame
         begun.append(child.pid)  # which waits for an answer
         os.kill(child.pid, signal.SIGSTOP)  # so that it does not come to an end by itself

@@ -24,6 +24,7 @@ from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.core.world import Room, World
 from codebotler.simulator import pool
 from codebotler.simulator.engine import digest, run
+from codebotler.simulator.isolated_call import IDLE_PROCESSES, end_all
 from codebotler.simulator.ledger import SkillAnswer
 from codebotler.simulator.pool import MIN_BATCH_KEYS, WorkerPool
 from codebotler.simulator.process import bytecode, spawn
@@ -31,7 +32,7 @@ from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.fork_server_client import BatchServer
 from codebotler.simulator.process.spawn import compiled_file
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, PREPARER
+from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.skill_protocol import OVERRUN, SkillProtocol
 from codebotler.simulator.worker import EngineError, Worker
@@ -73,10 +74,12 @@ def held() -> tuple[set[object], ...]:
 @pytest.fixture
 def nothing_is_left() -> Iterator[None]:
     """Compares what this process holds after the test with what it held before."""
-    for role in (PREPARER, BATCH_SERVER, FORK_SERVER):
+    for role in (BATCH_SERVER, FORK_SERVER):
         compiled_file(role)  # files that stay
+    end_all()
     before = held()
     yield
+    end_all()  # processes that wait for the next program
     assert [after - earlier for after, earlier in zip(held(), before, strict=True)] == [set()] * 3
 
 
@@ -703,15 +706,14 @@ def test_what_was_prepared_before_changes_no_outcome() -> None:
     assert after == alone
 
 
-def test_a_preparer_that_is_killed_from_outside_is_no_verdict() -> None:
+def test_a_compiler_that_is_killed_from_outside_is_no_verdict() -> None:
     worker = Worker()
 
     def robot() -> SimulatedRobot:
         return SimulatedRobot(WORLD)
 
     assert said(worker.run(saying("a"), robot)) == ["a"]
-    assert worker._preparer._process is not None
-    os.kill(worker._preparer._process.pid, signal.SIGKILL)
+    os.kill(IDLE_PROCESSES["codebotler.simulator.compiler"][-1]._process.pid, signal.SIGKILL)
     assert said(worker.run(saying("b"), robot)) == ["b"]
     worker.close()
 

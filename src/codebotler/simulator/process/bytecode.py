@@ -14,7 +14,7 @@ from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType
 
-from codebotler.simulator.sandbox import BATCH_SERVER, PREPARER, WITHOUT_REFERENCES
+from codebotler.simulator.sandbox import BATCH_SERVER, WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.stdlib import IMPORTED
 
 SIMULATOR = __package__.rpartition(".")[0]
@@ -72,7 +72,7 @@ def compiled_modules(compiler: Callable[[str, str], bytes], role: str) -> bytes:
     empty = [SIMULATOR.partition(".")[0], SIMULATOR, *([CORE, f"{CORE}.skills", BATCHES] if further else ())]
     codes = {name: compiled_source("", f"<{name}>") for name in empty}
     codes |= {name: compiler(file, f"<{name}>") for name, file in files.items()}
-    if role not in {PREPARER, BATCH_SERVER}:
+    if role != BATCH_SERVER:
         codes |= {name: code_of(str(file), file.name) for name, file in stdlib_files().items()}
     return marshal.dumps(codes, WITHOUT_REFERENCES)
 

@@ -1,4 +1,4 @@
-"""Starts isolated processes, each with the compiled code for its role."""
+"""Starts fork servers, each with the compiled code for its role."""
 
 from __future__ import annotations
 
@@ -13,15 +13,13 @@ from typing import IO
 
 from codebotler.simulator.process.bytecode import BATCHES, SANDBOX, SIMULATOR, compiled, compiled_modules
 from codebotler.simulator.process.errors import LostProcessError
-from codebotler.simulator.sandbox import BATCH_SERVER, FLAGS, FORK_SERVER, LIVE_SERVER, PREPARER
-
-ROLE_MODULES = {PREPARER: f"{SIMULATOR}.sandbox.preparer", BATCH_SERVER: f"{BATCHES}.process"}
+from codebotler.simulator.sandbox import BATCH_SERVER, FLAGS, FORK_SERVER, LIVE_SERVER
 
 
 def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
     """Start a process in a role, and pass it descriptors."""
     handed = (compiled_file(role).fileno(), *descriptors)
-    module = ROLE_MODULES.get(role, f"{SIMULATOR}.sandbox.fork_server")
+    module = f"{BATCHES}.process" if role == BATCH_SERVER else f"{SIMULATOR}.sandbox.fork_server"
     with START_LOCK:
         return subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that runs us
             [sys.executable, *FLAGS, str(SANDBOX / "start.py"), module, role, *map(str, handed)],

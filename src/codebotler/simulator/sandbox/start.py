@@ -1,4 +1,4 @@
-"""Starts each isolated process: fixes its memory layout and limits, then serves in the requested role."""
+"""Starts each fork server: fixes its memory layout and limits, then serves in the requested role."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def main(module: str, role: str, descriptors: list[str]) -> None:
     """Restart the interpreter if descriptors are given, else import a module and serve in a role."""
     if descriptors:
         start_again(list(map(int, descriptors)))
-    if role not in ("preparer", "batch-fork-server"):
+    if role != "batch-fork-server":
         sys.pycache_prefix = os.devnull  # a bytecode file that may or may not exist would move the heap
     modules = _CompiledModules(loads(os.pread(FIRST_DESCRIPTOR, os.fstat(FIRST_DESCRIPTOR).st_size, 0)))  # noqa: S302 - from the engine
     sys.meta_path.insert(0, modules)
