@@ -42,7 +42,6 @@ __all__ = ["get_ready", "serve"]
 
 # A run that recurses too deep here is repeated in its own process, where it may recurse far deeper.
 BATCH_RECURSION_LIMIT = 400
-MAX_PLAIN_CALLS = 50  # in a longer transcript, equal calls are written only once
 MAX_CALL_BYTES = 50_000  # bytes of a skill's arguments, which must fit into a frame
 SURROGATE_ESCAPE = b"\\ud"  # start of a surrogate in JSON
 UNDECIDED_RUN = b"null"  # replaces a transcript if the run must be repeated in its own process
@@ -209,11 +208,10 @@ class TranscribedRun(ProgramRun):
         return super().ended_by(error)
 
     def _written(self, end: str) -> bytes:
-        calls, order = (self._calls, None) if len(self._calls) <= MAX_PLAIN_CALLS else _distinct(self._calls)
-        data = f"[{encoded([calls, order, self._moments])[1:-1]},{end}]".encode("ascii")
+        data = f"[{encoded([self._calls, self._moments])[1:-1]},{end}]".encode("ascii")
         if len(data) > MAX_CALL_BYTES or SURROGATE_ESCAPE in data:
             self.is_undecided = self.is_undecided or not all(
-                _is_plain(each) for _, given, _, _ in calls for each in given
+                _is_plain(each) for _, given, _, _ in self._calls for each in given
             )
         return data
 
@@ -251,21 +249,6 @@ def _is_plain(given: Argument) -> bool:
         return len(text.encode()) <= MAX_CALL_BYTES
     except UnicodeEncodeError:
         return False
-
-
-def _distinct(calls: list[Called]) -> tuple[list[Called], list[int]]:
-    """Return the distinct calls, and for each call its position among them."""
-    positions: dict[object, int] = {}
-    different: list[Called] = []
-    order = []
-    for call in calls:
-        name, given, kind, value = call
-        key = (name, *given, kind, tuple(value) if type(value) is list else value)
-        if key not in positions:
-            positions[key] = len(different)
-            different.append(call)
-        order.append(positions[key])
-    return different, order
 
 
 ROBOTS: dict[str, type[SimulatedRobot]] = {"simulated": SimulatedRobot, "sampled": SampledRobot}

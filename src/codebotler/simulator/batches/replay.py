@@ -36,7 +36,6 @@ class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """A child's report on a run: the program's skill calls, and how it ended."""
 
     calls: list[Call]
-    order: list[int] | None  # positions in `calls`; None if each call occurs once, in order
     moments: list[tuple[int, float]]  # number of a call, and the clock's time from that call on
     end: dict[str, Any] | None  # None if the child is waiting for the answer to the last call
 
@@ -141,16 +140,12 @@ class Replay:
         calls = [self._expected(call) for call in transcript.calls]
         if transcript.end is None and (not calls or calls[-1][2] is not None):
             raise ProtocolError("the child is waiting, but has asked for nothing")
-        order = range(len(calls)) if transcript.order is None else transcript.order
-        if transcript.order and not 0 <= min(order) <= max(order) < len(calls):
-            raise ProtocolError("a call does not exist")
         ledger, moments = self.ledger, iter((*transcript.moments, LAST_MOMENT))
         changes, later = next(moments)
         answer: SkillAnswer = ("ok", None)
-        for number, place in enumerate(order):
+        for number, (skill, arguments, expected) in enumerate(calls):
             if ledger.limit is not None:
                 raise ProtocolError("the program continues beyond a limit")
-            skill, arguments, expected = calls[place]
             if number == changes:
                 self._let_time_pass(later, is_last=expected == ONLY_TIME)
                 changes, later = next(moments)
