@@ -26,9 +26,6 @@ run_log = logging.getLogger("codebotler.engine.events")  # logs the start and en
 NewRobot: TypeAlias = Callable[[], SimulatedRobot]
 Job: TypeAlias = tuple[str, Sequence[NewRobot]]
 """A program, and one function per run that creates its robot."""
-Meanwhile: TypeAlias = Callable[[], object]
-"""A function to call while a child runs programs. Its result is ignored."""
-DO_NOTHING: Meanwhile = bool
 
 
 class Worker:
@@ -120,9 +117,7 @@ class Worker:
 
     # --- several tame programs in one child
 
-    def run_tame(
-        self, jobs: Sequence[Job], meanwhile: Meanwhile = DO_NOTHING
-    ) -> dict[tuple[int, int], Outcome]:
+    def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
         """Return outcomes of tame programs by job and robot number, without undecided runs."""
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
@@ -130,7 +125,7 @@ class Worker:
         try:
             waiting = list(self._tame(jobs))
             while waiting:
-                waiting = self._run_batch(waiting, jobs, known, meanwhile)
+                waiting = self._run_batch(waiting, jobs, known)
         except (LostProcessError, OSError):
             if self._stopped:
                 raise EngineError("the engine was stopped") from None
@@ -152,14 +147,13 @@ class Worker:
         batch: list[tuple[int, bytes, list[SimulatedRobot]]],
         jobs: Sequence[Job],
         known: dict[tuple[int, int], Outcome],
-        meanwhile: Meanwhile,
     ) -> list[tuple[int, bytes, list[SimulatedRobot]]]:
         """Run programs in one child, and return the programs that it did not begin before it failed."""
         child = self._child = self._child or self._fork_server(BATCH_SERVER).fork()
         for number, _, robots in batch:
             for _ in robots:
                 _log(jobs[number][0], "started")
-        ended = outcomes(child, [(code, robots) for _, code, robots in batch], meanwhile)
+        ended = outcomes(child, [(code, robots) for _, code, robots in batch])
         waiting = list(batch)
         is_sound = False
         try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias
 
@@ -65,16 +65,13 @@ def message(
     return describe_skills(robot), robot.own_skills, pickle.dumps(list(setups.values()), protocol=5), numbered
 
 
-def outcomes(
-    child: IsolatedProcess, programs: Programs, meanwhile: Callable[[], object] = bool
-) -> Iterator[Outcome | None]:
+def outcomes(child: IsolatedProcess, programs: Programs) -> Iterator[Outcome | None]:
     """Run programs in a child process, and yield their outcomes in order.
 
-    An outcome is None if the run must be repeated in its own process. `meanwhile` is called while the child
-    is busy. Raise LostProcessError, ProtocolError or TimeoutError if the child can no longer be used.
+    An outcome is None if the run must be repeated in its own process. Raise LostProcessError, ProtocolError
+    or TimeoutError if the child can no longer be used.
     """
     child.send(message(programs), at_once=True)
-    meanwhile()
     for _, robots in programs:
         for robot in robots:
             yield _outcome(child, robot)
