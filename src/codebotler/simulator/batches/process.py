@@ -26,6 +26,7 @@ from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun, robot_error
 from codebotler.simulator.sandbox.fork_server import RUN_DOOR, serve
 from codebotler.simulator.sandbox.isolation import give_up_rights, usable_filter
+from codebotler.simulator.sandbox.start import arrange, forget_the_shell
 from codebotler.simulator.sandbox.tame_expressions import GIVEN
 
 TYPE_CHECKING = False
@@ -33,12 +34,9 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from codebotler.simulator.sandbox.execution import SkillDescriptions
-    from codebotler.simulator.sandbox.isolation import Filter
 
     Called: TypeAlias = tuple[str, Sequence[Argument], str, Any]  # skill, arguments, kind and value of answer
     Batch: TypeAlias = tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]
-
-__all__ = ["get_ready", "serve"]
 
 # A run that recurses too deep here is repeated in its own process, where it may recurse far deeper.
 BATCH_RECURSION_LIMIT = 400
@@ -47,10 +45,10 @@ SURROGATE_ESCAPE = b"\\ud"  # start of a surrogate in JSON
 UNDECIDED_RUN = b"null"  # replaces a transcript if the run must be repeated in its own process
 
 
-def get_ready(
-    _role: str,
-) -> tuple[socket, TranscribedRun, Callable[[TranscribedRun], None], Filter | None, int]:
-    """Prepare everything that batches share, and return the arguments for `serve`."""
+def main(*descriptors: str) -> None:
+    """Prepare everything that batches share, then fork a child for each batch."""
+    forget_the_shell()
+    arrange(list(map(int, descriptors)))
     door = socket(fileno=RUN_DOOR)
     run = TranscribedRun()
     simulate_environment(run)
@@ -60,7 +58,7 @@ def get_ready(
     seccomp = usable_filter()
     for _ in range(lessons):
         transcripts(run, rehearsal)
-    return door, run, lambda run: execute(run, rehearsal), seccomp, BATCH_CPU_SECONDS
+    serve(door, run, lambda run: execute(run, rehearsal), seccomp, BATCH_CPU_SECONDS)
 
 
 def _receive_setup(door: socket) -> bytes:

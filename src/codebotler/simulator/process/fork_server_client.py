@@ -6,6 +6,7 @@ import contextlib
 import marshal
 import os
 import socket
+import subprocess
 import sys
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import message
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.process.spawn import start
+from codebotler.simulator.process.spawn import start_fork_server, start_module
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.fuel import prepared
@@ -22,6 +23,7 @@ from codebotler.simulator.skill_protocol import SkillProtocol, describe_skills
 REPORT_BYTES = 8  # size of a reported number
 EMPTY_PROGRAM = marshal.dumps(compile("task_program = int", "<program>", "exec"), WITHOUT_REFERENCES)
 REHEARSALS = 8
+BATCH_CODE = "from codebotler.simulator.batches.process import main; main(*sys.argv[1:])"
 
 # Code typical of programs. A fork server runs it first, so that all children share the specialized bytecode.
 WARM_UP = Path(__file__).with_name("warm-up.txt").read_text()
@@ -36,9 +38,15 @@ class ForkServer:
     def __init__(self, role: str) -> None:
         self._report, report = os.pipe()
         door, self._door = socket.socketpair()
-        with door:
-            self._process = start(role, door.fileno(), report)
-        os.close(report)
+        try:
+            with door:
+                self._process = self._start(role, door.fileno(), report)
+        except BaseException:
+            os.close(self._report)
+            self._door.close()
+            raise
+        finally:
+            os.close(report)
         self._end_is_unread = False
         try:
             self._set_up()
@@ -48,6 +56,9 @@ class ForkServer:
         except BaseException:  # such as an interrupt
             self.close()
             raise
+
+    def _start(self, role: str, *descriptors: int) -> subprocess.Popen[bytes]:
+        return start_fork_server(role, *descriptors)
 
     def fork(self) -> IsolatedProcess:
         """Return a newly forked child."""
@@ -136,6 +147,9 @@ class BatchServer(ForkServer):
     def __init__(self) -> None:
         self._next: IsolatedProcess | None = None
         super().__init__(BATCH_SERVER)
+
+    def _start(self, _role: str, *descriptors: int) -> subprocess.Popen[bytes]:
+        return start_module(BATCH_CODE, (), descriptors)
 
     def fork(self) -> IsolatedProcess:
         """Return a new child, which may have been forked in advance."""

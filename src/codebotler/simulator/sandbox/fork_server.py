@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Run = TypeVar("Run", bound=ProgramRun)
 
-RUN_DOOR, REPORT_DESCRIPTOR = 5, 6  # descriptors for requests of runs, and for reported numbers
+RUN_DOOR, REPORT_DESCRIPTOR = 4, 5  # descriptors for requests of runs, and for reported numbers
 PID_BYTES = 8  # size of a process id as bytes; the size of an int object would depend on its value
 DESCRIPTOR_BYTES = 4  # size of a descriptor in a message
 
