@@ -20,7 +20,6 @@ from codebotler.core.trace import Option, Outcome, RunError, Status
 from codebotler.core.world import World
 from codebotler.simulator.compiler import CompiledProgram, compile_here, result_of
 from codebotler.simulator.ledger import texts_in
-from codebotler.simulator.process.fork_server_client import WARM_UP_CODE, WARM_UP_RUNS, WARM_UP_WORLD
 from codebotler.simulator.robot import Argument, SimulatedRobot
 from codebotler.simulator.sandbox import execution
 from codebotler.simulator.sandbox.execution import PROGRAM_RECURSION_LIMIT, LimitReachedError, ProgramRun
@@ -267,9 +266,6 @@ class StandIn(Protocol):
 
 def serve(stand_in: StandIn, input_: IO[bytes], output: IO[bytes]) -> None:
     """Run programs one after another until the input ends."""
-    for _ in range(WARM_UP_RUNS):  # as the fork server does, so that the bytecode is specialized here, too
-        run = stand_in.run = Unwalled(SimulatedRobot(WARM_UP_WORLD))
-        run.execute(*run.execution(WARM_UP_CODE))
     while one_run(stand_in, input_, output):
         pass
 
