@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -96,11 +95,6 @@ class Worker:
         self._stopped = True
         for fork_server in list(self._fork_servers.values()):
             fork_server.kill()
-
-    def stay_on(self, core: int) -> None:
-        """Pin the worker's fork servers and their children to one core."""
-        for fork_server in self._fork_servers.values():
-            os.sched_setaffinity(fork_server.pid, {core})
 
     def close(self) -> None:
         """End all processes. Call this only while nothing is running."""
