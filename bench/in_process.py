@@ -18,13 +18,12 @@ from typing import IO, Any, Protocol, Self, TypeAlias
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Option, Outcome, RunError, Status
 from codebotler.core.world import World
+from codebotler.simulator.compiler import CompiledProgram, compile_here, result_of
 from codebotler.simulator.ledger import texts_in
-from codebotler.simulator.process.fork_server_client import WARM_UP_CODE, WARM_UP_RUNS, WARM_UP_WORLD
 from codebotler.simulator.robot import Argument, SimulatedRobot
-from codebotler.simulator.sandbox import REFUSED, execution
+from codebotler.simulator.sandbox import execution
 from codebotler.simulator.sandbox.execution import PROGRAM_RECURSION_LIMIT, LimitReachedError, ProgramRun
 from codebotler.simulator.sandbox.fuel import prepared
-from codebotler.simulator.sandbox.preparer import answer
 from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings
 from codebotler.simulator.skill_protocol import describe_skills, run_parameters
 
@@ -177,11 +176,12 @@ class Unwalled(Bare):
 
     def prepare(self, source: str) -> Outcome | Execution:
         """Return what to execute, or an outcome if the source is not a valid program."""
-        told = answer(source, lowercase=self.robot.settings.literals == "lowercase")
-        if told[:1] == REFUSED:
-            kind, message, line = json.loads(told[1:])
-            return Outcome(Status.PYTHON_ERROR, (), RunError(kind, message), line)
-        return self.execution(told[1:])
+        try:
+            row = compile_here(source, self.robot.settings.literals, frozenset(self.robot.skills))
+        except MemoryError as error:
+            return Outcome(Status.PYTHON_ERROR, (), RunError("MemoryError", str(error)))
+        found = result_of(*row)
+        return self.execution(found.code) if isinstance(found, CompiledProgram) else found
 
     def execution(self, code: bytes) -> Execution:
         """Return what to execute of a program that parses."""
@@ -266,9 +266,6 @@ class StandIn(Protocol):
 
 def serve(stand_in: StandIn, input_: IO[bytes], output: IO[bytes]) -> None:
     """Run programs one after another until the input ends."""
-    for _ in range(WARM_UP_RUNS):  # as the fork server does, so that the bytecode is specialized here, too
-        run = stand_in.run = Unwalled(SimulatedRobot(WARM_UP_WORLD))
-        run.execute(*run.execution(WARM_UP_CODE))
     while one_run(stand_in, input_, output):
         pass
 

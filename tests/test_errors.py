@@ -55,7 +55,7 @@ def exceptions() -> list[str]:
 def test_the_exceptions_are_found() -> None:
     assert {
         *MADE_OF,
-        "codebotler.simulator.worker.EngineError",
+        "codebotler.simulator.process.errors.EngineError",
         "codebotler.missions.mission.MissionError",
     } <= {*exceptions()}
 

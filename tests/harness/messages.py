@@ -12,7 +12,7 @@ from typing import Any
 
 ERRORS = {
     "UserError": "codebotler.core.errors",
-    "EngineError": "codebotler.simulator.worker",
+    "EngineError": "codebotler.simulator.process.errors",
     "MissionError": "codebotler.missions.mission",
     "ModelError": "codebotler.models.base",
     "NotReadyError": "codebotler.robots.base",

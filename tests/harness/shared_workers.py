@@ -17,7 +17,7 @@ from codebotler.core.trace import Outcome
 from codebotler.simulator.isolated_call import ClosedProcess
 from codebotler.simulator.ledger import SkillPerformer
 from codebotler.simulator.process.fork_server_client import ForkServer
-from codebotler.simulator.worker import DO_NOTHING, EngineError, Job, Meanwhile, NewRobot, Worker
+from codebotler.simulator.worker import EngineError, Job, NewRobot, Worker
 
 Started = TypeVar("Started")
 Ran = TypeVar("Ran")
@@ -31,14 +31,10 @@ class SharedWorker(Worker):
     def __init__(self, *, is_live: bool = False) -> None:
         self.is_running = self.is_leaving = self.was_stopped = False
         super().__init__(is_live=is_live)
-        start = self._preparer.start
-        self._preparer.start = lambda: lasting(start)  # type: ignore[method-assign]  # so does its process
 
-    def run_tame(
-        self, jobs: Sequence[Job], meanwhile: Meanwhile = DO_NOTHING
-    ) -> dict[tuple[int, int], Outcome]:
+    def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
         """Run the tame ones of some programs."""
-        return self._running(lambda: super(SharedWorker, self).run_tame(jobs, meanwhile))
+        return self._running(lambda: super(SharedWorker, self).run_tame(jobs))
 
     def run_alone(self, source: str, new_robot: NewRobot) -> Outcome:
         """Run a program in a process of its own."""

@@ -15,7 +15,13 @@ from codebotler.candidates.behaviour import (
 )
 from codebotler.checking.check import check_on
 from codebotler.checking.problems import Sample
-from codebotler.checking.sampled import CheckSettings, SampledRuns, first_samplers, unexplored_samplers
+from codebotler.checking.sampled import (
+    CheckSettings,
+    SampledRuns,
+    first_samplers,
+    run_together,
+    unexplored_samplers,
+)
 from codebotler.checking.static import read_rooms
 from codebotler.core.errors import UserError
 from codebotler.core.words import counted
@@ -184,11 +190,8 @@ def _run_all(
     settings: CheckSettings,
 ) -> list[list[Sample]]:
     """Run programs, where tame ones share a process, and worlds that repeat a run share its result."""
-    jobs = [SampledRuns(program, room_map, samplers, settings) for program in programs]
-    known = worker.run_tame([one.job for one in jobs])
-    found = []
-    for number, runs in enumerate(jobs):
-        outcomes = {run: outcome for (job, run), outcome in known.items() if job == number}
-        ran = runs.samples_on(worker, outcomes)
-        found.append([next(one for one in ran if one.would_repeat_in(sampler)) for sampler in samplers])
-    return found
+    runs = [SampledRuns(program, room_map, samplers, settings) for program in programs]
+    return [
+        [next(one for one in ran if one.would_repeat_in(sampler)) for sampler in samplers]
+        for ran in run_together(worker, runs)
+    ]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache, partial
-from typing import TypeAlias
+from functools import partial
 
 from codebotler.checking.problems import CheckResult, Sample
 from codebotler.checking.proof import extend_check
@@ -13,23 +12,24 @@ from codebotler.checking.rooms import add_visited_rooms, room_map_for
 from codebotler.checking.sampled import (
     DEFAULT_SAMPLES,
     CheckSettings,
+    RunInWorlds,
     SampledRuns,
     first_samplers,
     group_failures,
     run_in_sampled_worlds,
     run_samples,
+    run_together,
 )
 from codebotler.checking.static import read_program
 from codebotler.core.errors import expect_list
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.trace import Outcome
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
 from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.sampled_robot import AS_WRITTEN
-from codebotler.simulator.worker import Meanwhile, Worker
+from codebotler.simulator.worker import Worker
 
 WORLDS_PER_WORKER = 16  # in each batch
 MAX_WIDENINGS = 3  # rounds that add rooms which the program visits but its source does not name
@@ -111,11 +111,9 @@ def check_on(
 ) -> CheckResult:
     """Check one program on a worker that no other thread uses."""
     how = settings or CheckSettings()
-    worker.begin_to_prepare(program, how.skills, how.simulation)
     room_map = room_map or room_map_for(program, skills=how.skills)
-    run = _runner_after(worker, SampledRuns(program, room_map, (), how), {})
     with worker.one_child():
-        return _run_check(program, room_map, how, run)
+        return _run_check(program, room_map, how, partial(run_samples, worker, program, settings=how))
 
 
 def check_together(
@@ -123,43 +121,33 @@ def check_together(
 ) -> list[CheckResult]:
     """Check several programs on one worker, where their first runs may share a process."""
     samplers = first_samplers(settings)[:WORLDS_PER_WORKER]
-    first = [SampledRuns(program, room_map, samplers, settings) for program, room_map in programs]
-    known: list[dict[int, Outcome]] = [{} for _ in programs]
-    for (number, run_number), outcome in worker.run_tame([runs.job for runs in first]).items():
-        known[number][run_number] = outcome
+    runs = [SampledRuns(program, room_map, samplers, settings) for program, room_map in programs]
     found = []
-    for runs, outcomes in zip(first, known, strict=True):
+    for one, first in zip(runs, run_together(worker, runs), strict=True):
         with worker.one_child():
-            run = _runner_after(worker, runs, outcomes)
-            found.append(_run_check(runs.program, runs.room_map, settings, run))
+            found.append(_run_check(one.program, one.room_map, settings, _runner_after(worker, one, first)))
     return found
 
 
-RunSamples: TypeAlias = Callable[[RoomMap, Sequence[FactSampler], Meanwhile], list[Sample]]
-"""Runs a program in several worlds, and calls the last argument while the program runs."""
-
-
-def _runner_on_pool(pool: WorkerPool, program: str, settings: CheckSettings) -> RunSamples:
+def _runner_on_pool(pool: WorkerPool, program: str, settings: CheckSettings) -> RunInWorlds:
     def run_share(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
         return run_samples(pool.here(), program, room_map, samplers, settings)
 
-    def run(room_map: RoomMap, samplers: Sequence[FactSampler], meanwhile: Meanwhile) -> list[Sample]:
+    def run(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
         shares = [samplers[start :: pool.workers] for start in range(pool.workers)]
         futures = [pool.submit(run_share, room_map, each) for each in shares if each]
-        meanwhile()
         return [sample for future in futures for sample in future.result()]
 
     return run
 
 
-def _runner_after(worker: Worker, first: SampledRuns, outcomes: Mapping[int, Outcome]) -> RunSamples:
-    """Return a function that runs a program on a worker and reuses the outcomes of its first runs."""
+def _runner_after(worker: Worker, runs: SampledRuns, first: list[Sample]) -> RunInWorlds:
+    """Return a function that runs a program on a worker and reuses its first runs."""
 
-    def run(room_map: RoomMap, samplers: Sequence[FactSampler], meanwhile: Meanwhile) -> list[Sample]:
-        if room_map == first.room_map and samplers == first.samplers:
-            return first.samples_on(worker, outcomes)
-        how = first.settings
-        return run_samples(worker, first.program, room_map, samplers, how, meanwhile=meanwhile)
+    def run(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
+        if room_map == runs.room_map and samplers == runs.samplers:
+            return first
+        return run_samples(worker, runs.program, room_map, samplers, runs.settings)
 
     return run
 
@@ -168,24 +156,19 @@ def _run_check(
     program: str,
     room_map: RoomMap,
     settings: CheckSettings,
-    run: RunSamples,
+    run: RunInWorlds,
     width: int = WORLDS_PER_WORKER,
 ) -> CheckResult:
-    read = cache(partial(read_program, program, room_map, settings.skills))
-
-    def run_worlds(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
-        return run(room_map, samplers, read)
-
-    ran = run_in_sampled_worlds(run_worlds, room_map, settings, width)
-    problems = list(read().problems)
-    if not read().compiles:
-        return CheckResult(tuple(problems), (), room_map, settings.seed, settings.strict)
+    text = read_program(program, room_map, settings.skills)
+    if not text.compiles:
+        return CheckResult(text.problems, (), room_map, settings.seed, settings.strict)
+    ran = run_in_sampled_worlds(run, room_map, settings, width)
     for _ in range(MAX_WIDENINGS if room_map.guessed else 0):
         wider = add_visited_rooms(room_map, ran)
         if wider == room_map:
             break
-        room_map, ran = wider, run_in_sampled_worlds(run_worlds, wider, settings, width)
-    blamed = {problem.line for problem in problems}
-    problems += [problem for problem in group_failures(ran, room_map) if problem.line not in blamed]
-    problems.sort(key=lambda problem: problem.line or 0)
+        room_map, ran = wider, run_in_sampled_worlds(run, wider, settings, width)
+    blamed = {problem.line for problem in text.problems}
+    failures = (problem for problem in group_failures(ran, room_map) if problem.line not in blamed)
+    problems = sorted((*text.problems, *failures), key=lambda problem: problem.line or 0)
     return CheckResult(tuple(problems), tuple(ran), room_map, settings.seed, settings.strict)

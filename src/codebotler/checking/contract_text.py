@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from codebotler.core.phrases import verb
 from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.core.words import brief, counted, listed
+from codebotler.core.words import brief, counted, elide_list, listed
 from codebotler.simulator.contract import TELLING_SKILLS, Contract, SkillBound, is_goal
 
 NEVER = {
@@ -72,9 +72,9 @@ def contract_sentence(
     return " ".join(f"{part}." for part in parts if part)
 
 
-def contract_clauses(contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief) -> list[str]:
+def contract_clauses(contract: Contract, skills: SkillTable) -> list[str]:
     """Say of each skill what a program may do with it, such as `go to "kitchen" or "lab" at most 3 times`."""
-    rows = contract_rows(contract, skills, show)
+    rows = contract_rows(contract, skills)
     return [" ".join(filter(None, (row.what, row.texts, row.places, row.at_most))) for row in rows]
 
 
@@ -94,6 +94,4 @@ def _texts_of(row: Skill, bound: SkillBound, show: Callable[[str], str], *, is_s
 def _any_of(texts: Iterable[str], empty: str = '""', *, is_short: bool) -> str:
     shown = ['"{}"'.format(text.replace('"', "'")) if text else empty for text in texts]
     few = MAX_LONG_TEXTS if any(len(text) > LONG_TEXT for text in shown) else MAX_VALUES
-    most = few if is_short else len(shown)
-    more = len(shown) - most
-    return listed([*shown[:most], *([f"{more:,} more"] if more > 0 else [])], "or")
+    return listed(elide_list(shown, few) if is_short else shown, "or")

@@ -21,7 +21,7 @@ from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.sampled_robot import AS_WRITTEN, SampledRobot
 from codebotler.simulator.settings import SimulationSettings
-from codebotler.simulator.worker import DO_NOTHING, Job, Meanwhile, Worker
+from codebotler.simulator.worker import Job, Worker
 
 DEFAULT_SAMPLES, MAX_SAMPLES = 5, 10_000
 EXPLORATION_FACTOR = 2  # worlds added per sample, at most, to try both values of each fact
@@ -89,15 +89,19 @@ def run_samples(
     room_map: RoomMap,
     samplers: Sequence[FactSampler],
     settings: CheckSettings,
-    *,
-    meanwhile: Meanwhile = DO_NOTHING,
 ) -> list[Sample]:
     """Run a program in sampled worlds, but skip worlds that would repeat a run."""
     if not samplers:
         return []
-    runs = SampledRuns(program, room_map, samplers, settings)
-    known = worker.run_tame([runs.job], meanwhile)
-    return runs.samples_on(worker, {number: outcome for (_, number), outcome in known.items()})
+    return run_together(worker, [SampledRuns(program, room_map, samplers, settings)])[0]
+
+
+def run_together(worker: Worker, runs: Sequence[SampledRuns]) -> list[list[Sample]]:
+    """Run several programs, of which tame ones share a process, and return the samples of each."""
+    known: list[dict[int, Outcome]] = [{} for _ in runs]
+    for (number, run), outcome in worker.run_tame([one.job for one in runs]).items():
+        known[number][run] = outcome
+    return [one.samples_on(worker, outcomes) for one, outcomes in zip(runs, known, strict=True)]
 
 
 def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:

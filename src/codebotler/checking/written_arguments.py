@@ -5,11 +5,13 @@ from __future__ import annotations
 import ast
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product, zip_longest
+from itertools import product
+from math import prod
 from typing import TypeAlias
 
+from codebotler.checking.possible_values import PossibleValues
 from codebotler.core.program import all_bound_names, nodes, parse_leniently
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import as_text
@@ -26,12 +28,6 @@ CLOCKS = frozenset({"datetime", "random", "secrets", "uuid"})
 TRICKS = frozenset(
     {"eval", "exec", "globals", "locals", "vars", "getattr", "__builtins__", "__import__", "sys"}
 )
-UNCHANGED = frozenset({"strip", "lower", "upper", "title", "capitalize", "casefold", "lstrip", "rstrip"})
-"""Methods whose result is the same text for a template, which ignores case and surrounding whitespace."""
-
-CHANGES = frozenset({"extend", "insert", "update", "setdefault", "appendleft"})
-"""Methods that may give a list any other elements."""
-
 Templates: TypeAlias = frozenset[TextTemplate]
 UNKNOWN: Templates = frozenset({ANY_TEXT})
 NOTHING: Templates = frozenset()
@@ -114,18 +110,11 @@ def _reads_clock(tree: ast.Module) -> bool:
 
 
 class _Texts:
-    """The texts that the names of a program may have, whatever their scope and the order of statements."""
+    """The texts that the expressions of a program may have."""
 
     def __init__(self, tree: ast.Module) -> None:
-        self._tree = tree
-        self._values: defaultdict[str, list[ast.expr | None]] = defaultdict(list)  # None for an unknown value
-        self._functions = {node.name: node for node in nodes(tree) if isinstance(node, ast.FunctionDef)}
-        self._reading: set[str] = set()  # names whose texts are being determined
-        for node in nodes(tree):
-            for target, value in _bindings(node):
-                self._bind(target, value)
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-                self._bind_parameters(node, self._functions.get(node.func.id))
+        self._tree, self._values = tree, PossibleValues(tree)
+        self._reading: set[ast.expr] = set()  # expressions whose texts are being determined
 
     def given(self, skills: Mapping[str, list[str]]) -> dict[tuple[str, str], Templates]:
         """Return the texts of each argument of each skill that the program names."""
@@ -152,10 +141,14 @@ class _Texts:
 
     def texts(self, node: ast.expr) -> Templates:
         """Return the possible texts of an expression, or of the elements of a list."""
-        found = self._texts(node)
+        values = self._values.of(node)
+        found = NOTHING.union(*(UNKNOWN if value is None else self._texts(value) for value in values))
         return found if len(found) <= MAX_TEMPLATES else UNKNOWN
 
     def _texts(self, node: ast.expr) -> Templates:
+        if node in self._reading:  # a text that grows in a loop
+            return UNKNOWN
+        self._reading.add(node)
         found = UNKNOWN
         match node:
             case ast.Constant(str() | int() | float() as value):
@@ -168,105 +161,16 @@ class _Texts:
                 ast.Attribute(ast.Constant(str(text)), "format")
             ) if not ESCAPED.search(text):
                 found = frozenset({TextTemplate(tuple(FIELD.split(text)))})
-            case ast.BinOp(left, ast.Add(), right) if self._is_list(left) or self._is_list(right):
-                found = self.texts(left) | self.texts(right)
             case ast.BinOp(left, ast.Add(), right):
                 found = _joined([self.texts(left), self.texts(right)])
-            case ast.Call(ast.Name(name)) if name in self._functions:
-                returned = [one.value for one in nodes(self._functions[name]) if isinstance(one, ast.Return)]
-                found = self._of_name(f"{name}()", returned)
-            case ast.Name(name):
-                found = self._of_name(name, self._values.get(name, [None]))
-            case _ if parts := _parts(node):
-                found = NOTHING.union(*map(self.texts, parts))
+        self._reading.remove(node)
         return found
-
-    def _is_list(self, node: ast.expr) -> bool:
-        values = self._values[node.id] if isinstance(node, ast.Name) and node.id in self._values else [node]
-        return any(isinstance(value, ast.List | ast.Tuple | ast.ListComp) for value in values)
-
-    def _of_name(self, name: str, values: Iterable[ast.expr | None]) -> Templates:
-        if name in self._reading:  # a text that grows in a loop
-            return UNKNOWN
-        self._reading.add(name)
-        found = NOTHING.union(*(UNKNOWN if value is None else self.texts(value) for value in values))
-        self._reading.remove(name)
-        return found
-
-    def _bind(self, target: ast.expr, value: ast.expr | None) -> None:
-        match target, value:
-            case ast.Name(name), _:
-                self._values[name].append(value)
-            case ((ast.Tuple(targets) | ast.List(targets)), (ast.Tuple(values) | ast.List(values))):
-                for one, its in zip_longest(targets, values):
-                    if one is not None:
-                        self._bind(one, its)
-            case ((ast.Tuple(targets) | ast.List(targets)), _):
-                for one in targets:
-                    self._bind(one, None)
-            case ast.Starred(one), _:
-                self._bind(one, None)
-
-    def _bind_parameters(self, call: ast.Call, function: ast.FunctionDef | None) -> None:
-        if function is None:
-            return
-        names = [
-            one.arg for one in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)
-        ]
-        for name, value in zip(names, call.args, strict=False):
-            self._values[name].append(None if isinstance(value, ast.Starred) else value)
-        for keyword in call.keywords:
-            for name in [keyword.arg] if keyword.arg else names:
-                self._values[name].append(keyword.value if keyword.arg else None)
-
-
-def _parts(node: ast.expr) -> list[ast.expr]:
-    """Return the expressions of which one is the value of another one, or an element of it."""
-    match node:
-        case ast.IfExp(_, one, other):
-            return [one, other]
-        case ast.BoolOp(_, some) | ast.List(some) | ast.Tuple(some) | ast.Set(some):
-            return some
-        case ast.NamedExpr(_, value) | ast.Call(ast.Name("str" | "list" | "sorted"), [value], []):
-            return [value]
-        case ast.Call(ast.Attribute(value, method), []) if method in UNCHANGED:
-            return [value]
-    return []
-
-
-def _bindings(node: ast.AST) -> Iterator[tuple[ast.expr, ast.expr | None]]:
-    """Yield each target that a node binds, with its value or each of its values, or with None if unknown."""
-    match node:
-        case ast.Assign(targets, value):
-            yield from ((target, value) for target in targets)
-        case ast.AnnAssign(target, value=ast.expr() as value) | ast.NamedExpr(target, value):
-            yield target, value
-        case ast.AugAssign(target, operator, value):
-            yield target, ast.BinOp(target, operator, value)
-        case ast.For(target, over) | ast.comprehension(target, over):
-            known = [over if isinstance(over, ast.Name) else None]
-            values = over.elts if isinstance(over, ast.List | ast.Tuple | ast.Set) else known
-            yield from ((target, value) for value in values)
-        case ast.Call(ast.Attribute(ast.Name() as target, "append" | "add"), [value]):
-            yield target, value
-        case ast.Call(ast.Attribute(ast.Name() as target, method)) if method in CHANGES:
-            yield target, None
-        case ast.withitem(optional_vars=ast.expr() as target):
-            yield target, None
-        case ast.arguments(kwonlyargs=only):
-            positional = [*node.posonlyargs, *node.args]
-            defaults = [*zip(reversed(positional), reversed(node.defaults), strict=False)]
-            defaults += [(one, value) for one, value in zip(only, node.kw_defaults, strict=True) if value]
-            yield from ((ast.Name(one.arg), value) for one, value in defaults)
-            yield from ((ast.Name(one.arg), None) for one in (node.vararg, node.kwarg) if one is not None)
 
 
 def _joined(some: Sequence[Templates]) -> Templates:
     """Return the texts that consist of one text of each set."""
-    count = 1
-    for one in some:
-        count *= len(one)
-    if count > MAX_COMBINATIONS:
+    some = [UNKNOWN if one & UNKNOWN else one for one in some]
+    if prod(map(len, some)) > MAX_COMBINATIONS:
         some = [one if len(one) == 1 else UNKNOWN for one in some]
     return frozenset(_concatenated(texts) for texts in product(*some))
 

@@ -9,7 +9,7 @@ from codebotler.core.skills.table import Recording
 from codebotler.core.skills.verbs import Verb, VerbForm
 from codebotler.core.terminal import visible
 from codebotler.core.trace import Event, Option
-from codebotler.core.words import brief
+from codebotler.core.words import brief, elide_list
 
 NO_ANSWER = "no answer"
 MAX_BRACKETED_OPTIONS = 20
@@ -53,11 +53,8 @@ def result_words(event: Event) -> str:
 
 def bracket_options(options: Sequence[Option], show: Callable[[str], str] = brief) -> str:
     """Write the options of a question in brackets, such as `[yes | no]`."""
-    shown = [
-        f"{show(one.text)}{'' if one.is_text else ' (no text)'}" for one in options[:MAX_BRACKETED_OPTIONS]
-    ]
-    more = len(options) - MAX_BRACKETED_OPTIONS
-    return f"[{' | '.join(shown + [f'{more:,} more'] * (more > 0))}]"
+    shown = [f"{show(one.text)}{'' if one.is_text else ' (no text)'}" for one in options]
+    return f"[{' | '.join(elide_list(shown, MAX_BRACKETED_OPTIONS))}]"
 
 
 def verb(kind: str) -> Verb:

@@ -12,6 +12,12 @@ def listed(parts: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(parts[:-1])} {last} {parts[-1]}"
 
 
+def elide_list(parts: Sequence[str], most: int = 5) -> list[str]:
+    """Shorten an enumeration to its first parts and the number of the rest."""
+    more = len(parts) - most
+    return [*parts[:most], f"{more:,} more"] if more > 0 else [*parts]
+
+
 def counted(number: int, noun: str) -> str:
     """Return a number with a regular noun, such as `1 world` or `2,000 worlds`."""
     return f"{number:,} {noun}{'s' * (number != 1)}"

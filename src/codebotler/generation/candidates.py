@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from functools import partial
 
-from codebotler.generation.generate import Attempt, ignore_attempt
-from codebotler.generation.no_program import describe_programless
+from codebotler.generation.generate import Attempt, ignore_attempt, make_attempt
 from codebotler.models.base import Model
 from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import Prompt
@@ -28,10 +26,8 @@ async def gather_candidates(
         replies = await asyncio.gather(*(limited.reply(prompt, number=number) for number in range(count)))
     finally:
         await model.close()
-    describe = partial(describe_programless, settings=model.settings)
     attempts = [
-        Attempt(number, prompt, reply, () if (none := describe(reply)) is None else (none.sentence,), none)
-        for number, reply in enumerate(replies)
+        await make_attempt(number, prompt, reply, model.settings) for number, reply in enumerate(replies)
     ]
     for attempt in attempts:
         on_attempt(attempt)

@@ -99,7 +99,7 @@ async def write_program(
     try:
         for number in range(retries + 1):
             reply = await limited.reply(request, number=number, on_text=on_text)
-            attempts.append(await _attempt(number, request, reply, model.settings, find_problems))
+            attempts.append(await make_attempt(number, request, reply, model.settings, find_problems))
             on_attempt(attempts[-1])
             if not attempts[-1].problems:
                 break
@@ -110,8 +110,12 @@ async def write_program(
     return Generation(tuple(attempts))
 
 
-async def _attempt(
-    number: int, prompt: Prompt, reply: Reply, settings: SamplingSettings, find_problems: Checker | None
+async def make_attempt(
+    number: int,
+    prompt: Prompt,
+    reply: Reply,
+    settings: SamplingSettings,
+    find_problems: Checker | None = None,
 ) -> Attempt:
     """Check the program in a reply. If there is none, this is the only problem."""
     if (none := describe_programless(reply, settings)) is not None:

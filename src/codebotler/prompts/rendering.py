@@ -67,9 +67,9 @@ class Prompt:
 
     def after(self, program: str, problems: Sequence[str]) -> Prompt:
         """Return a request to rewrite a program without these problems, each given in a sentence."""
-        listed = _listed(problems)
-        repair = _fill("repair", problems=listed)
-        text = _fill(
+        listed = list_lines(problems)
+        repair = fill_template("repair", problems=listed)
+        text = fill_template(
             "completion-repair", program=_comment(program), problems=_comment(listed), opening=self.opening
         )
         return self._followed(program, repair, text)
@@ -84,9 +84,9 @@ class Prompt:
             here: where the robot is and what it holds, in a sentence.
             last_step: the last of the steps that did not fail; empty if there is none.
         """
-        listed = _listed(steps or [NO_STEP])
-        request = _fill("continue", steps=listed, why=why, here=here)
-        text = _fill(
+        listed = list_lines(steps or [NO_STEP])
+        request = fill_template("continue", steps=listed, why=why, here=here)
+        text = fill_template(
             "completion-continue",
             program=_comment(program),
             steps=_comment(listed),
@@ -108,7 +108,7 @@ class Prompt:
     def after_no_program(self, why: str) -> Prompt:
         """Return the request to send after a reply without a program, with the reason for chat models."""
         *before, request = self.messages
-        asked = f"{request.text}\n\n{_fill('no-program', why=why)}"
+        asked = f"{request.text}\n\n{fill_template('no-program', why=why)}"
         return replace(self, messages=(*before, replace(request, text=asked)))
 
     def program_from(self, reply: str) -> str:
@@ -160,21 +160,22 @@ def prompt_for(
     """
     expect_list(rooms, "the rooms")
     instruction = clean_instruction(instruction)
-    about_rooms = _fill("rooms", rooms=", ".join(rooms)) if rooms else ""
-    about_rules = _fill("rules", rules="\n".join(f"- {rule}" for rule in rules)) if rules else ""
+    about_rooms = fill_template("rooms", rooms=", ".join(rooms)) if rooms else ""
+    about_rules = fill_template("rules", rules=list_lines(rules)) if rules else ""
     wish = "\n\n".join(filter(None, (instruction, about_rooms, about_rules)))
     stubs = [stub(skill) for skill in skills.values()]
     shown = [example for example in examples() if example.skills <= skills.keys()]
-    messages = [PromptMessage("system", _fill("system", skills="\n\n".join(stubs)))]
+    messages = [PromptMessage("system", fill_template("system", skills="\n\n".join(stubs)))]
     for example in shown:
         messages.append(PromptMessage("user", example.instruction))
         messages.append(PromptMessage("assistant", _fence(example.program)))
     messages.append(PromptMessage("user", wish))
-    text = _fill(
+    text = fill_template(
         "completion",
         skills="\n\n\n".join(stubs),
         examples="\n\n\n".join(
-            _fill("completion-example", instruction=e.instruction, program=e.program.rstrip()) for e in shown
+            fill_template("completion-example", instruction=e.instruction, program=e.program.rstrip())
+            for e in shown
         ),
         instruction=_comment(instruction.strip()).removeprefix("# "),
         rooms="".join(_comment(about) + "\n" for about in (about_rooms, about_rules) if about),
@@ -221,11 +222,13 @@ def _template(name: str) -> Template:
     return Template((PROMPT_FOLDER / f"{name}.txt").read_text(encoding="utf-8"))
 
 
-def _fill(name: str, **values: str) -> str:
+def fill_template(name: str, **values: str) -> str:
+    """Return the text of a file in this folder, with values in place of its variables."""
     return _template(name).substitute(values).rstrip("\n")
 
 
-def _listed(sentences: Sequence[str]) -> str:
+def list_lines(sentences: Sequence[str]) -> str:
+    """Return a list in Markdown."""
     return "\n".join(f"- {sentence}" for sentence in sentences)
 
 

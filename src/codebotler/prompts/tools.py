@@ -7,20 +7,16 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cache
-from pathlib import Path
-from string import Template
 from typing import Any
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.skills.values import ValueType
-from codebotler.prompts.rendering import Prompt, PromptMessage, clean_instruction
+from codebotler.prompts.rendering import Prompt, PromptMessage, clean_instruction, fill_template, list_lines
 
 GIVE_UP, WAIT = "give_up", "wait"
 """The names of the two tools that are offered in addition to the skills."""
 
-_AGENT_FILE = Path(__file__).parent / "agent.txt"
-_RULES_FILE = Path(__file__).parent / "rules.txt"
 _JSON_TYPES = {"str": "string", "int": "integer", "float": "number", "bool": "boolean"}
 
 
@@ -82,11 +78,10 @@ def agent_prompt(
         UserError: the instruction is empty.
     """
     instruction = clean_instruction(instruction)
-    listed = "\n".join(f"- {rule}" for rule in rules)
-    about_rules = Template(_RULES_FILE.read_text(encoding="utf-8")).substitute(rules=listed) if rules else ""
+    about_rules = fill_template("rules", rules=list_lines(rules)) if rules else ""
     messages = (
-        PromptMessage("system", f"{_AGENT_FILE.read_text(encoding='utf-8').strip()}\n- {to_end}"),
-        PromptMessage("user", "\n\n".join(filter(None, (instruction, about_rules.strip())))),
+        PromptMessage("system", f"{fill_template('agent')}\n- {to_end}"),
+        PromptMessage("user", "\n\n".join(filter(None, (instruction, about_rules)))),
     )
     return ToolPrompt(instruction, messages, instruction, (), "", tools=tools_for(skills))
 

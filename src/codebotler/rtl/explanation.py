@@ -9,7 +9,7 @@ from typing import NamedTuple
 from codebotler.core.phrases import verb
 from codebotler.core.skills.kinds import GOTO
 from codebotler.core.trace import Trace
-from codebotler.core.words import brief, listed, times
+from codebotler.core.words import brief, elide_list, listed, times
 from codebotler.rtl import formulas
 from codebotler.rtl.semantics import (
     Inconclusive,
@@ -21,7 +21,7 @@ from codebotler.rtl.semantics import (
     narrow,
     positions_in_scopes,
 )
-from codebotler.rtl.wording import describe_action, describe_event, elide_list, is_any, is_plain, room
+from codebotler.rtl.wording import describe_action, describe_event, is_any, is_plain, room
 
 
 @dataclass(frozen=True)

@@ -37,10 +37,10 @@ def choices(pattern: str) -> tuple[str, ...] | None:
     return distinct
 
 
-def one_of(texts: tuple[str, ...], quote: str = '"') -> str:
+def one_of(texts: tuple[str, ...]) -> str:
     """Join alternatives, such as `"bread" or "toast"`. After the fifth, give only the number of the rest."""
     left = len(texts) - _MAX_SHOWN
-    shown = [f"{quote}{brief(text)}{quote}" for text in texts[: _MAX_SHOWN if left > 1 else None]]
+    shown = [f'"{brief(text)}"' for text in texts[: _MAX_SHOWN if left > 1 else None]]
     return listed([*shown, f"{left} more"] if left > 1 else shown, "or")
 
 

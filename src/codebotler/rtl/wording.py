@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import chain
 
 from codebotler.core import words
@@ -11,7 +11,7 @@ from codebotler.core.phrases import has_no_text, is_spoken, result_words, verb
 from codebotler.core.skills.kinds import CHECK, GOTO, INSIDE
 from codebotler.core.skills.verbs import VerbForm
 from codebotler.core.trace import Event
-from codebotler.core.words import brief, listed
+from codebotler.core.words import brief, elide_list, listed
 from codebotler.rtl.formulas import EventPattern, Regex, TextPattern, Without, Words
 from codebotler.rtl.regex_words import MATCH_ALL_PATTERNS, choices, one_of
 from codebotler.rtl.text.claims import Claim, Number, Time
@@ -24,7 +24,6 @@ _MENTIONS: Mapping[VerbForm, str] = {"base": "mention", "past": "mentioned", "in
 _OFFERS: Mapping[VerbForm, str] = {"base": "offer", "past": "offered", "ing": "offering"}
 _ANSWERS: Mapping[VerbForm, str] = {"base": "get", "past": "got", "ing": "getting"}
 _CLAUSES = ("that ", "to ", "whether ", "what ", "in one ")
-_MOST_LISTED = 5
 _UNCLEAR = "that fits the requirement"  # for a regex whose words cannot be determined
 
 
@@ -222,12 +221,6 @@ def _qualities(text: TextPattern) -> Iterator[str]:
 def is_any(text: TextPattern | None) -> bool:
     """Whether there is no pattern, or a regex such as `.*` that matches every string."""
     return text is None or (isinstance(text, Regex) and text.pattern in MATCH_ALL_PATTERNS)
-
-
-def elide_list(parts: Sequence[str], most: int = _MOST_LISTED) -> list[str]:
-    """Shorten an enumeration to its first parts and the number of the rest."""
-    more = len(parts) - most
-    return [*parts[:most], f"{more:,} more"] if more > 0 else [*parts]
 
 
 def quoted(text: str) -> str:

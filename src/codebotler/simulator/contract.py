@@ -11,7 +11,7 @@ from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import as_text
 from codebotler.core.text_template import TextTemplate
 from codebotler.core.trace import Event, Option, attempted_event
-from codebotler.core.words import brief, counted, listed
+from codebotler.core.words import brief, counted, elide_list, listed
 from codebotler.rtl import And
 from codebotler.simulator.house_rule import UNKNOWN_ROOM, Rule, RuleViolationError
 from codebotler.simulator.robot import Argument
@@ -23,7 +23,6 @@ TELLING_SKILLS = frozenset({"get_all_rooms", "get_current_location"})
 """Skills that only tell rooms, which every contract allows."""
 
 KINDS_WITH_PLACE = {PICK, PLACE}
-MAX_NAMED_VALUES = 5  # of the allowed values, in a message
 
 Templates: TypeAlias = tuple[TextTemplate, ...]
 
@@ -159,5 +158,4 @@ def contract_violation(row: Skill, arguments: Sequence[Argument], place: str, wh
 
 def _some(values: Iterable[object]) -> str:
     shown = [f'"{brief(str(value))}"' for value in values]
-    more = len(shown) - MAX_NAMED_VALUES
-    return listed([*shown[:MAX_NAMED_VALUES], *([f"{more:,} more"] if more > 0 else [])], "or") or "nothing"
+    return listed(elide_list(shown), "or") or "nothing"

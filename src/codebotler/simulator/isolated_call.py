@@ -13,25 +13,24 @@ import os
 import pickle
 import signal
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from typing import Any, Generic, NoReturn, ParamSpec, TypeVar
 
-from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.errors import EngineError, LostProcessError, ProtocolError
 from codebotler.simulator.process.exit_status import cause_of_death
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.process.spawn import START_LOCK
+from codebotler.simulator.process.spawn import start_module
 from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS
 from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
 from codebotler.simulator.sandbox.isolation import enclose, give_up_rights, usable_filter
+from codebotler.simulator.sandbox.start import forget_the_shell
 
 MAX_RESULT = 64_000_000  # bytes of JSON
 RESULT, FAILURE = b"+", b"-"  # the first byte of an answer
-SERVE_CODE = f"import sys; sys.path[:] = sys.argv[3:]; from {__name__} import serve; serve(*sys.argv[1:3])"
+SERVE_CODE = f"from {__name__} import serve; serve(*sys.argv[1:])"
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
@@ -77,8 +76,6 @@ class IsolatedFunction(Generic[_Arguments, _Result]):
                 return self._call(ClosedProcess(self.__module__), call)
             return self._call(ClosedProcess(self.__module__), call)
         except (LostProcessError, OSError) as error:
-            from codebotler.simulator.worker import EngineError  # noqa: PLC0415 - too large for these processes
-
             raise EngineError(f"an isolated process was lost twice: {error}") from None
 
     def _call(self, process: ClosedProcess, call: tuple[str, bytes]) -> _Result:
@@ -108,20 +105,9 @@ class ClosedProcess:
     """A closed process in which the isolated functions of one module are called."""
 
     def __init__(self, module: str) -> None:
-        flags = ["-S", "-s", "-P", "-W", "ignore", *(["-B"] if sys.dont_write_bytecode else [])]
-        path = [os.path.abspath(folder) for folder in sys.path]  # noqa: PTH100 - Path.resolve follows links
         ours, theirs = socket.socketpair()
-        with theirs, START_LOCK:
-            self._process = subprocess.Popen(  # noqa: S603 - our own code, by the interpreter that runs us
-                [sys.executable, *flags, "-c", SERVE_CODE, module, str(theirs.fileno()), *path],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                cwd="/",
-                env={"PYTHONHASHSEED": "0", "LC_ALL": "C.UTF-8", "PYTHONUTF8": "1"},
-                pass_fds=[theirs.fileno()],
-                start_new_session=True,
-            )
+        with theirs:
+            self._process = start_module(SERVE_CODE, [module], [theirs.fileno()])
         self._channel = IsolatedProcess(
             lambda: self._process.pid, ours, self._process.wait, has_seccomp=False
         )
@@ -134,15 +120,17 @@ class ClosedProcess:
         self._channel.send((name, arguments), at_once=True)
         try:
             answer = self._channel.receive_bytes(len(RESULT) + MAX_RESULT)
-        except (TimeoutError, ProtocolError) as silence:
-            raise IsolatedCallError(type(silence).__name__, "the process did not answer") from None
+        except TimeoutError:  # our own functions never wait, so the machine is to blame
+            raise LostProcessError("it did not answer") from None
+        except ProtocolError as error:
+            raise IsolatedCallError("MemoryError", f"the result is too large: {error}") from None
         self._channel.reset_patience()
         if not answer:
             status = self._channel.end_gently()
             if status == -signal.SIGKILL:
                 raise LostProcessError("it was killed from outside")
-            _, error = cause_of_death(status)
-            raise IsolatedCallError(error.kind, error.message)
+            _, fault = cause_of_death(status)
+            raise IsolatedCallError(fault.kind, fault.message)
         data = json.loads(answer[1:])
         if answer[:1] == FAILURE:
             raise IsolatedCallError(*data)
@@ -187,6 +175,7 @@ def serve(module: str, descriptor: str) -> NoReturn:
     """Call the functions that the engine asks for until it hangs up."""
     import unicodedata as _  # noqa: F401, PLC0415 - needed to parse "\N{...}", and cannot be imported later
 
+    forget_the_shell()
     functions = {
         name: one for name, one in vars(import_module(module)).items() if isinstance(one, IsolatedFunction)
     }

@@ -56,7 +56,6 @@ class WorkerPool:
         self._threads = ThreadPoolExecutor(
             workers, thread_name_prefix="worker", initializer=lambda: setattr(self._local, "is_ours", True)
         )
-        self._takes_turns = one_process_per_run  # thread and child never run at the same time
         self._new_worker = partial(Worker, one_process_per_run=one_process_per_run)
         self._workers: list[Worker] = []
         self._idle: list[Worker] = []
@@ -109,24 +108,7 @@ class WorkerPool:
                 if self._stopping:
                     worker.stop()
             self._local.worker = worker
-            if self._takes_turns:
-                self._keep_together(worker)
         return worker
-
-    def _keep_together(self, worker: Worker) -> None:
-        """Pin this thread and its worker's processes to one core.
-
-        Waking a process on another core takes longer than a skill call. The batch scheduling policy stops
-        this thread from preempting the child at each message.
-        """
-        if sys.platform != "linux":
-            return
-        cores = sorted(os.sched_getaffinity(0))
-        core = cores[(os.getpid() + self._workers.index(worker)) % len(cores)]
-        with contextlib.suppress(OSError):  # runs are slower without it
-            os.sched_setaffinity(0, {core})
-            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
-            worker.stay_on(core)
 
     def submit(
         self, function: Callable[_Arguments, _Value], *args: _Arguments.args, **kwargs: _Arguments.kwargs

@@ -1,34 +1,30 @@
-"""Runs programs one at a time, with a preparer and fork servers."""
+"""Runs programs one at a time, each compiled first, with fork servers."""
 
 from __future__ import annotations
 
 import logging
-import os
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TypeAlias
 
-from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.simulator.batches.replay import outcomes
+from codebotler.simulator.compiler import CompiledProgram, compile_program, compile_programs
 from codebotler.simulator.ledger import SkillPerformer, judge_end
-from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.errors import EngineError, LostProcessError, ProtocolError
 from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.process.preparer_client import Prepared, Preparer
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER
-from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.skill_protocol import SkillProtocol
+
+__all__ = ["EngineError", "Worker"]
 
 run_log = logging.getLogger("codebotler.engine.events")  # logs the start and end of each run, at DEBUG
 NewRobot: TypeAlias = Callable[[], SimulatedRobot]
 Job: TypeAlias = tuple[str, Sequence[NewRobot]]
 """A program, and one function per run that creates its robot."""
-Meanwhile: TypeAlias = Callable[[], object]
-"""A function to call while a child runs programs. Its result is ignored."""
-DO_NOTHING: Meanwhile = bool
 
 
 class Worker:
@@ -48,18 +44,12 @@ class Worker:
         self._child: IsolatedProcess | None = None  # the child that runs batches
         self._keeps_child = False
         self._one_process_per_run = one_process_per_run
-        self._preparer = Preparer()
         self._fork_servers: dict[str, ForkServer] = {}
+        simulating = FORK_SERVER if one_process_per_run else BATCH_SERVER
         try:
-            self._preparer.start()  # gets ready while the fork server starts
-            simulating = FORK_SERVER if one_process_per_run else BATCH_SERVER
             self.has_seccomp = self._fork_server(LIVE_SERVER if is_live else simulating).has_seccomp
         except LostProcessError as error:
-            self._preparer.close()
             raise EngineError(f"the engine cannot start: {error}") from None
-        except BaseException:  # such as an interrupt
-            self._preparer.close()
-            raise
 
     def run(self, source: str, new_robot: NewRobot) -> Outcome:
         """Run a program with a robot. If a process is lost, repeat the run with a new robot."""
@@ -89,8 +79,8 @@ class Worker:
         Any error of the robot other than `RobotError` ends the run, and is raised here.
         """
         try:
-            prepared = self._prepare(source, robot)
-            return prepared if isinstance(prepared, Outcome) else self._fork(LIVE_SERVER, prepared, robot)
+            compiled = _compile(source, robot)
+            return compiled if isinstance(compiled, Outcome) else self._fork(LIVE_SERVER, compiled, robot)
         except LostProcessError as error:
             self.close()
             stopped = "the engine was stopped" if self._stopped else f"an isolated process was lost: {error}"
@@ -98,54 +88,30 @@ class Worker:
 
     def compiles(self, source: str, robot: SkillPerformer) -> bool:
         """Return whether a program compiles."""
-        try:
-            return isinstance(self._prepare(source, robot), Prepared)
-        except LostProcessError as error:
-            raise EngineError(f"an isolated process was lost: {error}") from None
+        return isinstance(_compile(source, robot), CompiledProgram)
 
     def stop(self) -> None:
         """Kill all processes and any current run. Any thread may call this."""
         self._stopped = True
-        self._preparer.kill()
         for fork_server in list(self._fork_servers.values()):
             fork_server.kill()
-
-    def stay_on(self, core: int) -> None:
-        """Pin the worker's fork servers and their children to one core."""
-        for fork_server in self._fork_servers.values():
-            os.sched_setaffinity(fork_server.pid, {core})
 
     def close(self) -> None:
         """End all processes. Call this only while nothing is running."""
         self._end_child()
-        self._preparer.close()
         while self._fork_servers:
             self._fork_servers.popitem()[1].close()
 
     def forget(self) -> None:
         """After a fork, close the descriptors in the new process, which is not the children's parent."""
-        self._preparer.forget()
         if self._child is not None:
             self._child.hang_up()
         while self._fork_servers:
             self._fork_servers.popitem()[1].forget()
 
-    def _prepare(self, source: str, robot: SkillPerformer) -> Prepared | Outcome:
-        lowercase = robot.settings.literals == "lowercase"
-        return self._preparer.prepare(source, lowercase=lowercase, skills=tuple(robot.skills))
-
-    def begin_to_prepare(self, source: str, skills: SkillTable, settings: SimulationSettings) -> None:
-        """Start to compile a program while the caller prepares its robots."""
-        try:
-            self._preparer.ask_ahead(source, lowercase=settings.literals == "lowercase", skills=tuple(skills))
-        except (LostProcessError, OSError):  # the run will retry with a new preparer
-            self._preparer.close()
-
     # --- several tame programs in one child
 
-    def run_tame(
-        self, jobs: Sequence[Job], meanwhile: Meanwhile = DO_NOTHING
-    ) -> dict[tuple[int, int], Outcome]:
+    def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
         """Return outcomes of tame programs by job and robot number, without undecided runs."""
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
@@ -153,7 +119,7 @@ class Worker:
         try:
             waiting = list(self._tame(jobs))
             while waiting:
-                waiting = self._run_batch(waiting, jobs, known, meanwhile)
+                waiting = self._run_batch(waiting, jobs, known)
         except (LostProcessError, OSError):
             if self._stopped:
                 raise EngineError("the engine was stopped") from None
@@ -164,26 +130,24 @@ class Worker:
         robot = jobs[0][1][0]()
         if robot.guard is not None and robot.guard.may_refuse:
             return  # the child's copies of robots cannot refuse actions
-        lowercase = robot.settings.literals == "lowercase"
-        sources, skills = [source for source, _ in jobs], tuple(robot.skills)
-        answers = self._preparer.prepare_all(sources, lowercase=lowercase, skills=skills)
-        for number, prepared in enumerate(answers):
-            if isinstance(prepared, Prepared) and prepared.is_tame:
-                yield number, prepared.code, [new_robot() for new_robot in jobs[number][1]]
+        sources = [source for source, _ in jobs]
+        found = compile_programs(sources, robot.settings.literals, tuple(robot.skills))
+        for number, compiled in enumerate(found):
+            if isinstance(compiled, CompiledProgram) and compiled.is_tame:
+                yield number, compiled.code, [new_robot() for new_robot in jobs[number][1]]
 
     def _run_batch(
         self,
         batch: list[tuple[int, bytes, list[SimulatedRobot]]],
         jobs: Sequence[Job],
         known: dict[tuple[int, int], Outcome],
-        meanwhile: Meanwhile,
     ) -> list[tuple[int, bytes, list[SimulatedRobot]]]:
         """Run programs in one child, and return the programs that it did not begin before it failed."""
         child = self._child = self._child or self._fork_server(BATCH_SERVER).fork()
         for number, _, robots in batch:
             for _ in robots:
                 _log(jobs[number][0], "started")
-        ended = outcomes(child, [(code, robots) for _, code, robots in batch], meanwhile)
+        ended = outcomes(child, [(code, robots) for _, code, robots in batch])
         waiting = list(batch)
         is_sound = False
         try:
@@ -245,18 +209,18 @@ class Worker:
     def _try(self, source: str, new_robot: NewRobot) -> Outcome:
         try:
             robot = new_robot()
-            prepared = self._prepare(source, robot)
-            if isinstance(prepared, Outcome):
-                return prepared
-            return judge_end(self._fork(FORK_SERVER, prepared, robot), robot)
+            compiled = _compile(source, robot)
+            if isinstance(compiled, Outcome):
+                return compiled
+            return judge_end(self._fork(FORK_SERVER, compiled, robot), robot)
         except (LostProcessError, OSError) as error:
             if self._stopped:
                 raise EngineError("the engine was stopped") from None
             self.close()
             raise LostProcessError(str(error)) from None
 
-    def _fork(self, role: str, prepared: Prepared, robot: SkillPerformer) -> Outcome:
-        return SkillProtocol(self._fork_server(role).fork(), prepared.code, robot).outcome()
+    def _fork(self, role: str, compiled: CompiledProgram, robot: SkillPerformer) -> Outcome:
+        return SkillProtocol(self._fork_server(role).fork(), compiled.code, robot).outcome()
 
     def _fork_server(self, role: str) -> ForkServer:
         if role not in self._fork_servers:
@@ -264,6 +228,10 @@ class Worker:
             if self._stopped:
                 self._fork_servers[role].kill()
         return self._fork_servers[role]
+
+
+def _compile(source: str, robot: SkillPerformer) -> CompiledProgram | Outcome:
+    return compile_program(source, robot.settings.literals, tuple(robot.skills))
 
 
 def _log(source: str, what: str) -> None:
@@ -274,7 +242,3 @@ def _log(source: str, what: str) -> None:
 def _log_end(source: str, outcome: Outcome) -> None:
     why = "" if outcome.error is None else f" ({outcome.error.kind}: {outcome.error.message!a})"
     _log(source, f"{outcome.status.value}{why}")
-
-
-class EngineError(RuntimeError):
-    """The engine itself failed, through no fault of a program."""

@@ -8,10 +8,10 @@ from typing import Any
 
 from codebotler.core.phrases import phrase
 from codebotler.core.trace import Event, Status, Trace
-from codebotler.core.words import counted, listed
+from codebotler.core.words import counted, elide_list, listed
 from codebotler.core.world import Answer, Person, World
 from codebotler.rtl.regex_words import choices, one_of
-from codebotler.rtl.wording import elide_list, quoted, room_name
+from codebotler.rtl.wording import quoted, room_name
 from codebotler.simulator.matching import finds
 from codebotler.simulator.settings import SimulationSettings, choose
 

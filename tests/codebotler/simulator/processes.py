@@ -49,9 +49,10 @@ def fork_servers() -> set[int]:
 
 def _is_isolated(pid: int) -> bool:
     try:
-        return b"sandbox/start.py" in Path(f"/proc/{pid}/cmdline").read_bytes()
+        command = Path(f"/proc/{pid}/cmdline").read_bytes()
     except OSError:
         return False
+    return any(code in command for code in (b"sandbox/start.py", b"simulator.batches.process"))
 
 
 def engine_processes() -> set[int]:

@@ -1,4 +1,4 @@
-"""The child that is forked ahead, the program that is prepared ahead, and what becomes of them in trouble."""
+"""The child that is forked ahead, and what becomes of it in trouble."""
 
 import marshal
 import os
@@ -17,7 +17,6 @@ from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
 from codebotler.simulator.process import bytecode
 from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.process.preparer_client import Preparer
 from codebotler.simulator.sandbox import BATCH_SERVER
 from codebotler.simulator.worker import Worker
 from processes import are_gone
@@ -82,18 +81,7 @@ def test_no_child_of_a_dead_server_is_signalled_since_its_number_may_be_anothers
     assert server_of(own_worker) is not server
 
 
-def test_a_program_that_cannot_be_prepared_ahead_is_prepared_when_it_runs(
-    own_worker: Worker, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def failing(*_: object, **__: object) -> None:
-        raise TimeoutError
-
-    monkeypatch.setattr(Preparer, "ask_ahead", failing)
-    assert check_on(own_worker, PROGRAM).problems == ()
-    assert [one.kind for one in check_on(own_worker, PROGRAM + "    say(x)\n").problems] == ["NameError"]
-
-
-def test_what_was_prepared_ahead_and_never_run_is_no_other_programs(own_worker: Worker) -> None:
+def test_what_was_compiled_before_is_no_other_programs(own_worker: Worker) -> None:
     for text in (
         "def task_program(",
         PROGRAM,

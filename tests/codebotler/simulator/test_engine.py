@@ -24,6 +24,7 @@ from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.core.world import Room, World
 from codebotler.simulator import pool
 from codebotler.simulator.engine import digest, run
+from codebotler.simulator.isolated_call import IDLE_PROCESSES, end_all
 from codebotler.simulator.ledger import SkillAnswer
 from codebotler.simulator.pool import MIN_BATCH_KEYS, WorkerPool
 from codebotler.simulator.process import bytecode, spawn
@@ -31,7 +32,6 @@ from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.fork_server_client import BatchServer
 from codebotler.simulator.process.spawn import compiled_file
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, PREPARER
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.skill_protocol import OVERRUN, SkillProtocol
 from codebotler.simulator.worker import EngineError, Worker
@@ -73,10 +73,11 @@ def held() -> tuple[set[object], ...]:
 @pytest.fixture
 def nothing_is_left() -> Iterator[None]:
     """Compares what this process holds after the test with what it held before."""
-    for role in (PREPARER, BATCH_SERVER, FORK_SERVER):
-        compiled_file(role)  # files that stay
+    compiled_file()  # a file that stays
+    end_all()
     before = held()
     yield
+    end_all()  # processes that wait for the next program
     assert [after - earlier for after, earlier in zip(held(), before, strict=True)] == [set()] * 3
 
 
@@ -653,7 +654,7 @@ def test_processes_do_with_what_macos_has_with_linux_patched_to_lack_the_rest(
 
     with TemporaryFile() as file:
         monkeypatch.setattr(spawn, "compiled_file", lambda *_: file)
-        file.write(bytecode.compiled_modules(compiled, BATCH_SERVER))
+        file.write(bytecode.compiled_modules(compiled))
         file.flush()
         programs = [saying("a"), "import json\n" + saying("b"), "import os\n\ndef task_program(): os.abort()"]
         outcomes = list(run([(program, WORLD) for program in programs], workers=1))
@@ -703,15 +704,14 @@ def test_what_was_prepared_before_changes_no_outcome() -> None:
     assert after == alone
 
 
-def test_a_preparer_that_is_killed_from_outside_is_no_verdict() -> None:
+def test_a_compiler_that_is_killed_from_outside_is_no_verdict() -> None:
     worker = Worker()
 
     def robot() -> SimulatedRobot:
         return SimulatedRobot(WORLD)
 
     assert said(worker.run(saying("a"), robot)) == ["a"]
-    assert worker._preparer._process is not None
-    os.kill(worker._preparer._process.pid, signal.SIGKILL)
+    os.kill(IDLE_PROCESSES["codebotler.simulator.compiler"][-1]._process.pid, signal.SIGKILL)
     assert said(worker.run(saying("b"), robot)) == ["b"]
     worker.close()
 
@@ -750,10 +750,10 @@ def test_what_a_shell_has_set_changes_no_outcome() -> None:
     assert "5 seconds of processor time" in told("trap '' XCPU INT", "sum(range(10**12))")
 
 
-HANDED_OVER = f"""
+HANDED_OVER = """
 from hashlib import sha256
-from codebotler.simulator.process.bytecode import compiled, compiled_modules
-print(sha256(compiled_modules(compiled, {FORK_SERVER!r})).hexdigest())
+from codebotler.simulator.process.bytecode import code_of, compiled_modules
+print(sha256(compiled_modules(code_of)).hexdigest())
 """
 
 
@@ -801,8 +801,9 @@ def test_an_interrupt_while_code_is_compiled_leaves_nothing_open(monkeypatch: py
 
     before = set(Path("/proc/self/fd").iterdir())
     monkeypatch.setattr(spawn, "compiled_modules", interrupted)
+    monkeypatch.setattr(spawn, "_written_file", spawn._written_file.__wrapped__)
     with pytest.raises(KeyboardInterrupt):
-        compiled_file("no role that was compiled before")
+        compiled_file()
     assert set(Path("/proc/self/fd").iterdir()) == before
 
 
@@ -812,7 +813,7 @@ def test_a_limit_on_the_size_of_files_ends_in_a_sentence(monkeypatch: pytest.Mon
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
     try:
         with pytest.raises(EngineError, match="ulimit"):
-            WorkerPool(1).__enter__()
+            WorkerPool(1, one_process_per_run=True).__enter__()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
@@ -821,7 +822,6 @@ def test_an_interrupted_start_leaves_nothing_open(monkeypatch: pytest.MonkeyPatc
     def interrupted(_: BatchServer) -> None:
         raise KeyboardInterrupt
 
-    compiled_file(BATCH_SERVER)  # a file that stays open
     before, processes = set(Path("/proc/self/fd").iterdir()), fork_servers()
     monkeypatch.setattr(BatchServer, "_set_up", interrupted)
     with pytest.raises(KeyboardInterrupt), WorkerPool(1):

@@ -320,11 +320,7 @@ def reach(
         reach.run(program)  # by now all processes are there
     before = {number: signal.signal(number, lambda n, _: reach.signals.append(n)) for number in COUNTED}
     assert libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            "codebotler.simulator.process.preparer_client.MAX_PREPARED", 10_000
-        )  # one that is replaced would look new
-        yield reach
+    yield reach
     for pid in carry_the_marker():  # a test has failed; nothing of it stays
         os.kill(pid, signal.SIGKILL)
     assert libc.prctl(PR_SET_CHILD_SUBREAPER, 0, 0, 0, 0) == 0

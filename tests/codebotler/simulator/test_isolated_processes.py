@@ -13,6 +13,7 @@ import pytest
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
+from codebotler.simulator.isolated_call import IDLE_PROCESSES
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox.isolation import NOBODY
 from codebotler.simulator.worker import Worker
@@ -22,7 +23,7 @@ from processes import children_of, lives
 WORLD = World((Room("start_loc"),), "start_loc")
 ROOT = os.geteuid() == 0
 USER = NOBODY if ROOT else os.geteuid()
-CLOSED = ("preparer", "child of a batch", "child")
+CLOSED = ("compiler", "child of a batch", "child")
 ROLES = (*CLOSED, "batch-fork-server", "fork-server")
 NEVER = {"Max core file size": "0", "Max file size": "0", "Max locked memory": "0", "Max msgqueue size": "0"}
 ENVIRONMENT = {"PYTHONHASHSEED", "TZ", "LC_ALL", "PYTHONUTF8", "LD_BIND_NOW"}
@@ -69,9 +70,7 @@ def enclosed() -> Iterator[dict[str, Enclosed]]:
     worker = Worker()
 
     def say(_robot: SimulatedRobot, message: str) -> None:
-        preparer = worker._preparer._process
-        assert preparer is not None
-        found["preparer"] = Enclosed.of(preparer.pid)
+        found["compiler"] = Enclosed.of(IDLE_PROCESSES["codebotler.simulator.compiler"][-1]._process.pid)
         for role, fork_server in worker._fork_servers.items():
             found[role] = Enclosed.of(fork_server.pid)
             for pid in filter(lives, children_of(fork_server.pid)):

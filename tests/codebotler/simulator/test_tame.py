@@ -13,7 +13,8 @@ import pytest
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Room, World
-from codebotler.simulator.process.preparer_client import LONG_SOURCE, Prepared, Preparer, is_exhausted
+from codebotler.simulator.compiler import LONG_SOURCE, CompiledProgram, compile_program, compile_programs
+from codebotler.simulator.isolated_call import IDLE_PROCESSES
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import tame
 from codebotler.simulator.sandbox.fuel import nodes_of
@@ -519,63 +520,48 @@ def test_each_name_that_other_programs_find_is_allowed_or_makes_a_program_wild()
             assert not is_tame(f"x = {name}")
 
 
-def test_the_preparer_knows_names_that_its_own_interpreter_lacks() -> None:
-    preparer = Preparer()
-    try:
-        for program, is_wild in (
-            ("x = exit", True),
-            ("x = quit", True),
-            ("def quit(): pass", True),
-            ("x = y", False),
-        ):
-            prepared = preparer.prepare(program, lowercase=True, skills=tuple(NAMES))
-            assert isinstance(prepared, Prepared)
-            assert prepared.is_tame is not is_wild
-    finally:
-        preparer.close()
+def test_the_compiler_knows_names_that_its_own_interpreter_lacks() -> None:
+    for program, is_wild in (
+        ("x = exit", True),
+        ("x = quit", True),
+        ("def quit(): pass", True),
+        ("x = y", False),
+    ):
+        compiled = compile_program(program, "lowercase", tuple(NAMES))
+        assert isinstance(compiled, CompiledProgram)
+        assert compiled.is_tame is not is_wild
 
 
-def test_programs_that_are_prepared_together_are_as_if_each_were_alone() -> None:
+def test_programs_that_are_compiled_together_are_as_if_each_were_alone() -> None:
     deep = "x = " + "[" * 3_000 + "]" * 3_000
     programs = ["say('Hi')", "import os", "x = (", deep, "\ud800", "go_to('lab')\n" * 3_000, "say('Ho')"]
     skills = tuple(NAMES)
-    preparer = Preparer()
-    try:
-        alone = [preparer.prepare(program, lowercase=True, skills=skills) for program in programs]
-        assert preparer.prepare_all(programs, lowercase=True, skills=skills) == alone
-        with_long = [*programs, f"'{'x' * LONG_SOURCE}'"]
-        together = preparer.prepare_all(with_long, lowercase=True, skills=skills)
-        assert together[:-1] == alone
-        assert isinstance(together[-1], Prepared)
-    finally:
-        preparer.close()
+    alone = [compile_program(program, "lowercase", skills) for program in programs]
+    compile_program.cache_clear()
+    assert compile_programs(programs, "lowercase", skills) == alone
+    with_long = [*programs, f"'{'x' * LONG_SOURCE}'"]
+    together = compile_programs(with_long, "lowercase", skills)
+    assert together[:-1] == alone
+    assert isinstance(together[-1], CompiledProgram)
 
 
 @pytest.mark.slow
-def test_a_program_that_exhausts_the_preparer_costs_those_beside_it_nothing() -> None:
+def test_a_program_that_exhausts_the_compiler_costs_those_beside_it_nothing() -> None:
     greedy = f"import {'.'.join(['a'] * 40_000)}\n"
-    preparer = Preparer()
-    try:
-        programs = ["say(1)", greedy, "say(2)"]
-        first, refused, last = preparer.prepare_all(programs, lowercase=True, skills=("say",))
-        assert isinstance(first, Prepared)
-        assert isinstance(last, Prepared)
-        assert isinstance(refused, Outcome)
-        assert is_exhausted(refused)
-    finally:
-        preparer.close()
+    first, refused, last = compile_programs(["say(1)", greedy, "say(2)"], "lowercase", ("say",))
+    assert isinstance(first, CompiledProgram)
+    assert isinstance(last, CompiledProgram)
+    assert isinstance(refused, Outcome)
+    assert refused.error is not None
+    assert refused.error.kind in {"MemoryError", "TimeoutError", "Crash"}
 
 
 @pytest.mark.parametrize("number", [signal.SIGXCPU, signal.SIGSYS, signal.SIGSEGV])
-def test_a_preparer_that_dies_at_several_programs_is_replaced(number: int) -> None:
-    preparer = Preparer()
-    try:
-        preparer.prepare("say(0)", lowercase=True, skills=("say",))
-        os.kill(preparer.start().pid, number)
-        together = preparer.prepare_all(["say(1)", "say(2)"], lowercase=True, skills=("say",))
-        assert [type(one) for one in together] == [Prepared, Prepared]
-    finally:
-        preparer.close()
+def test_a_compiler_that_dies_at_several_programs_is_replaced(number: int) -> None:
+    compile_programs(["say(0)", "say(1)"], "lowercase", ("say",))
+    os.kill(IDLE_PROCESSES["codebotler.simulator.compiler"][-1]._process.pid, number)
+    together = compile_programs(["say(1)", "say(2)"], "lowercase", ("say",))
+    assert [type(one) for one in together] == [CompiledProgram, CompiledProgram]
 
 
 def test_tame_programs_find_each_name_that_is_allowed() -> None:

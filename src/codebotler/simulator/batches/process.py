@@ -26,6 +26,7 @@ from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun, robot_error
 from codebotler.simulator.sandbox.fork_server import RUN_DOOR, serve
 from codebotler.simulator.sandbox.isolation import give_up_rights, usable_filter
+from codebotler.simulator.sandbox.start import arrange, forget_the_shell
 from codebotler.simulator.sandbox.tame_expressions import GIVEN
 
 TYPE_CHECKING = False
@@ -33,25 +34,21 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from codebotler.simulator.sandbox.execution import SkillDescriptions
-    from codebotler.simulator.sandbox.isolation import Filter
 
     Called: TypeAlias = tuple[str, Sequence[Argument], str, Any]  # skill, arguments, kind and value of answer
     Batch: TypeAlias = tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]
 
-__all__ = ["get_ready", "serve"]
-
 # A run that recurses too deep here is repeated in its own process, where it may recurse far deeper.
 BATCH_RECURSION_LIMIT = 400
-MAX_PLAIN_CALLS = 50  # in a longer transcript, equal calls are written only once
 MAX_CALL_BYTES = 50_000  # bytes of a skill's arguments, which must fit into a frame
 SURROGATE_ESCAPE = b"\\ud"  # start of a surrogate in JSON
 UNDECIDED_RUN = b"null"  # replaces a transcript if the run must be repeated in its own process
 
 
-def get_ready(
-    _role: str,
-) -> tuple[socket, TranscribedRun, Callable[[TranscribedRun], None], Filter | None, int]:
-    """Prepare everything that batches share, and return the arguments for `serve`."""
+def main(*descriptors: str) -> None:
+    """Prepare everything that batches share, then fork a child for each batch."""
+    forget_the_shell()
+    arrange(list(map(int, descriptors)))
     door = socket(fileno=RUN_DOOR)
     run = TranscribedRun()
     simulate_environment(run)
@@ -61,7 +58,7 @@ def get_ready(
     seccomp = usable_filter()
     for _ in range(lessons):
         transcripts(run, rehearsal)
-    return door, run, lambda run: execute(run, rehearsal), seccomp, BATCH_CPU_SECONDS
+    serve(door, run, lambda run: execute(run, rehearsal), seccomp, BATCH_CPU_SECONDS)
 
 
 def _receive_setup(door: socket) -> bytes:
@@ -209,11 +206,10 @@ class TranscribedRun(ProgramRun):
         return super().ended_by(error)
 
     def _written(self, end: str) -> bytes:
-        calls, order = (self._calls, None) if len(self._calls) <= MAX_PLAIN_CALLS else _distinct(self._calls)
-        data = f"[{encoded([calls, order, self._moments])[1:-1]},{end}]".encode("ascii")
+        data = f"[{encoded([self._calls, self._moments])[1:-1]},{end}]".encode("ascii")
         if len(data) > MAX_CALL_BYTES or SURROGATE_ESCAPE in data:
             self.is_undecided = self.is_undecided or not all(
-                _is_plain(each) for _, given, _, _ in calls for each in given
+                _is_plain(each) for _, given, _, _ in self._calls for each in given
             )
         return data
 
@@ -251,21 +247,6 @@ def _is_plain(given: Argument) -> bool:
         return len(text.encode()) <= MAX_CALL_BYTES
     except UnicodeEncodeError:
         return False
-
-
-def _distinct(calls: list[Called]) -> tuple[list[Called], list[int]]:
-    """Return the distinct calls, and for each call its position among them."""
-    positions: dict[object, int] = {}
-    different: list[Called] = []
-    order = []
-    for call in calls:
-        name, given, kind, value = call
-        key = (name, *given, kind, tuple(value) if type(value) is list else value)
-        if key not in positions:
-            positions[key] = len(different)
-            different.append(call)
-        order.append(positions[key])
-    return different, order
 
 
 ROBOTS: dict[str, type[SimulatedRobot]] = {"simulated": SimulatedRobot, "sampled": SampledRobot}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias
 
@@ -36,7 +36,6 @@ class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """A child's report on a run: the program's skill calls, and how it ended."""
 
     calls: list[Call]
-    order: list[int] | None  # positions in `calls`; None if each call occurs once, in order
     moments: list[tuple[int, float]]  # number of a call, and the clock's time from that call on
     end: dict[str, Any] | None  # None if the child is waiting for the answer to the last call
 
@@ -66,16 +65,13 @@ def message(
     return describe_skills(robot), robot.own_skills, pickle.dumps(list(setups.values()), protocol=5), numbered
 
 
-def outcomes(
-    child: IsolatedProcess, programs: Programs, meanwhile: Callable[[], object] = bool
-) -> Iterator[Outcome | None]:
+def outcomes(child: IsolatedProcess, programs: Programs) -> Iterator[Outcome | None]:
     """Run programs in a child process, and yield their outcomes in order.
 
-    An outcome is None if the run must be repeated in its own process. `meanwhile` is called while the child
-    is busy. Raise LostProcessError, ProtocolError or TimeoutError if the child can no longer be used.
+    An outcome is None if the run must be repeated in its own process. Raise LostProcessError, ProtocolError
+    or TimeoutError if the child can no longer be used.
     """
     child.send(message(programs), at_once=True)
-    meanwhile()
     for _, robots in programs:
         for robot in robots:
             yield _outcome(child, robot)
@@ -141,16 +137,12 @@ class Replay:
         calls = [self._expected(call) for call in transcript.calls]
         if transcript.end is None and (not calls or calls[-1][2] is not None):
             raise ProtocolError("the child is waiting, but has asked for nothing")
-        order = range(len(calls)) if transcript.order is None else transcript.order
-        if transcript.order and not 0 <= min(order) <= max(order) < len(calls):
-            raise ProtocolError("a call does not exist")
         ledger, moments = self.ledger, iter((*transcript.moments, LAST_MOMENT))
         changes, later = next(moments)
         answer: SkillAnswer = ("ok", None)
-        for number, place in enumerate(order):
+        for number, (skill, arguments, expected) in enumerate(calls):
             if ledger.limit is not None:
                 raise ProtocolError("the program continues beyond a limit")
-            skill, arguments, expected = calls[place]
             if number == changes:
                 self._let_time_pass(later, is_last=expected == ONLY_TIME)
                 changes, later = next(moments)

@@ -1,4 +1,4 @@
-"""Compiles the code that isolated processes run: our modules and the standard library."""
+"""Compiles the code of fork servers: our modules and the standard library."""
 
 from __future__ import annotations
 
@@ -9,71 +9,26 @@ import marshal
 import os
 import sys
 from collections.abc import Callable
-from functools import cache
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType
 
-from codebotler.simulator.sandbox import BATCH_SERVER, PREPARER, WITHOUT_REFERENCES
+from codebotler.simulator.sandbox import WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.stdlib import IMPORTED
 
 SIMULATOR = __package__.rpartition(".")[0]
 SANDBOX = Path(__file__).parents[1] / "sandbox"
-SKILLS_FOLDER = SANDBOX.parents[1] / "core" / "skills"
-CORE, BATCHES = "codebotler.core", f"{SIMULATOR}.batches"
-# Additional modules for children that hold robots.
-SIMULATION_MODULES = (
-    f"{BATCHES}.process",
-    *(
-        f"{CORE}.{name}"
-        for name in (
-            "cachedproperty",
-            "errors",
-            "labels",
-            "regex_flags",
-            "trace",
-            "unicode",
-            "words",
-            "world",
-        )
-    ),
-    *(
-        f"{CORE}.skills.{path.stem}"
-        for path in sorted(SKILLS_FOLDER.glob("[a-z]*.py"))
-        if path.stem != "files"
-    ),
-    *(
-        f"{SIMULATOR}.{name}"
-        for name in (
-            "entities",
-            "fact_sampler",
-            "simulated_world",
-            "ledger",
-            "matching",
-            "robot",
-            "room_map",
-            "settings",
-            "sampled_facts",
-            "sampled_robot",
-        )
-    ),
-)
 
 
-def compiled_modules(compiler: Callable[[str, str], bytes], role: str) -> bytes:
-    """Return the code of all modules for a role, by name, as one marshalled message."""
-    further = SIMULATION_MODULES if role == BATCH_SERVER else ()
+def compiled_modules(compiler: Callable[[str, str], bytes]) -> bytes:
+    """Return the code of all modules of a fork server, by name, as one marshalled message."""
     package = f"{SIMULATOR}.sandbox"
     files = {package: str(SANDBOX / "__init__.py")}
     files |= {f"{package}.{path.stem}": str(path) for path in sorted(SANDBOX.glob("[a-z]*.py"))}
     files |= {name: inspect.getfile(importlib.import_module(name)) for name in ("__future__", "types")}
-    folder = SANDBOX.parents[1]
-    files |= {name: str(folder.joinpath(*name.split(".")[1:]).with_suffix(".py")) for name in further}
-    empty = [SIMULATOR.partition(".")[0], SIMULATOR, *([CORE, f"{CORE}.skills", BATCHES] if further else ())]
-    codes = {name: compiled_source("", f"<{name}>") for name in empty}
+    codes = {name: compiled_source("", f"<{name}>") for name in (SIMULATOR.partition(".")[0], SIMULATOR)}
     codes |= {name: compiler(file, f"<{name}>") for name, file in files.items()}
-    if role not in {PREPARER, BATCH_SERVER}:
-        codes |= {name: code_of(str(file), file.name) for name, file in stdlib_files().items()}
+    codes |= {name: code_of(str(file), file.name) for name, file in stdlib_files().items()}
     return marshal.dumps(codes, WITHOUT_REFERENCES)
 
 
@@ -101,9 +56,6 @@ def code_of(file: str, shown: str) -> bytes:
         # Compile again, since an interpreter that omits column numbers wrote this shorter code.
         return compiled_source(Path(file).read_text(encoding="utf-8"), shown)
     return dumped(code, shown)
-
-
-compiled = cache(code_of)
 
 
 def compiled_source(source: str, shown: str) -> bytes:

@@ -1,4 +1,8 @@
-"""Errors of the communication with isolated processes."""
+"""Errors of isolated processes, and of the engine that starts them."""
+
+
+class EngineError(RuntimeError):
+    """The engine itself failed, through no fault of a program."""
 
 
 class LostProcessError(Exception):

@@ -6,6 +6,7 @@ import contextlib
 import marshal
 import os
 import socket
+import subprocess
 import sys
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import message
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.process.spawn import start
+from codebotler.simulator.process.spawn import start_fork_server, start_module
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.fuel import prepared
@@ -22,8 +23,9 @@ from codebotler.simulator.skill_protocol import SkillProtocol, describe_skills
 REPORT_BYTES = 8  # size of a reported number
 EMPTY_PROGRAM = marshal.dumps(compile("task_program = int", "<program>", "exec"), WITHOUT_REFERENCES)
 REHEARSALS = 8
+BATCH_CODE = "from codebotler.simulator.batches.process import main; main(*sys.argv[1:])"
 
-# Code typical of programs. A fork server runs it first, so that all children share the specialized bytecode.
+# Code typical of programs. The server of batches runs it first, so that children share specialized bytecode.
 WARM_UP = Path(__file__).with_name("warm-up.txt").read_text()
 WARM_UP_CODE = marshal.dumps(prepared(WARM_UP, lowercase=False)[0], WITHOUT_REFERENCES)
 WARM_UP_WORLD = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
@@ -36,9 +38,15 @@ class ForkServer:
     def __init__(self, role: str) -> None:
         self._report, report = os.pipe()
         door, self._door = socket.socketpair()
-        with door:
-            self._process = start(role, door.fileno(), report)
-        os.close(report)
+        try:
+            with door:
+                self._process = self._start(role, door.fileno(), report)
+        except BaseException:
+            os.close(self._report)
+            self._door.close()
+            raise
+        finally:
+            os.close(report)
         self._end_is_unread = False
         try:
             self._set_up()
@@ -49,13 +57,19 @@ class ForkServer:
             self.close()
             raise
 
+    def _start(self, role: str, *descriptors: int) -> subprocess.Popen[bytes]:
+        return start_fork_server(role, *descriptors)
+
     def fork(self) -> IsolatedProcess:
         """Return a newly forked child."""
+        ours, theirs = socket.socketpair()
         try:
-            channel = self._ask_for_channel()
+            with theirs:
+                socket.send_fds(self._door, [b"x"], [theirs.fileno()])
         except OSError:
+            ours.close()
             raise LostProcessError("the fork server has ended") from None
-        return IsolatedProcess(self._pid_of_child, channel, self._end_of_child, has_seccomp=self.has_seccomp)
+        return IsolatedProcess(self._pid_of_child, ours, self._end_of_child, has_seccomp=self.has_seccomp)
 
     @property
     def pid(self) -> int:
@@ -86,29 +100,11 @@ class ForkServer:
 
     def _set_up(self) -> None:
         """Prepare the fork server, and learn whether its children will have a system call filter."""
-        setup = (describe_skills(SimulatedRobot(WARM_UP_WORLD)), WARM_UP_RUNS)
-        self._door.sendall(marshal.dumps(setup, WITHOUT_REFERENCES))
-        for _ in range(self._read_report()):
-            self._warm_up()
+        skills = describe_skills(SimulatedRobot(WARM_UP_WORLD))
+        self._door.sendall(marshal.dumps(skills, WITHOUT_REFERENCES))
         self.has_seccomp = self._read_report() == 1
         for _ in range(REHEARSALS):  # until the heap, which programs can observe, is stable
             SkillProtocol(self.fork(), EMPTY_PROGRAM, SimulatedRobot(WARM_UP_WORLD)).outcome()
-
-    def _warm_up(self) -> None:
-        channel = self._ask_for_channel()
-        itself = IsolatedProcess(lambda: self.pid, channel, self._process.wait, has_seccomp=False)
-        SkillProtocol(itself, WARM_UP_CODE, SimulatedRobot(WARM_UP_WORLD)).talk()
-        itself.hang_up()
-
-    def _ask_for_channel(self) -> socket.socket:
-        ours, theirs = socket.socketpair()
-        try:
-            with theirs:
-                socket.send_fds(self._door, [b"x"], [theirs.fileno()])
-        except OSError:
-            ours.close()
-            raise
-        return ours
 
     def _pid_of_child(self) -> int:
         if self._end_is_unread:
@@ -136,6 +132,9 @@ class BatchServer(ForkServer):
     def __init__(self) -> None:
         self._next: IsolatedProcess | None = None
         super().__init__(BATCH_SERVER)
+
+    def _start(self, _role: str, *descriptors: int) -> subprocess.Popen[bytes]:
+        return start_module(BATCH_CODE, (), descriptors)
 
     def fork(self) -> IsolatedProcess:
         """Return a new child, which may have been forked in advance."""

@@ -1,4 +1,4 @@
-"""The isolated side of the engine: processes that compile programs, and fork closed children to run them.
+"""The isolated side of the engine: code that compiles programs, and processes that fork children to run them.
 
 The child of a single run holds only the program, and requests skills over a socket. The child of a batch (see
 `batches`) also holds copies of worlds and robots, but the engine's own robot and trace are authoritative. All
@@ -8,9 +8,8 @@ this runs in a bare interpreter with few imports, since every page of memory slo
 # Interpreter options: no site module, no user site folder, no unsafe path, no bytecode files, no warnings.
 FLAGS = ("-S", "-s", "-P", "-B", "-W", "ignore")
 
-# The roles of a process: compile programs, fork for batches, fork for single runs, fork for live runs.
-PREPARER, BATCH_SERVER = "preparer", "batch-fork-server"
-FORK_SERVER, LIVE_SERVER = "fork-server", "live-fork-server"
+# The roles of a fork server: for batches, for single runs, for live runs.
+BATCH_SERVER, FORK_SERVER, LIVE_SERVER = "batch-fork-server", "fork-server", "live-fork-server"
 
 CHANNEL = 3  # the descriptor that connects a closed process to the engine
 HEADER, MAX_FRAME = 4, 1_000_000  # bytes of the length that precedes a frame, and of the frame
@@ -28,6 +27,3 @@ PROGRAM = "<program>"  # the file name of a program's code
 
 # Names of the functions that we insert into compiled programs, which no source text can spell.
 FUEL, CAUGHT, ENTRY, ENTER, BY_NAME = "<fuel>", "<caught>", "<entry>", "<enter>", "<by-name>"
-
-# The first byte of the preparer's answer. The rest is code, tame code, or the reason for a refusal.
-PLAIN, TAME, REFUSED = b"p", b"t", b"-"

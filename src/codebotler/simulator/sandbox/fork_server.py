@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Run = TypeVar("Run", bound=ProgramRun)
 
-RUN_DOOR, REPORT_DESCRIPTOR = 5, 6  # descriptors for requests of runs, and for reported numbers
+RUN_DOOR, REPORT_DESCRIPTOR = 4, 5  # descriptors for requests of runs, and for reported numbers
 PID_BYTES = 8  # size of a process id as bytes; the size of an int object would depend on its value
 DESCRIPTOR_BYTES = 4  # size of a descriptor in a message
 
@@ -38,8 +38,7 @@ def get_ready(
     door = socket(fileno=RUN_DOOR)
     run = ProgramRun()
     simulate_environment(run)
-    skills, lessons = loads(door.recv(1 << 16))  # noqa: S302 - from the engine
-    run.provide(skills)
+    run.provide(loads(door.recv(1 << 16)))  # noqa: S302 - from the engine
     load_stdlib(run)
     sys.pycache_prefix = None
     for name in [name for name in sys.modules if name.partition(".")[0] == "codebotler"]:
@@ -51,9 +50,7 @@ def get_ready(
                 module.__spec__.submodule_search_locations = module.__path__
     sys.meta_path[:] = [_NothingMore()]
     give_up_rights()
-    seccomp = usable_filter()
-    _warm_up(run, door, lessons)
-    return door, run, execute, seccomp, seconds
+    return door, run, execute, usable_filter(), seconds
 
 
 def serve(
@@ -65,20 +62,6 @@ def serve(
     _report(0 if seccomp is None else 1)
     while _one_run(door, run, execute, seccomp, seconds):
         pass
-
-
-def _warm_up(run: ProgramRun, door: socket, lessons: int) -> None:
-    """Run the engine's own program in this process, so that all children share the specialized bytecode."""
-    _report(lessons)
-    names = vars(run.namespace).copy()
-    for _ in range(lessons):
-        line = _asked_for(door)
-        os.dup2(line, CHANNEL)
-        if line != CHANNEL:
-            os.close(line)
-        execute(run)
-        run.forget(names)
-    os.close(CHANNEL)
 
 
 class _NothingMore:

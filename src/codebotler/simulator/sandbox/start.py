@@ -1,4 +1,4 @@
-"""Starts each isolated process: fixes its memory layout and limits, then serves in the requested role."""
+"""Starts each fork server for wild programs: fixes its memory layout and limits, then serves in a role."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ if TYPE_CHECKING:
     import types
     from typing import NoReturn
 
-FIRST_DESCRIPTOR = 4  # a file from the engine with the code of our modules
+FIRST_DESCRIPTOR = 4  # of the descriptors that the engine passes
+CODES = 6  # the last one, a file with the code of our modules
 STACK = 8 * 1024 * 1024
 ADDR_NO_RANDOMIZE = 0x0040000
 
 
-def main(module: str, role: str, descriptors: list[str]) -> None:
-    """Restart the interpreter if descriptors are given, else import a module and serve in a role."""
+def main(role: str, descriptors: list[str]) -> None:
+    """Restart the interpreter if descriptors are given, else serve in a role."""
     if descriptors:
         start_again(list(map(int, descriptors)))
-    if role not in ("preparer", "batch-fork-server"):
-        sys.pycache_prefix = os.devnull  # a bytecode file that may or may not exist would move the heap
-    modules = _CompiledModules(loads(os.pread(FIRST_DESCRIPTOR, os.fstat(FIRST_DESCRIPTOR).st_size, 0)))  # noqa: S302 - from the engine
+    sys.pycache_prefix = os.devnull  # a bytecode file that may or may not exist would move the heap
+    modules = _CompiledModules(loads(os.pread(CODES, os.fstat(CODES).st_size, 0)))  # noqa: S302 - from the engine
     sys.meta_path.insert(0, modules)
-    os.close(FIRST_DESCRIPTOR)
-    serving = __import__(module, fromlist=["serve"])
-    ready = serving.get_ready(role)
+    os.close(CODES)
+    from codebotler.simulator.sandbox.fork_server import get_ready, serve  # noqa: PLC0415 - found by `modules`
+
+    ready = get_ready(role)
     modules.codes.clear()  # there are no more imports
-    serving.serve(*ready)
+    serve(*ready)
 
 
 class _CompiledModules:
@@ -70,17 +71,23 @@ def start_again(descriptors: list[int]) -> NoReturn:
     or the number of a descriptor would change it.
     """
     import ctypes  # noqa: PLC0415 - large, and not needed after the restart
-    from fcntl import F_DUPFD, fcntl  # noqa: PLC0415 - see above
 
     forget_the_shell()
+    arrange(descriptors)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).personality(ctypes.c_ulong(ADDR_NO_RANDOMIZE))
+    os.execv(sys.executable, sys.orig_argv[: -len(descriptors)])  # noqa: S606 - runs this program again
+
+
+def arrange(descriptors: list[int]) -> None:
+    """Give descriptors the numbers from FIRST_DESCRIPTOR on, and close all others after them."""
+    from fcntl import F_DUPFD, fcntl  # noqa: PLC0415 - not needed after the restart
+
     end = FIRST_DESCRIPTOR + len(descriptors)
     copies = [fcntl(descriptor, F_DUPFD, end) for descriptor in descriptors]
     for number, copy in enumerate(copies, FIRST_DESCRIPTOR):
         os.dup2(copy, number, inheritable=True)
     os.closerange(end, 65536)
-    if sys.platform == "linux":
-        ctypes.CDLL(None).personality(ctypes.c_ulong(ADDR_NO_RANDOMIZE))
-    os.execv(sys.executable, sys.orig_argv[: -len(descriptors)])  # noqa: S606 - runs this program again
 
 
 def forget_the_shell() -> None:
@@ -100,4 +107,4 @@ def forget_the_shell() -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2], sys.argv[3:])
+    main(sys.argv[1], sys.argv[2:])
