@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal, TypeAlias
@@ -12,15 +11,14 @@ from mcp.server.mcpserver.exceptions import ToolError
 from mcp.server.mcpserver.resolve import Elicit, Resolve
 from pydantic import BaseModel, Field
 
-from codebotler.agents.gatekeeper import Gatekeeper
+from codebotler.agents.gatekeeper import Gatekeeper, in_thread
 from codebotler.agents.reports import question, which_question
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.missions.mission import MissionError
 from codebotler.missions.past import MissionPast
-from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.session import MissionSession
-from codebotler.models.base import ModelError, ignore_text
+from codebotler.models.base import ModelError
 
 MAX_ARGUMENT = 10_000
 """The limit for an instruction, in characters."""
@@ -87,11 +85,11 @@ def ask_which_behaviour(
 
 async def read_last_past(ctx: AgentContext) -> MissionPast:
     """Return the past of the last mission, or the one that the current mission continues."""
-    console = gatekeeper_of(ctx).console
+    gatekeeper, console = gatekeeper_of(ctx), gatekeeper_of(ctx).console
     with as_tool_errors():
         if console.view.past is not None and not console.view.is_over:
             return console.view.past
-        return await asyncio.to_thread(console.past_of, "last")
+        return await in_thread(gatekeeper.read_last_past)
 
 
 async def ask_whether(
@@ -101,8 +99,8 @@ async def ask_whether(
     gatekeeper = gatekeeper_of(ctx)
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
         return NoWord(answer="it did not happen")
-    robot, home = gatekeeper.console.robot, gatekeeper.console.home
-    evidence = await asyncio.to_thread(ask_evidence, robot, home, past, ignore_text)
+    with as_tool_errors():
+        evidence = await in_thread(gatekeeper.ask_evidence, past)
     return Elicit("\n".join((past.question, *evidence)), StepWord)
 
 

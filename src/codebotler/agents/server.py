@@ -3,33 +3,30 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
 import os
 import signal
 import stat
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
-from dataclasses import asdict
 from io import BufferedWriter, FileIO, TextIOWrapper
-from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import anyio
 from mcp.server import MCPServer
-from mcp.server.mcpserver.exceptions import ResourceNotFoundError
+from mcp.server.mcpserver.exceptions import ResourceError, ResourceNotFoundError
 from mcp.server.stdio import stdio_server
 from mcp.server.transport_security import TransportSecuritySettings
 from mcp_types import ToolAnnotations
 
 from codebotler import __version__
-from codebotler.agents.gatekeeper import Gatekeeper
+from codebotler.agents.gatekeeper import Gatekeeper, in_thread
 from codebotler.agents.tools import ACTING, READING
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
 from codebotler.missions.log import EVENTS_FILE, SUMMARY_FILE
-from codebotler.missions.mission import BY_SHUTDOWN
-from codebotler.missions.store import find_mission, read_missions
+from codebotler.missions.mission import BY_SHUTDOWN, MissionError
+from codebotler.missions.store import find_mission
 from codebotler.web.access import AGENT_PATH
 from codebotler.web.console import Console
 from codebotler.web.server import Companion
@@ -73,16 +70,18 @@ def make_server(gatekeeper: Gatekeeper) -> MCPServer[Gatekeeper]:
     for tools, only_reads in ((READING, True), (ACTING, False)):
         for tool in tools:
             server.add_tool(tool, annotations=ToolAnnotations(read_only_hint=only_reads))
-    _add_resources(server, gatekeeper.console.home)
+    _add_resources(server, gatekeeper)
     return server
 
 
-def _add_resources(server: MCPServer[Gatekeeper], home: Path) -> None:
+def _add_resources(server: MCPServer[Gatekeeper], gatekeeper: Gatekeeper) -> None:
+    home = gatekeeper.console.home
+
     @server.resource("codebotler://missions", mime_type="application/json")
-    def missions() -> str:
-        """List all missions, oldest first."""
+    async def missions() -> str:
+        """List the last missions, oldest first, without their programs."""
         with _as_resource_errors():
-            return json.dumps([asdict(summary) for summary in read_missions(home)])
+            return await in_thread(gatekeeper.list_missions)
 
     @server.resource("codebotler://missions/{mission}", mime_type="application/json")
     def mission(mission: str) -> str:
@@ -103,6 +102,8 @@ def _as_resource_errors() -> Iterator[None]:
         yield
     except UserError as error:
         raise ResourceNotFoundError(error.sentence) from None
+    except MissionError as error:
+        raise ResourceError(error.sentence) from None
 
 
 # --- transports
