@@ -18,6 +18,7 @@ from mcp.server.mcpserver.exceptions import ResourceError, ResourceNotFoundError
 from mcp.server.stdio import stdio_server
 from mcp.server.transport_security import TransportSecuritySettings
 from mcp_types import ToolAnnotations
+from starlette.routing import Route
 
 from codebotler import __version__
 from codebotler.agents.gatekeeper import Gatekeeper, in_thread
@@ -65,6 +66,7 @@ def make_server(gatekeeper: Gatekeeper) -> MCPServer[Gatekeeper]:
         version=__version__,
         lifespan=lifespan,
         log_level="WARNING",
+        subscriptions=False,  # nothing is published, and idle streams would use up the limit for requests
     )
     logging.root.handlers[:] = handlers  # our own log escapes control characters
     for tools, only_reads in ((READING, True), (ACTING, False)):
@@ -112,15 +114,17 @@ def _as_resource_errors() -> Iterator[None]:
 def over_http(server: MCPServer[Gatekeeper], announce: Callable[[str], None]) -> Companion:
     """Return what serves agents over HTTP on the page's port. `announce` receives the page's address."""
     security = TransportSecuritySettings(enable_dns_rebinding_protection=False)  # the page's guard has it
-    app = server.streamable_http_app(
+    (route,) = server.streamable_http_app(
         streamable_http_path=AGENT_PATH, transport_security=security, max_sessions=MAX_SESSIONS
-    )
+    ).routes
+    assert isinstance(route, Route)
+    without_stream = Route(AGENT_PATH, route.endpoint, methods=["POST", "DELETE"])  # GET opens an idle one
 
     async def run() -> None:
         async with server.session_manager.run():
             await asyncio.Event().wait()
 
-    return Companion(tuple(app.routes), run, announce)
+    return Companion((without_stream,), run, announce)
 
 
 def over_stdio(server: MCPServer[Gatekeeper], streams: Streams, announce: Callable[[str], None]) -> Companion:
