@@ -11,14 +11,15 @@ from mcp.server.mcpserver.exceptions import ToolError
 from mcp.server.mcpserver.resolve import Elicit, Resolve
 from pydantic import BaseModel, Field
 
-from codebotler.agents.gatekeeper import Gatekeeper, in_thread
+from codebotler.agents.gatekeeper import Gatekeeper
 from codebotler.agents.reports import question, which_question
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.missions.mission import MissionError
 from codebotler.missions.past import MissionPast
+from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.session import MissionSession
-from codebotler.models.base import ModelError
+from codebotler.models.base import ModelError, ignore_text
 
 MAX_ARGUMENT = 10_000
 """The limit for an instruction, in characters."""
@@ -89,7 +90,7 @@ async def read_last_past(ctx: AgentContext) -> MissionPast:
     with as_tool_errors():
         if console.view.past is not None and not console.view.is_over:
             return console.view.past
-        return await in_thread(gatekeeper.read_last_past)
+        return await gatekeeper.read(console.past_of, "last")
 
 
 async def ask_whether(
@@ -99,8 +100,9 @@ async def ask_whether(
     gatekeeper = gatekeeper_of(ctx)
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
         return NoWord(answer="it did not happen")
+    robot, home = gatekeeper.console.robot, gatekeeper.console.home
     with as_tool_errors():
-        evidence = await in_thread(gatekeeper.ask_evidence, past)
+        evidence = await gatekeeper.read(ask_evidence, robot, home, past, ignore_text)
     return Elicit("\n".join((past.question, *evidence)), StepWord)
 
 

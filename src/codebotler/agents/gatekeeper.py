@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from secrets import compare_digest
 from threading import Lock, Thread
 from typing import Any, ParamSpec, TypeVar
@@ -22,11 +22,8 @@ from codebotler.core.words import listed
 from codebotler.missions.authoring import ModelAuthor
 from codebotler.missions.log import MissionState
 from codebotler.missions.mission import MissionError
-from codebotler.missions.past import MissionPast
 from codebotler.missions.preflight import missing_skills
-from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import RECENT_MISSIONS, read_missions
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.missions.wording import event_text
 from codebotler.models.base import ignore_text
@@ -175,21 +172,14 @@ class Gatekeeper:
             raise UserError(made.programless.sentence)
         return self.check(made.reply.program)
 
-    def list_missions(self) -> str:
-        """Return the last missions without their programs, oldest first, but read only one list at a time."""
-        with _one_at_a_time(self._reading, "reading of missions"):
-            rows = [asdict(one) for one in read_missions(self.console.home, RECENT_MISSIONS)]
-            return json.dumps([{name: row[name] for name in row if name != "program"} for row in rows])
+    async def read(self, work: Callable[_Given, _Made], *given: _Given.args, **named: _Given.kwargs) -> _Made:
+        """Read past missions, or what the robot says of one, on a thread, but only for one call at a time."""
 
-    def read_last_past(self) -> MissionPast:
-        """Read what the last mission did and saw, but only for one call at a time."""
-        with _one_at_a_time(self._reading, "reading of missions"):
-            return self.console.past_of("last")
+        def read_alone() -> _Made:
+            with _one_at_a_time(self._reading, "reading of missions"):
+                return work(*given, **named)
 
-    def ask_evidence(self, past: MissionPast) -> list[str]:
-        """Ask the log and the robot about an unsure step, but only for one call at a time."""
-        with _one_at_a_time(self._reading, "reading of missions"):
-            return ask_evidence(self.console.robot, self.console.home, past, ignore_text)
+        return await in_thread(read_alone)
 
     def report(self, session: MissionSession | None, after: int = 0) -> MissionReport:
         """Return a session's mission, with its first events after a position."""

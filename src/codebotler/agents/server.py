@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import os
 import signal
 import stat
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
+from dataclasses import asdict
 from io import BufferedWriter, FileIO, TextIOWrapper
+from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import anyio
@@ -21,13 +24,14 @@ from mcp_types import ToolAnnotations
 from starlette.routing import Route
 
 from codebotler import __version__
-from codebotler.agents.gatekeeper import Gatekeeper, in_thread
+from codebotler.agents.gatekeeper import Gatekeeper
 from codebotler.agents.tools import ACTING, READING
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
+from codebotler.core.terminal import shortened
 from codebotler.missions.log import EVENTS_FILE, SUMMARY_FILE
 from codebotler.missions.mission import BY_SHUTDOWN, MissionError
-from codebotler.missions.store import find_mission
+from codebotler.missions.store import RECENT_MISSIONS, find_mission, read_missions
 from codebotler.web.access import AGENT_PATH
 from codebotler.web.console import Console
 from codebotler.web.server import Companion
@@ -37,6 +41,9 @@ MAX_MESSAGE_BYTES = 2_000_000
 
 MAX_SESSIONS = 100
 """The limit for clients over HTTP that have not ended their sessions."""
+
+MAX_READ_BYTES = 1_000_000
+"""The limit for a file of a mission, since STOP waits while the event loop writes an answer."""
 
 
 class Streams(NamedTuple):
@@ -83,19 +90,35 @@ def _add_resources(server: MCPServer[Gatekeeper], gatekeeper: Gatekeeper) -> Non
     async def missions() -> str:
         """List the last missions, oldest first, without their programs."""
         with _as_resource_errors():
-            return await in_thread(gatekeeper.list_missions)
+            return await gatekeeper.read(_list_missions, home)
 
     @server.resource("codebotler://missions/{mission}", mime_type="application/json")
-    def mission(mission: str) -> str:
+    async def mission(mission: str) -> str:
         """Read a mission: its program, its state and the reason."""
         with _as_resource_errors():
-            return read_text(find_mission(home, mission) / SUMMARY_FILE)
+            return await gatekeeper.read(_read_file, home, mission, SUMMARY_FILE)
 
     @server.resource("codebotler://missions/{mission}/log", mime_type="application/jsonl")
-    def log(mission: str) -> str:
+    async def log(mission: str) -> str:
         """Read the log of a mission, one event per line."""
         with _as_resource_errors():
-            return read_text(find_mission(home, mission) / EVENTS_FILE)
+            return await gatekeeper.read(_read_file, home, mission, EVENTS_FILE)
+
+
+def _list_missions(home: Path) -> str:
+    rows = [
+        {
+            name: shortened(value) if isinstance(value, str) else value
+            for name, value in asdict(one).items()
+            if name not in {"program", "problems"}
+        }
+        for one in read_missions(home, RECENT_MISSIONS)
+    ]
+    return json.dumps(rows)
+
+
+def _read_file(home: Path, mission: str, name: str) -> str:
+    return read_text(find_mission(home, mission) / name, limit=MAX_READ_BYTES)
 
 
 @contextmanager

@@ -472,7 +472,9 @@ def test_missions_and_their_logs_are_resources(gatekeeper: Gatekeeper) -> None:
     use(gatekeeper, act)
 
 
-@pytest.mark.parametrize("what", ["codebotler://missions", "continue_mission"])
+@pytest.mark.parametrize(
+    "what", ["codebotler://missions", "codebotler://missions/last/log", "continue_mission"]
+)
 def test_past_missions_are_read_by_one_call_at_a_time_and_never_all(
     gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
@@ -484,7 +486,7 @@ def test_past_missions_are_read_by_one_call_at_a_time_and_never_all(
         go_on.wait(SOON)
         return []
 
-    for module in ("agents.gatekeeper", "missions.store"):
+    for module in ("agents.server", "missions.store"):
         monkeypatch.setattr(f"codebotler.{module}.read_missions", slowly)
 
     async def act(agent: Agent) -> None:
@@ -506,6 +508,19 @@ def test_past_missions_are_read_by_one_call_at_a_time_and_never_all(
 
     use(gatekeeper, act)
     assert asked == [RECENT_MISSIONS]
+
+
+def test_no_agent_reads_long_texts_at_once(gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("codebotler.agents.server.MAX_READ_BYTES", 10_000)
+
+    async def act(agent: Agent) -> None:
+        asked = await agent.call("propose_mission", instruction="x" * 9_999, program=HELLO)
+        assert len(await read(agent, "codebotler://missions")) < 2_000
+        for uri in (f"codebotler://missions/{asked['mission']}", "codebotler://missions/last"):
+            with pytest.raises(MCPError, match="larger than"):
+                await read(agent, uri)
+
+    use(gatekeeper, act)
 
 
 async def read(agent: Agent, uri: str) -> str:
