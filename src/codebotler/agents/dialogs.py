@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any, Literal, TypeAlias
@@ -77,11 +76,11 @@ def ask_which_behaviour(
 
 async def read_last_past(ctx: AgentContext) -> MissionPast:
     """Return the past of the last mission, or the one that the current mission continues."""
-    console = gatekeeper_of(ctx).console
+    gatekeeper, console = gatekeeper_of(ctx), gatekeeper_of(ctx).console
     with as_tool_errors():
         if console.view.past is not None and not console.view.is_over:
             return console.view.past
-        return await asyncio.to_thread(console.past_of, "last")
+        return await gatekeeper.read(console.past_of, "last")
 
 
 async def ask_whether(
@@ -92,7 +91,8 @@ async def ask_whether(
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
         return NotAsked()
     robot, home = gatekeeper.console.robot, gatekeeper.console.home
-    evidence = await asyncio.to_thread(ask_evidence, robot, home, past, ignore_text)
+    with as_tool_errors():
+        evidence = await gatekeeper.read(ask_evidence, robot, home, past, ignore_text)
     return Elicit("\n".join((past.question, *evidence)), StepWord)
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from secrets import compare_digest
-from threading import Lock
-from typing import Any
+from threading import Lock, Thread
+from typing import Any, ParamSpec, TypeVar
 
 from codebotler.agents.reports import CheckReport, MissionReport, RobotReport, report_check
 from codebotler.agents.steps import NOT_RUNNING, Steps
@@ -29,6 +31,8 @@ from codebotler.models.base import ignore_text
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.web.console import Console
 
+_Given = ParamSpec("_Given")
+_Made = TypeVar("_Made")
 MAX_CONTRACT_CHARACTERS = 16_000  # a check reads no program of more than 20,000
 TOO_LONG = f"the contract is longer than {MAX_CONTRACT_CHARACTERS:,} characters; shorten it"
 MAX_REPORTED_EVENTS = 1_000  # in one report
@@ -57,6 +61,7 @@ class Gatekeeper:
     _checking: Lock = field(default_factory=Lock, init=False)  # held while a program of an agent is checked
     _waiting: int = field(default=0, init=False)  # calls of agents that wait for a mission or a skill
     _writing: Lock = field(default_factory=Lock, init=False)  # held while a model writes for an agent
+    _reading: Lock = field(default_factory=Lock, init=False)  # held while an agent reads past missions
 
     def propose(self, order: MissionOrder, steps: Steps | None = None) -> MissionSession:
         """Begin a mission that waits for approval. Raise MissionError if the console is busy with another."""
@@ -172,6 +177,15 @@ class Gatekeeper:
             raise UserError(made.programless.sentence)
         return self.check(made.reply.program)
 
+    async def read(self, work: Callable[_Given, _Made], *given: _Given.args, **named: _Given.kwargs) -> _Made:
+        """Read past missions, or what the robot says of one, on a thread, but only for one call at a time."""
+
+        def read_alone() -> _Made:
+            with _one_at_a_time(self._reading, "reading of missions"):
+                return work(*given, **named)
+
+        return await in_thread(read_alone)
+
     def report(self, session: MissionSession | None, after: int = 0) -> MissionReport:
         """Return a session's mission, with its first events after a position."""
         view = SessionView() if session is None else session.view
@@ -220,6 +234,24 @@ class Gatekeeper:
         page = [f"on the page {self.page}, whose link with its token was printed at the start"]
         where = listed(dialog * self.may_ask_client(view) + page * bool(self.page), "or")
         return f"A person must approve this program {where}. Then call run_mission with its digest."
+
+
+async def in_thread(work: Callable[_Given, _Made], *given: _Given.args, **named: _Given.kwargs) -> _Made:
+    """Call a slow function on a thread of its own.
+
+    The threads of the SDK and of the event loop are few, people need them, and the process waits for them.
+    """
+    made = Future[_Made]()
+    made.set_running_or_notify_cancel()
+
+    def run() -> None:
+        try:
+            made.set_result(work(*given, **named))
+        except BaseException as error:  # noqa: BLE001 - raised again where the result is awaited
+            made.set_exception(error)
+
+    Thread(target=run, daemon=True).start()
+    return await asyncio.wrap_future(made)
 
 
 @contextmanager

@@ -17,19 +17,21 @@ from typing import Any, NamedTuple, cast
 
 import anyio
 from mcp.server import MCPServer
-from mcp.server.mcpserver.exceptions import ResourceNotFoundError
+from mcp.server.mcpserver.exceptions import ResourceError, ResourceNotFoundError
 from mcp.server.stdio import stdio_server
 from mcp.server.transport_security import TransportSecuritySettings
 from mcp_types import ToolAnnotations
+from starlette.routing import Route
 
 from codebotler import __version__
 from codebotler.agents.gatekeeper import Gatekeeper
 from codebotler.agents.tools import ACTING, READING
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
+from codebotler.core.terminal import shortened
 from codebotler.missions.log import EVENTS_FILE, SUMMARY_FILE
-from codebotler.missions.mission import BY_SHUTDOWN
-from codebotler.missions.store import find_mission, read_missions
+from codebotler.missions.mission import BY_SHUTDOWN, MissionError
+from codebotler.missions.store import RECENT_MISSIONS, find_mission, read_missions
 from codebotler.web.access import AGENT_PATH
 from codebotler.web.console import Console
 from codebotler.web.server import Companion
@@ -39,6 +41,9 @@ MAX_MESSAGE_BYTES = 2_000_000
 
 MAX_SESSIONS = 100
 """The limit for clients over HTTP that have not ended their sessions."""
+
+MAX_READ_BYTES = 1_000_000
+"""The limit for a file of a mission, since STOP waits while the event loop writes an answer."""
 
 
 class Streams(NamedTuple):
@@ -68,33 +73,52 @@ def make_server(gatekeeper: Gatekeeper) -> MCPServer[Gatekeeper]:
         version=__version__,
         lifespan=lifespan,
         log_level="WARNING",
+        subscriptions=False,  # nothing is published, and idle streams would use up the limit for requests
     )
     logging.root.handlers[:] = handlers  # our own log escapes control characters
     for tools, only_reads in ((READING, True), (ACTING, False)):
         for tool in tools:
             server.add_tool(tool, annotations=ToolAnnotations(read_only_hint=only_reads))
-    _add_resources(server, gatekeeper.console.home)
+    _add_resources(server, gatekeeper)
     return server
 
 
-def _add_resources(server: MCPServer[Gatekeeper], home: Path) -> None:
+def _add_resources(server: MCPServer[Gatekeeper], gatekeeper: Gatekeeper) -> None:
+    home = gatekeeper.console.home
+
     @server.resource("codebotler://missions", mime_type="application/json")
-    def missions() -> str:
-        """List all missions, oldest first."""
+    async def missions() -> str:
+        """List the last missions, oldest first, without their programs."""
         with _as_resource_errors():
-            return json.dumps([asdict(summary) for summary in read_missions(home)])
+            return await gatekeeper.read(_list_missions, home)
 
     @server.resource("codebotler://missions/{mission}", mime_type="application/json")
-    def mission(mission: str) -> str:
+    async def mission(mission: str) -> str:
         """Read a mission: its program, its state and the reason."""
         with _as_resource_errors():
-            return read_text(find_mission(home, mission) / SUMMARY_FILE)
+            return await gatekeeper.read(_read_file, home, mission, SUMMARY_FILE)
 
     @server.resource("codebotler://missions/{mission}/log", mime_type="application/jsonl")
-    def log(mission: str) -> str:
+    async def log(mission: str) -> str:
         """Read the log of a mission, one event per line."""
         with _as_resource_errors():
-            return read_text(find_mission(home, mission) / EVENTS_FILE)
+            return await gatekeeper.read(_read_file, home, mission, EVENTS_FILE)
+
+
+def _list_missions(home: Path) -> str:
+    rows = [
+        {
+            name: shortened(value) if isinstance(value, str) else value
+            for name, value in asdict(one).items()
+            if name not in {"program", "problems"}
+        }
+        for one in read_missions(home, RECENT_MISSIONS)
+    ]
+    return json.dumps(rows)
+
+
+def _read_file(home: Path, mission: str, name: str) -> str:
+    return read_text(find_mission(home, mission) / name, limit=MAX_READ_BYTES)
 
 
 @contextmanager
@@ -103,6 +127,8 @@ def _as_resource_errors() -> Iterator[None]:
         yield
     except UserError as error:
         raise ResourceNotFoundError(error.sentence) from None
+    except MissionError as error:
+        raise ResourceError(error.sentence) from None
 
 
 # --- transports
@@ -111,15 +137,17 @@ def _as_resource_errors() -> Iterator[None]:
 def over_http(server: MCPServer[Gatekeeper], announce: Callable[[str], None]) -> Companion:
     """Return what serves agents over HTTP on the page's port. `announce` receives the page's address."""
     security = TransportSecuritySettings(enable_dns_rebinding_protection=False)  # the page's guard has it
-    app = server.streamable_http_app(
+    (route,) = server.streamable_http_app(
         streamable_http_path=AGENT_PATH, transport_security=security, max_sessions=MAX_SESSIONS
-    )
+    ).routes
+    assert isinstance(route, Route)
+    without_stream = Route(AGENT_PATH, route.endpoint, methods=["POST", "DELETE"])  # GET opens an idle one
 
     async def run() -> None:
         async with server.session_manager.run():
             await asyncio.Event().wait()
 
-    return Companion(tuple(app.routes), run, announce)
+    return Companion((without_stream,), run, announce)
 
 
 def over_stdio(server: MCPServer[Gatekeeper], streams: Streams, announce: Callable[[str], None]) -> Companion:

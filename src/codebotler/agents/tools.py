@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future
 from contextlib import aclosing, contextmanager, suppress
-from threading import Thread
-from typing import Annotated, Any, ParamSpec, TypeVar
+from typing import Annotated, Any
 
 import anyio
 from mcp.server.elicitation import AcceptedElicitation, DeclinedElicitation, ElicitationResult
@@ -31,7 +29,7 @@ from codebotler.agents.dialogs import (
     gatekeeper_of,
     read_last_past,
 )
-from codebotler.agents.gatekeeper import MAX_REPORTED_EVENTS, Gatekeeper
+from codebotler.agents.gatekeeper import MAX_REPORTED_EVENTS, Gatekeeper, in_thread
 from codebotler.agents.reports import (
     CheckReport,
     MissionReport,
@@ -48,8 +46,6 @@ from codebotler.missions.wording import event_text
 from codebotler.prompts import clean_instruction
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS
 
-_Given = ParamSpec("_Given")
-_Made = TypeVar("_Made")
 _Digest = Annotated[str, Field(description="The digest of the program, from propose_mission or begin_steps.")]
 _Key = Annotated[str, Field(description="The key `steps` from begin_steps.")]
 _After = Annotated[int, Field(ge=0, description="Leave out this many earlier events.")]
@@ -80,7 +76,7 @@ async def check_program(
     It changes nothing and needs no approval. Mend all problems before you propose the program.
     """
     with as_tool_errors():
-        return await _in_thread(gatekeeper_of(ctx).check, program)
+        return await in_thread(gatekeeper_of(ctx).check, program)
 
 
 async def write_program(
@@ -103,7 +99,7 @@ async def write_program(
         author = ModelAuthor(console.open_model, console.models[0])
         prompt = prompt_of(asked, console.robot, repair=False)
         try:
-            return await _in_thread(gatekeeper.write, author, prompt)
+            return await in_thread(gatekeeper.write, author, prompt)
         finally:
             author.cancel()
 
@@ -339,24 +335,6 @@ async def _follow(
                         await ctx.report_progress(known, message=text)
                 if is_last:
                     return
-
-
-async def _in_thread(work: Callable[_Given, _Made], *given: _Given.args, **named: _Given.kwargs) -> _Made:
-    """Call a slow function on a thread of its own.
-
-    The threads of the SDK and of the event loop are few, people need them, and the process waits for them.
-    """
-    made = Future[_Made]()
-    made.set_running_or_notify_cancel()
-
-    def run() -> None:
-        try:
-            made.set_result(work(*given, **named))
-        except BaseException as error:  # noqa: BLE001 - raised again where the result is awaited
-            made.set_exception(error)
-
-    Thread(target=run, daemon=True).start()
-    return await asyncio.wrap_future(made)
 
 
 @contextmanager

@@ -22,7 +22,7 @@ from typing import Any
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill, SkillTable
-from codebotler.core.unicode import compose
+from codebotler.core.unicode import MAX_ACCENTS, compose, long_rows
 from codebotler.core.words import counted, listed
 
 TASK_FUNCTION = "task_program"
@@ -72,6 +72,7 @@ class Program:
 @lru_cache(maxsize=8)
 def parse(source: str) -> ast.Module:
     """Return a program's syntax tree, which callers must not change, or raise an error of `ast.parse`."""
+    _expect_short_rows(source)
     with _PARSING:
         return ast.parse(compose(source), SOURCE_NAME)
 
@@ -92,8 +93,16 @@ def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
 
 def parse_expression(source: str) -> ast.expr:
     """Return the syntax tree of an expression, or raise an error of `ast.parse`."""
+    _expect_short_rows(source)
     with _PARSING:
         return ast.parse(source, SOURCE_NAME, mode="eval").body
+
+
+def _expect_short_rows(source: str) -> None:
+    """Raise SyntaxError if a letter has too many accents, since `ast.parse` normalizes names, too."""
+    for start, _ in long_rows(source):
+        line = source.count("\n", 0, start) + 1
+        raise SyntaxError(f"more than {MAX_ACCENTS} accents in a row", (SOURCE_NAME, line, None, None))
 
 
 def parse_program(source: str, *, compiled: bool = False) -> ast.Module | Flaw:

@@ -42,20 +42,25 @@ def normalize_text(form: Literal["NFC", "NFD"], text: str) -> str:
     Python sorts a row of accents in quadratic time, and no other thread, such as the one for STOP, can run
     meanwhile.
     """
+    parts, end = [], 0
+    for start, after in long_rows(text):
+        parts += [normalize(form, text[end:start]), text[start:after]]
+        end = after
+    return "".join((*parts, normalize(form, text[end:])))
+
+
+def long_rows(text: str) -> Iterator[tuple[int, int]]:
+    """Yield where each letter with too many accents begins, and where its accents end."""
     if len(text) <= SHORT_TEXT or text.isascii():
-        return normalize(form, text)
-    return "".join(part if is_long else normalize(form, part) for part, is_long in _split(text))
-
-
-def _split(text: str) -> Iterator[tuple[str, bool]]:
-    """Yield the parts of a text, and whether each is a letter with too many accents."""
-    start = letter = 0  # where the current part and the last letter begin
+        return
+    letter = 0  # where the last letter begins
     for at, character in enumerate((*text, " ")):
-        if combining(character):
-            continue
-        if at - letter > MAX_ACCENTS + 1:
-            yield text[start:letter], False
-            yield text[letter:at], True
-            start = at
-        letter = at
-    yield text[start:], False
+        if character.isascii() or not _is_accent(character):
+            if at - letter > MAX_ACCENTS + 1:
+                yield letter, at
+            letter = at
+
+
+def _is_accent(character: str) -> bool:
+    """Whether a character is an accent, or becomes accents in some normal form, as U+0F73 and U+FF9E do."""
+    return combining(normalize("NFKD", character)[0]) > 0

@@ -23,19 +23,25 @@ from codebotler.missions.log import (
     read_events,
 )
 
+RECENT_MISSIONS = 200
+"""The number of missions that agents see, and among which the last one is looked for."""
+
 _MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d{1,6})?", re.ASCII)
 
 
-def read_missions(home: Path) -> list[MissionSummary]:
-    """Read the summaries of all missions, oldest first. Raise UserError if one is damaged."""
-    return sorted(
-        map(MissionSummary.read, _mission_folders(home)), key=lambda summary: (summary.created, summary.id)
-    )
+def read_missions(home: Path, most: int | None = None) -> list[MissionSummary]:
+    """Read the summaries of all missions, or of the last ones, oldest first.
+
+    Raises:
+        UserError: a summary is damaged.
+    """
+    folders = _mission_folders(home)[-most if most else 0 :]
+    return sorted(map(MissionSummary.read, folders), key=lambda summary: (summary.created, summary.id))
 
 
 def find_mission(home: Path, name: str) -> Path:
     """Return the folder of a mission, given its ID or `last`. Raise UserError if there is no such mission."""
-    if name == "last" and (known := read_missions(home)):
+    if name == "last" and (known := read_missions(home, RECENT_MISSIONS)):
         return home / "missions" / known[-1].id
     folder = home / "missions" / name
     if not _MISSION_ID.fullmatch(name) or not (folder / SUMMARY_FILE).is_file():
@@ -94,7 +100,7 @@ def recover_missions(home: Path) -> list[MissionSummary]:
 def _mission_folders(home: Path) -> list[Path]:
     folder = home / "missions"
     try:
-        found = sorted(folder.iterdir())
+        found = sorted(folder.iterdir(), key=_numbers)
     except FileNotFoundError:
         return []
     except NotADirectoryError:
@@ -102,6 +108,11 @@ def _mission_folders(home: Path) -> list[Path]:
             "this is a file, not a folder of missions; set CODEBOTLER_HOME to another folder", file=folder
         ) from None
     return [path for path in found if os.path.exists(path / SUMMARY_FILE)]  # noqa: PTH110 - raises nothing
+
+
+def _numbers(folder: Path) -> tuple[list[int], str]:
+    """Return a key that sorts the tenth mission of a second after the second one."""
+    return [int(number) for number in re.findall(r"\d+", folder.name)], folder.name
 
 
 def _close_interrupted(folder: Path) -> list[MissionSummary]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 
 from codebotler.core.phrases import phrase
-from codebotler.core.program import nodes, parse_leniently
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.skills.values import written_call
 from codebotler.core.skills.verbs import VerbForm
@@ -18,6 +17,11 @@ from codebotler.simulator.contract import CONTRACT
 
 BY_PAGE = "the page"  # the source of a stop from the page, as it appears in the log
 _TITLE_CALLS = 2
+_TITLE_SOURCE = 2_000  # characters in which calls are looked for
+_TITLE_TOKEN = re.compile(
+    r"""#.*|(?P<quote>\'{3}|"{3}|['"])(?s:\\.|(?!(?P=quote)).)*+(?P=quote)?"""  # comments and strings
+    r"""|(?:def +|\.)\w+|(?P<name>\w*+)\(|\w+|\)"""
+)
 _MAX_ACTIVITY_CHARACTERS = 100
 
 
@@ -74,15 +78,22 @@ def title(summary: MissionSummary) -> str:
     """Return the title of a mission: its instruction, or else the first skills that its program calls."""
     if summary.instruction:
         return summary.instruction
-    calls = [
-        node
-        for node in nodes(parse_leniently(summary.program))
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and by_name(node.func.id)
-    ]
-    calls.sort(key=lambda call: (call.lineno, call.col_offset))
-    shown = [brief(ast.get_source_segment(summary.program, call) or "") for call in calls[:_TITLE_CALLS]]
+    calls = sorted(_skill_calls(summary.program[:_TITLE_SOURCE]))
+    shown = [brief(summary.program[begin:end]) for begin, end in calls[:_TITLE_CALLS]]
     more = ["…"] * (len(calls) > _TITLE_CALLS)
     return f"typed: {', '.join([*shown, *more])}" if calls else "a program without an instruction"
+
+
+def _skill_calls(source: str) -> Iterator[tuple[int, int]]:
+    """Yield where calls of skills begin and end, without parsing, which takes long and keeps STOP waiting."""
+    opened: list[tuple[str, int]] = []  # the name before each open bracket, and where it begins
+    for token in _TITLE_TOKEN.finditer(source):
+        if token["name"] is not None:
+            opened.append((token["name"], token.start()))
+        elif token[0] == ")" and opened:
+            name, begin = opened.pop()
+            if by_name(name):
+                yield begin, token.end()
 
 
 def _skill(line: LogLine) -> str:

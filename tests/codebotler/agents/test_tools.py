@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pytest
-from mcp import Client
+from mcp import Client, MCPError
 from mcp.client.session import ClientRequestContext, ElicitationFnT
 from mcp_types import ElicitRequestParams, ElicitResult
 
@@ -25,8 +25,9 @@ from codebotler.checking.contract_file import contract_from
 from codebotler.checking.rules import read_rules
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
-from codebotler.missions.log import MissionState
+from codebotler.missions.log import MissionState, MissionSummary
 from codebotler.missions.preflight import known_instructions
+from codebotler.missions.store import RECENT_MISSIONS
 from codebotler.missions.view import MissionOrder, SessionView, program_digest
 from codebotler.missions.wording import event_text
 from codebotler.models.base import Reply, TextListener, ignore_text
@@ -470,7 +471,7 @@ def test_missions_and_their_logs_are_resources(gatekeeper: Gatekeeper) -> None:
         proposed = await agent.call("propose_mission", program=HELLO)
         await agent.call("stop")
         listed = await read(agent, "codebotler://missions")
-        assert [one["id"] for one in json.loads(listed)] == [proposed["mission"]]
+        assert [(one["id"], "program" in one) for one in json.loads(listed)] == [(proposed["mission"], False)]
         one = f"codebotler://missions/{proposed['mission']}"
         assert json.loads(await read(agent, one))["program"] == HELLO
         log = [json.loads(line) for line in (await read(agent, f"{one}/log")).splitlines()]
@@ -478,6 +479,57 @@ def test_missions_and_their_logs_are_resources(gatekeeper: Gatekeeper) -> None:
         for wrong in ("20200101-000000", "..%2F..%2Fsecret", "20200101-000000%2Flog"):
             with pytest.raises(Exception, match=r"no mission|not found|Unknown|rejected"):
                 await read(agent, f"codebotler://missions/{wrong}")
+
+    use(gatekeeper, act)
+
+
+@pytest.mark.parametrize(
+    "what", ["codebotler://missions", "codebotler://missions/last/log", "continue_mission"]
+)
+def test_past_missions_are_read_by_one_call_at_a_time_and_never_all(
+    gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    begun, go_on, asked = threading.Event(), threading.Event(), list[int | None]()
+
+    def slowly(home: Path, most: int | None = None) -> list[MissionSummary]:  # noqa: ARG001 - as it is called
+        asked.append(most)
+        begun.set()
+        go_on.wait(SOON)
+        return []
+
+    for module in ("agents.server", "missions.store"):
+        monkeypatch.setattr(f"codebotler.{module}.read_missions", slowly)
+
+    async def act(agent: Agent) -> None:
+        async def ask() -> str:
+            try:
+                return await (agent.fails(what) if what == "continue_mission" else read(agent, what))
+            except MCPError as error:
+                return str(error)
+
+        asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(1))
+        first = asyncio.ensure_future(ask())
+        try:
+            assert await asyncio.to_thread(begun.wait, SOON)
+            assert "another reading" in await ask()
+            assert await asyncio.wait_for(asyncio.to_thread(begun.is_set), 1.0), "a person needs the threads"
+        finally:
+            go_on.set()
+        assert "another reading" not in await first
+
+    use(gatekeeper, act)
+    assert asked == [RECENT_MISSIONS]
+
+
+def test_no_agent_reads_long_texts_at_once(gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("codebotler.agents.server.MAX_READ_BYTES", 10_000)
+
+    async def act(agent: Agent) -> None:
+        asked = await agent.call("propose_mission", instruction="x" * 9_999, program=HELLO)
+        assert len(await read(agent, "codebotler://missions")) < 2_000
+        for uri in (f"codebotler://missions/{asked['mission']}", "codebotler://missions/last"):
+            with pytest.raises(MCPError, match="larger than"):
+                await read(agent, uri)
 
     use(gatekeeper, act)
 

@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote_plus
@@ -180,6 +180,32 @@ def test_pages_of_other_sites_and_other_hosts_are_refused(server: AgentServer) -
     assert server.ask("POST", "/mcp", INITIALIZE, **headers).status == 200
 
 
+def test_no_stream_stays_open_without_a_call(server: AgentServer) -> None:
+    headers = {
+        "authorization": f"Bearer {server.agent_token}",
+        "accept": "application/json, text/event-stream",
+    }
+    session = server.ask("POST", "/mcp", INITIALIZE, **headers).headers["mcp-session-id"]
+    meta = {"protocolVersion": "2026-07-28", "clientInfo": CLIENT, "clientCapabilities": {}}
+    params = {
+        "_meta": {f"io.modelcontextprotocol/{key}": value for key, value in meta.items()},
+        "notifications": {"toolsListChanged": True},
+    }
+    listen = {"jsonrpc": "2.0", "id": 2, "method": "subscriptions/listen", "params": params}
+    new = {"mcp-protocol-version": "2026-07-28", "mcp-method": "subscriptions/listen"}
+    new["content-type"] = "application/json"
+    found: list[int] = []
+    for method, text, more in (
+        ("GET", None, {"mcp-session-id": session}),
+        ("POST", json.dumps(listen), new),
+    ):
+        with closing(http.client.HTTPConnection("127.0.0.1", server.port, timeout=SOON)) as connection:
+            connection.request(method, "/mcp", text, {**headers, **more})
+            found.append(connection.getresponse().status)  # a stream would have no end to read
+    assert found == [405, 404]
+
+
+CLIENT = {"name": "plain", "version": "1"}
 INITIALIZE = {
     "jsonrpc": "2.0",
     "id": 1,
@@ -187,7 +213,7 @@ INITIALIZE = {
     "params": {
         "protocolVersion": "2025-06-18",
         "capabilities": {},
-        "clientInfo": {"name": "plain", "version": "1"},
+        "clientInfo": CLIENT,
     },
 }
 """The first request of clients that use last year's protocol."""

@@ -1,11 +1,13 @@
 """Texts are normalized quickly, whatever somebody sends."""
 
+import sys
 import time
-from unicodedata import normalize
+from unicodedata import combining, normalize
 
 import pytest
 
-from codebotler.core.unicode import MAX_ACCENTS, SHORT_TEXT, compose, normalize_text
+from codebotler.core.program import Flaw, parse_expression, parse_program
+from codebotler.core.unicode import MAX_ACCENTS, SHORT_TEXT, compose, long_rows, normalize_text
 
 LONG = "e\u0301" * SHORT_TEXT
 ROW = "a" + "\u0315\u0300" * 50
@@ -32,3 +34,29 @@ def test_hostile_texts_take_no_longer_than_others(size: int, count: int) -> None
         compose(text)
         spent.append(time.process_time() - began)
     assert spent[1] < 5 * spent[0] + 0.05
+
+
+HIDDEN = "\u0f73\u0f75\u0f81\uff9e\uff9f"
+"""Signs that count as letters but become accents in a normal form; of all characters, there are no others."""
+
+
+@pytest.mark.slow
+def test_no_other_letter_becomes_an_accent() -> None:
+    forms = ((one, normalize("NFKD", one)) for one in map(chr, range(sys.maxunicode + 1)))
+    assert "".join(one for one, form in forms if combining(form[0]) and not combining(one)) == HIDDEN
+
+
+@pytest.mark.parametrize("sign", HIDDEN)
+def test_signs_that_become_accents_are_counted(sign: str) -> None:
+    text = f"{LONG}a{sign * MAX_ACCENTS}"
+    assert list(long_rows(text)) == []
+    assert list(long_rows(f"{text}{sign}b")) == [(len(LONG), len(text) + 1)]
+
+
+@pytest.mark.parametrize("row", [ROW, "a" + "\uff9e\u0334" * 50])
+def test_no_name_with_a_long_row_of_accents_reaches_the_parser(row: str) -> None:
+    flaw = parse_program(f"def task_program():\n    {row} = 1\n")
+    assert isinstance(flaw, Flaw)
+    assert (flaw.line, flaw.kind) == (2, "SyntaxError")
+    with pytest.raises(SyntaxError):
+        parse_expression(row)

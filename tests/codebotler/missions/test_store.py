@@ -21,7 +21,7 @@ from codebotler.missions.log import (
     read_events,
 )
 from codebotler.missions.mission import Mission
-from codebotler.missions.store import last_rest, read_missions, recover_missions
+from codebotler.missions.store import find_mission, last_rest, read_missions, recover_missions
 
 IF_TOOL_DIES = "its worker cancelled the goal"
 
@@ -131,6 +131,22 @@ def test_missions_come_in_their_order(tmp_path: Path) -> None:
         with Mission(tmp_path, name):
             time.sleep(0.01)
     assert [summary.robot for summary in read_missions(tmp_path)] == ["b", "a"]
+
+
+def test_the_last_mission_is_found_without_reading_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = left(tmp_path, MissionState.DONE)
+    for suffix in ("-2", "-9", "-10"):
+        folder = first.with_name(first.name + suffix)
+        folder.mkdir()
+        MissionSummary(folder.name, MissionState.DONE, "sim", 1_000.0).write(folder)
+    (first / SUMMARY_FILE).write_text("damaged")
+    with pytest.raises(UserError):
+        read_missions(tmp_path)
+    monkeypatch.setattr("codebotler.missions.store.RECENT_MISSIONS", 1)
+    assert find_mission(tmp_path, "last").name.endswith("-10")
+    assert [one.id[-2:] for one in read_missions(tmp_path, 2)] == ["10", "-9"]  # in the order of their times
 
 
 WHOLE = {"id": "x", "state": "done", "robot": "sim", "created": 1.0}
