@@ -50,6 +50,7 @@ def test_continue(tmp_path: Path, opened: OpenPage, shoot: Shoot, screen: Screen
         expect(page.locator(".moment", has_text="→ not found").first).to_be_visible()
         page.locator("#stop").click()
         expect(page.get_by_role("button", name="Continue", exact=True)).to_be_visible()
+        expect(page.get_by_role("button", name="Start again from the beginning")).to_be_visible()
         look(page, shoot, f"continue-offered-{which}")
         press(page, "Continue")
         expect(page.get_by_role("button", name="Run it on the robot")).to_be_enabled()
@@ -79,7 +80,7 @@ def test_a_person_is_asked_about_an_unsure_step_and_types_the_rest(
         card = page.locator(".q-dialog .pane")
         expect(card).to_contain_text('picked up "mug" in "kitchen"')
         expect(card.locator(".quiet")).to_have_count(2)
-        expect(card.locator(".quiet").last).to_contain_text("kitchen")
+        expect(card.locator(".quiet").first).to_contain_text("kitchen")
         page.wait_for_timeout(400)
         evidence, button = (card.locator(each).bounding_box() for each in (".quiet >> nth=-1", ".word"))
         assert evidence is not None
@@ -117,7 +118,7 @@ def test_missions_link_to_those_they_continue(
         page = opened(server, "missions", size=size)
         expect(page.locator(".rows .outcome").first).to_contain_text(f"mission {second}")
         expect(page.locator(".rows .outcome").first).to_contain_text(f"continues mission {first}")
-        expect(page.locator(".rows .outcome").last).to_contain_text(f"continued by mission {second}")
+        expect(page.locator(".rows .outcome").last).not_to_contain_text("continued by")  # it did not run
         look(page, shoot, f"continue-list-{size[0]}")
         page.locator(".rows a").last.click()
         page.locator(".chain a", has_text=second).click()

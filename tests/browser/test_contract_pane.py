@@ -20,10 +20,10 @@ def test_a_contract_is_shown_and_an_edit_shows_only_what_is_new(tmp_path: Path, 
         write(page, GREET)
         expect(pane).to_contain_text('It may go to "kitchen"; say "hello". It picks up nothing')
         write(page, GREET.replace("hello", "good morning"))
-        expect(pane).to_contain_text("More than the last program:")
+        expect(pane).to_contain_text("More than the draft before:")
         expect(pane.locator("table").first.locator("tr")).to_have_text(['say"good morning"'])
         write(page, "def task_program():\n    go_to('kitchen')\n")
-        expect(pane).to_contain_text("Less than the last program.")
+        expect(pane).to_contain_text("Less than the draft before.")
         pane.get_by_text("The whole contract").click()
         expect(pane.locator("tr")).to_have_text(['go to"kitchen"at most 1 time'])
 

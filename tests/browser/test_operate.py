@@ -328,7 +328,7 @@ def test_recent_instructions_are_up_to_date(tmp_path: Path, opened: OpenPage) ->
         expect(page.locator(".pick .state")).to_have_count(0)
         page.locator("#stop").click()
         expect(page.locator(".pick .state")).to_have_text("stopped")
-        expect(page.get_by_role("button", name="Prepare another run")).to_be_visible()
+        expect(page.get_by_role("button", name="Start again from the beginning")).to_be_visible()
         page.context.close()
 
 

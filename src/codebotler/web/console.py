@@ -15,7 +15,7 @@ from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.files import make_folder
 from codebotler.core.world import World
-from codebotler.missions.log import MissionSummary
+from codebotler.missions.log import MissionState, MissionSummary
 from codebotler.missions.mission import BY_SHUTDOWN, STOP_GRACE_SECONDS, MissionError
 from codebotler.missions.past import MissionPast, read_past
 from codebotler.missions.recovery import PriorApproval, past_to_recover
@@ -70,6 +70,7 @@ class Console:
         self._lock = threading.RLock()  # held briefly, and again by a signal handler
         self.session: MissionSession | None = None  # the current session, or else the last one
         self._may_recover: MissionSession | None = None  # the current session, unless somebody pressed STOP
+        self.unfinished = ""  # the mission that had begun and ended early before another one was written
         self._checking = threading.Lock()
         self._held = ExitStack()
         self._pool: WorkerPool | None = None
@@ -123,6 +124,10 @@ class Console:
                 raise MissionError(f"mission {before.view.id} is {before.view.state}; stop it first")
             if after is not None and after is not self._may_recover:
                 raise MissionError("somebody pressed STOP, or began another mission")
+            if order.past is not None:
+                self.unfinished = ""
+            elif before is not None and before.view.progress.has_begun:
+                self.unfinished = "" if before.view.state is MissionState.DONE else before.view.id
             self.session = self._may_recover = session = MissionSession(
                 self.robot,
                 self.home,

@@ -231,6 +231,17 @@ def test_a_rest_beyond_the_approval_waits_for_a_person(tmp_path: Path) -> None:
         assert console.view.state is MissionState.CHECKED
 
 
+def test_a_mission_that_was_put_aside_is_still_offered(tmp_path: Path) -> None:
+    with desk_of(tmp_path, Author(FETCH, GO_BACK)) as console:
+        before = fetch(console)
+        console.edit(GO_BACK)
+        view = until(console, lambda now: now.number == 2 and now.may_be_approved)
+        assert (view.past, console.unfinished) == (None, before.id)
+        console.begin(console.rest_of(console.past_of(console.unfinished)))
+        until(console, lambda now: now.number == 3 and now.may_be_approved)
+        assert console.unfinished == ""
+
+
 def test_a_program_that_is_continued_keeps_its_author(console: Console) -> None:
     order = console.rest_of(MissionPast("1", "", "agent x", TYPED, "", ()))
     assert (order.program, order.author, order.model) == (TYPED, "agent x", "")

@@ -34,9 +34,12 @@ class ContinueButton(Button):
         self._console, self._mission = console, mission
 
     def show(self, view: SessionView) -> None:
-        """Offer to continue the mission of a view, if it has begun and ended early."""
-        self._mission = view.id or ("" if view.past is None else view.past.mission)
-        self.set_visibility(has_rest(view))
+        """Offer to continue the mission of a view, or that before it, if it has begun and ended early."""
+        is_other = not (has_rest(view) or view.progress.has_begun or view.past)
+        aside = self._console.unfinished if is_other else ""
+        self._mission = aside or view.id or ("" if view.past is None else view.past.mission)
+        self.text = f"Continue mission {aside} instead" if aside else "Continue"
+        self.set_visibility(has_rest(view) or bool(aside))
 
     async def _continue(self) -> None:
         console = self._console

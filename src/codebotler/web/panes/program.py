@@ -117,7 +117,7 @@ class ProgramPane:
                 *_problem_marks(view.check, shown),
                 *_current_line(view),
             ],
-            "editable": view.may_be_edited and not is_unfinished(view),
+            "editable": view.may_be_edited,
             "received": self._received,
             "force": force,
         }
@@ -257,8 +257,6 @@ def route_progress(view: SessionView) -> RouteProgress:
 
 
 def _author_text(view: SessionView) -> str:
-    if is_unfinished(view):
-        return "To change the program, continue the mission, or start again."
     if not view.author:
         return "Typed or edited by hand."
     if is_recorded(view.author):
