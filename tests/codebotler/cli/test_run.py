@@ -321,7 +321,7 @@ def test_tool_that_is_killed_leaves_a_mission_that_was_interrupted(folder: Path)
         assert are_gone(family)
     status, out, err = run(folder, "good.py", "--yes")
     assert status == 0
-    assert re.match(r"mission \d{8}-\d{6} .*interrupted.* go_to\(\"\w+\"\) \(at .*simulated.*\n", err)
+    assert re.match(r"mission \d{8}-\d{6} .*interrupted.* go_to\(\"\w+\"\), at .*simulated.*\n", err)
     assert states(folder) == ["interrupted", "done"]
     status, out, err = ended(folder, "missions")
     assert (status, err) == (0, "")
