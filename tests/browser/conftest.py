@@ -104,6 +104,8 @@ def opened(browser: Browser) -> Iterator[OpenPage]:
             page.on("console", heard)
             page.on("pageerror", lambda error: complaints.append(str(error)))
             page.goto(link or server.link.replace("/?", f"/{path}?"))
+            # Until then, NiceGUI may send what is typed after the key that is pressed next.
+            page.wait_for_function("() => !window.socket || window.did_handshake")
             return page
 
         yield open_page
