@@ -46,13 +46,7 @@ def generate(
     from functools import partial
 
     from codebotler.checking.sampled import CheckSettings
-    from codebotler.cli.candidates import (
-        choose_candidate,
-        expect_no_retries,
-        line_reader,
-        print_candidate,
-        requests_to,
-    )
+    from codebotler.cli.candidates import expect_no_retries, requests_to, write_candidate
     from codebotler.cli.generate import print_prompt, prompt_maker, write
     from codebotler.cli.rules import rules_for
     from codebotler.core.skills.files import skills_from
@@ -75,9 +69,8 @@ def generate(
         expect_no_retries(retries, repair=repair)
         opener = partial(open_model, chosen.name, settings)
         request = requests_to(opener, make_prompt, candidates, room_map, record)
-        how, ask = CheckSettings(skills=table, house_rules=house_rules), line_reader(is_allowed=not yes)
-        program = choose_candidate(request, instruction, how, room_map, ask=ask, model=chosen.name)
-        accepted = program is not None and print_candidate(program, how, room_map)
+        how = CheckSettings(skills=table, house_rules=house_rules)
+        accepted = write_candidate(request, instruction, how, room_map, asks=not yes, model=chosen.name)
     else:
         accepted = write(
             make_prompt(instruction),

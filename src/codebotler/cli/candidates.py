@@ -122,8 +122,20 @@ def choose_candidate(
     return None
 
 
-def print_candidate(program: str, settings: CheckSettings, room_map: RoomMap | None) -> bool:
-    """Print the chosen program and its problems, and return whether the check accepts it."""
+def write_candidate(
+    request: Callable[[str], Sequence[Attempt]],
+    instruction: str,
+    settings: CheckSettings,
+    room_map: RoomMap | None,
+    *,
+    asks: bool,
+    model: str,
+) -> bool:
+    """Print the program that a person means and its problems, and return whether the check accepts it."""
+    ask = line_reader(is_allowed=asks)
+    program = choose_candidate(request, instruction, settings, room_map, ask=ask, model=model)
+    if program is None:
+        return False
     print_source(program)
     rules, skills = settings.house_rules, settings.skills
     problems = check(program, room_map=room_map, skills=skills, house_rules=rules).problems
