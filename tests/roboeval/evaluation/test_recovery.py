@@ -225,4 +225,5 @@ def test_the_command_prints_shares_and_missions(tmp_path: Path) -> None:
     assert (data["faults"], data["continued"], data["passed"], data["rejected"]) == (42, 15, 1.0, 0.0)
     assert len(data["missions"]) == data["faults"]
     table = roboeval("recover", "--tasks", "GetDrink", "--model", "recorded:hasty", cwd=tmp_path)
-    assert ["all", "18", "0", "13", "5", "0.600", "0.400"] in [row.split()[:7] for row in table.out.splitlines()]
+    rows = [row.split()[:7] for row in table.out.splitlines()]
+    assert ["all", "18", "0", "13", "5", "0.600", "0.400"] in rows
