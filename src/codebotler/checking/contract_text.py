@@ -62,7 +62,7 @@ def contract_sentence(
 ) -> str:
     """Say in a sentence or two what a program may do at most, and what it never does.
 
-    A short sentence leaves texts out and says how many, so that a person needs a table besides.
+    A short sentence only counts some of the texts. Show it together with a table that has them all.
     """
     rows = contract_rows(contract, skills, show, is_short=is_short)
     may = [" ".join(filter(None, (row.what, row.texts, row.places))) for row in rows]
