@@ -17,7 +17,7 @@ from codebotler.core.trace import Event, Option, Trace, attempted_event, to_opti
 from codebotler.core.world import World
 from codebotler.simulator.entities import Thing
 from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings, choose
-from codebotler.simulator.simulated_world import SimulatedWorld, unknown_room
+from codebotler.simulator.simulated_world import NO_SUCH_THING, SimulatedWorld, unknown_room
 
 Argument: TypeAlias = Scalar | tuple[Option, ...] | tuple[Scalar, ...]
 Result: TypeAlias = Scalar | list[str] | list[Scalar] | None
@@ -159,7 +159,7 @@ class SimulatedRobot(SimulatedWorld):
             )
         thing = self.thing_meant(obj)
         if thing is None:
-            raise RobotError("PickInvalidObject", f'there is no "{obj}" in "{self.room}"')
+            raise RobotError(NO_SUCH_THING, f'there is no "{obj}" in "{self.room}"')
         self.record(PICK, obj if self.settings.events == "as-requested" else thing.label)
         here = next(things for things in self.contents.values() if any(one is thing for one in things))
         here.remove(thing)

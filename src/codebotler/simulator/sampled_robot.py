@@ -41,6 +41,7 @@ from codebotler.simulator.sampled_facts import (
     Whereabouts,
 )
 from codebotler.simulator.settings import SimulationSettings
+from codebotler.simulator.simulated_world import NO_SUCH_THING
 
 AS_WRITTEN = SimulationSettings(literals="as-written", matching="longest-name")  # as on a robot
 AGREEING_TEXT = re.compile(r"\s*(?:yes|yeah|sure|ok)\b", re.IGNORECASE)
@@ -86,8 +87,7 @@ class SampledRobot(SimulatedRobot):
         self.excuses: set[str] = set()  # messages of excused errors
         self.has_assumed = False  # whether a fact holds that strict worlds would draw
         for event in room_map.past:
-            if not event.failed:
-                self._recall(event)
+            self._recall(event)
         self.room = world.robot
 
     @property
@@ -132,6 +132,11 @@ class SampledRobot(SimulatedRobot):
     def _recall(self, event: Event) -> None:
         """Let the world be as the robot left or saw it in an event before the program began."""
         room, name = self.room_map.room(event.place), normalized(event.text)
+        if event.failed:
+            if room is not None and event.failed == NO_SUCH_THING:
+                self.room = room
+                self._see(name, is_person=False, is_there=False)
+            return
         if room is None:
             if event.kind in {PICK, PLACE}:
                 self._hold(event.text if event.kind == PICK else None)

@@ -26,6 +26,9 @@ from codebotler.simulator.matching import (
 )
 from codebotler.simulator.settings import SimulationSettings
 
+NO_SUCH_THING = "PickInvalidObject"
+"""The kind of error with which a robot fails to pick up a thing that is not there."""
+
 
 class SimulatedWorld:
     """A copy of a world that changes while a robot acts in it.
@@ -123,7 +126,7 @@ class SimulatedWorld:
             return next((thing for thing in here if thing.is_meant_by(request, matching)), None)
         best = [here[number] for number in best_fits(request, [thing.entity for thing in here])]
         if len(best) > 1:
-            raise RobotError("PickInvalidObject", ambiguous(request, [thing.label for thing in best]))
+            raise RobotError(NO_SUCH_THING, ambiguous(request, [thing.label for thing in best]))
         return best[0] if best else None
 
     def person_meant(self, request: str) -> Somebody | None:

@@ -46,6 +46,17 @@ def test_a_look_finds_what_was_seen_last(what: str, found: bool) -> None:  # noq
     assert elsewhere == {True, False}, "another room is still imagined"
 
 
+def test_a_thing_that_could_not_be_picked_up_is_not_there() -> None:
+    failed = event(PICK, "mug", "lab", failed="PickInvalidObject")
+    for robot in robots(event(CHECK, "mug", "lab", found=True), failed, event(GOTO, "kitchen")):
+        robot.perform("go_to", ["lab"])
+        assert robot.perform("is_in_room", ["mug"]) is False
+        with pytest.raises(RobotError, match="no"):
+            robot.perform("pick", ["mug"])
+    unsure = robots(event(PICK, "mug", failed="SkillFailed"))
+    assert {one.perform("is_in_room", ["mug"]) for one in unsure} == {True, False}
+
+
 def test_an_answer_stays_the_same() -> None:
     asked = event(ASK, "Tea?", options=YES_NO, answer="no", to="Anne")
     for robot in robots(asked):
