@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from mcp.server.mcpserver import Context
 from mcp.server.mcpserver.exceptions import ToolError
@@ -13,6 +13,7 @@ from pydantic import BaseModel, Field
 
 from codebotler.agents.gatekeeper import Gatekeeper
 from codebotler.agents.reports import question, which_question
+from codebotler.candidates.question import ClarifyingQuestion
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.missions.mission import MissionError
@@ -55,23 +56,30 @@ class StepWord(BaseModel):
 # --- who is asked, and what about
 
 
-async def find_question(ctx: AgentContext) -> MissionSession:
-    """Return the mission that waits for a person's choice."""
+class OpenQuestion(NamedTuple):
+    """A question about behaviours, and the mission that waits for its answer."""
+
+    session: MissionSession
+    asked: ClarifyingQuestion
+
+
+async def find_question(ctx: AgentContext) -> OpenQuestion:
+    """Return the question that the current mission asks a person."""
     session = gatekeeper_of(ctx).console.session
-    if session is None or not session.view.waits_for_answer:
+    view = None if session is None else session.view
+    if session is None or view is None or view.question is None or not view.waits_for_answer:
         with as_tool_errors():
             raise MissionError("no mission waits for such an answer")
-    return session
+    return OpenQuestion(session, view.question)
 
 
 def ask_which_behaviour(
-    session: Annotated[MissionSession, Resolve(find_question)], ctx: AgentContext
+    question: Annotated[OpenQuestion, Resolve(find_question)], ctx: AgentContext
 ) -> Elicit[Choice] | NotAsked:
     """Have the client ask its person which behaviour they mean, if it can."""
-    asked = session.view.question
-    if asked is None or not gatekeeper_of(ctx).asks_client or not _has_dialogs(ctx):
+    if not gatekeeper_of(ctx).asks_client or not _has_dialogs(ctx):
         return NotAsked()
-    return Elicit(which_question(asked), Choice)
+    return Elicit(which_question(question.asked), Choice)
 
 
 async def read_last_past(ctx: AgentContext) -> MissionPast:

@@ -18,6 +18,7 @@ from codebotler.agents.dialogs import (
     Choice,
     Consent,
     NotAsked,
+    OpenQuestion,
     StepWord,
     agent_name,
     as_tool_errors,
@@ -131,7 +132,7 @@ async def propose_mission(
 
 async def choose_behaviour(
     ctx: AgentContext,
-    session: Annotated[MissionSession, Resolve(find_question)],
+    question: Annotated[OpenQuestion, Resolve(find_question)],
     answer: Annotated[ElicitationResult[Choice | NotAsked], Resolve(ask_which_behaviour)],
 ) -> MissionReport:
     """Let the person say which of several behaviours they mean, if a proposed mission waits for that.
@@ -142,11 +143,10 @@ async def choose_behaviour(
     with as_tool_errors():
         if not isinstance(answer, AcceptedElicitation) or isinstance(answer.data, NotAsked):
             raise MissionError(f"a person must choose on the page {gatekeeper.page}".rstrip())
-        asked, given = session.view.question, answer.data
-        if asked is not None:
-            session.answer(asked.parse(given.answer), given.more)
+        given = answer.data
+        question.session.answer(question.asked, question.asked.parse(given.answer), given.more)
         with gatekeeper.waiting():
-            return await _prepared(gatekeeper, session)
+            return await _prepared(gatekeeper, question.session)
 
 
 async def continue_mission(
@@ -255,8 +255,9 @@ async def end_steps(steps: _Key, ctx: AgentContext) -> MissionReport:
     gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors():
         session, known = gatekeeper.find_steps(steps)
-    known.end()
-    await gatekeeper.console.notifier.until(lambda: session.view.is_over, 15)
+        known.end()
+        with gatekeeper.waiting():
+            await gatekeeper.console.notifier.until(lambda: session.view.is_over, 15)
     return gatekeeper.report(session)
 
 
@@ -342,6 +343,6 @@ def _stopping_if_cancelled(session: MissionSession, by: str) -> Iterator[None]:
     try:
         yield
     except anyio.get_cancelled_exc_class():
-        if session.view.is_running:
+        if session.view.is_approved:
             session.stop_soon(f"{by}, which cancelled its call")
         raise

@@ -44,7 +44,9 @@ def read_contract(path: Path, skills: SkillTable = SKILLS) -> Contract:
 
 def contract_from(data: Mapping[str, Any], skills: SkillTable) -> Contract:
     """Convert the bounds of skills, as in a file, to a contract. Raise UserError if they are not valid."""
-    return _contract_in(YamlFile(json.dumps({"version": 1, "skills": data}), "the contract"), skills)
+    return _contract_in(
+        YamlFile(json.dumps({"version": 1, "skills": data}, ensure_ascii=False), "the contract"), skills
+    )
 
 
 def _contract_in(file: YamlFile, skills: SkillTable) -> Contract:

@@ -185,7 +185,7 @@ def _prepared(session: MissionSession) -> SessionView:
         if view.question is not None and view.waits_for_answer:
             answer = ask_which(view.question, read_line)
             adds = answer == "none" and not view.question.why_last
-            session.answer(answer, read_line(ADD_SENTENCE) if adds else "")
+            session.answer(view.question, answer, read_line(ADD_SENTENCE) if adds else "")
             view = session.view
         before = view.busy
         with busy(before or "finishing"):

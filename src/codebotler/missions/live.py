@@ -28,6 +28,9 @@ from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.rule_guard import RuleGuard, name_of
 from codebotler.simulator.settings import ENDLESS, SimulationSettings
 
+MIN_LOGGED_SECONDS = 0.1
+"""Shorter pauses are not logged, since a program may make thousands of them per second."""
+
 EventWriter: TypeAlias = Callable[..., None]
 """A function that logs an event from any thread. It takes the kind and, as keyword arguments, the data."""
 
@@ -95,7 +98,8 @@ class LiveRobot:
         self._check_end()
         seconds = max(0.0, now - self.now)
         at = {} if self.line is None else {"line": self.line}
-        self._write_event("sleep", seconds=round(seconds, 3), **at)
+        if seconds >= MIN_LOGGED_SECONDS:
+            self._write_event("sleep", seconds=round(seconds, 3), **at)
         self.robot.clock.wait(seconds)
         self._check_end()
 

@@ -170,7 +170,7 @@ def read_past(
     summary = MissionSummary.read(folder)
     if robot_kind not in {"", summary.robot}:
         raise UserError(f"mission {summary.id} ran on the robot {summary.robot}, not {robot_kind}")
-    _expect_rest(summary, folder)
+    expect_rest(folder)
     events = read_events(folder)
     before: LogLine = next((line for line in events if line["event"] == "past"), {})
     has_run = any(line["event"] == "state" and line["state"] == MissionState.RUNNING for line in events)
@@ -201,8 +201,9 @@ def read_past(
     )
 
 
-def _expect_rest(summary: MissionSummary, folder: Path) -> None:
-    """Raise UserError if a mission goes on, is done, or has been continued."""
+def expect_rest(folder: Path) -> None:
+    """Raise UserError if the mission in a folder goes on, is done, or has been continued."""
+    summary = MissionSummary.read(folder)
     if not summary.has_ended:
         raise UserError(f"mission {summary.id} has not ended; stop it first")
     if summary.state is MissionState.DONE:

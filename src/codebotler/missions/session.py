@@ -25,6 +25,7 @@ from codebotler.missions.authoring import ModelAuthor, prompt_of
 from codebotler.missions.drafts import compare_drafts, examine_draft
 from codebotler.missions.log import MissionState
 from codebotler.missions.mission import Mission, MissionError
+from codebotler.missions.past import expect_rest
 from codebotler.missions.preflight import (
     ask_rooms,
     expect_poses,
@@ -35,6 +36,7 @@ from codebotler.missions.preflight import (
 from codebotler.missions.progress import Progress
 from codebotler.missions.shared_view import SharedView
 from codebotler.missions.stop import StopButton
+from codebotler.missions.store import find_mission
 from codebotler.missions.view import CHECKING, UNCHECKED, MissionOrder, SessionView, program_digest
 from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import UnknownInstructionError
@@ -143,20 +145,24 @@ class MissionSession(SharedView):
                 raise MissionError("the model cannot be queried again at this point")
             self._author.max_tokens = max_tokens or self._author.max_tokens
             self._next_task = partial(self._ask, repair=repair)
-            self._change(busy=f"asking {self._view.model}", is_written=True, reply="", disabled_rules=())
+            self._change(busy=f"asking {self._view.model}", is_written=True, reply="")
 
-    def answer(self, answer: ClarifyingAnswer, more: str = "") -> None:
+    def answer(self, question: ClarifyingQuestion | None, answer: ClarifyingAnswer, more: str = "") -> None:
         """Say which behaviour is meant. With `none`, a sentence is added to the instruction.
 
         The answer `none` without a sentence, or to the last question, ends the mission.
 
         Raises:
-            MissionError: there is no question, or no such option.
+            MissionError: the session does not ask this question now, or there is no such option.
         """
         with self._editing, self._lock:
-            question = self._view.question
-            if question is None or not self._view.waits_for_answer:
-                raise MissionError("there is no question to answer")
+            if (
+                question is None
+                or question is not self._view.question
+                or self._view.is_over
+                or self._view.busy
+            ):
+                raise MissionError("this question is no longer asked")
             if isinstance(answer, int) and not 0 <= answer < len(question.options):
                 raise MissionError(f"there is no option {answer + 1}; there are {len(question.options)}")
             self._next_task = partial(
@@ -229,6 +235,9 @@ class MissionSession(SharedView):
                 if self._world is not None:
                     mission.show_map(self._world)
                 if (past := self._order.past) is not None:
+                    expect_rest(
+                        find_mission(self._home, past.mission)
+                    )  # another one may have done it meanwhile
                     mission.continue_from(past)
                     resume_robot(self._robot, past)
                 room_map, place = self._prepare_rooms()
@@ -286,7 +295,7 @@ class MissionSession(SharedView):
         writing = {"busy": f"asking {before.model}{many}", "is_written": True}
         self._show(**UNCHECKED | writing, program="", reply="", error="")
         try:
-            prompt = prompt_of(before, self._robot, repair=repair)
+            prompt = prompt_of(replace(before, disabled_rules=()), self._robot, repair=repair)
             if self._rejected is not None and not repair:
                 prompt = prompt.after(self._rejected.options[0].program, self._rejected.rejections)
             author, attempts = self._author.write(prompt, count, self._add_to_reply)
@@ -307,7 +316,7 @@ class MissionSession(SharedView):
             mission.note(none.sentence)
             self._restore(replace(before, programless=none))
             return
-        self._show(is_written=False, author=author)
+        self._show(is_written=False, author=author, disabled_rules=())
         if count > 1:
             self._choose(mission, programs)
         else:
@@ -357,7 +366,6 @@ class MissionSession(SharedView):
             mission.draft(program, view.author)
             check = self._check(program, view.room_map, view.rules_in_force)
             found = examine_draft(check, program, view, self._order, self._robot)
-            found["earlier"], self._checked = self._checked, found["check"].contract
             mission.check(replace(view, **found).problems)
         except MissionError:
             if not mission.has_ended:
@@ -365,7 +373,8 @@ class MissionSession(SharedView):
             return
         with self._lock:
             if self._next_task is None:
-                self._change(**found)
+                self._change(**found, earlier=self._checked)
+                self._checked = found["check"].contract
 
 
 def _sentence(error: Exception) -> str:

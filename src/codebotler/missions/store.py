@@ -97,6 +97,15 @@ def recover_missions(home: Path) -> list[MissionSummary]:
     return found
 
 
+def find_interrupted(home: Path) -> list[MissionSummary]:
+    """Close missions whose process died. Return them, with the last mission if it was interrupted before."""
+    found = recover_missions(home)
+    with suppress(UserError):
+        last = read_missions(home, 1)
+        found += [one for one in last if one.state is MissionState.INTERRUPTED and one not in found]
+    return found
+
+
 def _mission_folders(home: Path) -> list[Path]:
     folder = home / "missions"
     try:

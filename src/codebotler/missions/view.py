@@ -153,6 +153,11 @@ class SessionView:
         return self.state is not None and self.state.is_moving and not self.is_over
 
     @property
+    def is_approved(self) -> bool:
+        """Whether the robot works, or is about to, since the program is approved."""
+        return self.is_running or (self.state is MissionState.APPROVED and not self.is_over)
+
+    @property
     def may_be_approved(self) -> bool:
         """Whether the program can be approved now."""
         return self.state is MissionState.CHECKED and not (self.is_over or self.busy or self.question)

@@ -20,7 +20,7 @@ _TITLE_CALLS = 2
 _TITLE_SOURCE = 2_000  # characters in which calls are looked for
 _TITLE_TOKEN = re.compile(
     r"""#.*|(?P<quote>\'{3}|"{3}|['"])(?s:\\.|(?!(?P=quote)).)*+(?P=quote)?"""  # comments and strings
-    r"""|(?:def +|\.)\w+|(?P<name>\w*+)\(|\w+|\)"""
+    r"""|(?:def +|\.)\w+|(?P<name>\w*+) ?\(|\w+|\)"""
 )
 _MAX_ACTIVITY_CHARACTERS = 100
 
@@ -81,7 +81,8 @@ def title(summary: MissionSummary) -> str:
     calls = sorted(_skill_calls(summary.program[:_TITLE_SOURCE]))
     shown = [brief(summary.program[begin:end]) for begin, end in calls[:_TITLE_CALLS]]
     more = ["…"] * (len(calls) > _TITLE_CALLS)
-    return f"typed: {', '.join([*shown, *more])}" if calls else "a program without an instruction"
+    begin = "calls" if summary.model else "typed"
+    return f"{begin}: {', '.join([*shown, *more])}" if calls else "a program without an instruction"
 
 
 def _skill_calls(source: str) -> Iterator[tuple[int, int]]:

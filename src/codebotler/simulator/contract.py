@@ -94,7 +94,10 @@ class SkillBound:
         return f'since it may happen in {_some(self.places)}, and not in "{brief(call.place)}"'
 
     def beyond(self, other: SkillBound) -> SkillBound | None:
-        """Return the part of this bound that another one does not allow, or None if it allows all."""
+        """Return the part of this bound that another one does not allow, or None if it allows all.
+
+        If several of its limits are wider, the part is the whole bound.
+        """
         added: list[tuple[str, Templates | None]] = []
         for (name, templates), (_, allowed) in zip(self.texts, other.texts, strict=True):
             if allowed is None:
@@ -109,9 +112,11 @@ class SkillBound:
             known = {place.casefold() for place in other.places}
             places = self.places and tuple(place for place in self.places if place.casefold() not in known)
         is_more = other.at_most is not None and (self.at_most is None or self.at_most > other.at_most)
-        if all(templates == () for _, templates in added) and places == () and not is_more:
-            return None
-        return SkillBound(tuple(added), places, self.at_most if is_more else 0)
+        wider = [*(new != () for _, new in added), places != (), is_more]
+        if sum(wider) != 1:
+            return self if any(wider) else None
+        texts = (new if new[1] != () else old for new, old in zip(added, self.texts, strict=True))
+        return SkillBound(tuple(texts), self.places if places == () else places, self.at_most)
 
 
 @dataclass(frozen=True)

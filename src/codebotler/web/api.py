@@ -188,8 +188,9 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     def answer(mission: str, given: AnswerForm) -> dict[str, Any]:
         """Say which of the behaviours in `question` is meant."""
         session = _current_session(console, mission)
+        chosen = given.answer if isinstance(given.answer, str) else given.answer - 1
         with as_http_errors():
-            session.answer(given.answer if isinstance(given.answer, str) else given.answer - 1, given.more)
+            session.answer(session.view.question, chosen, given.more)
         return view_data(session.view)
 
     @api.post("/missions/{mission}/approve")

@@ -20,7 +20,7 @@ from codebotler.missions.mission import BY_SHUTDOWN, STOP_GRACE_SECONDS, Mission
 from codebotler.missions.past import MissionPast, read_past
 from codebotler.missions.recovery import PriorApproval, past_to_recover
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import find_mission, recover_missions
+from codebotler.missions.store import find_interrupted, find_mission
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.missions.wording import BY_PAGE
 from codebotler.models.base import Model
@@ -76,7 +76,7 @@ class Console:
         self._pool: WorkerPool | None = None
 
     def __enter__(self) -> Self:
-        self.interrupted = tuple(recover_missions(self.home))
+        self.interrupted = tuple(find_interrupted(self.home))
         self.obstacles = {one.id: self.obstacle_to(one.id) for one in self.interrupted}
         make_folder(self.home / "missions")
         return self
@@ -207,10 +207,10 @@ class Console:
         self.notifier.change()
 
     def stop(self, by: str, *, only_moving: bool = False) -> bool:
-        """Stop the mission, or only a running one, without waiting. Return whether there was one to stop."""
+        """Stop the mission, or only an approved one, without waiting. Return whether there was one."""
         with self._lock:
             session, self._may_recover = self.session, None
-        if session is None or session.view.is_over or (only_moving and not session.view.is_running):
+        if session is None or session.view.is_over or (only_moving and not session.view.is_approved):
             return False
         session.stop_soon(by)
         return True

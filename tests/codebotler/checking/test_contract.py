@@ -175,7 +175,7 @@ def test_what_a_changed_program_may_do_beyond_the_approved_one(contracts: Contra
     assert set(after.beyond(before).skills) == {"say"}
     assert set(before.beyond(after).skills) == {"place"}
     wider = contracts(BRING.replace('["yes", "no"]', '["yes", "no", "later"]')).beyond(before)
-    assert allowed(wider, "ask") == {"person": [], "question": [], "options": ["later"]}
+    assert allowed(wider, "ask") == {"person": ["Ann"], "question": ["Coffee?"], "options": ["later"]}
 
 
 def test_a_contract_is_read_as_it_was_written(contracts: Contracts, tmp_path: Path) -> None:

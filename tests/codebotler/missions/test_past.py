@@ -20,7 +20,7 @@ from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
-from codebotler.missions.log import MissionSummary, add_event, open_log, read_events
+from codebotler.missions.log import MissionState, MissionSummary, add_event, open_log, read_events
 from codebotler.missions.map_event import map_data
 from codebotler.missions.mission import Mission
 from codebotler.missions.past import MissionPast, read_past
@@ -344,7 +344,8 @@ def task_program():
 
 
 def test_a_session_compares_the_rest_with_what_remained(tmp_path: Path) -> None:
-    past = MissionPast("m", "", "", POLL, "stopped", (WENT, ASKED, ASKED), "lab")
+    mission = failed(tmp_path, BRING).name
+    past = MissionPast(mission, "", "", POLL, "stopped", (WENT, ASKED, ASKED), "lab")
     session = MissionSession(
         Simulated(WORLD, speed=None),
         tmp_path,
@@ -358,6 +359,30 @@ def test_a_session_compares_the_rest_with_what_remained(tmp_path: Path) -> None:
     session.stop("the test")
     assert view.check is not None
     assert (view.check.problems, len(view.check.remaining)) == ((), DEFAULT_SAMPLES)
+
+
+def test_a_rest_that_was_done_meanwhile_is_not_done_again(tmp_path: Path) -> None:
+    past = read_past(failed(tmp_path, BRING), SKILLS)
+    rest = "def task_program():\n    say('hello')\n"
+
+    def session() -> MissionSession:
+        made = MissionSession(
+            Simulated(WORLD, speed=None),
+            tmp_path,
+            MissionOrder(program=rest, past=past),
+            open_model=open_recorded,
+            check=checker(SKILLS),
+            world=WORLD,
+        )
+        made.start()
+        return made
+
+    first = session()
+    first.approve(first.wait_until(lambda view: view.may_be_approved).digest, despite_problems=True)
+    assert first.wait_until(lambda _: False).state is MissionState.DONE
+    second = session().wait_until(lambda view: view.is_over or view.may_be_approved)
+    assert second.is_over
+    assert first.view.id in second.error
 
 
 def test_nothing_is_known_of_a_program_that_does_something_else() -> None:

@@ -67,7 +67,7 @@ def test_a_person_chooses_and_the_mission_keeps_the_answer(
         assert view.question is not None
         assert [option.size for option in view.question.options] == [2, 1]
         difference = view.question.chosen(answer)
-        session.answer(answer)
+        session.answer(session.view.question, answer)
         view = waited(session)
         assert (view.program, view.question, view.author) == (program, None, "several")
         assert view.may_be_approved
@@ -82,13 +82,13 @@ def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_pa
         assert question is not None
         assert not question.why_last
         model.programs = [CARRY, GO]
-        session.answer("none", "But  quietly.")
+        session.answer(session.view.question, "none", "But  quietly.")
         view = session.wait_until(lambda now: now.waits_for_answer)
         assert view.question is not None
         assert view.question.why_last
         assert view.instruction == "Do it. But quietly."
         assert model.prompts[-1].instruction == "Do it. But quietly."
-        session.answer("none", "And fast.")
+        session.answer(session.view.question, "none", "And fast.")
         view = session.wait_until(lambda now: now.is_over or now.state is MissionState.FAILED)
         assert view.state is MissionState.FAILED
         summary = MissionSummary.read(tmp_path / "missions" / view.id)
@@ -99,11 +99,11 @@ def test_what_a_person_did_not_mean_is_not_taken_again(tmp_path: Path) -> None:
     with asking(tmp_path, STAY, FETCH, STAY) as (session, model):
         waited(session)
         model.programs = [FETCH, GO, STAY]
-        session.answer("none", "But quietly.")
+        session.answer(session.view.question, "none", "But quietly.")
         assert session.wait_until(lambda view: view.may_be_approved).program == GO
     with asking(tmp_path, STAY, FETCH) as (session, _):
         waited(session)
-        session.answer("none", "But quietly.")
+        session.answer(session.view.question, "none", "But quietly.")
         view = session.wait_until(lambda _: False)
         assert (view.state, view.program) == (MissionState.FAILED, "")
         assert view.error
@@ -113,7 +113,7 @@ def test_a_recorded_model_is_not_asked_again(tmp_path: Path) -> None:
     with asking(tmp_path, STAY, FETCH, name="recorded:several") as (session, model):
         question = waited(session).question
         assert question is not None
-        session.answer("none", "But quietly.")
+        session.answer(session.view.question, "none", "But quietly.")
         view = session.wait_until(lambda now: now.state is MissionState.FAILED or now.waits_for_answer)
         assert question.why_last
         assert question.why_last in view.reason
@@ -133,12 +133,24 @@ def test_wrong_answers_are_refused(tmp_path: Path) -> None:
     with asking(tmp_path, STAY, FETCH) as (session, _):
         waited(session)
         with pytest.raises(MissionError):
-            session.answer(2)
+            session.answer(session.view.question, 2)
         with pytest.raises(MissionError):
-            session.answer(-1)
-        session.answer(0)
+            session.answer(session.view.question, -1)
+        asked = session.view.question
+        session.answer(asked, 0)
         with pytest.raises(MissionError):
-            session.answer(0)
+            session.answer(asked, 0)
+
+
+def test_an_answer_to_an_earlier_question_is_refused(tmp_path: Path) -> None:
+    with asking(tmp_path, STAY, FETCH) as (session, model):
+        first = waited(session).question
+        model.programs = [CARRY, GO]
+        session.answer(first, "none", "But quietly.")
+        session.wait_until(lambda now: now.waits_for_answer)
+        with pytest.raises(MissionError):
+            session.answer(first, 0)
+        assert session.view.waits_for_answer
 
 
 def test_a_stop_ends_the_question(tmp_path: Path) -> None:
@@ -158,7 +170,7 @@ def test_replies_without_a_program_do_not_count(tmp_path: Path) -> None:
 def test_an_old_program_cannot_be_approved_while_a_question_waits(tmp_path: Path) -> None:
     with asking(tmp_path, STAY, FETCH) as (session, _):
         waited(session)
-        session.answer(0)
+        session.answer(session.view.question, 0)
         waited(session)
         session.ask_again(repair=False)
         view = session.wait_until(lambda now: now.waits_for_answer)

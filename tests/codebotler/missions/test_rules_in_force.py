@@ -18,6 +18,7 @@ from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.view import MissionOrder
 from codebotler.missions.wording import event_text
+from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import open_recorded as recorded
 from codebotler.robots.base import Robot, RobotResult
 from codebotler.robots.reservation import Reservation
@@ -564,6 +565,25 @@ def test_a_rule_that_was_switched_off_is_in_force_for_another_program(tmp_path: 
     assert session.wait_until(lambda now: now.may_be_approved).rules_in_force == ()
     session.edit("def task_program():\n    go_to('vault')\n")
     assert session.wait_until(lambda now: now.may_be_approved).rules_in_force == (VAULT,)
+    session.stop("a test")
+    session.join(10)
+
+
+def test_a_rule_stays_switched_off_if_no_other_program_comes(tmp_path: Path) -> None:
+    def refuses(_name: str) -> Model:
+        raise ModelError("the model is not there", may_pass=False)
+
+    order = MissionOrder("Go to the vault.", "refuses", STUBBORN)
+    session = MissionSession(
+        knowing("hall", "vault"), tmp_path, order, open_model=refuses, check=checker(SKILLS), rules=(VAULT,)
+    )
+    session.start()
+    session.wait_until(lambda now: now.may_be_approved)
+    session.switch_off("vault", "the door is broken")
+    checked = session.wait_until(lambda now: now.may_be_asked_again)
+    session.ask_again(repair=False)
+    view = session.wait_until(lambda now: bool(now.error))
+    assert (view.check, view.disabled_rules) == (checked.check, ("vault",))
     session.stop("a test")
     session.join(10)
 

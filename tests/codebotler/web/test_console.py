@@ -491,6 +491,48 @@ def test_the_robot_is_stopped_with_the_tool(tmp_path: Path) -> None:
     assert read_missions(tmp_path)[0].state == "stopped"
 
 
+def test_a_stop_between_the_approval_and_the_start_counts(tmp_path: Path) -> None:
+    robot, starting, go_on = Simulated(WORLD, speed=None), threading.Event(), threading.Event()
+
+    def keep_out(_rules: object) -> None:
+        starting.set()
+        go_on.wait(20)
+
+    robot.keep_out = keep_out  # type: ignore[attr-defined]  # an optional method
+    with desk_of(tmp_path, robot) as console:
+        session = console.begin(MissionOrder(program=HELLO))
+        view = until(console, lambda view: view.may_be_approved)
+        assert not console.stop("a test", only_moving=True)
+        session.approve(view.digest)
+        assert starting.wait(20)
+        assert console.stop("a test", only_moving=True)
+        session._stop_button.ended.wait(20)
+        go_on.set()
+        assert until(console, lambda view: view.is_over).state is MissionState.STOPPED
+        assert not session.view.progress.visited
+
+
+def test_a_draft_that_nobody_saw_is_no_draft_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, go_on, check = threading.Event(), threading.Event(), Console.check
+
+    def slow(
+        console: Console, program: str, plan: RoomMap | None = None, rules: tuple[Rule, ...] = ()
+    ) -> CheckResult:
+        begun.set()
+        go_on.wait(20)
+        return check(console, program, plan, rules)
+
+    monkeypatch.setattr(Console, "check", slow)
+    with desk_of(tmp_path) as console:
+        console.begin(MissionOrder(program=HELLO))
+        assert begun.wait(20)
+        console.edit(f"{HELLO}# a comment\n")
+        go_on.set()
+        assert until(console, lambda view: view.may_be_approved).earlier is None
+        console.edit(HELLO)
+        assert until(console, lambda view: view.may_be_approved and view.program == HELLO).earlier is not None
+
+
 def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     go_on, check = threading.Event(), Console.check
 
@@ -522,6 +564,12 @@ def test_missions_that_a_dead_tool_left_are_told_of(tmp_path: Path) -> None:
     with desk_of(tmp_path) as console:
         assert [summary.id for summary in console.interrupted] == [mission.id]
         assert "ended unexpectedly" in console.interrupted[0].reason
+    with desk_of(tmp_path) as console:
+        assert [summary.id for summary in console.interrupted] == [mission.id], "until it is dealt with"
+        console.begin(MissionOrder(program=HELLO))
+        until(console, lambda view: view.may_be_approved)
+    with desk_of(tmp_path) as console:
+        assert console.interrupted == ()
 
 
 def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:

@@ -38,6 +38,10 @@ from ended import cut, failed_mission, line_of
 WORLD = World((Room("hall"), Room("kitchen"), Room("study")), "hall")
 FETCH = "def task_program():\n    go_to('kitchen')\n    pick('mug')\n    say('done')\n    go_to('hall')\n"
 GO_BACK = "def task_program():\n    go_to('hall')\n"
+SEEK = (
+    "def task_program():\n    go_to('kitchen')\n    pick('mug')\n"
+    "    place('mug')\n    go_to('study')\n    pick('mug')\n"
+)
 ELSEWHERE = "def task_program():\n    go_to('study')\n"
 TYPED = "def task_program():\n    go_to('kitchen')\n    say('hello')\n    go_to('cellar')\n"
 
@@ -257,7 +261,7 @@ def test_after_an_own_skill_without_an_event_a_person_decides() -> None:
 
 
 def test_recoveries_are_counted(tmp_path: Path) -> None:
-    author = Author(FETCH, "def task_program():\n    pick('mug')\n", GO_BACK)
+    author = Author(SEEK, "def task_program():\n    go_to('study')\n    pick('mug')\n", GO_BACK)
     with desk_of(tmp_path, author, recoveries=1) as console:
         fetch(console)
         until(console, lambda view: view.number == 2 and view.is_over)

@@ -320,6 +320,7 @@ def test_a_strip_in_which_something_else_is_answered_is_no_longer_possible() -> 
         ("def task_program():\n  go_to(\"x\")\n  say('y')\n  say('z')\n", "typed: go_to(\"x\"), say('y'), …"),
         ("def task_program(:\n", "a program without an instruction"),
         ("go_to('not parsed')\n    )", "typed: go_to('not parsed')"),
+        ("say (1)", "typed: say (1)"),
         ("'say(1)' # pick(1)\ndef say(a):\n  me.say(2)\n  say(')\\'')", "typed: say(')\\'')"),
         ("'''It's\nsay(1)'''\nif (a):\n  say(\n    'b'\n  )", "typed: say( 'b' )"),
         (f"{'#' * 2_000}\nsay('beyond what is read')\n", "a program without an instruction"),

@@ -79,9 +79,9 @@ class CandidatesPane:
 
     async def _answer(self, answer: ClarifyingAnswer, more: str = "") -> None:
         session = self._console.session
-        if session is not None:
+        if session is not None and self._drawn is not None:
             try:
-                await asyncio.to_thread(session.answer, answer, more)
+                await asyncio.to_thread(session.answer, self._drawn, answer, more)
                 scroll_up()
             except MissionError as error:
                 warn(error.sentence)

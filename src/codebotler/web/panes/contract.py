@@ -13,7 +13,7 @@ from codebotler.web.frame import PlainText
 
 
 class ContractPane:
-    """Shows the contract of the checked program, or only what the last program's contract did not allow."""
+    """Shows the contract of the checked program, and what the last program's contract did not allow."""
 
     def __init__(self, skills: SkillTable) -> None:
         self._skills = skills
@@ -33,21 +33,18 @@ class ContractPane:
 
     def _draw(self, contract: Contract, earlier: Contract | None) -> None:
         PlainText("h3", "What it may do at most")
-        new = contract if earlier is None else contract.beyond(earlier)
-        if earlier is not None:
-            is_narrower = bool(earlier.beyond(contract).skills)
-            same = "Less than the draft before." if is_narrower else "The same as the draft before."
-            PlainText("p", "More than the draft before:" if new.skills else same)
-        sentence = contract_sentence(new, self._skills) if earlier is None else ""
-        if sentence:  # whole, since a cut would hide a skill
-            PlainText("p", visible(sentence))
-        if earlier is not None and new.skills:
-            self._table(new)
-        whole = contract_sentence(contract, self._skills, is_short=False)
-        is_cut = sentence not in {"", whole}
+        sentence = contract_sentence(contract, self._skills)
+        PlainText("p", visible(sentence))
+        is_cut = sentence != contract_sentence(contract, self._skills, is_short=False)
         with ui.element("details").props("open" if is_cut else ""):
             PlainText("summary", "The whole contract")
             self._table(contract)
+        if earlier is not None:
+            new, is_narrower = contract.beyond(earlier), bool(earlier.beyond(contract).skills)
+            same = "Less than the draft before." if is_narrower else "The same as the draft before."
+            PlainText("p", "More than the draft before:" if new.skills else same)
+            if new.skills:
+                self._table(new)
 
     def _table(self, contract: Contract) -> None:
         with ui.element("table"), ui.element("tbody"):
