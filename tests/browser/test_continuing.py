@@ -51,6 +51,8 @@ def test_continue(tmp_path: Path, opened: OpenPage, shoot: Shoot, screen: Screen
         page.locator("#stop").click()
         expect(page.get_by_role("button", name="Continue", exact=True)).to_be_visible()
         expect(page.get_by_role("button", name="Start again from the beginning")).to_be_visible()
+        expect(page.locator(".scene.stopped").first).to_be_visible()
+        expect(page.locator(".strip .ending.good")).to_have_count(0)
         look(page, shoot, f"continue-offered-{which}")
         press(page, "Continue")
         expect(page.get_by_role("button", name="Run it on the robot")).to_be_enabled()

@@ -12,7 +12,7 @@ from viewing import OpenPage, write
 GREET = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
 
 
-def test_a_contract_is_shown_and_an_edit_shows_only_what_is_new(tmp_path: Path, opened: OpenPage) -> None:
+def test_a_contract_is_shown_and_an_edit_shows_what_is_new(tmp_path: Path, opened: OpenPage) -> None:
     with PageServer(tmp_path, "--speed", "40") as server:
         page = opened(server)
         pane = page.locator(".contract")
@@ -20,8 +20,9 @@ def test_a_contract_is_shown_and_an_edit_shows_only_what_is_new(tmp_path: Path, 
         write(page, GREET)
         expect(pane).to_contain_text('It may go to "kitchen"; say "hello". It picks up nothing')
         write(page, GREET.replace("hello", "good morning"))
+        expect(pane).to_contain_text('say "good morning". It picks up nothing')
         expect(pane).to_contain_text("More than the draft before:")
-        expect(pane.locator("table").first.locator("tr")).to_have_text(['say"good morning"'])
+        expect(pane.locator("table").first.locator("tr")).to_have_text(['say"good morning"at most 1 time'])
         write(page, "def task_program():\n    go_to('kitchen')\n")
         expect(pane).to_contain_text("Less than the draft before.")
         pane.get_by_text("The whole contract").click()

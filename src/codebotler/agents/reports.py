@@ -101,7 +101,7 @@ def which_question(asked: ClarifyingQuestion) -> str:
         f"{number}. The robot {shortened(one.difference)}." for number, one in enumerate(asked.options, 1)
     )
     last = f'The answer "none" ends the mission: {asked.why_last}.' if asked.why_last else ""
-    return "\n".join(filter(None, ("Which did you mean?", facts, *options, last)))
+    return "\n".join(filter(None, ("Which did you mean?", facts, *options, asked.left_out, last)))
 
 
 def _sendable(value: object) -> object:

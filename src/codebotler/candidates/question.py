@@ -15,7 +15,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.phrases import phrase
 from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE
 from codebotler.core.trace import Event
-from codebotler.core.words import brief, listed
+from codebotler.core.words import brief, counted, listed
 from codebotler.models.recorded import is_recorded
 from codebotler.simulator.matching import normalized
 
@@ -67,6 +67,12 @@ class ClarifyingQuestion:
     total: int
     sample: int
     why_last: str = ""
+
+    @property
+    def left_out(self) -> str:
+        """Say how many candidates no option stands for; empty if none."""
+        left = self.total - sum(one.size for one in self.options)
+        return f"Not shown: {counted(left, 'program')} that would do something else." if left else ""
 
     @property
     def programs(self) -> tuple[str, ...]:
@@ -170,7 +176,7 @@ def describe_differences(samples: Sequence[Sample], behaviours: Sequence[Behavio
     for sample in samples:
         parts = [_words(key, sample) for key in differing]
         left = len(parts) - MAX_SHOWN_DIFFERENCES
-        more = [f"does {left} more things differently"] if left > 0 else []
+        more = ["does other things differently, too"] if left > 0 else []
         sentences.append(listed([*parts[:MAX_SHOWN_DIFFERENCES], *more]))
     return sentences
 

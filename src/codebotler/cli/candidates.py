@@ -27,7 +27,7 @@ from codebotler.core.terminal import (
     shortened,
     visible,
 )
-from codebotler.core.words import counted, listed
+from codebotler.core.words import counted, listed, with_sentence
 from codebotler.generation.candidates import gather_candidates
 from codebotler.generation.generate import Attempt
 from codebotler.missions.preflight import with_closest_here
@@ -117,7 +117,7 @@ def choose_candidate(
         if not more:
             break
         refused = question.programs
-        instruction = f"{instruction.rstrip()} {more}"
+        instruction = with_sentence(instruction, more)
     note("no program chosen")
     return None
 
@@ -153,6 +153,8 @@ def question_view(question: ClarifyingQuestion) -> RenderableType:
         like = f"{option.size} of {counted(question.total, 'program')}"
         parts += [Text(), Text.assemble((head, "bold"), (f"  ({like})", "dim"))]
         parts.append(Padding(storyboard(option.steps, set()), (0, 0, 0, 2)))
+    if question.left_out:
+        parts += [Text(), Text(question.left_out, "dim")]
     last = f'The answer "none" gives up: {question.why_last}.\n' if question.why_last else ""
     return Group(*parts, Text(), Text(last, "dim", end=""))
 

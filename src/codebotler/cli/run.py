@@ -12,9 +12,10 @@ from codebotler.checking.check import check
 from codebotler.checking.problems import CheckResult
 from codebotler.cli.candidates import ADD_SENTENCE, ask_which, line_reader
 from codebotler.cli.check import check_view, read_program
+from codebotler.cli.continuing import past_view
 from codebotler.cli.contract import contract_view
 from codebotler.cli.generate import note_programless
-from codebotler.cli.views import EventPrinter, ending_view, source_view
+from codebotler.cli.views import EventPrinter, continue_view, ending_view, source_view
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, confirm, note, print_rich, read_line, shortened
@@ -149,6 +150,8 @@ def run(
             status = _watched(session, view, robot, request)
             rest = _recovery(session, robot, request, home) if status == 1 else None
             if rest is None:
+                if session.view.state in {MissionState.STOPPED, MissionState.FAILED}:
+                    print_rich(continue_view(session.view))
                 return status
             try:
                 return run(robot, rest, home, open_model, world)
@@ -250,6 +253,7 @@ def _recovery(session: MissionSession, robot: Robot, request: Request, home: Pat
     if past is None:
         return None
     approval = request.approval or PriorApproval.of(session.view)
+    print_rich(past_view(past))
     note(f"recovering: asking {request.model} for the rest")
     return replace(
         request,

@@ -89,18 +89,22 @@ def _event_line(line: LogLine) -> Text:
     return text
 
 
-def ending_view(ended: MissionSummary | SessionView) -> Group:
+def ending_view(ended: SessionView) -> Group:
     """Show how a mission ended, and the command that shows it again, on a line that is never wrapped."""
     state = ended.state
     assert state is not None, "the mission has begun"
     text = Text.assemble((state, STATE_STYLES.get(state, "bold")), _why(ended))
     if state is MissionState.STOPPED:
         text.append("\nthe robot has stopped")
-    again = [f"`codebotler missions {ended.id}` shows this mission again"]
-    if state in {MissionState.STOPPED, MissionState.FAILED}:
-        options = "the same --world, --robot and --model"
-        again.append(f"`codebotler continue {ended.id}` does the rest, with {options}")
-    return Group(text, *(Text(one, "dim", no_wrap=True, overflow="ignore") for one in again))
+    again = f"`codebotler missions {ended.id}` shows this mission again"
+    return Group(text, Text(again, "dim", no_wrap=True, overflow="ignore"))
+
+
+def continue_view(ended: SessionView) -> Text:
+    """Show the command that does the rest of a mission, on a line that is never wrapped."""
+    options = "add --world, --robot and --model as you gave them now"
+    command = f"`codebotler continue {ended.id}` does the rest; {options}"
+    return Text(command, "dim", no_wrap=True, overflow="ignore")
 
 
 def _why(ended: MissionSummary | SessionView) -> str:
@@ -144,7 +148,7 @@ def mission_view(
     table = grid("left", "right", "left")
     before: Text | None = None
     for line in events:
-        text = _event_line(line)
+        text = Text() if line["event"] == "feedback" else _event_line(line)
         if text and text != before:  # each edit of a draft records the same state again
             before = text if line["event"] == "state" else None
             at = datetime.fromtimestamp(line["time"]).astimezone()

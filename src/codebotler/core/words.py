@@ -23,6 +23,13 @@ def counted(number: int, noun: str) -> str:
     return f"{number:,} {noun}{'s' * (number != 1)}"
 
 
+def with_sentence(text: str, sentence: str) -> str:
+    """Add a sentence to a text, after a full stop."""
+    text = text.rstrip()
+    stop = "" if not text or text[-1] in ".!?:;…。" else "."
+    return f"{text}{stop} {sentence}"
+
+
 def times(number: int) -> str:
     """Return a frequency in words, such as `once`, `twice` or `3 times`."""
     return {0: "not at all", 1: "once", 2: "twice"}.get(number, f"{number:,} times")

@@ -16,6 +16,7 @@ from codebotler.checking.contract_file import contract_data
 from codebotler.core.files import Appender, make_folder
 from codebotler.core.terminal import visible
 from codebotler.core.trace import Outcome, RunError, Status, Trace
+from codebotler.core.words import with_sentence
 from codebotler.core.world import World
 from codebotler.missions.live import LiveRobot, StoppedError
 from codebotler.missions.log import NEXT_STATES, LogLine, MissionState, MissionSummary, add_event, open_log
@@ -167,7 +168,7 @@ class Mission:
         """Add a person's sentence to the instruction."""
         with self._writing:
             self.note(f"a person added to the instruction: {visible(sentence)}")
-            self.summary.instruction = f"{self.summary.instruction} {sentence}"
+            self.summary.instruction = with_sentence(self.summary.instruction, sentence)
 
     def note(self, text: str) -> None:
         """Add a sentence to the log."""

@@ -96,8 +96,17 @@ class MissionPast:
 
     def here(self, place: str) -> str:
         """Say that the robot is at a place, and what it holds."""
-        holds = f'holds "{shortened(self.held)}"' if self.held else "holds nothing"
-        return f'The robot is in "{shortened(place)}" and {holds}.'
+        return f'The robot is in "{shortened(place)}" and holds {self._held_words}.'
+
+    @property
+    def was(self) -> str:
+        """Say where the robot was last and what it held, according to the log; empty if unknown."""
+        where = f'the robot was in "{shortened(self.place)}" and held {self._held_words}'
+        return f"Just before that, {where}, says the log." if self.place else ""
+
+    @property
+    def _held_words(self) -> str:
+        return f'"{shortened(self.held)}"' if self.held else "nothing"
 
     @property
     def question(self) -> str:

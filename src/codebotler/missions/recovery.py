@@ -85,9 +85,9 @@ def ask_evidence(robot: Robot, home: Path, past: MissionPast, remark: Callable[[
 
     The robot is connected, unless it is in use. `remark` receives likely mistakes in its setup.
     """
-    before = [f"Before, according to the log: {past.here(past.place)}"] if past.place else []
+    before = [past.was] if past.was else []
     if is_resumable(robot):  # it knows no more than the log
-        return [*before, "The simulated robot will begin there."]
+        return [*before, "The simulated robot knows no more, and will go on as you answer."]
     try:
         with Reservation(robot, home):
             place = ask_rooms(robot, remark)[1]

@@ -156,12 +156,8 @@ class MissionSession(SharedView):
             MissionError: the session does not ask this question now, or there is no such option.
         """
         with self._editing, self._lock:
-            if (
-                question is None
-                or question is not self._view.question
-                or self._view.is_over
-                or self._view.busy
-            ):
+            view = self._view
+            if question is None or question is not view.question or not view.waits_for_answer:
                 raise MissionError("this question is no longer asked")
             if isinstance(answer, int) and not 0 <= answer < len(question.options):
                 raise MissionError(f"there is no option {answer + 1}; there are {len(question.options)}")
@@ -235,9 +231,8 @@ class MissionSession(SharedView):
                 if self._world is not None:
                     mission.show_map(self._world)
                 if (past := self._order.past) is not None:
-                    expect_rest(
-                        find_mission(self._home, past.mission)
-                    )  # another one may have done it meanwhile
+                    # Another mission may have done the rest since this past was read.
+                    expect_rest(find_mission(self._home, past.mission))
                     mission.continue_from(past)
                     resume_robot(self._robot, past)
                 room_map, place = self._prepare_rooms()

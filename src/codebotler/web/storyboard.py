@@ -18,6 +18,12 @@ from codebotler.core.trace import Event
 from codebotler.web.frame import PlainText
 
 _MAX_STEP_TEXT, _MAX_WORLD_TEXT, MAX_STRIPS = 300, 800, 6
+SCENE_MARKS = {
+    "reached": ("✓", "reached"),
+    "failed": ("✗", "failed here"),
+    "stopped": ("■", "stopped here"),
+}
+"""The sign of a room for how far a mission came, and its meaning."""
 _LEFT_OUT = "…"  # replaces rooms in a shortened strip
 
 
@@ -58,7 +64,7 @@ class RouteProgress:
     visited: tuple[str, ...] = ()  # the rooms of completed drives
     looks: tuple[tuple[str, bool], ...] = ()  # objects that were looked for, and whether they were found
     answers: tuple[str | None, ...] = ()  # the answers to questions; None for a question that failed
-    has_failed: bool = False  # whether the mission failed after that
+    end: str = ""  # how the mission ended early after that: a key of `SCENE_MARKS`
 
 
 NO_PROGRESS = RouteProgress()
@@ -84,9 +90,10 @@ def draw_strips(
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
                 for number, scene in enumerate(strip.scenes):
                     is_reached = bool(reached.visited and number_reached) and number <= (number_reached or 0)
-                    has_failed = reached.has_failed and number == number_reached
-                    draw_scene(scene, is_reached=is_reached, has_failed=has_failed)
-            PlainText("p", strip.ending, "ending good" if strip.ends_well else "ending bad")
+                    end = reached.end if number == number_reached else ""
+                    draw_scene(scene, mark=end or ("reached" if is_reached else ""))
+            quality = "good" if strip.ends_well else "bad"
+            PlainText("p", strip.ending, "ending quiet" if reached.end else f"ending {quality}")
 
 
 def folded(numbers: Sequence[int | None]) -> list[bool]:
@@ -126,22 +133,20 @@ def draw_scene(
     scene: Scene,
     wrong: Container[int] = frozenset(),
     *,
-    is_reached: bool = False,
-    has_failed: bool = False,
+    mark: str = "",
     anchor: str = "",
 ) -> None:
-    """Draw one visit to a room, and mark wrong steps and the room in which a mission failed.
+    """Draw one visit to a room, and mark wrong steps and, by a key of `SCENE_MARKS`, how far a mission came.
 
     A step's HTML ID is `anchor` followed by its number.
     """
     kinds = ["scene"] if scene.deeds or not scene.is_found else ["scene", "passing"]
-    kinds += ["wrong"] * (scene.step in wrong) + ["reached"] * is_reached
+    kinds += ["wrong"] * (scene.step in wrong) + [mark] * bool(mark)
     with ui.element("li").classes(" ".join(kinds)):
         _number(PlainText("b", scene.room, "room"), scene.step, anchor)
-        if has_failed:
-            PlainText("span", "✗", "tick failed").props('role=img aria-label="failed here"')
-        elif is_reached:
-            PlainText("span", "✓", "tick").props('role=img aria-label="reached"')
+        if mark:
+            sign, words = SCENE_MARKS[mark]
+            PlainText("span", sign, f"tick {mark}").props(f'role=img aria-label="{words}"')
         if not scene.is_found:
             PlainText("span", "there is no such room", "deed missing")
         for deed in scene.deeds:

@@ -62,6 +62,8 @@ def test_there_are_at_most_three_options_and_the_largest_ones() -> None:
     question = asked(*(cluster(4 - n, str(n), run) for n, run in enumerate([ONE, TWO, THREE, four])))
     assert [(one.program, one.size) for one in question.options] == [("0", 4), ("1", 3), ("2", 2)]
     assert question.total == 10
+    assert "1 program " in question.left_out
+    assert not asked(cluster(2, "a", ONE), cluster(1, "b", TWO)).left_out
 
 
 def test_a_shorter_storyboard_is_preferred() -> None:

@@ -48,6 +48,7 @@ class CandidatesPane:
             for number, option in enumerate(question.options):
                 with ui.element("article").classes("card"):
                     self._draw_option(question, option, number)
+        PlainText("p", question.left_out, "quiet")
         more = None
         if question.why_last:
             PlainText("p", f'{capitalize(question.why_last)}, so "None of these" ends the mission.', "quiet")

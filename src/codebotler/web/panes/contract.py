@@ -35,16 +35,16 @@ class ContractPane:
         PlainText("h3", "What it may do at most")
         sentence = contract_sentence(contract, self._skills)
         PlainText("p", visible(sentence))
-        is_cut = sentence != contract_sentence(contract, self._skills, is_short=False)
-        with ui.element("details").props("open" if is_cut else ""):
-            PlainText("summary", "The whole contract")
-            self._table(contract)
         if earlier is not None:
             new, is_narrower = contract.beyond(earlier), bool(earlier.beyond(contract).skills)
             same = "Less than the draft before." if is_narrower else "The same as the draft before."
             PlainText("p", "More than the draft before:" if new.skills else same)
             if new.skills:
                 self._table(new)
+        is_cut = sentence != contract_sentence(contract, self._skills, is_short=False)
+        with ui.element("details").props("open" if is_cut else ""):
+            PlainText("summary", "The whole contract")
+            self._table(contract)
 
     def _table(self, contract: Contract) -> None:
         with ui.element("table"), ui.element("tbody"):

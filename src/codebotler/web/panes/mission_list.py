@@ -14,7 +14,7 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
-from codebotler.missions.log import MissionSummary
+from codebotler.missions.log import MissionState, MissionSummary
 from codebotler.missions.store import last_rest, read_missions, rest_text
 from codebotler.missions.view import SessionView
 from codebotler.missions.wording import reason_text, title
@@ -123,8 +123,9 @@ class _MissionList:
 
 def state_words(summary: MissionSummary, view: SessionView) -> str:
     """Return the state of a mission, or that it waits for a person's answer, given the current view."""
-    is_asking = summary.id == view.id and view.waits_for_answer
-    return "waits for an answer" if is_asking else str(summary.state)
+    if summary.id == view.id and view.waits_for_answer:
+        return "waits for an answer"
+    return "waits for approval" if summary.state is MissionState.CHECKED else str(summary.state)
 
 
 def _select_box(label: str, value: str, chosen: Any) -> ui.select:  # noqa: ANN401 - any handler of NiceGUI's

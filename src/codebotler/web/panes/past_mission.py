@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
+from typing import NamedTuple
 
 from nicegui import html, ui
 
@@ -14,7 +15,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
 from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState, MissionSummary, read_events
-from codebotler.missions.store import find_continuations, find_mission
+from codebotler.missions.store import find_continuations, find_mission, find_rest
 from codebotler.missions.wording import activity, capitalize, event_text, reason_text, stop_text, title
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText, outside
@@ -38,19 +39,19 @@ def add(console: Console, frame: Frame) -> None:
         frame("Mission", "/missions")
         with ui.element("div").classes("past"):
             try:
-                summary, events, later = await asyncio.to_thread(_read, console, mission)
+                summary, events, chain = await asyncio.to_thread(_read, console, mission)
             except UserError as error:
                 PlainText("p", error.sentence, "trouble")
                 return
             page = _MissionPage(console, summary)
-            page.show(summary, events, later)
+            page.show(summary, events, chain)
             if summary.state in EARLY_ENDS and can_be_continued(summary):
                 obstacle = await asyncio.to_thread(console.obstacle_to, mission)
                 with page.rest:
                     if not obstacle:
                         ContinueButton(console, summary.id)
-                    elif not later:  # the link to a later mission says enough
-                        PlainText("p", f"{capitalize(obstacle)}.", "quiet")
+                    elif not chain.later:  # the link to a later mission says enough
+                        PlainText("p", f"It cannot be continued here: {obstacle}.", "quiet")
             if not summary.has_ended:
                 await follow(console.notifier, partial(_update, console, page))
 
@@ -93,10 +94,16 @@ def timeline_text(line: LogLine, *, is_first: bool) -> str:
     return "" if event == "feedback" else capitalize(event_text(line))
 
 
-def _read(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine], list[MissionSummary]]:
-    """Return the summary and the events of a mission, and the missions that continue it."""
+class _Chain(NamedTuple):
+    later: list[MissionSummary]  # the missions that continue a mission
+    last: MissionSummary | None  # the last one that did its rest, directly or after others
+
+
+def _read(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine], _Chain]:
+    """Return the summary and the events of a mission, and what became of its rest."""
     folder = find_mission(console.home, mission)
-    return MissionSummary.read(folder), read_events(folder), find_continuations(folder)
+    chain = _Chain(find_continuations(folder), find_rest(folder))
+    return MissionSummary.read(folder), read_events(folder), chain
 
 
 class _MissionPage:
@@ -113,9 +120,7 @@ class _MissionPage:
         PlainText("h2", "Program")
         self._source = ui.element("pre").classes("source").props("tabindex=0 dir=auto")
 
-    def show(
-        self, summary: MissionSummary, events: Sequence[LogLine], later: Sequence[MissionSummary]
-    ) -> None:
+    def show(self, summary: MissionSummary, events: Sequence[LogLine], chain: _Chain) -> None:
         """Show a mission, including new events, and links to the missions that continue it."""
         self.has_ended = summary.has_ended
         state = state_words(summary, self._console.view)
@@ -123,7 +128,7 @@ class _MissionPage:
             self._shown = (replace(summary), state)
             self._head.clear()
             with self._head:
-                _draw_header(summary, state, later)
+                _draw_header(summary, state, chain)
             self._source.clear()
             with self._source:
                 _draw_source(summary)
@@ -136,7 +141,7 @@ class _MissionPage:
         self._more.say(f"Download the events to see {more:,} more." if more > 0 else "")
 
 
-def _draw_header(summary: MissionSummary, state: str, later: Sequence[MissionSummary]) -> None:
+def _draw_header(summary: MissionSummary, state: str, chain: _Chain) -> None:
     began = datetime.fromtimestamp(summary.created).astimezone()
     PlainText("h1", shortened(title(summary), 300))
     with ui.element("div").classes(f"ending ending-{summary.state}"):
@@ -150,8 +155,10 @@ def _draw_header(summary: MissionSummary, state: str, later: Sequence[MissionSum
     PlainText("p", f"{began:%d %b %Y, %H:%M:%S} · robot: {summary.robot}{shortened(by)}", "facts")
     if summary.continues:
         _draw_link("Continues", summary.continues, "")
-    for one in later:
+    for one in chain.later:
         _draw_link("Continued by", one.id, one.state if one.if_tool_dies else "did not run")
+    if chain.last is not None and chain.last not in chain.later:
+        _draw_link("In the end continued by", chain.last.id, chain.last.state)
     with ui.element("p").classes("downloads"):
         for kind, name in (("jsonl", "Events (JSON lines)"), ("mcap", "MCAP, for Foxglove")):
             html.a(name, href=outside(f"/api/missions/{summary.id}/events.{kind}")).props("download")

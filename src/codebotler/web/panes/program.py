@@ -24,7 +24,7 @@ from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.frame import Button, PlainText, script, scroll_up, warn
 from codebotler.web.panes.candidates import CandidatesPane
-from codebotler.web.panes.continuing import PastPane, is_unfinished, origin_text, storyboard_title
+from codebotler.web.panes.continuing import EARLY_ENDS, PastPane, is_unfinished, origin_text, storyboard_title
 from codebotler.web.panes.contract import ContractPane
 from codebotler.web.panes.reply import ReplyPane
 from codebotler.web.panes.rules import RulesPane
@@ -176,7 +176,8 @@ class ProgramPane:
         higher = none.higher_limit if none is not None and may_again else None
         self._raise.say(f"Raise the limit to {higher:,} tokens" if higher else "")
         self._run.set_visibility(open_ or self._may_rerun(view))
-        again = "Start again from the beginning" if is_unfinished(view) else "Prepare another run"
+        again = "Prepare another run" if view.past is None else "Check this rest again"
+        again = "Start again from the beginning" if is_unfinished(view) else again
         self._run.text = again if self._may_rerun(view) else "Run it on the robot"
         self._ticked()
 
@@ -252,8 +253,10 @@ def route_progress(view: SessionView) -> RouteProgress:
     if not named:
         return RouteProgress()
     visited = tuple(named.room(words) or words for words in view.progress.visited)
-    has_failed = view.is_over and view.state is MissionState.FAILED
-    return RouteProgress(visited, view.progress.looks, view.progress.answers, has_failed=has_failed)
+    end = ""
+    if view.is_over and view.state in EARLY_ENDS:
+        end = "failed" if view.state is MissionState.FAILED else "stopped"
+    return RouteProgress(visited, view.progress.looks, view.progress.answers, end)
 
 
 def _author_text(view: SessionView) -> str:

@@ -13,7 +13,7 @@ from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.log import MissionState, MissionSummary
 from codebotler.missions.progress import ANSWER, Moment, position_on_map
 from codebotler.missions.view import Phase, SessionView
-from codebotler.missions.wording import capitalize, reason_text, title
+from codebotler.missions.wording import reason_text, title
 from codebotler.simulator.room_map import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.floorplan import MapState, floorplan, room_at
@@ -121,7 +121,7 @@ class RobotPane:
                 if not can_be_continued(summary):
                     continue
                 if obstacle := self._console.obstacles[summary.id]:
-                    PlainText("p", f"{capitalize(obstacle)}.", "quiet")
+                    PlainText("p", f"It cannot be continued here: {obstacle}.", "quiet")
                 else:
                     button = ContinueButton(self._console, summary.id)
                     button.props(f'aria-label="Continue mission {summary.id}"')
@@ -131,6 +131,8 @@ class RobotPane:
 def _headline(view: SessionView) -> str:
     if view.phase == MissionState.CHECKED and view.problems:
         return "The program has problems" if view.can_run else "The program cannot run"
+    if view.phase == MissionState.CHECKED and view.past is not None:
+        return "Ready: the rest waits for your approval"
     return _PHASE_HEADLINES.get(view.phase) or view.phase.capitalize()
 
 

@@ -1,0 +1,12 @@
+"""English for messages."""
+
+import pytest
+
+from codebotler.core.words import with_sentence
+
+
+@pytest.mark.parametrize(
+    ("text", "whole"), [("Go", "Go. Now"), ("Go! ", "Go! Now"), ("Is it?", "Is it? Now")]
+)
+def test_a_sentence_follows_a_full_stop(text: str, whole: str) -> None:
+    assert with_sentence(text, "Now") == whole
