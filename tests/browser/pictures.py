@@ -36,9 +36,8 @@ def main() -> None:
             (WIDEST if shot.width > WIDEST else WIDEST // 2, 10 * TALLEST), Image.Resampling.LANCZOS
         )
         shot = shot.crop((0, 0, shot.width, min(shot.height, TALLEST)))
-        shot.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
-            pictures / f"{name}.png", optimize=True
-        )
+        few = shot.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE)
+        few.save(pictures / f"{name}.png", optimize=True)
 
 
 if __name__ == "__main__":
