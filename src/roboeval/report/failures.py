@@ -8,7 +8,7 @@ from roboeval.analysis.counts import tally_of
 from roboeval.analysis.failure_groups import FailureGroup, describe_groups, group_failures
 from roboeval.analysis.summary import ALL, Causes, causes, cut_off_replies
 from roboeval.analysis.summary import failures as count_failures
-from roboeval.analysis.verdict_changes import VerdictChanges, rank, sentences, verdict_changes
+from roboeval.analysis.verdict_changes import VerdictChanges, ranks, sentences, verdict_changes
 from roboeval.evaluation.failures import plural_of
 from roboeval.evaluation.runs.completions import name_of
 from roboeval.report import figures, paper
@@ -127,13 +127,14 @@ def other_suite(runs: Sequence[JudgedRun]) -> Section:
 
 def changes_sheet(found: Sequence[VerdictChanges]) -> Sheet:
     """Build the table of pass@1 under both suites."""
-    here, there = ({one.name: one.pass_at_1[side] for one in found} for side in (0, 1))
+    here, there = ranks(found)
     rows: list[list[Cell]] = []
     for one in found:
         before, after = one.pass_at_1
         over = one.comparison.over_tasks
-        ranks = rank(one.name, here), rank(one.name, there)
-        rows.append([one.name, before, after, after - before, over.low, over.high, *ranks])
+        rows.append(
+            [one.name, before, after, after - before, over.low, over.high, here[one.name], there[one.name]]
+        )
     return sheet("beside", rows)
 
 
