@@ -26,7 +26,6 @@ from roboeval.report.drawing import (
     MUTED,
     PAGE_WIDTH,
     PALE,
-    WHITE,
     new_figure,
     shades,
     share_axis,
@@ -195,7 +194,7 @@ def draw_heat_map(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequen
     for y, shares in zip(middles, cells, strict=False):
         for x, share in zip(middles, shares, strict=False):
             if share is not None:
-                colour = MUTED if share == 0 else FOREGROUND if share < DARK_CELL_SHARE else WHITE
+                colour = MUTED if share == 0 else FOREGROUND if share < DARK_CELL_SHARE else BACKGROUND
                 cell = axes.text(x, y, percent(share), ha="center", va="center", color=colour, fontsize=6)
                 cell.set_in_layout(False)  # the text is inside the axes, so layout may ignore it
 

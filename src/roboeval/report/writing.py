@@ -14,8 +14,8 @@ from roboeval.evaluation.requests import batches
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.evaluation.runs.table import Price
 from roboeval.report import breakdown, cost, failures, house, modes, question, scores
-from roboeval.report.drawing import darken, render, use_style
-from roboeval.report.page import GENERATOR, DrawnFigure, page
+from roboeval.report.drawing import render, use_style
+from roboeval.report.page import GENERATOR, page
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import (
     Card,
@@ -147,7 +147,7 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
     (out / "tables").mkdir(parents=True, exist_ok=True)
     if not (out / PAGE_FILE).exists():
         write_whole(out / PAGE_FILE, page(title, UNFINISHED, [], {}).encode())
-    drawings: dict[str, DrawnFigure] = {}
+    drawings: dict[str, bytes] = {}
     for part in parts:
         if isinstance(part, Sheet):
             write_csv(part, out / "tables")
@@ -184,9 +184,9 @@ def pieces(sections: Sequence[Section]) -> int:
     return 1 + sum(isinstance(part, Sheet | ReportFigure) for section in sections for part in section.parts)
 
 
-def _draw(figure: ReportFigure, folder: Path) -> DrawnFigure:
+def _draw(figure: ReportFigure, folder: Path) -> bytes:
     with use_style():
         files = render(figure.draw())
     for kind in FIGURE_FORMATS:
         write_whole(folder / f"{figure.name}.{kind}", files[kind])
-    return files["svg"], darken(files["svg"])
+    return files["svg"]
