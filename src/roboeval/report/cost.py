@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from codebotler.core.errors import UserError
-from roboeval.analysis.cost import budgets, cost_of
+from roboeval.analysis.cost import cost_of
 from roboeval.analysis.metrics import threshold_curve
 from roboeval.analysis.resample import LIMITS, CheckedPrompt, accepted_after, resample
 from roboeval.evaluation.runs.table import Price
@@ -42,7 +42,7 @@ def retries_sheet(checked: Mapping[str, Sequence[CheckedPrompt]]) -> Sheet:
     for name, prompts in checked.items():
         for at in (resample(prompts, limit) for limit in LIMITS):
             passed = at.passed.mean, at.passed.low, at.passed.high
-            rows.append([name, at.retries, *passed, at.accepted, at.ran, 1 - at.accepted])
+            rows.append([name, at.retries, *passed, at.accepted, at.ran, 1 - at.accepted, at.requests])
     return sheet("rejection-sampling", rows)
 
 
@@ -62,7 +62,7 @@ def curves_sheet(points: Mapping[str, Mapping[int, Sequence[tuple[float, float]]
 
 def costs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
     """Build the section on the cost of programs, for runs that recorded it."""
-    return section("cost", cost_sheet(runs, prices), budget_sheet(runs, prices))
+    return section("cost", cost_sheet(runs, prices))
 
 
 def cost_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
@@ -83,13 +83,6 @@ def cost_sentence(run: JudgedRun, prices: Mapping[str, Price]) -> str:
     if cost.seconds_per_pass is not None:
         each.append(f"{cost.seconds_per_pass:,.1f} s")
     return f"Cost per pass: {', '.join(each)}" if each else ""
-
-
-def budget_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
-    """Build a table that shows how many passing programs a budget buys, for runs with checked programs."""
-    checked = [run for run in runs if run.trials]
-    rows = [[run.name, *one] for run in checked for one in budgets(run.table, price_of(run, prices))]
-    return sheet("budget", rows)
 
 
 def read_prices(texts: Sequence[str]) -> dict[str, Price]:
