@@ -32,7 +32,7 @@ POSE_IN_ROOM = Skill(
 """A pseudo-skill whose event tells house rules that the robot's pose has entered a room."""
 RTL_WORDS = frozenset(
     {
-        *("at", "holding", "to", "options", "found", "missed", "mention", "answered", "returned", "tr"),
+        *("at", "holding", "to", "found", "missed", "mention", "answered", "returned", "tr"),
         *("last_found", "last_missed"),
         *("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies", INSIDE),
     }
