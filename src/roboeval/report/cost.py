@@ -10,7 +10,7 @@ from roboeval.analysis.metrics import threshold_curve
 from roboeval.analysis.resample import LIMITS, CheckedPrompt, accepted_after, resample
 from roboeval.evaluation.runs.table import Price
 from roboeval.report.curves import draw_accepted, draw_limits, most_completions
-from roboeval.report.runs import JudgedRun
+from roboeval.report.runs import JudgedRun, runs_to_draw
 from roboeval.report.sheets import Cell, ReportFigure, Section, Sheet, section, sheet
 
 
@@ -20,10 +20,13 @@ def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
     points = {name: retry_curves(prompts) for name, prompts in checked.items()}
     shares = {name: accepted_after(prompts, LIMITS[-1]) for name, prompts in checked.items()}
     steps = [[retries, *those] for retries, those in enumerate(zip(*shares.values(), strict=True))]
+    drawn, left_out = runs_to_draw([run for run in runs if run.trials])
+    curves = {run.name: points[run.name] for run in drawn}
+    lines = {run.name: shares[run.name] for run in drawn}
     parts = (
-        ReportFigure("rejection-sampling", lambda: draw_limits(points, most_completions(runs))),
+        ReportFigure("rejection-sampling", lambda: draw_limits(curves, most_completions(runs)), left_out),
         retries_sheet(checked),
-        ReportFigure("accepted", lambda: draw_accepted(shares)),
+        ReportFigure("accepted", lambda: draw_accepted(lines), left_out),
         curves_sheet(points),
         sheet("accepted", steps, shares=[*shares]),
     )

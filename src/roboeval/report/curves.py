@@ -18,10 +18,8 @@ from roboeval.report.drawing import (
     DASHES,
     FOREGROUND,
     MARKERS,
-    MAX_COLOURED_RUNS,
     MAX_LEGEND_NAME,
     PAGE_WIDTH,
-    PALE,
     new_figure,
     share_axis,
     short_name,
@@ -39,8 +37,7 @@ def draw_thresholds(runs: Sequence[JudgedRun]) -> Figure:
     """Draw the share of prompts that reach each threshold of pass@1, with one line per model."""
     most = most_completions(runs)
     lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()]), most) for run in runs}
-    means = [run.mean for run in runs]
-    figure = _plot_lines(lines, means, 2.75, drawstyle="steps-post", markevery=[0, -1])
+    figure = _plot_lines(lines, 2.75, drawstyle="steps-post", markevery=[0, -1])
     _threshold_axes(figure.axes[0], most)
     _threshold_labels(figure.axes[0], most)
     return figure
@@ -54,7 +51,7 @@ def most_completions(runs: Sequence[JudgedRun]) -> int:
 def draw_accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
     """Draw the share of accepted programs by number of retries, with one line per model."""
     lines = {name: [*enumerate(those)] for name, those in shares.items()}
-    figure = _plot_lines(lines, [those[-1] for those in shares.values()], 2.6, markevery=[*LIMITS])
+    figure = _plot_lines(lines, 2.6, markevery=[*LIMITS])
     axes = figure.axes[0]
     axes.set_xscale("symlog", linthresh=1)
     axes.set_xlim(0, LIMITS[-1])
@@ -66,30 +63,15 @@ def draw_accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
     return figure
 
 
-def _plot_lines(
-    lines: Mapping[str, Points],
-    quality: Sequence[float],
-    height: float,
-    **style: Any,  # noqa: ANN401 - passed on to matplotlib
-) -> Figure:
-    """Draw one line per model. If there are too many models, only the best ones are coloured."""
-    is_narrow = len(lines) <= MAX_COLOURED_RUNS
-    columns = 1 if is_narrow and max(len(short_name(name)) for name in lines) > MAX_LEGEND_NAME else 2
-    figure = new_figure(
-        COLUMN_WIDTH if is_narrow else PAGE_WIDTH, height + 0.13 * math.ceil(len(lines) / columns)
-    )
+def _plot_lines(lines: Mapping[str, Points], height: float, **style: Any) -> Figure:  # noqa: ANN401 - for matplotlib
+    """Draw one line per model."""
+    columns = 1 if max(len(short_name(name)) for name in lines) > MAX_LEGEND_NAME else 2
+    figure = new_figure(COLUMN_WIDTH, height + 0.13 * math.ceil(len(lines) / columns))
     axes = figure.add_subplot()
-    best = sorted(range(len(lines)), key=lambda number: -quality[number])[:MAX_COLOURED_RUNS]
-    for number, (name, points) in enumerate(lines.items()):
-        if number not in best:
-            axes.plot(*zip(*points, strict=True), color=PALE, linewidth=0.7, zorder=1, **style)
-            continue
-        at = number if is_narrow else best.index(number)
+    for at, (name, points) in enumerate(lines.items()):
         look = {"linestyle": DASHES[at % len(DASHES)], "marker": MARKERS[at % len(MARKERS)], **style}
         look |= {"color": COLOURS[at], "label": short_name(name), "markersize": 3.2, "clip_on": False}
         axes.plot(*zip(*points, strict=True), **look)
-    if not is_narrow:
-        axes.plot([], [], color=PALE, linewidth=0.7, label=f"{len(lines) - MAX_COLOURED_RUNS} others")
     figure.legend(loc="outside lower center", ncols=columns, handlelength=3.2)
     return figure
 
@@ -124,7 +106,7 @@ def _threshold_labels(axes: Axes, most: int) -> None:
 
 def draw_limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure:
     """Draw the share of prompts that reach each threshold of pass@1, by model and limit on retries."""
-    columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3 if len(curves) <= MAX_COLOURED_RUNS else 5)
+    columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3)
     rows = math.ceil(len(curves) / columns)
     figure = new_figure(PAGE_WIDTH if columns > 1 else COLUMN_WIDTH, 1.75 * rows + 0.55)
     all_axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)

@@ -28,7 +28,6 @@ COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#0
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 MAX_FIGURE_NAME = 26
-MAX_COLOURED_RUNS = len(COLOURS)
 MAX_LEGEND_NAME = 16  # characters; two of these names fit side by side below a narrow figure
 
 FIGURE_STYLE: dict[Any, Any] = {

@@ -12,7 +12,7 @@ from roboeval.analysis.verdict_changes import VerdictChanges, ranks, sentences, 
 from roboeval.evaluation.failures import plural_of
 from roboeval.evaluation.runs.completions import name_of
 from roboeval.report import figures, paper
-from roboeval.report.runs import JudgedRun, coverage_of
+from roboeval.report.runs import JudgedRun, coverage_of, runs_to_draw
 from roboeval.report.sheets import Cell, Groups, Prose, ReportFigure, Section, Sheet, note, section, sheet
 from roboeval.suites.task import check_label
 
@@ -25,10 +25,11 @@ MAX_GROUPS_SHOWN = 200  # number of groups on the page
 
 def causes_section(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
     """Build the section on causes of failures (paper, section V.B)."""
-    found = all_causes(runs, with_published=with_published)
-    figure = ReportFigure("causes", lambda: figures.draw_causes(found), coverage_of(runs))
+    drawn, left_out = runs_to_draw(runs)
+    shown = all_causes(drawn, with_published=with_published)
+    figure = ReportFigure("causes", lambda: figures.draw_causes(shown), [*coverage_of(runs), *left_out])
     notes = Prose(published_notes(runs) if with_published else [])
-    return section("causes", figure, notes, causes_sheet(found))
+    return section("causes", figure, notes, causes_sheet(all_causes(runs, with_published=with_published)))
 
 
 def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple[str, Causes]]:

@@ -24,7 +24,7 @@ from roboeval.analysis.metrics import (
 from roboeval.analysis.missions import has_missions
 from roboeval.report import figures, paper
 from roboeval.report.curves import draw_thresholds
-from roboeval.report.runs import JudgedRun, coverage_of, tasks_of
+from roboeval.report.runs import JudgedRun, coverage_of, runs_to_draw, tasks_of
 from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, note, section, sheet
 
 
@@ -32,7 +32,8 @@ def results(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on pass@1 by run and task."""
     coverage = coverage_of(runs)
     by_run = ReportFigure("overall", lambda: figures.draw_overall(runs), coverage)
-    by_task = ReportFigure("tasks", lambda: figures.draw_task_scores(runs), coverage)
+    drawn, left_out = runs_to_draw(runs)
+    by_task = ReportFigure("tasks", lambda: figures.draw_task_scores(drawn), [*coverage, *left_out])
     return section("results", by_run, overall_sheet(runs), by_task, task_sheet(runs))
 
 
@@ -92,7 +93,9 @@ def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
 
 def thresholds(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on the share of prompts that reach each pass@1 (paper, section V.A)."""
-    return section("thresholds", ReportFigure("thresholds", lambda: draw_thresholds(runs)), curve_sheet(runs))
+    drawn, left_out = runs_to_draw(runs)
+    figure = ReportFigure("thresholds", lambda: draw_thresholds(drawn), left_out)
+    return section("thresholds", figure, curve_sheet(runs))
 
 
 def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:
