@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -66,21 +65,7 @@ def render(figure: Figure) -> dict[str, bytes]:
         files["pdf"], format="pdf", metadata=dict.fromkeys(("Creator", "Producer", "CreationDate"))
     )
     figure.savefig(files["svg"], format="svg", metadata=dict.fromkeys(("Creator", "Date")))
-    return {kind: file.getvalue() for kind, file in files.items()} | {"svg": _slim(files["svg"].getvalue())}
-
-
-def _slim(svg: bytes) -> bytes:
-    """Shrink an SVG file by removing comments, metadata and repeated definitions of letter shapes."""
-    seen: set[bytes] = set()
-
-    def once(shape: re.Match[bytes]) -> bytes:
-        is_new = shape[1] not in seen
-        seen.add(shape[1])
-        return shape[0] if is_new else b""
-
-    svg = re.sub(rb"<!--.*?-->|<metadata>.*?</metadata>", b"", svg, flags=re.DOTALL)
-    svg = re.sub(rb'<path id="(\w+-[0-9a-f]+)"[^>]*?/>', once, svg, flags=re.DOTALL)
-    return re.sub(rb"<defs>\s*</defs>|\s*\n\s*", b"\n", svg)
+    return {kind: file.getvalue() for kind, file in files.items()}
 
 
 def shades() -> LinearSegmentedColormap:
