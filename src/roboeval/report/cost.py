@@ -23,11 +23,17 @@ def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
     drawn, left_out = runs_to_draw([run for run in runs if run.trials])
     curves = {run.name: points[run.name] for run in drawn}
     lines = {run.name: shares[run.name] for run in drawn}
+    thresholds = [
+        [name, limit, *point]
+        for name, of_limits in points.items()
+        for limit, curve in of_limits.items()
+        for point in curve
+    ]
     parts = (
         ReportFigure("rejection-sampling", lambda: draw_limits(curves, most_completions(runs)), left_out),
         retries_sheet(checked),
         ReportFigure("accepted", lambda: draw_accepted(lines), left_out),
-        curves_sheet(points),
+        sheet("rejection-sampling-curves", thresholds),
         sheet("accepted", steps, shares=[*shares]),
     )
     return section("rejection-sampling", *(parts if checked else ()))
@@ -47,17 +53,6 @@ def retries_sheet(checked: Mapping[str, Sequence[CheckedPrompt]]) -> Sheet:
             passed = at.passed.mean, at.passed.low, at.passed.high
             rows.append([name, at.retries, *passed, at.accepted, at.ran, 1 - at.accepted, at.requests])
     return sheet("rejection-sampling", rows)
-
-
-def curves_sheet(points: Mapping[str, Mapping[int, Sequence[tuple[float, float]]]]) -> Sheet:
-    """Build the table with the points of the rejection sampling curves."""
-    rows = [
-        [name, limit, *point]
-        for name, of_limits in points.items()
-        for limit, curve in of_limits.items()
-        for point in curve
-    ]
-    return sheet("rejection-sampling-curves", rows)
 
 
 # --- tokens, time and money

@@ -8,7 +8,7 @@ from roboeval.analysis.counts import tally_of
 from roboeval.analysis.failure_groups import FailureGroup, describe_groups, group_failures
 from roboeval.analysis.summary import ALL, Causes, causes, cut_off_replies
 from roboeval.analysis.summary import failures as count_failures
-from roboeval.analysis.verdict_changes import VerdictChanges, ranks, sentences, verdict_changes
+from roboeval.analysis.verdict_changes import ranks, sentences, verdict_changes
 from roboeval.evaluation.failures import plural_of
 from roboeval.evaluation.runs.completions import name_of
 from roboeval.report import figures, paper
@@ -96,16 +96,11 @@ def failures_section(runs: Sequence[JudgedRun]) -> Section:
         if len(named) > most:
             notes.append(f"{run.name}: {most:,} of {len(named):,} groups are shown here; the table has all.")
     about = Prose([note("groups"), *notes] if shown else [])
-    return section("failures", about, Groups(shown), groups_sheet(every))
-
-
-def groups_sheet(every: Sequence[tuple[str, FailureGroup]]) -> Sheet:
-    """Build the table of all groups."""
     rows = [
         [name, len(one.members), *_cells(one), one.fix and one.fix.name, one.fix and one.fix.changed]
         for name, one in every
     ]
-    return sheet("failures", rows)
+    return section("failures", about, Groups(shown), sheet("failures", rows))
 
 
 def _cells(one: FailureGroup) -> list[Cell]:
@@ -122,39 +117,20 @@ def other_suite(runs: Sequence[JudgedRun]) -> Section:
     found = [
         verdict_changes(run.name, run.results, run.other_suite) for run in runs if run.other_suite is not None
     ]
-    sheets = changes_sheet(found), changed_tasks_sheet(found), reversals_sheet(found)
-    return section("beside", Prose(sentences(found)), *sheets)
-
-
-def changes_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """Build the table of pass@1 under both suites."""
     here, there = ranks(found)
-    rows: list[list[Cell]] = []
+    scores: list[list[Cell]] = []
+    tasks: list[list[Cell]] = []
+    reversals: list[list[Cell]] = []
     for one in found:
         before, after = one.pass_at_1
-        over = one.comparison.over_tasks
-        rows.append(
-            [one.name, before, after, after - before, over.low, over.high, here[one.name], there[one.name]]
-        )
-    return sheet("beside", rows)
-
-
-def changed_tasks_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """Build the table that counts, for each task, the completions that pass under each suite."""
-    rows = [
-        [task.task, one.name, task.both, task.first_only, task.second_only, task.neither]
-        for one in found
-        for task in one.tasks
-    ]
-    return sheet("beside-tasks", rows)
-
-
-def reversals_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """Build the table of groups of completions that pass under only one of two suites."""
-    rows: list[list[Cell]] = []
-    for one in found:
+        over, places = one.comparison.over_tasks, (here[one.name], there[one.name])
+        scores.append([one.name, before, after, after - before, over.low, over.high, *places])
+        for task in one.tasks:
+            counts = task.both, task.first_only, task.second_only, task.neither
+            tasks.append([task.task, one.name, *counts])
         sides = zip(one.suites, (one.first_only, one.second_only), strict=True)
         those = [(suite, group) for suite, groups in sides for group in groups]
         for suite, group in sorted(those, key=lambda pair: -len(pair[1].members)):
-            rows.append([one.name, f"{suite} only", len(group.members), *_cells(group)])
-    return sheet("reversals", rows)
+            reversals.append([one.name, f"{suite} only", len(group.members), *_cells(group)])
+    sheets = sheet("beside", scores), sheet("beside-tasks", tasks), sheet("reversals", reversals)
+    return section("beside", Prose(sentences(found)), *sheets)

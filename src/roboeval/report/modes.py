@@ -6,21 +6,16 @@ from collections.abc import Sequence
 
 from roboeval.analysis.missions import has_missions, mission_costs
 from roboeval.report.runs import JudgedRun
-from roboeval.report.sheets import Cell, Section, Sheet, section, sheet
+from roboeval.report.sheets import Cell, Section, section, sheet
 
 
 def modes(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on the missions of each run."""
     has_agent = any(has_missions(run.table) for run in runs)
-    return section("modes", mode_sheet(runs if has_agent else []))
-
-
-def mode_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of missions by run."""
     rows: list[list[Cell]] = []
-    for run in runs:
+    for run in runs if has_agent else ():
         one = mission_costs(run.table)
         share = one.satisfied.mean, one.satisfied.low, one.satisfied.high, one.forbidden
         means = one.turns, one.tool_errors, one.tokens, one.tokens_per_success
         rows.append([run.name, one.mode, one.missions, *share, *means])
-    return sheet("modes", rows)
+    return section("modes", sheet("modes", rows))
