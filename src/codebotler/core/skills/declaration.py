@@ -160,7 +160,6 @@ class _Declaration:
             fails=tuple(fails.items()),
             example=self.said["example"],
         )
-        self.check_example(row)
         known = _DECLARED.get(self.name)
         if known is None or getattr(known.does, "__module__", "") != PAPER_MODULE:
             _DECLARED[self.name] = row
@@ -173,20 +172,6 @@ class _Declaration:
         for name, (fits, wanted) in SKILL_OPTIONS.items():
             if not fits(self.said[name]):
                 self.wrong(f"{name} of {self.name} must be {wanted}, not {self.said[name]!r:.60}")
-
-    def check_example(self, row: Skill) -> None:
-        if not row.example:
-            return
-        import ast  # noqa: PLC0415 - sandboxed processes do not need it
-
-        try:
-            call = ast.parse(row.call, mode="eval").body
-        except (SyntaxError, ValueError):
-            call = ast.Constant(None)
-        match call:
-            case ast.Call(ast.Name(name)) if name == self.name:
-                return
-        self.wrong(f"the example of {self.name} does not call it: {row.call}")
 
     def check_name(self) -> None:
         kind = self.said["event"] or self.name
