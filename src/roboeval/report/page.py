@@ -18,7 +18,6 @@ from roboeval.report.sheets import (
     Card,
     Cards,
     Cell,
-    Code,
     Column,
     Groups,
     Part,
@@ -92,8 +91,6 @@ def _part(part: Part, drawings: DrawnFigures) -> str:
             return _figure(part, drawings)
         case Prose(paragraphs):
             return "".join(f"<p>{_prose(words)}</p>\n" for words in paragraphs)
-        case Code(text):
-            return f"<pre>{_text(text)}</pre>\n"
         case Cards(cards):
             return f'<div class="cards">{"".join(map(_card, cards))}</div>\n'
         case Groups(shown):

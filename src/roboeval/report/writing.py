@@ -21,7 +21,6 @@ from roboeval.report.sheets import (
     Card,
     Cards,
     Cell,
-    Code,
     Prose,
     ReportFigure,
     Section,
@@ -105,7 +104,7 @@ def _models(runs: Sequence[JudgedRun]) -> str:
 
 def origin(runs: Sequence[JudgedRun], command: str) -> Section:
     """Build the section on the runs, the suite, and the command that reproduces the report."""
-    return section("origin", origin_sheet(runs), Prose(about_suite(runs)), Code(command))
+    return section("origin", origin_sheet(runs), Prose([*about_suite(runs), f"`{command}`"]))
 
 
 def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
