@@ -187,7 +187,7 @@ def _not_last(element: formulas.EventPattern, where: str, trace: Trace, here: Se
 
 def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: bool) -> _Fact:
     where, number = _where(test.scopes, trace, is_true=is_true), test.number
-    exactly, is_missing = isinstance(test, formulas.Count), not is_true
+    exactly = isinstance(test, formulas.Count)
     span = positions_in_scopes(test.scopes, trace)
     found = [at for at in span if _is_conclusive_match(test.element, trace, at)]
     if found:
@@ -197,16 +197,12 @@ def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: b
     else:
         text = f"never {describe_action(test.element, 'past', negated=True, where=where)}"
     if is_true:
-        limit = (
-            f"must not do so exactly {times(number)}" if exactly else f"may do so {times(number - 1)} at most"
-        )
-        return _Fact(found[-1] if found else None, text, f", but {limit}")
-    if not found:
-        _, detail = _describe_instead(test.element, trace, span)
-        ending = f", but should have {'' if exactly else 'at least '}{times(number)}"
-        return _Fact(None, text, ending, detail, is_missing)
-    ending = f" instead of {'' if exactly else 'at least '}{times(number)}"
-    return _Fact(found[number] if len(found) > number else None, text, ending, is_missing=is_missing)
+        limit = f"not do so exactly {times(number)}" if exactly else f"do so {times(number - 1)} at most"
+        return _Fact(found[-1] if found else None, text, f", but {'must' if exactly else 'may'} {limit}")
+    wanted = f"{'' if exactly else 'at least '}{times(number)}"
+    ending = f" instead of {wanted}" if found else f", but should have {wanted}"
+    detail = "" if found else _describe_instead(test.element, trace, span)[1]
+    return _Fact(found[number] if len(found) > number else None, text, ending, detail, is_missing=True)
 
 
 def _positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:

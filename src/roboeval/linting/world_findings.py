@@ -107,7 +107,7 @@ class JudgedWorld:
     def _room_for(self, request: str) -> str | None:
         return resolve_room(self._rooms, request, self.matching)
 
-    @property
+    @cached_property
     def _rooms(self) -> list[str]:
         return [room.name for room in self.scenario.world.rooms]
 

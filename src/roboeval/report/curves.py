@@ -8,7 +8,6 @@ from typing import Any, TypeAlias
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.markers import TICKDOWN
 
 from roboeval.analysis.metrics import threshold_curve
 from roboeval.analysis.resample import LIMITS
@@ -39,7 +38,7 @@ def draw_thresholds(runs: Sequence[JudgedRun]) -> Figure:
     lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()]), most) for run in runs}
     figure = _plot_lines(lines, 2.75, drawstyle="steps-post", markevery=[0, -1])
     _threshold_axes(figure.axes[0], most)
-    _threshold_labels(figure.axes[0], most)
+    _threshold_labels(figure.axes[0])
     return figure
 
 
@@ -93,12 +92,8 @@ def _threshold_axes(axes: Axes, most: int) -> None:
     share_axis(axes)
 
 
-def _threshold_labels(axes: Axes, most: int) -> None:
+def _threshold_labels(axes: Axes) -> None:
     axes.minorticks_off()  # drawing is much faster without minor ticks
-    marks = (digit * power for power in LABELLED_POWERS for digit in range(2, 10))
-    between = [mark for mark in marks if mark > 1 / most]
-    small: dict[str, Any] = {"marker": TICKDOWN, "markersize": 1.5, "markeredgewidth": 0.6}
-    axes.plot(between, [0] * len(between), color=FOREGROUND, clip_on=False, linestyle="none", **small)
     axes.grid(visible=True, axis="y")
     axes.set_xlabel("threshold of pass@1")
     axes.set_ylabel("prompts at or above it")
@@ -124,7 +119,7 @@ def draw_limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure
                 drawstyle="steps-post",
                 clip_on=False,
             )
-        _threshold_labels(axes, most)
+        _threshold_labels(axes)
         axes.set_title(short_name(name), loc="left")
         axes.label_outer()
     handles, labels = all_axes[0, 0].get_legend_handles_labels()

@@ -22,12 +22,10 @@ from roboeval.analysis.metrics import Estimate
 from roboeval.analysis.missions import has_missions
 from roboeval.web.heat_map import MAX_NAME
 from roboeval.web.snapshot import Snapshot
-from roboeval.web.widgets import interval_text
 
 MAX_PAIR_TASKS = 100
 RUNS_IN_PAIR = 2
 INTERVAL_NOTE = "The interval for all tasks is over tasks; other intervals are over the prompts of a task."
-UNKNOWN_NOTE = " An interval is unknown if there is only one prompt or no variation."
 
 
 @dataclass(frozen=True)
@@ -88,8 +86,7 @@ def _draw_difference(difference: Difference) -> None:
             _draw_row("All tasks", (found.first, found.second), found.over_tasks)
             for one in tasks:
                 _draw_row(one.task, (one.first, one.second), one.difference)
-    is_unknown = any(not one.difference.is_known for one in tasks)
-    PlainText("p", INTERVAL_NOTE + UNKNOWN_NOTE * is_unknown, "quiet")
+    PlainText("p", INTERVAL_NOTE, "quiet")
 
 
 def _draw_row(task: str, shares: tuple[float, float], difference: Estimate) -> None:
@@ -98,4 +95,4 @@ def _draw_row(task: str, shares: tuple[float, float], difference: Estimate) -> N
         for share in shares:
             PlainText("td", f"{share:.2f}", "number")
         PlainText("td", f"{difference.mean:+.2f}", "number strong")
-        PlainText("td", interval_text(difference, "+.2f"), "number")
+        PlainText("td", difference.ends("+.2f"), "number")

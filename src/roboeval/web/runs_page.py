@@ -15,7 +15,7 @@ from codebotler.web.frame import Button, PlainText, outside
 from roboeval.analysis.metrics import Estimate
 from roboeval.web.heat_map import MAX_NAME, MISSING, run_address
 from roboeval.web.serializers import RunList
-from roboeval.web.widgets import REFRESH_SECONDS, count_text, date_text, interval_text, show_state, tasks_text
+from roboeval.web.widgets import REFRESH_SECONDS, count_text, date_text, show_state, tasks_text
 
 MAX_READ_SECONDS = 0.5  # seconds to wait before the page shows runs that are not read yet
 
@@ -141,6 +141,6 @@ class _RunRow:
         self._count.say(count_text(run))
         mean = run.get("pass@1")
         self._score.say(MISSING if mean is None else f"{mean['mean']:.3f}")
-        self._interval.say("" if mean is None else interval_text(Estimate(**mean)))
+        self._interval.say("" if mean is None else Estimate(**mean).ends(".2f"))
         self._meter.set_visibility(mean is not None)
         self._meter.style(f"--share: {0 if mean is None else mean['mean']:.3f}")
