@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Mapping
 from keyword import iskeyword
 from types import FunctionType
-from typing import Any, NoReturn
+from typing import Any, NoReturn, overload
 
 from codebotler.core.errors import VIOLATION, UserError
 from codebotler.core.skills.kinds import INSIDE
@@ -67,6 +67,32 @@ def verb_for(kind: str) -> Verb | None:
     return None if row is None else row.verb
 
 
+@overload
+def skill(does: Callable[..., Any], /) -> Skill: ...
+
+
+@overload
+def skill(
+    *,
+    verb: Verb | str | None = None,
+    past: str = "",
+    results: tuple[str, str] = ("no", "yes"),
+    fails: Mapping[str, str] | None = None,
+    ros: RosAction | str | None = None,
+    example: str = "",
+    event: str | None = "",
+    text: str = "",
+    names: str = "thing",
+    to: str | None = None,
+    when_tried: bool | None = None,
+    sets: str = "",
+    clears: str = "",
+    seconds: float = 1.0,
+    is_idle: bool = False,
+    adds_event: bool = True,
+) -> Callable[[Callable[..., Any]], Skill]: ...
+
+
 def skill(
     does: Callable[..., Any] | None = None,
     /,
@@ -87,7 +113,7 @@ def skill(
     seconds: float = 1.0,
     is_idle: bool = False,
     adds_event: bool = True,
-) -> Any:  # noqa: ANN401 - a Skill or, with options, a decorator that returns one
+) -> Skill | Callable[[Callable[..., Any]], Skill]:
     """Declare a skill as a function that acts on a simulated robot, which is its first parameter.
 
     A function with an empty body (`...`) records the skill's event and returns a random value of its type. In
