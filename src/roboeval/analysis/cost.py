@@ -37,8 +37,8 @@ def cost_of(table: pl.DataFrame, price: Price | None = None) -> RunCost:
     money = None if price is None or tokens is None else price.of(sent, received)
     each = (_per(total, passed) for total in (tokens, seconds, money))
     uncounted = completions.height - counted.height
-    known = (None, None) if tokens is None else (sent, received)
-    return RunCost(completions.height, passed, uncounted, *known, seconds, money, *each)
+    known = [count if tokens else None for count in (sent, received)]
+    return RunCost(completions.height, passed, uncounted, known[0], known[1], seconds, money, *each)
 
 
 def _per(total: float | None, count: float) -> float | None:

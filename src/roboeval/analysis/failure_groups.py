@@ -173,6 +173,9 @@ def normalised_lines(program: str) -> ProgramLines:
         return _lines(program)
 
 
+NAMES_OF_OTHERS = ast.keyword | ast.alias  # nodes whose names a program does not choose
+
+
 class _Normaliser(ast.NodeTransformer):
     """Numbers the names that a program binds, and replaces docstrings and other bare strings by `pass`."""
 
@@ -183,7 +186,7 @@ class _Normaliser(ast.NodeTransformer):
     def visit(self, node: ast.AST) -> ast.AST:
         for field in ("id", "arg", "name"):
             name = getattr(node, field, None)
-            if name in self._bound and not isinstance(node, ast.keyword | ast.alias):
+            if isinstance(name, str) and name in self._bound and not isinstance(node, NAMES_OF_OTHERS):
                 setattr(node, field, f"name{self._numbers.setdefault(name, len(self._numbers) + 1)}")
         match node:
             case ast.Expr(ast.Constant(str())):

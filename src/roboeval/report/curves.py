@@ -25,8 +25,7 @@ from roboeval.report.drawing import (
 )
 from roboeval.report.runs import JudgedRun
 
-LABELLED_POWERS = (0.1, 0.01, 0.001)  # tick labels of the threshold axis
-MAX_SHORT_AXIS, EXTRA_LABELS = 20, (0.5, 0.2)  # add tick labels if no prompt has more completions than this
+LABELLED_THRESHOLDS = (0.5, 0.2, 0.1, 0.01, 0.001)  # tick labels of the threshold axis
 MIN_LABEL_RATIO = 1.6  # two labels with a smaller ratio would overlap
 
 Points: TypeAlias = Sequence[tuple[float, float]]
@@ -86,8 +85,7 @@ def _threshold_axes(axes: Axes, most: int) -> None:
     """Set the scale and labels of a threshold axis. Axes that share it follow."""
     axes.set_xscale("log")
     axes.set_xlim(1, 1 / most)
-    shown = (*(EXTRA_LABELS if most <= MAX_SHORT_AXIS else ()), *LABELLED_POWERS)
-    marked = [mark for mark in shown if mark * most >= MIN_LABEL_RATIO]
+    marked = [mark for mark in LABELLED_THRESHOLDS if mark * most >= MIN_LABEL_RATIO]
     axes.set_xticks([1, *marked, 1 / most], ["1", *(f"{power:g}" for power in marked), f"1/{most}"])
     share_axis(axes)
 

@@ -48,16 +48,7 @@ def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         counts = coverage.judged, coverage.total, len(run.by_prompt), len(run.scores)
         rows.append([run.name, *counts, found[0].mean, *ends])
     missions = [note("missions")] if any(has_missions(run.table) for run in runs) else []
-    return sheet("overall", rows, notes=[*missions, *_unknown(runs), *_unfinished(runs)])
-
-
-def _unknown(runs: Sequence[JudgedRun]) -> list[str]:
-    found = ((run.name, overall(run.scores, 1)) for run in runs)
-    return [
-        f"{name}: the interval over tasks is {passed.ends()}."
-        for name, passed in found
-        if not passed.is_known
-    ]
+    return sheet("overall", rows, notes=[*missions, *_unfinished(runs)])
 
 
 def _unfinished(runs: Sequence[JudgedRun]) -> list[str]:
@@ -146,11 +137,7 @@ def leader(runs: Sequence[JudgedRun]) -> list[str]:
 
 def prompts(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on pass@1 by prompt, with the published results."""
-    unknown = ", ".join(run.name for run in runs if paper.model_of(run) is None)
-    published = paper.published_sheet(runs)
-    nothing = f"The paper has no results for {unknown}."
-    prose = Prose([nothing] if unknown and published.rows else [])
-    return section("prompts", prompt_sheet(runs), published, prose)
+    return section("prompts", prompt_sheet(runs), paper.published_sheet(runs))
 
 
 def prompt_sheet(runs: Sequence[JudgedRun]) -> Sheet:

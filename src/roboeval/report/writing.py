@@ -39,7 +39,9 @@ GENERATOR_WITHIN = 4_000  # bytes at the start of a page that are searched for i
 
 def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
     """Return the title of a report and its introductory paragraphs."""
-    title = runs[0].name if len(runs) == 1 else _models(runs)
+    models = {run.model for run in runs}
+    one_model = len(models) == 1 and runs[0].model
+    title = runs[0].name if len(runs) == 1 else one_model or f"{len(models)} models"
     each = [run.results.coverage for run in runs]
     count = Coverage(
         *(sum(counts) for counts in zip(*((c.judged, c.there, c.total) for c in each), strict=True))
@@ -94,11 +96,6 @@ def glance(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
         for run in runs
     ]
     return section("glance", Cards(cards), Prose(scores.leader(runs)))
-
-
-def _models(runs: Sequence[JudgedRun]) -> str:
-    models = {run.model for run in runs}
-    return str(runs[0].model) if len(models) == 1 and runs[0].model else f"{len(models)} models"
 
 
 def origin(runs: Sequence[JudgedRun], command: str) -> Section:

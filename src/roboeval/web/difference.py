@@ -23,7 +23,6 @@ from roboeval.analysis.missions import has_missions
 from roboeval.web.heat_map import MAX_NAME
 from roboeval.web.snapshot import Snapshot
 
-MAX_PAIR_TASKS = 100
 RUNS_IN_PAIR = 2
 INTERVAL_NOTE = "The interval for all tasks is over tasks; other intervals are over the prompts of a task."
 
@@ -75,7 +74,7 @@ def _draw_difference(difference: Difference) -> None:
     found = difference.comparison
     if found is None:
         return
-    tasks = sorted(found.tasks, key=lambda one: (-abs(one.difference.mean), one.task))[:MAX_PAIR_TASKS]
+    tasks = sorted(found.tasks, key=lambda one: (-abs(one.difference.mean), one.task))
     region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Differences"')
     with region, html.table().classes("differences"):
         with html.thead(), html.tr():
