@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import polars as pl
-
 from codebotler.rtl import Formula, Inconclusive, holds, parse
-from roboeval.analysis.counts import completions_of
-from roboeval.evaluation.runs.completions import KEY, CompletionKey
+from roboeval.evaluation.runs.completions import CompletionKey
 from roboeval.evaluation.runs.rows import key_of
 from roboeval.evaluation.runs.traces import trace_of
 
@@ -39,23 +36,6 @@ def search(lines: Iterable[bytes], query: TraceQuery) -> Iterator[TraceMatch]:
     """Match rows against a query, and yield the matches in order."""
     formula = None if query.formula is None else parse(query.formula)
     return (match_row(json.loads(line), query, formula) for line in lines)
-
-
-def count_searched(table: pl.DataFrame, task: str | None) -> int:
-    """Count the judged completions of one task, or of all tasks if it is None."""
-    return completions_of(table if task is None else table.filter(task=task)).height
-
-
-def matches_by_task(found: Sequence[TraceMatch], table: pl.DataFrame) -> pl.DataFrame:
-    """Count for each `task` the completions that were `found`, and how many of these `passed`."""
-    keys = pl.DataFrame(
-        [one.key for one in found], schema={name: table.schema[name] for name in KEY}, orient="row"
-    )
-    verdicts = completions_of(table).select(*KEY, "passed")
-    counted = keys.join(verdicts, on=KEY, how="left", maintain_order="left").group_by(
-        "task", maintain_order=True
-    )
-    return counted.agg(found=pl.len(), passed=pl.col("passed").sum())
 
 
 def match_row(row: Mapping[str, Any], query: TraceQuery, formula: Formula | None) -> TraceMatch:

@@ -45,7 +45,7 @@ def find(
     the reason.
     """
     from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures
-    from roboeval.analysis.search import TraceQuery, count_searched, matches_by_task, search
+    from roboeval.analysis.search import TraceQuery, search
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import RunFolder, with_judged_worlds
@@ -68,7 +68,7 @@ def find(
     undecided = [one for one in every if one.cut]
     if undecided:
         note(f"undecided because their traces were too long to save: {how_many(len(undecided))}")
-    total = count_searched(results.table, task)
+    total = sum(task in {None, key[0]} for key in results.places)
     if json:
         data = {
             "looked_at": total,
@@ -77,9 +77,8 @@ def find(
         }
         print_json({**data, "groups": list(map(group_data, described))})
     else:
-        counts = matches_by_task(found, results.table)
         is_search = formula is not None
-        print_rich(found_view(found, counts, total, described, groups=len(together), is_search=is_search))
+        print_rich(found_view(found, passed, total, described, groups=len(together), is_search=is_search))
 
 
 def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:
