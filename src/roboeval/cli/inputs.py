@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,9 +48,9 @@ def command(
     return shlex.join(words)
 
 
-def note_houses(run: RunFolder, suite: str) -> None:
-    """Tell the user if a run was also judged with house rules, and which option shows those verdicts."""
-    if houses := run.houses(suite):
+def note_houses(runs: Iterable[RunFolder], suite: str) -> None:
+    """Tell the user if runs were also judged with house rules, and which option shows those verdicts."""
+    if houses := dict.fromkeys(house for run in runs for house in run.houses(suite)):
         files = " or ".join(f"--rules {house}.yaml" for house in houses)
         note(f"also judged with house rules; {files} shows those verdicts")
 

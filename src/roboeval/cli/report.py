@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboeval.cli.compare import check_run
-from roboeval.cli.inputs import command, expect_same_suite, open_current
+from roboeval.cli.inputs import command, expect_same_suite, note_houses, open_current
 from roboeval.cli.options import (
     BesideOption,
     CheckOption,
+    HouseRulesOption,
     LabelsOption,
     PricesOption,
     PublishedOption,
@@ -37,6 +38,7 @@ def report(
     beside: BesideOption = None,
     check: CheckOption = True,
     workers: WorkersOption = None,
+    rules: HouseRulesOption = None,
 ) -> None:
     """Write a report with figures, tables and a web page.
 
@@ -61,10 +63,14 @@ def report(
     opened = [open_current(run, suite, ablated=False) for run in runs]
     expect_same_suite(opened, suite)
     engine = Local(workers or cores()) if check else None
-    read = name_runs([judged_run(one, suite, beside=beside, engine=engine) for one in opened], labels)
+    read = name_runs(
+        [judged_run(one, suite, beside=beside, rules=rules, engine=engine) for one in opened],
+        labels,
+    )
     expect_known(prices, read)
     options: list[object] = ["--out", out, *["--published"] * published]
     options += [] if beside is None else ["--beside", beside]
+    options += [] if rules is None else ["--rules", rules]
     options += ["--no-check"] * (not check)
     options += [word for text in price or () for word in ("--price", text)]
     options += [word for text in label or () for word in ("--label", text)]
@@ -74,11 +80,15 @@ def report(
     written = write_report(*headline(read), parts, out)
     for _ in show_progress(written, "writing", pieces(parts)):
         pass
+    if rules is None:
+        note_houses([one.run for one in opened], suite)
     note(f"the report is in {out / 'index.html'}")
 
 
-def judged_run(results: Results, suite: str, *, beside: str | None, engine: OpenEngine | None) -> JudgedRun:
-    """Read a run with any verdicts of its ablation and of another suite.
+def judged_run(
+    results: Results, suite: str, *, beside: str | None, rules: Path | None, engine: OpenEngine | None
+) -> JudgedRun:
+    """Read a run with any verdicts of its ablation, of another suite and with house rules.
 
     The engine checks the programs. Without an engine, earlier results of the check are left out, too.
     """
@@ -88,7 +98,7 @@ def judged_run(results: Results, suite: str, *, beside: str | None, engine: Open
     from roboeval.report.runs import JudgedRun
 
     run = results.run
-    ablated = other = None
+    ablated = other = house = None
     if run.rows(evaluation_key(results.known_suite, ablated=True)).is_file():
         ablated = open_current(run.path, suite, ablated=True, reuse_from=results)
     if engine is None:
@@ -97,4 +107,6 @@ def judged_run(results: Results, suite: str, *, beside: str | None, engine: Open
         table = check_run(results, engine=engine)
     if beside is not None:
         other = open_current(run.path, beside, ablated=False, reuse_from=results)
-    return JudgedRun(results, table, ablated=ablated, other_suite=other)
+    if rules is not None:
+        house = open_current(run.path, suite, ablated=False, rules=rules, reuse_from=results)
+    return JudgedRun(results, table, ablated=ablated, other_suite=other, house=house)

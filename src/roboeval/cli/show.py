@@ -83,7 +83,7 @@ def show(
     if selection.task is None:
         show_run(judged, k or [], title=str(run), has_rules=rules is not None, as_json=json)
         if rules is None:
-            note_houses(judged.run, suite)
+            note_houses([judged.run], suite)
     elif is_one:
         show_completion(judged, selection, suite, in_full=in_full, with_reply=with_reply, as_json=json)
     else:

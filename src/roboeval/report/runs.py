@@ -31,6 +31,7 @@ class JudgedRun:
     table: pl.DataFrame  # the column `accepted` is null for unchecked programs
     ablated: Results | None = None  # judged by common-sense requirements only
     other_suite: Results | None = None  # judged with another suite
+    house: Results | None = None  # judged with the same suite and house rules
     name: str = ""  # unique within a report
 
     @property

@@ -13,7 +13,7 @@ from roboeval.analysis.metrics import overall
 from roboeval.evaluation.requests import batches
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.evaluation.runs.table import Price
-from roboeval.report import breakdown, cost, failures, modes, question, scores
+from roboeval.report import breakdown, cost, failures, house, modes, question, scores
 from roboeval.report.drawing import render, use_style
 from roboeval.report.page import GENERATOR, page
 from roboeval.report.runs import JudgedRun
@@ -68,6 +68,7 @@ def sections(
         scores.differences(runs),
         failures.other_suite(runs),
         modes.modes(runs),
+        house.house(runs),
         scores.thresholds(runs),
         failures.causes_section(runs, with_published=with_published),
         failures.failures_section(runs),

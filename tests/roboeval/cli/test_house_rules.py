@@ -10,6 +10,10 @@ from pathlib import Path
 import pytest
 
 from command_line import refused, roboeval
+from roboeval.cli.inputs import open_current
+from roboeval.cli.report import judged_run
+from roboeval.report.house import house
+from roboeval.report.page import page
 
 RULES = """
 rules:
@@ -70,8 +74,12 @@ def test_where_rules_are_not_named_their_verdicts_are_told_of(folder: Path) -> N
             "was judged only with house rules (house); give their file with --rules, or run"
         )
     assert roboeval("evaluate", "run", *TASKS, cwd=folder).status == 0
+    reported = roboeval("report", "run", "--rules", "house.yaml", "--out", "kept", "--no-check", cwd=folder)
+    assert reported.status == 0, reported.err
+    assert "knock" in (folder / "kept" / "index.html").read_text()
     hint = "also judged with house rules; --rules house.yaml shows those verdicts"
-    assert hint in roboeval("show", "run", cwd=folder).err
+    for command in (("show", "run"), ("report", "run", "--out", "report", "--no-check")):
+        assert hint in roboeval(*command, cwd=folder).err
     assert hint not in roboeval("show", "run", "--rules", "house.yaml", cwd=folder).err
 
 
@@ -100,6 +108,11 @@ def test_an_interval_of_what_is_alike_everywhere_is_unknown(folder: Path) -> Non
     shown = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder).out
     assert "100.0% of a prompt's programs" in shown
     assert "(95% interval over tasks unknown: no variation between tasks)" in " ".join(shown.split())
+    results = open_current(folder / "run", "paper", ablated=False)
+    run = judged_run(results, "paper", beside=None, rules=folder / "house.yaml", engine=None)
+    assert "the interval of the share that breaks a rule is unknown: no variation between tasks." in page(
+        "a report", [], [house([run])], {}
+    )
 
 
 @pytest.mark.slow
@@ -119,11 +132,12 @@ def test_other_rules_do_not_go_on_with_an_evaluation(folder: Path) -> None:
     told = refused("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)
     assert "judged with a different set of house rules" in told.sentence
     assert "--redo starts over" in told.sentence
-    told = refused("show", "run", "--rules", "house.yaml", cwd=folder)
-    assert told.file == "house.yaml"
-    assert re.search(
-        "has changed since the run was judged; `.* --rules house.yaml --redo` judges", told.sentence
-    )
+    for command in (("show", "run"), ("report", "run", "--out", "report")):
+        told = refused(*command, "--rules", "house.yaml", cwd=folder)
+        assert told.file == "house.yaml"
+        assert re.search(
+            "has changed since the run was judged; `.* --rules house.yaml --redo` judges", told.sentence
+        )
 
 
 def test_rules_are_read_before_anything_is_judged(folder: Path) -> None:
