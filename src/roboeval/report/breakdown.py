@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,6 +16,7 @@ from roboeval.report.sheets import Cell, Section, Sheet, section, sheet
 
 NO_INSTRUCTION = "instruction not recorded"
 REPORTING_TASKS = "come back and report"
+MAX_DISTINCT_WORDS = 12
 
 
 def abilities(runs: Sequence[JudgedRun]) -> Section:
@@ -58,8 +60,25 @@ def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """Build the table of the spread of pass@1 over the prompts of each task and run, widest spread first."""
     order = tasks_of(runs)
     found = [(run, row) for run in runs for row in spread_by_task(run.table).iter_rows()]
-    found.sort(key=lambda pair: (-pair[1][1], order.index(pair[1][0])))
-    return sheet("spread", [[task, run.name, *row] for run, (task, *row) in found])
+    rows = []
+    for run, (task, width, *ends) in sorted(found, key=lambda pair: (-pair[1][1], order.index(pair[1][0]))):
+        texts = [run.instructions.get((task, prompt)) for prompt in (ends[0], ends[2])]
+        rows.append([task, run.name, width, *ends, *distinct_words(*texts)])
+    return sheet("spread", rows)
+
+
+def distinct_words(one: str | None, other: str | None) -> tuple[str, str]:
+    """Return the words that occur only in the first text, and the words that occur only in the second."""
+    if one is None or other is None:
+        return NO_INSTRUCTION, NO_INSTRUCTION
+    words = (re.findall(r"[^\W_]+(?:['\u2019][^\W_]+)*", text.lower()) for text in (one, other))
+    first, second = map(dict.fromkeys, words)
+    return _join([w for w in first if w not in second]), _join([w for w in second if w not in first])
+
+
+def _join(words: Sequence[str]) -> str:
+    more = len(words) - MAX_DISTINCT_WORDS
+    return " ".join(words[:MAX_DISTINCT_WORDS]) + (f" and {more} more" if more > 0 else "")
 
 
 def phrasing_sheet(runs: Sequence[JudgedRun]) -> Sheet:

@@ -20,6 +20,7 @@ from roboeval.evaluation.clarify import (
 from roboeval.evaluation.runs.table import Price
 from roboeval.report.breakdown import (
     ability_sheet,
+    distinct_words,
     phrasing_sheet,
     report_back_sheet,
     spread_sheet,
@@ -82,11 +83,18 @@ def asked(instructions: Sequence[str]) -> JudgedRun:
     return made_up("a", {"Visit": (9, 2)}, written=lambda prompt, _: {"instruction": instructions[prompt]})
 
 
-def test_the_spread_over_prompts() -> None:
+def test_the_spread_and_the_words_that_differ() -> None:
     run = asked(["Ask him what's there.", "Inquire of him, what's there?"])
     (found,) = as_dicts(spread_sheet([run]))
     assert found["spread"] == pytest.approx(0.7)
     assert (found["worst prompt"], found["best prompt"]) == (1, 0)
+    assert (found["words of the worst only"], found["words of the best only"]) == ("inquire of", "ask")
+
+
+def test_words_that_nobody_recorded() -> None:
+    assert distinct_words(None, "a") == ("instruction not recorded",) * 2
+    assert distinct_words("a a b", "b") == ("a", "")
+    assert distinct_words(" ".join(map(str, range(20))), "")[0].endswith("11 and 8 more")
 
 
 def test_which_phrasing_hurts() -> None:
