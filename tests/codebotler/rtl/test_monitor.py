@@ -1,6 +1,7 @@
-"""The monitor, against `holds` on every prefix."""
+"""The monitor, against `holds` on every prefix, and against all that can follow."""
 
 import pickle
+from itertools import product
 
 import pytest
 from hypothesis import given
@@ -26,6 +27,63 @@ def test_it_says_of_every_prefix_what_the_formula_does(
     for end, event in enumerate(trace, 1):
         ahead = monitor.would_hold(event)
         assert monitor.feed(event) == monitor.holds == ahead == holds(formula, trace[:end])
+    assert monitor.is_final is None
+
+
+TEXTS = (
+    'not tr.Exists(goto("kitchen"))',
+    'tr.Exists(goto("kitchen"))',
+    'tr.AtLeast(say("knock"), 2)',
+    'tr.Count(goto("office"), 1)',
+    'tr.Last(goto("office"))',
+    'tr.AfterFirst(goto("kitchen")).Exists(goto("office")) and not tr.Exists(say("knock"))',
+    'tr.OnlyAfterLast(goto("kitchen")).Exists(say("knock"))',
+    'tr.BeforeFirst(goto("kitchen")).Exists(goto("office"))',
+    'tr.Exists(goto("attic"))',
+    'tr.AtLeast(goto("attic"), 0)',
+    str(KNOCK),
+)
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_what_is_final_is_so_whatever_follows(text: str) -> None:
+    formula, length = parse(text), 3
+    for word in product(ROOMS, repeat=length):
+        monitor = Monitor(formula, ROOMS)
+        for end in range(length + 1):
+            if end:
+                monitor.feed(word[end - 1])
+            futures = (word[:end] + more for n in range(4) for more in product(ROOMS, repeat=n))
+            same = len({holds(formula, future) for future in futures}) == 1
+            assert monitor.is_final is same, (word[:end], text)
+
+
+@given(st.data())
+def test_what_is_final_stays_so_for_any_formula(
+    formulas: SearchStrategy[Formula], traces: SearchStrategy[Trace], data: DataObject
+) -> None:
+    formula, trace = data.draw(formulas), data.draw(traces)
+    monitor, final = Monitor(formula, trace), None
+    for event in trace:
+        now = monitor.feed(event)
+        assert final is None or now is final
+        final = now if monitor.is_final else final
+
+
+def test_what_cannot_happen_is_refused_and_does_not_count() -> None:
+    monitor = Monitor(parse('tr.Exists(say("attic"))'), ROOMS)
+    assert monitor.is_final
+    with pytest.raises(ValueError, match="list of possible events"):
+        monitor.feed(Event("say", "attic"))
+    assert not monitor.holds
+    assert not monitor.feed(Event("goto", "another room"))  # as the others, by what the formula compares
+
+
+def test_a_formula_too_large_to_look_ahead_is_inconclusive() -> None:
+    parts = " and ".join(f'tr.Count(say("{name}"), 50)' for name in "abcd")
+    monitor = Monitor(parse(parts), [Event("say", name) for name in "abcd"])
+    assert monitor.is_final is None
+    assert not monitor.feed(Event("say", "a"))
 
 
 def test_an_option_that_is_no_text_is_never_judged() -> None:
