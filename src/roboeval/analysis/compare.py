@@ -16,7 +16,7 @@ from codebotler.core.words import counted
 from roboeval.analysis.counts import tally_of, task_scores
 from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of, pass_at_1
 from roboeval.analysis.missions import comparable_tables
-from roboeval.analysis.statistics import SampleSizes, p_by_signs, sample_sizes
+from roboeval.analysis.statistics import SampleSizes, by_bootstrap, p_by_signs, sample_sizes
 from roboeval.analysis.summary import cut_off_replies, failures
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.results import Results
@@ -51,6 +51,7 @@ class Comparison:
     left_out: int  # number of prompts that only one model has
     over_prompts: Estimate  # the difference, with its interval over prompts
     over_tasks: Estimate  # the difference, with its interval over tasks
+    bootstrap: Estimate  # the difference, with an interval from a cluster bootstrap over tasks
     p_prompts: float  # p-value of the sign-flip permutation test over prompts
     p_tasks: float  # p-value of the same test over tasks
     sample_sizes: SampleSizes
@@ -75,6 +76,7 @@ def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
         left_out=len({*first, *second}) - len(keys),
         over_prompts=by_formula(prompts, within=DIFFERENCE),
         over_tasks=by_formula(tasks, within=DIFFERENCE, over="tasks"),
+        bootstrap=by_bootstrap(tasks, within=DIFFERENCE, over="tasks"),
         p_prompts=p_by_signs(prompts),
         p_tasks=p_by_signs(tasks),
         sample_sizes=sample_sizes(pairs),
@@ -211,6 +213,7 @@ def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str,
         "interval": {
             "prompts": _ends(comparison.over_prompts),
             "tasks": _ends(comparison.over_tasks),
+            "bootstrap": _ends(comparison.bootstrap),
         },
         "p": {"prompts": comparison.p_prompts, "tasks": comparison.p_tasks},
         "needed": asdict(comparison.sample_sizes),

@@ -1,4 +1,4 @@
-"""Computes sign-flip permutation tests, and sample sizes for 80% power."""
+"""Computes cluster bootstraps, sign-flip permutation tests, and sample sizes for 80% power."""
 
 from __future__ import annotations
 
@@ -9,15 +9,54 @@ from statistics import NormalDist
 
 import numpy as np
 
-from roboeval.analysis.metrics import CONFIDENCE, ROUNDING_ERROR, Clusters
+from roboeval.analysis.metrics import (
+    CONFIDENCE,
+    ROUNDING_ERROR,
+    SHARE,
+    Clusters,
+    Estimate,
+    SamplingUnit,
+    mean_of,
+    t_quantile,
+)
 
-SIGN_SEED = 0
+BOOTSTRAP_SEED = 0
 TEST_POWER = 0.8
+MIN_CLUSTERS = 8  # with fewer clusters, the bootstrap interval is too narrow
 MAX_EXACT_CLUSTERS = 20  # up to this many clusters, all 2**20 sign flips are enumerated
-FLIPS_AT_ONCE = 1_000  # number of sampled sign flips in memory at a time
+RESAMPLES_AT_ONCE = 1_000  # number of resamples in memory at a time
 
 
-def p_by_signs(clusters: Clusters, *, seed: int = SIGN_SEED, draws: int = 100_000) -> float:
+def by_bootstrap(
+    clusters: Clusters,
+    *,
+    within: tuple[float, float] = SHARE,
+    over: SamplingUnit = "prompts",
+    seed: int = BOOTSTRAP_SEED,
+    draws: int = 10_000,
+) -> Estimate:
+    """Return the mean of all values with a percentile interval from a cluster bootstrap.
+
+    Plain percentiles are too narrow for few clusters, so they are expanded by the ratio of Student's t to the
+    normal distribution (Hesterberg's expanded percentile interval).
+    """
+    mean, count = mean_of(clusters), len(clusters)
+    if count == 1:
+        return Estimate(mean, *within, over)
+    generator = np.random.default_rng(seed)
+    sums = np.array([math.fsum(values) for values in clusters])
+    sizes = np.array([len(values) for values in clusters])
+    means = []
+    for start in range(0, draws, RESAMPLES_AT_ONCE):
+        sample = generator.integers(count, size=(min(RESAMPLES_AT_ONCE, draws - start), count))
+        means.append(sums[sample].sum(axis=1) / sizes[sample].sum(axis=1))
+    wider = math.sqrt(count / (count - 1)) * t_quantile((1 + CONFIDENCE) / 2, count - 1)
+    tail = NormalDist().cdf(-wider)
+    low, high = np.quantile(np.concatenate(means), [tail, 1 - tail])
+    return Estimate(mean, max(within[0], float(low)), min(within[1], float(high)), over)
+
+
+def p_by_signs(clusters: Clusters, *, seed: int = BOOTSTRAP_SEED, draws: int = 100_000) -> float:
     """Return the p-value of a two-sided permutation test that flips the signs of whole clusters.
 
     The test is exact for up to 20 clusters. For more, signs are sampled. With G clusters, p is at least
@@ -32,8 +71,8 @@ def p_by_signs(clusters: Clusters, *, seed: int = SIGN_SEED, draws: int = 100_00
         return float((np.abs(totals) >= observed).mean())
     generator = np.random.default_rng(seed)
     extreme = 0
-    for start in range(0, draws, FLIPS_AT_ONCE):
-        signs = generator.integers(2, size=(min(FLIPS_AT_ONCE, draws - start), len(sums))) * 2 - 1
+    for start in range(0, draws, RESAMPLES_AT_ONCE):
+        signs = generator.integers(2, size=(min(RESAMPLES_AT_ONCE, draws - start), len(sums))) * 2 - 1
         extreme += int((np.abs(signs @ sums) >= observed).sum())
     return (extreme + 1) / (draws + 1)
 

@@ -22,6 +22,7 @@ from roboeval.analysis.metrics import (
     threshold_curve,
 )
 from roboeval.analysis.missions import has_missions
+from roboeval.analysis.statistics import MIN_CLUSTERS, by_bootstrap
 from roboeval.report import figures, paper
 from roboeval.report.curves import draw_thresholds
 from roboeval.report.runs import JudgedRun, coverage_of, runs_to_draw, tasks_of
@@ -41,14 +42,24 @@ def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """Build the table of pass@1 by run, with intervals."""
     rows: list[list[Cell]] = []
     for run in runs:
+        tasks = [[prompt.pass_at(1) for prompt in score.prompts] for score in run.scores]
         over_prompts = by_formula([[prompt.pass_at(1)] for prompt in prompts_of(run.scores)])
-        found = [overall(run.scores, 1), over_prompts]
+        found = [overall(run.scores, 1), over_prompts, by_bootstrap(tasks, over="tasks")]
         ends = [end for estimate in found for end in (estimate.low, estimate.high)]
         coverage = run.results.coverage
-        counts = coverage.judged, coverage.total, len(run.by_prompt), len(run.scores)
+        counts = coverage.judged, coverage.total, len(run.by_prompt), len(tasks)
         rows.append([run.name, *counts, found[0].mean, *ends])
     missions = [note("missions")] if any(has_missions(run.table) for run in runs) else []
-    return sheet("overall", rows, notes=[*missions, *_unfinished(runs)])
+    return sheet("overall", rows, notes=[*missions, *_few_tasks(runs), *_unfinished(runs)])
+
+
+def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
+    few = [run.name for run in runs if len(run.scores) < MIN_CLUSTERS]
+    if not few:
+        return []
+    of_which = "" if len(few) == len(runs) else f" of {', '.join(few)}"
+    few_tasks = f"The bootstrap interval{of_which} is too narrow with fewer than {MIN_CLUSTERS} tasks"
+    return [f"{few_tasks}; quote the interval over tasks."]
 
 
 def _unfinished(runs: Sequence[JudgedRun]) -> list[str]:

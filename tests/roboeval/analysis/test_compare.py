@@ -159,10 +159,16 @@ def test_other_suites_are_refused() -> None:
     assert "`roboeval evaluate b --suite mine --redo`" in str(e.value)
 
 
-def test_the_interval_of_a_single_task_is_unknown() -> None:
-    found = compare_scores({("T0", 0): 0.4}, {("T0", 0): 0.2})
-    shown = printed(comparison_view(found, sides()), width=120)
-    assert re.search(r"over tasks +unknown: too few tasks", shown)
+def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
+    def shown(tasks: int) -> str:
+        a = {(f"T{n}", 0): n / 10 for n in range(tasks)}
+        found = compare_scores(a, {key: value / 2 for key, value in a.items()})
+        return printed(comparison_view(found, sides()), width=120)
+
+    assert re.search(r"bootstrap.* too narrow", shown(7))
+    assert "too narrow" not in shown(8)
+    assert "too narrow" not in shown(1)
+    assert re.search(r"over tasks +unknown: too few tasks", shown(1))
 
 
 def test_equal_differences_have_no_interval() -> None:

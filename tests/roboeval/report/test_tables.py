@@ -59,6 +59,15 @@ def test_an_unfinished_run_says_so() -> None:
     assert re.match(r"a: .*\b10 of 99 completions\b", overall_sheet([run]).notes[-1])
 
 
+def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
+    few, enough = (made_up(name, {f"T{n}": (n,) for n in range(of)}) for name, of in (("a", 7), ("b", 8)))
+    assert overall_sheet([enough]).notes == []
+    (note,) = overall_sheet([few]).notes
+    assert re.search(r"bootstrap .* narrow .*\b8 tasks\b", note)
+    (note,) = overall_sheet([few, enough]).notes
+    assert "bootstrap interval of a " in note
+
+
 def test_an_interval_without_width_is_in_the_table() -> None:
     alike = made_up("a", {"Visit": (5, 5), "CountMugs": (5,)})
     others = made_up("b", {"Visit": (4, 5), "CountMugs": (5,)})

@@ -19,6 +19,7 @@ from roboeval.analysis.compare import (
     sample_size_sentences,
 )
 from roboeval.analysis.failure_groups import FailureGroup
+from roboeval.analysis.statistics import MIN_CLUSTERS
 from roboeval.analysis.verdict_changes import VerdictChanges, ranks, sentences
 from roboeval.cli.views.groups import failure_group_view
 from roboeval.cli.views.results import ruled
@@ -34,11 +35,13 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
     rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}", str(runs[1].coverage))
     over = f"over {counted(comparison.prompts, 'prompt')} that both have"
     rows.add_row("difference, second minus first", f"{comparison.over_tasks.mean:+.3f}", over)
-    for estimate, p in (
-        (comparison.over_tasks, comparison.p_tasks),
-        (comparison.over_prompts, comparison.p_prompts),
+    few = "too narrow with so few tasks" * (1 < len(comparison.tasks) < MIN_CLUSTERS)
+    for name, estimate, remark in (
+        ("over tasks", comparison.over_tasks, p_text(comparison.p_tasks)),
+        ("over prompts", comparison.over_prompts, p_text(comparison.p_prompts)),
+        ("over tasks, by resampling (bootstrap)", comparison.bootstrap, few),
     ):
-        rows.add_row(f"95% interval over {estimate.over}", estimate.ends("+.3f"), p_text(p))
+        rows.add_row(f"95% interval {name}", estimate.ends("+.3f"), remark)
     table = ruled("task", a, b, "difference", "adds", "prompts")
     for task in comparison.tasks:
         cells = (
