@@ -113,8 +113,13 @@ def test_a_report_has_a_table_of_missions(runs: tuple[Path, Path, str], tmp_path
         ("program", "2", 0.5),
         ("agent", "4", 0.75),
     ]
+    with (tmp_path / "report" / "tables" / "endings.csv").open() as file:
+        ended = [(row["ending"], row["missions"], float(row["turns: most"])) for row in csv.DictReader(file)]
+    assert ended == [("answer", "3", 3.0), ("TurnLimit", "1", 3.0)]
     roboeval("report", paths[0], "--suite", suite, "--out", str(tmp_path / "plain"))
-    assert not (tmp_path / "plain" / "tables" / "modes.csv").exists()
+    assert not {"modes.csv", "endings.csv"} & {
+        path.name for path in (tmp_path / "plain" / "tables").iterdir()
+    }
 
 
 def test_a_search_in_a_world_finds_its_missions(runs: tuple[Path, Path, str]) -> None:
