@@ -101,7 +101,6 @@ class RetryResult:
     passed: Estimate  # pass@1
     accepted: float  # share of final programs that the check accepts
     ran: float  # share of final programs that run without an error in every world
-    requests: float  # mean number of requests per program
     prompts: Mapping[float, float]  # share of prompts that reach each threshold of pass@1
     by_prompt: tuple[Chances, ...]
 
@@ -114,7 +113,6 @@ def resample(prompts: Sequence[CheckedPrompt], retries: int) -> RetryResult:
         passed=over_tasks((prompt.task, one.passed) for prompt, one in zip(prompts, each, strict=True)),
         accepted=mean_of([[one.accepted for one in each]]),
         ran=mean_of([[one.ran for one in each]]),
-        requests=mean_of([[mean_requests(rejected_share(one.trials), retries) for one in prompts]]),
         prompts={t: share_at_least([one.passed for one in each], t) for t in THRESHOLDS},
         by_prompt=each,
     )
@@ -136,7 +134,6 @@ def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[
                 "pass@1": asdict(limit.passed),
                 "accepted": limit.accepted,
                 "ran": limit.ran,
-                "requests": limit.requests,
                 "prompts_at_least": {str(t): share for t, share in limit.prompts.items()},
             }
             for limit in of_limits

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from codebotler.core.errors import UserError
-from roboeval.analysis.cost import cost_of
+from roboeval.analysis.cost import budgets, cost_of
 from roboeval.analysis.metrics import threshold_curve
 from roboeval.analysis.resample import LIMITS, CheckedPrompt, accepted_after, resample
 from roboeval.evaluation.runs.table import Price
@@ -27,7 +27,7 @@ def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
     for name, prompts in checked.items():
         for at in (resample(prompts, limit) for limit in LIMITS):
             passed = at.passed.mean, at.passed.low, at.passed.high
-            retries.append([name, at.retries, *passed, at.accepted, at.ran, 1 - at.accepted, at.requests])
+            retries.append([name, at.retries, *passed, at.accepted, at.ran, 1 - at.accepted])
     thresholds = [
         [name, limit, *point]
         for name, of_limits in points.items()
@@ -55,7 +55,7 @@ def retry_curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float
 
 def costs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
     """Build the section on the cost of programs, for runs that recorded it."""
-    return section("cost", cost_sheet(runs, prices))
+    return section("cost", cost_sheet(runs, prices), budget_sheet(runs, prices))
 
 
 def cost_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
@@ -75,6 +75,13 @@ def cost_sentence(run: JudgedRun, prices: Mapping[str, Price]) -> str:
     )
     each = [form.format(value) for value, form in parts if value is not None]
     return f"Cost per pass: {', '.join(each)}" if each else ""
+
+
+def budget_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
+    """Build a table that shows how many passing programs a budget buys, for runs with checked programs."""
+    checked = [run for run in runs if run.trials]
+    rows = [[run.name, *one] for run in checked for one in budgets(run.table, price_of(run, prices))]
+    return sheet("budget", rows)
 
 
 def read_prices(texts: Sequence[str]) -> dict[str, Price]:

@@ -1,4 +1,4 @@
-"""What completions cost."""
+"""What completions cost, and what a budget gives."""
 
 import math
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from made_up_runs import UNCHECKED, made_up
-from roboeval.analysis.cost import cost_of
+from roboeval.analysis.cost import budgets, cost_of
 from roboeval.analysis.resample import CheckedCompletion, mean_requests, rejected_share
 from roboeval.evaluation.runs.table import Price
 
@@ -64,6 +64,29 @@ def test_requests_by_hand() -> None:
     assert mean_requests(rejected_share((GOOD, BAD)), 2) == 1 + 1 / 2 + 1 / 4
     assert mean_requests(rejected_share((BAD,)), 4) == 5
     assert mean_requests(rejected_share((GOOD,)), 100) == 1
+
+
+def test_a_budget_by_hand() -> None:
+    table = paid(passes={"Visit": (5,)}, accepted=pl.col("passed"))
+    found = {one.retries: one for one in budgets(table, Price(10.0, 20.0))}
+    assert found[0].per_thousand_requests == pytest.approx(500)
+    assert found[2].requests == pytest.approx(1.75)
+    assert found[2].per_thousand_requests == pytest.approx(1_000 * 0.875 / 1.75)
+    assert found[0].per_million_tokens == pytest.approx(0.5 * 1e6 / 1_500)
+    assert found[0].per_money == pytest.approx(0.5 / 0.02)
+    assert {one.per_money for one in budgets(table, None)} == {None}
+
+
+def test_money_goes_by_what_each_prompt_takes() -> None:
+    table = paid(
+        passes={"Visit": (1, 0)},
+        of=1,
+        accepted=pl.col("passed"),
+        written=lambda prompt, _: usage(0, 1_000, 1.0) if prompt else usage(1_000, 0, 1.0),
+    )
+    found = {one.retries: one for one in budgets(table, Price(1.0, 100.0))}
+    # One request for the first prompt, and all three for the second, whose output is dear.
+    assert found[2].per_money == pytest.approx(1 / (0.001 + 3 * 0.1))
 
 
 def test_what_was_not_judged_costs_nothing() -> None:

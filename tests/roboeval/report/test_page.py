@@ -137,7 +137,7 @@ def test_caption_says_how_many_tasks_each_run_has() -> None:
     assert text.index('id="figure-overall"') < text.index('id="figure-tasks"')
 
 
-def test_empty_columns_are_left_out_and_long_tables_are_cut() -> None:
+def test_empty_columns_are_left_out_and_long_tables_are_cut(usual: Path) -> None:
     text = page(
         "t", [], [Section("origin", [sheet("phrasings", [["Visit", 0, 0.1, None, None, "x"]] * 1_001)])], {}
     )
@@ -145,6 +145,9 @@ def test_empty_columns_are_left_out_and_long_tables_are_cut() -> None:
     assert ">hurts<" not in text
     assert text.count("<tr>") == 1 + 1_000
     assert "1 more row in the CSV file." in text
+    budget = (usual / "tables" / "budget.csv").read_text().splitlines()[0]
+    assert "passes per unit of money" in budget
+    assert ">passes per unit of money<" not in (usual / "index.html").read_text()
 
 
 def test_commands_in_sentences_are_code() -> None:

@@ -25,7 +25,7 @@ from roboeval.report.breakdown import (
     report_back_sheet,
     spread_sheet,
 )
-from roboeval.report.cost import cost_sheet, expect_known, price_of, read_prices
+from roboeval.report.cost import budget_sheet, cost_sheet, expect_known, price_of, read_prices
 from roboeval.report.failures import failures_section
 from roboeval.report.question import question
 from roboeval.report.runs import JudgedRun
@@ -118,6 +118,12 @@ def test_costs_of_those_who_count_them() -> None:
     (found,) = as_dicts(cost_sheet(runs, prices))
     assert (found["model"], found["input tokens"], found["seconds"]) == ("a", 10_000, None)
     assert found["money per pass"] == pytest.approx(0.05)
+    budget = as_dicts(budget_sheet(runs, prices))
+    assert [(row["model"], row["retries"]) for row in budget[::5]] == [("a", 0), ("b", 0)]
+    assert (budget[0]["passes per unit of money"], budget[5]["passes per unit of money"]) == (
+        pytest.approx(0.4 / 0.02),
+        None,
+    )
     assert cost_sheet(runs[1:], {}).rows == []
 
 
