@@ -29,13 +29,10 @@ class Explanation:
     """The reason why a formula fails.
 
     Args:
-        clause: the smallest failing part of the formula, or its negation; the whole formula if an option is
-            not a string.
         event: the position of the event that makes it fail; None if an event is missing.
         sentence: the reason in words, with steps counted from 1.
     """
 
-    clause: formulas.Formula
     event: int | None
     sentence: str
 
@@ -48,13 +45,12 @@ def explain(formula: formulas.Formula, trace: Trace) -> Explanation | None:
     except Inconclusive as error:
         option = f"option {error.number + 1} of the question at step {error.event + 1}"
         problem = f"is not a string but {brief(error.option.text)}, so the requirement cannot be judged"
-        return Explanation(formula, error.event, f"{option} {problem}")
-    clause = _failing_part(formula, trace)
-    deciding = _deciding_tests(clause, trace, is_true=False)
+        return Explanation(error.event, f"{option} {problem}")
+    deciding = _deciding_tests(formula, trace, is_true=False)
     facts = [_fact(test, trace, is_true=is_true) for test, is_true in deciding]
     event = max((fact.event for fact in facts if fact.event is not None), default=None)
     text = _join_facts([*{fact.text: fact for fact in facts}.values()])
-    return Explanation(clause, event, " ".join(f"the robot {text}".split()))
+    return Explanation(event, " ".join(f"the robot {text}".split()))
 
 
 def _join_facts(facts: Sequence[_Fact]) -> str:
@@ -62,25 +58,12 @@ def _join_facts(facts: Sequence[_Fact]) -> str:
         return f"{facts[0].text}{facts[0].ending}{facts[0].detail}"
     missing = [fact for fact in facts if fact.is_missing]
     done = [fact for fact in facts if not fact.is_missing]
-    did = ", and it ".join(
-        f"{fact.short or fact.text}{fact.detail and f' ({fact.detail[2:]})'}" for fact in done
-    )
+    did = ", and it ".join(f"{fact.text}{fact.detail and f' ({fact.detail[2:]})'}" for fact in done)
     if not done:
         return f"{', and it '.join(fact.text for fact in missing)}; it had to do at least one of these"
     if missing:
-        return f"{did}, although it {' and it '.join(fact.short or fact.text for fact in missing)}"
+        return f"{did}, although it {' and it '.join(fact.text for fact in missing)}"
     return f"{did}; it must not do {'both' if len(done) == 2 else 'all'} of these"  # noqa: PLR2004 - a pair
-
-
-def _failing_part(formula: formulas.Formula, trace: Trace) -> formulas.Formula:
-    match formula:
-        case formulas.And(parts):
-            return _failing_part(next(part for part in parts if not holds(part, trace)), trace)
-        case formulas.Not(formulas.Not(part)):
-            return _failing_part(part, trace)
-        case formulas.Not(formulas.Or(parts)):
-            return _failing_part(formulas.Not(next(part for part in parts if holds(part, trace))), trace)
-    return formula
 
 
 def _deciding_tests(
@@ -131,7 +114,6 @@ class _Fact(NamedTuple):
     ending: str = ""  # the requirement; omitted if other facts follow
     detail: str = ""  # the closest event
     is_missing: bool = False  # whether the robot failed to do something
-    short: str = ""  # the text without parts that other facts repeat
 
 
 def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
@@ -155,19 +137,14 @@ def _presence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     step = f"{place}{stay}{' last,' * isinstance(test, formulas.Last)} at step {at + 1}"
     where = _where(test.scopes, trace, is_true=True)
     if is_plain(element):
-        return _Fact(at, f"{done}{step}{where}", ", which it must not do", short=f"{done}{step}")
+        return _Fact(at, f"{done}{step}{where}", ", which it must not do")
     text = describe_action(element, "past", when=step, where=where)
-    short = describe_action(element, "past", when=step)
-    return _Fact(at, text, ", which it must not do", "" if done == did else f": it {done}", short=short)
+    return _Fact(at, text, ", which it must not do", "" if done == did else f": it {done}")
 
 
 def _absence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     element, where = test.element, _where(test.scopes, trace, is_true=False)
     here = [*_positions(test, trace)]
-    if (missing := _missing_bound(test.scopes, trace)) is not None:
-        text = f"never {describe_action(missing.element, 'past', negated=True)}"
-        when = "before" if missing.is_before else "after"
-        return _Fact(None, text, f", {when} which it was to {describe_action(element, 'base')}")
     if isinstance(test, formulas.Exists):
         event, detail = _describe_instead(element, trace, here)
         return _Fact(
@@ -192,10 +169,8 @@ def _absence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     visits = arrivals[:1] if first else arrivals
     rooms = dict.fromkeys(describe_event(trace[at], test.arrival) for at in visits)
     failed = f"did not {describe_action(element, 'base', negated=True, when=f' {there}', where=where)}"
-    stay = f" in {room(test.arrival.text)}"
-    short = f"did not {describe_action(element, 'base', negated=True, when=stay, where=where)}"
     text = f"went to {listed(elide_list([*rooms]))} at {_steps(visits)} but {failed}"
-    return _Fact(arrivals[0] if event is None else event, text, detail=detail, short=short)
+    return _Fact(arrivals[0] if event is None else event, text, detail=detail)
 
 
 def _not_last(element: formulas.EventPattern, where: str, trace: Trace, here: Sequence[int]) -> _Fact:
@@ -210,20 +185,9 @@ def _not_last(element: formulas.EventPattern, where: str, trace: Trace, here: Se
     )
 
 
-def _missing_bound(scopes: tuple[formulas.Scope, ...], trace: Trace) -> formulas.Scope | None:
-    """Return the first scope that is empty because its bounding event never happened, or None."""
-    span = range(len(trace))
-    for scope in scopes:
-        at = bounding_event(scope, trace, span)
-        if at is None and scope.is_only:
-            return scope
-        span = narrow(scope, at, span)
-    return None
-
-
 def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: bool) -> _Fact:
     where, number = _where(test.scopes, trace, is_true=is_true), test.number
-    exactly, is_missing = isinstance(test, formulas.Count), not is_true
+    exactly = isinstance(test, formulas.Count)
     span = positions_in_scopes(test.scopes, trace)
     found = [at for at in span if _is_conclusive_match(test.element, trace, at)]
     if found:
@@ -233,16 +197,12 @@ def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: b
     else:
         text = f"never {describe_action(test.element, 'past', negated=True, where=where)}"
     if is_true:
-        limit = (
-            f"must not do so exactly {times(number)}" if exactly else f"may do so {times(number - 1)} at most"
-        )
-        return _Fact(found[-1] if found else None, text, f", but {limit}")
-    if not found:
-        _, detail = _describe_instead(test.element, trace, span)
-        ending = f", but should have {'' if exactly else 'at least '}{times(number)}"
-        return _Fact(None, text, ending, detail, is_missing)
-    ending = f" instead of {'' if exactly else 'at least '}{times(number)}"
-    return _Fact(found[number] if len(found) > number else None, text, ending, is_missing=is_missing)
+        limit = f"not do so exactly {times(number)}" if exactly else f"do so {times(number - 1)} at most"
+        return _Fact(found[-1] if found else None, text, f", but {'must' if exactly else 'may'} {limit}")
+    wanted = f"{'' if exactly else 'at least '}{times(number)}"
+    ending = f" instead of {wanted}" if found else f", but should have {wanted}"
+    detail = "" if found else _describe_instead(test.element, trace, span)[1]
+    return _Fact(found[number] if len(found) > number else None, text, ending, detail, is_missing=True)
 
 
 def _positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
@@ -269,7 +229,7 @@ def _where(scopes: tuple[formulas.Scope, ...], trace: Trace, *, is_true: bool) -
         if at is not None:
             bare = replace(scope.element, place=None, options=None, mention=False)
             ends[when] = f"{verb(bare.kind).ing} {describe_event(trace[at], bare)} (step {at + 1})"
-        elif not is_true and not scope.is_before:
+        elif not is_true and (scope.is_only or not scope.is_before):
             ends[when] = f"{describe_action(scope.element, 'ing')} (which never happened)"
         span = narrow(scope, at, span)
     if all(ends.values()):

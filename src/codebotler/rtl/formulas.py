@@ -92,7 +92,6 @@ class EventPattern:
         holding: matches what the robot held at the start of the event; None for anything.
         to: matches the addressee of a question; None for anyone.
         more: match further arguments, in order.
-        offers: the minimum and the maximum number of options; None for any number.
         has_text: whether events of this kind have a string; False if their skill has no parameters.
         means: words that explain its texts, such as `that nobody is coming`; None to show the texts.
     """
@@ -107,7 +106,6 @@ class EventPattern:
     holding: TextPattern | None = None
     to: TextPattern | None = None
     more: tuple[TextPattern, ...] = ()
-    offers: tuple[int, int | None] | None = None
     has_text: bool = True
     means: str | None = field(default=None, compare=False)
 
@@ -119,7 +117,7 @@ class EventPattern:
     @cached_property
     def is_about_more(self) -> bool:
         """Whether it has conditions other than those on text, options and room."""
-        wanted = self.answer, self.found, self.holding, self.to, self.offers
+        wanted = self.answer, self.found, self.holding, self.to
         return bool(self.more) or any(one is not None for one in wanted)
 
     def __str__(self) -> str:
@@ -136,9 +134,6 @@ class EventPattern:
             written = f"returned({self.found}, {written})"
         if self.to is not None:
             written = f"to({self.to}, {written})"
-        if self.offers is not None:
-            numbers = (str(number) for number in self.offers if number is not None)
-            written = f"options({', '.join(numbers)}, {written})"
         if self.holding is not None:
             written = f"holding({self.holding}, {written})"
         return written if self.place is None else f"at({quote(self.place)}, {written})"

@@ -94,10 +94,7 @@ def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
 
 
 def _fits(element: formulas.EventPattern, event: Event) -> bool:
-    """Whether the result, answer, held object, addressee, further arguments and number of options match."""
-    least, most = element.offers or (0, None)
-    if not least <= len(event.options) <= (len(event.options) if most is None else most):
-        return False
+    """Whether the result, answer, held object, addressee and further arguments match."""
     wanted = (element.answer, event.answer), (element.holding, event.holding or None), (element.to, event.to)
     if any(text is not None and (is_ is None or not text.matches(is_)) for text, is_ in wanted):
         return False

@@ -20,14 +20,17 @@ from codebotler.rtl.source import SKILL_KINDS, FormulaSource, RtlSyntaxError
 from codebotler.rtl.text.claims import Claim, Number, Time, minutes
 
 SCOPE_NAMES: dict[str, formulas.ScopeName] = {name: name for name in get_args(formulas.ScopeName)}
-TESTS = ("Exists", "Last", "ActAtFirst", "ActAtSome", "Count", "AtLeast")
+TESTS: Mapping[str, Callable[..., formulas.Test]] = {
+    kind.__name__: kind for kind in (*get_args(formulas.PresenceTest), formulas.Count, formulas.AtLeast)
+}
 TEXT_WORDS = ("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies")
 ANSWERED = "answered"
 QUESTIONS = ("mention", ANSWERED)
 LOOK_RESULTS = {"found": True, "missed": False}
 LAST_LOOKS = {"last_found": True, "last_missed": False}
-WRAPPERS = ("at", "holding", "to", "options", "returned")  # further conditions on an event
-NOT_STATES = frozenset({*TESTS, *SCOPE_NAMES, *QUESTIONS, *LOOK_RESULTS, *WRAPPERS, *SKILL_KINDS})
+WRAPPED_FIELDS = {"at": "place", "holding": "holding", "to": "to", "returned": "found"}
+"""The words for further conditions on an event, each with the field of `EventPattern` that it sets."""
+NOT_STATES = frozenset({*TESTS, *SCOPE_NAMES, *QUESTIONS, *LOOK_RESULTS, *WRAPPED_FIELDS, *SKILL_KINDS})
 
 SET_TAG = re.compile(r"\{([^\W\d_][\w ]*)\}")  # a set in a string, such as {metal}; {3} is a repetition
 THING_NAME = re.compile(r"\^?[\w ',;:!%@&/-]+\$?")
@@ -36,7 +39,6 @@ SPECIAL_CHARACTERS = re.compile(r"[][\\.^$*+?{}|()]")
 NO_MEANINGS: Mapping[str, str] = MappingProxyType({})
 
 MAX_FORMULA_DEPTH = 50  # low enough for Python's stack during every evaluation
-MAX_OPTIONS = 100  # the most options that a formula may require
 
 
 def parse(
@@ -161,20 +163,14 @@ class _Parser(FormulaSource):
             )
         if name not in TESTS:
             raise self.unknown(function, "test", name, [*TESTS, *SCOPE_NAMES])
-        scopes = self.scopes(function.value)
+        kind, scopes = TESTS[name], self.scopes(function.value)
         if name in {"Exists", "Last"}:
             (element,) = self.arguments(node, function, name, 1)
-            kind = formulas.Exists if name == "Exists" else formulas.Last
             return kind(self.element(element), scopes)
         one, other = self.arguments(node, function, name, 2)
-        match name:
-            case "ActAtFirst":
-                return formulas.ActAtFirst(self.word(one), self.element(other), scopes)
-            case "ActAtSome":
-                return formulas.ActAtSome(self.word(one), self.element(other), scopes)
-            case "Count":
-                return formulas.Count(self.element(one), self.number(other), scopes)
-        return formulas.AtLeast(self.element(one), self.number(other), scopes)
+        if name.startswith("ActAt"):
+            return kind(self.word(one), self.element(other), scopes)
+        return kind(self.element(one), self.number(other), scopes)
 
     def scopes(self, node: ast.expr) -> tuple[formulas.Scope, ...]:
         scopes: list[formulas.Scope] = []
@@ -200,7 +196,7 @@ class _Parser(FormulaSource):
 
     def bare_element(self, node: ast.expr) -> formulas.EventPattern:
         match node:
-            case ast.Call(ast.Name(name)) if name in WRAPPERS:
+            case ast.Call(ast.Name(name)) if name in WRAPPED_FIELDS:
                 return self.around(name, node)
             case ast.Call(ast.Name(kind)) if kind in self.recordings:
                 if self.recordings[kind].options is None:
@@ -217,7 +213,7 @@ class _Parser(FormulaSource):
                 return formulas.EventPattern(self.look, self.matched(text), found=LOOK_RESULTS[kind])
             case ast.Call(ast.Name(kind)):
                 raise self.unknown(
-                    node, "element", kind, [*self.recordings, *QUESTIONS, *LOOK_RESULTS, *WRAPPERS]
+                    node, "element", kind, [*self.recordings, *QUESTIONS, *LOOK_RESULTS, *WRAPPED_FIELDS]
                 )
         raise self.expected('an element such as goto("lobby")', node)
 
@@ -259,44 +255,24 @@ class _Parser(FormulaSource):
                 return formulas.Regex(f"^{re.escape(as_text(-value if is_negative else value))}$")
         return self.matched(node)
 
-    def around_arguments(self, name: str, node: ast.Call) -> list[ast.expr]:
-        if name == "options" and len(node.args) not in {2, 3}:
-            raise self.error(node, "options takes a minimum, an optional maximum and a question")
-        return self.arguments(node, node, name, None if name == "options" else 2)
-
     def around(self, name: str, node: ast.Call) -> formulas.EventPattern:
-        *given, inner = self.around_arguments(name, node)
-        what, element = given[0], self.element(inner)
-        nested = {
-            "at": element.place,
-            "holding": element.holding,
-            "to": element.to,
-            "options": element.offers,
-            "returned": element.found,
-        }[name]
-        if nested is not None:
+        what, inner = self.arguments(node, node, name, 2)
+        element, field = self.element(inner), WRAPPED_FIELDS[name]
+        if getattr(element, field) is not None:
             raise self.error(inner, f"{name} cannot be nested in another {name}")
-        match name:
-            case "at":
-                return replace(element, place=self.word(what))
-            case "holding":
-                return replace(element, holding=self.matched(what))
-            case "returned":
-                if not (isinstance(what, ast.Constant) and isinstance(what.value, bool)):
-                    raise self.expected("True or False", what)
-                if not self.skill_of[element.kind].returns == TRUTH_TYPE:
-                    raise self.error(
-                        inner, f"returned needs a skill that returns True or False; {element.kind} does not"
-                    )
-                return replace(element, found=what.value)
-        if element.kind != self.question:
-            raise self.error(inner, f"{name} needs a question; use ask, mention or answered")
-        if name == "to":
-            return replace(element, to=self.matched(what))
-        least, most = self.number(what), self.number(given[-1])
-        if not 0 <= least <= most <= MAX_OPTIONS:
-            raise self.error(node, f"options takes numbers from 0 to {MAX_OPTIONS}, the smaller one first")
-        return replace(element, offers=(least, most if len(given) > 1 else None))
+        if name == "to" and element.kind != self.question:
+            raise self.error(inner, "to needs a question; use ask, mention or answered")
+        if name == "returned" and self.skill_of[element.kind].returns != TRUTH_TYPE:
+            problem = f"returned needs a skill that returns True or False; {element.kind} does not"
+            raise self.error(inner, problem)
+        read: Callable[[ast.expr], object] = {"at": self.word, "returned": self.truth}.get(name, self.matched)
+        return replace(element, **{field: read(what)})  # type: ignore[arg-type]  # as `WRAPPED_FIELDS` says
+
+    def truth(self, node: ast.expr) -> bool:
+        match node:
+            case ast.Constant(bool(value)):
+                return value
+        raise self.expected("True or False", node)
 
     def matched(self, node: ast.expr) -> formulas.TextPattern:
         match node:

@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator, Mapping
 from itertools import chain
 
-from codebotler.core import words
 from codebotler.core.phrases import has_no_text, is_spoken, result_words, verb
 from codebotler.core.skills.kinds import CHECK, GOTO, INSIDE
 from codebotler.core.skills.verbs import VerbForm
@@ -62,7 +61,7 @@ def describe_action(
     elif element.mention and not is_open:
         mentioned = _quote_choices(element.text) or _describe_thing(element.text, thing)
         done = f"{_MENTIONS[form]} {mentioned} in a question"
-    elif element.options is not None and is_any(element.text) and not is_open and element.offers is None:
+    elif element.options is not None and is_any(element.text) and not is_open:
         return f"{_OFFERS[form]} an option {describe_text(element.options)}{when}{where}"
     elif verb(element.kind).object:
         doing = verb(element.kind)
@@ -77,10 +76,6 @@ def _describe_details(element: EventPattern, means: str | None) -> str:
     more = ""
     if element.options is not None and means is None and not is_any(element.options):
         more += f" offering an option {describe_text(element.options)}"
-    if element.offers is not None:
-        least, most = element.offers
-        number = f"{least} or more" if most is None else f"{least} to {most}" if most > least else f"{least}"
-        more += f" with {number} option{'s' * (number != '1')}"
     if element.more and not verb(element.kind).object:
         more += f", {listed([*filter(None, map(describe_text, element.more))])}".rstrip(", ")
     if element.found is not None and element.kind != CHECK:
@@ -149,7 +144,9 @@ def describe_event(event: Event, element: EventPattern) -> str:
         thing = ""
     else:
         thing = room_name(event.text) if event.kind in {GOTO, INSIDE} else quoted(event.text)
-    thing += _describe_options(event, element)
+    if event.options and (element.mention or not is_any(element.options)):
+        shown = elide_list([quoted(option.text) for option in event.options])
+        thing += f" with the options {listed(shown)}"
     if element.answer is not None:
         thing += (
             " and got no answer" if event.answer is None else f" and got the answer {quoted(event.answer)}"
@@ -165,12 +162,6 @@ def describe_event(event: Event, element: EventPattern) -> str:
     if element.holding is not None:
         thing += f" while holding {quoted(event.holding) if event.holding else 'nothing'}"
     return f"{thing} in {room_name(event.place)}" if element.place is not None and event.place else thing
-
-
-def _describe_options(event: Event, element: EventPattern) -> str:
-    if event.options and (element.mention or not is_any(element.options)):
-        return f" with the options {listed(elide_list([quoted(option.text) for option in event.options]))}"
-    return "" if element.offers is None else f" with {words.counted(len(event.options), 'option')}"
 
 
 def room(text: TextPattern, article: str = "a") -> str:

@@ -36,17 +36,12 @@ def count_broken_rules(table: pl.DataFrame, without: pl.DataFrame | None = None)
     marked = table.with_columns(passed=breaks.any().over(KEY))
     named = table.filter(breaks).select(*KEY, rule=pl.col("error_message").str.extract(RULE_NAME)).unique()
     counts = named.group_by("rule").len().sort("len", "rule", descending=[True, False])
-    return BrokenRules(
-        overall(task_scores(marked), 1),
-        dict(counts.iter_rows()),
-        None if without is None else _cost(table, without),
-    )
-
-
-def _cost(table: pl.DataFrame, without: pl.DataFrame) -> Estimate | None:
-    now, before = (pass_at_1(task_scores(each)) for each in (table, without))
-    differences = [(key[0], now[key] - before[key]) for key in now if key in before]
-    return over_tasks(differences, within=DIFFERENCE) if differences else None
+    cost = None
+    if without is not None:
+        now, before = (pass_at_1(task_scores(each)) for each in (table, without))
+        differences = [(key[0], now[key] - before[key]) for key in now if key in before]
+        cost = over_tasks(differences, within=DIFFERENCE) if differences else None
+    return BrokenRules(overall(task_scores(marked), 1), dict(counts.iter_rows()), cost)
 
 
 def broken_rules_data(found: BrokenRules) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections import Counter, defaultdict
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from functools import cache, partial
@@ -166,43 +167,36 @@ def normalised_lines(program: str) -> ProgramLines:
     if not isinstance(tree, ast.Module):
         return _lines(program)
     try:
-        nodes = list(ast.walk(tree))
-        bound = all_bound_names(tree) - {TASK_FUNCTION}
-        numbers = {name: f"name{number}" for number, name in enumerate(_names_in_order(nodes, bound), 1)}
-        for node in nodes:
-            _rename(node, numbers)
-        return _lines(ast.unparse(tree))
+        shape = _Normaliser(all_bound_names(tree) - {TASK_FUNCTION}).visit(deepcopy(tree))
+        return _lines(ast.unparse(shape))
     except (RecursionError, MemoryError, ValueError):
         return _lines(program)
 
 
+NAMES_OF_OTHERS = ast.keyword | ast.alias  # nodes whose names a program does not choose
+
+
+class _Normaliser(ast.NodeTransformer):
+    """Numbers the names that a program binds, and replaces docstrings and other bare strings by `pass`."""
+
+    def __init__(self, bound: Container[str]) -> None:
+        self._bound = bound
+        self._numbers: dict[str, int] = {}
+
+    def visit(self, node: ast.AST) -> ast.AST:
+        for field in ("id", "arg", "name"):
+            name = getattr(node, field, None)
+            if isinstance(name, str) and name in self._bound and not isinstance(node, NAMES_OF_OTHERS):
+                setattr(node, field, f"name{self._numbers.setdefault(name, len(self._numbers) + 1)}")
+        match node:
+            case ast.Expr(ast.Constant(str())):
+                return ast.Pass()
+        visited: ast.AST = self.generic_visit(node)
+        return visited
+
+
 def _lines(text: str) -> ProgramLines:
     return tuple(line.rstrip() for line in text[:MAX_COMPARED_CHARACTERS].splitlines() if line.strip())
-
-
-# The field of each node type that holds a name chosen by the program.
-NAMES_BOUND: Mapping[type[ast.AST], str] = {
-    **dict.fromkeys((ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.ExceptHandler), "name"),
-    ast.Name: "id",
-    ast.arg: "arg",
-}
-NAMES_USED: Mapping[type[ast.AST], str] = {**NAMES_BOUND, ast.MatchAs: "name", ast.MatchStar: "name"}
-
-
-def _names_in_order(nodes: Iterable[ast.AST], bound: Container[str]) -> list[str]:
-    """Return the names that a program binds, except its entry point, in order of appearance."""
-    named = [(node, getattr(node, NAMES_BOUND[type(node)])) for node in nodes if type(node) in NAMES_BOUND]
-    found = sorted((node.lineno, node.col_offset, name) for node, name in named if name in bound)  # type: ignore[attr-defined]  # nodes with names have positions
-    return list(dict.fromkeys(name for _, _, name in found))
-
-
-def _rename(node: ast.AST, numbers: Mapping[str, str]) -> None:
-    """Replace the name in a node, and replace docstrings and other bare strings by `pass`."""
-    if (field := NAMES_USED.get(type(node))) is not None:
-        old = getattr(node, field)
-        setattr(node, field, numbers.get(old, old))
-    elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-        node.value = ast.Name("pass") if isinstance(node.value.value, str) else node.value
 
 
 def similarity(one: Counter[str], other: Counter[str]) -> float:

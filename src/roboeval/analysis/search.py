@@ -1,24 +1,16 @@
-"""Searches the traces of a judged run for a formula, using all cores."""
+"""Searches the traces of a judged run for a formula."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
-from hashlib import sha256
 from typing import Any
 
-import polars as pl
-
 from codebotler.rtl import Formula, Inconclusive, holds, parse
-from roboeval.analysis.counts import completions_of
-from roboeval.evaluation.processes import map_in_processes
-from roboeval.evaluation.runs.completions import KEY, CompletionKey
+from roboeval.evaluation.runs.completions import CompletionKey
 from roboeval.evaluation.runs.rows import key_of
 from roboeval.evaluation.runs.traces import trace_of
-
-ROWS_FOR_PROCESSES = 2_000  # with fewer rows, starting processes takes longer than it saves
 
 
 @dataclass(frozen=True)
@@ -40,35 +32,10 @@ class TraceMatch:
     cut: tuple[tuple[int, str], ...] = ()  # worlds whose trace was too long to be stored
 
 
-def search(lines: Sequence[bytes], query: TraceQuery, *, workers: int = 1) -> Iterator[TraceMatch]:
-    """Match rows against a query and yield the matches in order. Many rows are split among `workers`."""
-    match = partial(match_rows, query=query)
-    if workers == 1 or len(lines) < ROWS_FOR_PROCESSES:
-        return iter(match(lines))
-    return map_in_processes(match, lines, workers=workers, name=lambda line: sha256(line).digest())
-
-
-def count_searched(table: pl.DataFrame, task: str | None) -> int:
-    """Count the judged completions of one task, or of all tasks if it is None."""
-    return completions_of(table if task is None else table.filter(task=task)).height
-
-
-def matches_by_task(found: Sequence[TraceMatch], table: pl.DataFrame) -> pl.DataFrame:
-    """Count for each `task` the completions that were `found`, and how many of these `passed`."""
-    keys = pl.DataFrame(
-        [one.key for one in found], schema={name: table.schema[name] for name in KEY}, orient="row"
-    )
-    verdicts = completions_of(table).select(*KEY, "passed")
-    counted = keys.join(verdicts, on=KEY, how="left", maintain_order="left").group_by(
-        "task", maintain_order=True
-    )
-    return counted.agg(found=pl.len(), passed=pl.col("passed").sum())
-
-
-def match_rows(lines: Sequence[bytes], query: TraceQuery) -> list[TraceMatch]:
-    """Match a batch of rows in a worker process."""
+def search(lines: Iterable[bytes], query: TraceQuery) -> Iterator[TraceMatch]:
+    """Match rows against a query, and yield the matches in order."""
     formula = None if query.formula is None else parse(query.formula)
-    return [match_row(json.loads(line), query, formula) for line in lines]
+    return (match_row(json.loads(line), query, formula) for line in lines)
 
 
 def match_row(row: Mapping[str, Any], query: TraceQuery, formula: Formula | None) -> TraceMatch:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import combinations
 from typing import Any
 
 import polars as pl
@@ -94,36 +93,17 @@ def _by_task(both: pl.DataFrame, order: Iterable[str]) -> Iterator[TaskChanges]:
 # --- ranking
 
 
-def rank(name: str, scores: Mapping[str, float]) -> int:
-    """Return the rank of a run, starting at 1. Runs with equal scores share a rank."""
-    return 1 + sum(score > scores[name] + ROUNDING_ERROR for score in scores.values())
+def ranks(found: Sequence[VerdictChanges]) -> tuple[dict[str, int], dict[str, int]]:
+    """Rank the runs under each suite, starting at 1. Runs with equal scores share a rank."""
+    first, second = ({run.name: run.pass_at_1[side] for run in found} for side in (0, 1))
+    return _ranked(first), _ranked(second)
 
 
-@dataclass(frozen=True)
-class RankChange:
-    """Two runs that are ranked in a different order by two suites, or that tie under only one of them."""
-
-    one: str  # the better run under the second suite, or under the first in case of a tie
-    other: str
-    first: float  # difference in pass@1 under the first suite
-    second: float
-
-
-def rank_changes(found: Sequence[VerdictChanges]) -> list[RankChange]:
-    """Return all pairs of runs whose order changes between the suites."""
-    pairs = (_compare_ranks(one, other) for one, other in combinations(found, 2))
-    return [pair for pair in pairs if _sign(pair.first) != _sign(pair.second)]
-
-
-def _compare_ranks(one: VerdictChanges, other: VerdictChanges) -> RankChange:
-    first, second = (a - b for a, b in zip(one.pass_at_1, other.pass_at_1, strict=True))
-    if (_sign(second), _sign(first)) < (0, 0):
-        return RankChange(other.name, one.name, -first, -second)
-    return RankChange(one.name, other.name, first, second)
-
-
-def _sign(difference: float) -> int:
-    return (difference > ROUNDING_ERROR) - (difference < -ROUNDING_ERROR)
+def _ranked(scores: Mapping[str, float]) -> dict[str, int]:
+    return {
+        name: 1 + sum(other > score + ROUNDING_ERROR for other in scores.values())
+        for name, score in scores.items()
+    }
 
 
 # --- sentences
@@ -155,17 +135,14 @@ def describe_ranking(found: Sequence[VerdictChanges]) -> list[str]:
     if len(found) < 2:  # noqa: PLR2004 - a ranking requires two runs
         return []
     first, second = found[0].suites
-    changes = rank_changes(found)
-    if not changes:
+    before, after = ranks(found)
+    if before == after:
         return [f"The ranking of the {len(found)} runs is the same under {second} as under {first}."]
-    return [
-        f"{pair.one} passes {FREQUENCY_WORDS[_sign(pair.second)]} {pair.other} under {second}, "
-        f"and {FREQUENCY_WORDS[_sign(pair.first)]} it under {first}."
-        for pair in changes
-    ]
+    return [f"Ranking under {first}: {_in_order(before)}; under {second}: {_in_order(after)}."]
 
 
-FREQUENCY_WORDS = {1: "more often than", 0: "as often as", -1: "less often than"}
+def _in_order(places: Mapping[str, int]) -> str:
+    return ", ".join(f"{place} {name}" for name, place in sorted(places.items(), key=lambda one: one[1]))
 
 
 def warn_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
@@ -184,19 +161,17 @@ def changes_data(found: Sequence[VerdictChanges]) -> dict[str, Any]:
     return {
         "suites": [first, second],
         "runs": [_run_data(one, found) for one in found],
-        "overtakings": [asdict(one) for one in rank_changes(found)],
     }
 
 
 def _run_data(one: VerdictChanges, all_of_them: Sequence[VerdictChanges]) -> dict[str, Any]:
-    scores = [{run.name: run.pass_at_1[side] for run in all_of_them} for side in (0, 1)]
     comparison = comparison_data(one.comparison, one.suites)
     return {
         "name": one.name,
         "completions": one.completions,
         "left_out": one.left_out,
         "programs": one.programs,
-        "places": [rank(one.name, side) for side in scores],
+        "places": [places[one.name] for places in ranks(all_of_them)],
         **{name: comparison[name] for name in ("first", "second", "difference", "interval", "p")},
         "tasks": [asdict(task) for task in one.tasks],
         "first_only": list(map(group_data, one.first_only)),

@@ -37,9 +37,6 @@ def find(
     most: Annotated[int, typer.Option("--groups", min=0, help="Number of failure groups to show.")] = 10,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Number of processes; one per core by default.")
-    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Find completions by what they did, and group the failures.
@@ -47,9 +44,8 @@ def find(
     A completion is found if its trace satisfies the formula in some world. Failed completions are grouped by
     the reason.
     """
-    from codebotler.simulator.pool import cores
     from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures
-    from roboeval.analysis.search import TraceQuery, count_searched, matches_by_task, search
+    from roboeval.analysis.search import TraceQuery, search
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import RunFolder, with_judged_worlds
@@ -62,7 +58,7 @@ def find(
     expect_query(query, known, ablated=ablation)
     results = open_current(run, suite, ablated=ablation)
     lines = results.lines
-    every = list(show_progress(search(lines, query, workers=workers or cores()), "searching", len(lines)))
+    every = list(show_progress(search(lines, query), "searching", len(lines)))
     found = [one for one in every if one.worlds]
     passed = {*results.passed}
     failed = [results.row(one.key) for one in found if one.key not in passed]
@@ -72,7 +68,7 @@ def find(
     undecided = [one for one in every if one.cut]
     if undecided:
         note(f"undecided because their traces were too long to save: {how_many(len(undecided))}")
-    total = count_searched(results.table, task)
+    total = sum(task in {None, key[0]} for key in results.places)
     if json:
         data = {
             "looked_at": total,
@@ -81,9 +77,8 @@ def find(
         }
         print_json({**data, "groups": list(map(group_data, described))})
     else:
-        counts = matches_by_task(found, results.table)
         is_search = formula is not None
-        print_rich(found_view(found, counts, total, described, groups=len(together), is_search=is_search))
+        print_rich(found_view(found, passed, total, described, groups=len(together), is_search=is_search))
 
 
 def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:

@@ -27,7 +27,7 @@ def lint(task: Task, verdicts: Sequence[Verdicts], matching: Matching = "label-i
         found += _lint_sampled([asked for world in worlds for asked in world.by_prompt()])
     else:
         found += [*_same_worlds(worlds), *(finding for world in worlds for finding in _lint_listed(world))]
-    distinct = {(finding.name, finding.line): finding for finding in reversed(found)}
+    distinct = {finding.name: finding for finding in reversed(found)}  # the first of each name
     ordered = sorted(distinct.values(), key=lambda finding: (finding.line or 0, finding.name))
     reasons = {accepted.finding: accepted.because for accepted in task.accepted}
     return [*(replace(one, accepted=reasons.get(one.name)) for one in ordered), *_stale(ordered, task)]

@@ -5,17 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from itertools import chain
-from typing import NamedTuple
 
 from codebotler.core.words import counted
-from codebotler.core.world import World
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Claim, Number, Regex, TextPattern, Without, Words
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.regex_words import UNCLEAR
 from codebotler.rtl.wording import is_clear
-from codebotler.simulator.matching import whole_words
 from roboeval.evaluation.failures import failure_of_verdicts
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.linting.clauses import clauses_of
@@ -149,43 +146,26 @@ def _side(requirement: Requirement) -> str:
     return f"not {requirement.check}" if requirement.text.strip().startswith("not ") else requirement.check
 
 
-class SearchedRegex(NamedTuple):
-    """A regex that judging searches for."""
-
-    pattern: str
-    where: str  # the requirement or the world that contains it
-    line: int | None
-
-
 def _slow(task: Task) -> Iterator[Finding]:
-    for pattern, one in {one.pattern: one for one in reversed([*searched_regexes(task)])}.items():
+    for pattern, requirement in searched_regexes(task).items():
         if (text := slow_text(pattern)) is not None:
             message = (
-                f"searching the regex {pattern!r} of {one.where} is slow for long texts, such as one that "
-                f"begins with {text!r}; avoid overlapping repetitions"
+                f'searching the regex {pattern!r} of "{requirement.text}" is slow for long texts, such as '
+                f"one that begins with {text!r}; avoid overlapping repetitions"
             )
-            yield Finding("slow-regex", pattern, message, task.path, one.line)
+            check = next(check for check in task.checks if check.name == requirement.check)
+            yield Finding("slow-regex", pattern, message, task.path, check.line)
 
 
-def searched_regexes(task: Task) -> Iterator[SearchedRegex]:
-    """Yield the regexes in a task's requirements, and those for labels and answers in its worlds."""
-    lines = {check.name: check.line for check in task.checks}
+def searched_regexes(task: Task) -> dict[str, Requirement]:
+    """Return the regexes that judging searches for, each with the first requirement that contains it."""
+    found: dict[str, Requirement] = {}
     for requirement in {one.text: one for one in _required(task)}.values():
         for element in elements(requirement.formula):
             texts = (text for text in (element.text, element.options, element.answer) if text is not None)
             for pattern in chain.from_iterable(map(_compiled, texts)):
-                yield SearchedRegex(pattern, f'"{requirement.text}"', lines[requirement.check])
-    labels = {label: world for world in judged_worlds(task) for label in _labels(world.scenario.world)}
-    for label, world in labels.items():
-        yield SearchedRegex(whole_words(label), world.name, None if task.is_sampled else world.line)
-
-
-def _labels(world: World) -> Iterator[str]:
-    for room in world.rooms:
-        yield from (room.name, *room.objects)
-        for person in room.people:
-            answers = (*person.answers, *chain.from_iterable(person.topics))
-            yield from (text for text in (person.name, *answers) if isinstance(text, str))
+                found.setdefault(pattern, requirement)
+    return found
 
 
 def _compiled(text: TextPattern) -> Iterator[str]:

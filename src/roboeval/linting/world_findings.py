@@ -1,7 +1,7 @@
 """Finds likely mistakes in the requirements of one world: conflicts, implications and dead regexes.
 
-`codebotler.rtl.reasoning` decides whether requirements are unsatisfiable or implied. It first considers only
-visits that each name one room of the world, then any visits.
+`codebotler.rtl.reasoning` decides whether requirements are unsatisfiable or implied, for a robot whose visits
+each name one room of the world.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.words import listed
 from codebotler.core.yaml_files import YamlFile
-from codebotler.rtl import Formula, Regex, TextPattern
+from codebotler.rtl import Regex, TextPattern
 from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.regex_samples import samples
@@ -21,8 +21,6 @@ from codebotler.simulator.matching import Matching, resolve_room
 from roboeval.linting.absent_names import absent_names
 from roboeval.linting.findings import Finding, FindingKind
 from roboeval.suites.load import Requirement, Scenario, Task, TaskCheck
-
-_PLAIN = ", if each visit names one room of the world"
 
 
 @dataclass(frozen=True)
@@ -67,74 +65,49 @@ class JudgedWorld:
         """Yield findings about requirements that cannot hold, or that follow from others."""
         rest = [*self.require]
         try:
-            while (conflict := self._conflict([r.formula for r in rest])) is not None:
-                involved = [r for r in rest if r.formula in conflict[0]]
-                yield self._unsatisfiable(involved, conflict[1])
+            while (conflict := self._reasoner.conflict([r.formula for r in rest])) is not None:
+                involved = [r for r in rest if r.formula in conflict]
+                yield self._unsatisfiable(involved)
                 rest = [r for r in rest if r not in involved]
         except Undecided:
             yield self._undecided(self.name, f"whether {self.name} can be satisfied", self.line)
         for requirement in rest:
             yield from self._implied(requirement, [r for r in rest if r is not requirement])
 
-    def _unsatisfiable(self, involved: Sequence[Requirement], condition: str) -> Finding:
+    def _unsatisfiable(self, involved: Sequence[Requirement]) -> Finding:
         subject = " and ".join(r.text for r in involved)
         together = "" if len(involved) == 1 else " together"
-        message = f'"{subject}" probably cannot hold{together} in {self.name}{condition}'
-        line = involved[-1].line if condition or together else self._line_of_fault(involved[0])
-        return self.finding("unsatisfiable", subject, message, line)
+        message = f'"{subject}" probably cannot hold{together} in {self.name}'
+        return self.finding("unsatisfiable", subject, message, involved[-1].line)
 
     def _implied(self, requirement: Requirement, others: Sequence[Requirement]) -> Iterator[Finding]:
         subject, line = requirement.text, requirement.line
         try:
-            conflict = self._conflict([r.formula for r in others], requirement.formula)
+            premises = self._reasoner.conflict([r.formula for r in others], requirement.formula)
         except Undecided:
             yield self._undecided(subject, f'whether "{subject}" is implied in {self.name}', line)
             return
-        if conflict is not None:
-            premises, condition = conflict
+        if premises is not None:
             reasons = [f'"{r.text}"' for r in others if r.formula in premises]
             unless = f" without breaking {'one of ' * (len(reasons) > 1)}{listed(reasons)}" if reasons else ""
-            message = (
-                f'nothing was found that breaks "{subject}" in {self.name}{unless}'
-                f"{condition}; it may be redundant"
-            )
-            fault = line if reasons or condition else self._line_of_fault(requirement)
-            yield self.finding("implied", subject, message, fault)
+            message = f'nothing was found that breaks "{subject}" in {self.name}{unless}; it may be redundant'
+            yield self.finding("implied", subject, message, line)
 
     def _undecided(self, subject: str, what: str, line: int | None) -> Finding:
         return self.finding("undecided", subject, f"{what} takes too long to decide", line)
 
-    def _line_of_fault(self, requirement: Requirement) -> int | None:
-        """Return the line to fix. A check without parameters is wrong in every world, so this is its line."""
-        check = self._check(requirement)
-        return requirement.line if check.parameters else check.line
-
     def _check(self, requirement: Requirement) -> TaskCheck:
         return next(check for check in self.task.checks if check.name == requirement.check)
 
-    def _conflict(
-        self, formulas: Sequence[Formula], denied: Formula | None = None
-    ) -> tuple[list[Formula], str] | None:
-        """Return formulas that contradict each other or imply the denied one, and under which condition."""
-        conflict = self._plain_moves.conflict(formulas, denied)
-        if conflict is None:
-            return None
-        always = self._any_moves.conflict(formulas, denied)
-        return (conflict, _PLAIN) if always is None else (always, "")
-
     @cached_property
-    def _any_moves(self) -> Reasoner:
-        return Reasoner(r.formula for r in self.require)
-
-    @cached_property
-    def _plain_moves(self) -> Reasoner:
+    def _reasoner(self) -> Reasoner:
         moves = {request: self._room_for(request) or request for request in self._requests}
         return Reasoner((r.formula for r in self.require), moves, self.scenario.world.robot)
 
     def _room_for(self, request: str) -> str | None:
         return resolve_room(self._rooms, request, self.matching)
 
-    @property
+    @cached_property
     def _rooms(self) -> list[str]:
         return [room.name for room in self.scenario.world.rooms]
 

@@ -12,7 +12,7 @@ from roboeval.analysis.breakdown import by_ability, compare_phrasings, compare_r
 from roboeval.analysis.counts import prompt_scores
 from roboeval.evaluation.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES
 from roboeval.report.runs import JudgedRun, tasks_of
-from roboeval.report.sheets import Cell, Prose, Section, Sheet, section, sheet
+from roboeval.report.sheets import Cell, Section, Sheet, section, sheet
 
 NO_INSTRUCTION = "instruction not recorded"
 REPORTING_TASKS = "come back and report"
@@ -21,8 +21,7 @@ MAX_DISTINCT_WORDS = 12
 
 def abilities(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on failures by required ability (paper, section V.B)."""
-    table = report_back_sheet(runs)
-    return section("abilities", ability_sheet(runs), Prose(report_back_sentences(table)), table)
+    return section("abilities", ability_sheet(runs), report_back_sheet(runs))
 
 
 def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -47,17 +46,6 @@ def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
             shares = [count / failed if failed and count is not None else None for count in (away, lost)]
             rows.append([run.name, tasks, completions, passed, failed, away, shares[0], lost, shares[1]])
     return sheet("coming-back", rows)
-
-
-def report_back_sentences(table: Sheet) -> list[str]:
-    """Describe the failures in tasks that end with a report."""
-    return [
-        f"{name}: of {failed:,} failures in tasks that end with a report, "
-        f"{away:,} never returned and {lost:,} went to a room "
-        "that does not exist."
-        for name, tasks, _, _, failed, away, _, lost, _ in table.rows
-        if tasks == REPORTING_TASKS and failed
-    ]
 
 
 # --- phrasing

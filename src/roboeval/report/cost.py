@@ -10,7 +10,7 @@ from roboeval.analysis.metrics import threshold_curve
 from roboeval.analysis.resample import LIMITS, CheckedPrompt, accepted_after, resample
 from roboeval.evaluation.runs.table import Price
 from roboeval.report.curves import draw_accepted, draw_limits, most_completions
-from roboeval.report.runs import JudgedRun
+from roboeval.report.runs import JudgedRun, runs_to_draw
 from roboeval.report.sheets import Cell, ReportFigure, Section, Sheet, section, sheet
 
 
@@ -20,11 +20,25 @@ def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
     points = {name: retry_curves(prompts) for name, prompts in checked.items()}
     shares = {name: accepted_after(prompts, LIMITS[-1]) for name, prompts in checked.items()}
     steps = [[retries, *those] for retries, those in enumerate(zip(*shares.values(), strict=True))]
+    drawn, left_out = runs_to_draw([run for run in runs if run.trials])
+    curves = {run.name: points[run.name] for run in drawn}
+    lines = {run.name: shares[run.name] for run in drawn}
+    retries: list[list[Cell]] = []
+    for name, prompts in checked.items():
+        for at in (resample(prompts, limit) for limit in LIMITS):
+            passed = at.passed.mean, at.passed.low, at.passed.high
+            retries.append([name, at.retries, *passed, at.accepted, at.ran, 1 - at.accepted])
+    thresholds = [
+        [name, limit, *point]
+        for name, of_limits in points.items()
+        for limit, curve in of_limits.items()
+        for point in curve
+    ]
     parts = (
-        ReportFigure("rejection-sampling", lambda: draw_limits(points, most_completions(runs))),
-        retries_sheet(checked),
-        ReportFigure("accepted", lambda: draw_accepted(shares)),
-        curves_sheet(points),
+        ReportFigure("rejection-sampling", lambda: draw_limits(curves, most_completions(runs)), left_out),
+        sheet("rejection-sampling", retries),
+        ReportFigure("accepted", lambda: draw_accepted(lines), left_out),
+        sheet("rejection-sampling-curves", thresholds),
         sheet("accepted", steps, shares=[*shares]),
     )
     return section("rejection-sampling", *(parts if checked else ()))
@@ -34,27 +48,6 @@ def retry_curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float
     """Compute, for each limit on retries, the share of prompts that reach each threshold of pass@1."""
     found = {limit: resample(prompts, limit).by_prompt for limit in LIMITS}
     return {limit: threshold_curve([one.passed for one in each]) for limit, each in found.items()}
-
-
-def retries_sheet(checked: Mapping[str, Sequence[CheckedPrompt]]) -> Sheet:
-    """Build the table of pass@1 by run and limit on retries."""
-    rows: list[list[Cell]] = []
-    for name, prompts in checked.items():
-        for at in (resample(prompts, limit) for limit in LIMITS):
-            passed = at.passed.mean, at.passed.low, at.passed.high
-            rows.append([name, at.retries, *passed, at.accepted, at.ran, 1 - at.accepted])
-    return sheet("rejection-sampling", rows)
-
-
-def curves_sheet(points: Mapping[str, Mapping[int, Sequence[tuple[float, float]]]]) -> Sheet:
-    """Build the table with the points of the rejection sampling curves."""
-    rows = [
-        [name, limit, *point]
-        for name, of_limits in points.items()
-        for limit, curve in of_limits.items()
-        for point in curve
-    ]
-    return sheet("rejection-sampling-curves", rows)
 
 
 # --- tokens, time and money
@@ -75,13 +68,12 @@ def cost_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
 def cost_sentence(run: JudgedRun, prices: Mapping[str, Price]) -> str:
     """Describe the cost per passing program. Return an empty string if no cost was recorded."""
     cost = cost_of(run.table, price_of(run, prices))
-    each = []
-    if cost.money_per_pass is not None:
-        each.append(f"${cost.money_per_pass:.3g}")
-    if cost.tokens_per_pass is not None:
-        each.append(f"{cost.tokens_per_pass:,.0f} tokens")
-    if cost.seconds_per_pass is not None:
-        each.append(f"{cost.seconds_per_pass:,.1f} s")
+    parts = (
+        (cost.money_per_pass, "${:.3g}"),
+        (cost.tokens_per_pass, "{:,.0f} tokens"),
+        (cost.seconds_per_pass, "{:,.1f} s"),
+    )
+    each = [form.format(value) for value, form in parts if value is not None]
     return f"Cost per pass: {', '.join(each)}" if each else ""
 
 

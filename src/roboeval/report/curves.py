@@ -8,7 +8,6 @@ from typing import Any, TypeAlias
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.markers import TICKDOWN
 
 from roboeval.analysis.metrics import threshold_curve
 from roboeval.analysis.resample import LIMITS
@@ -18,18 +17,15 @@ from roboeval.report.drawing import (
     DASHES,
     FOREGROUND,
     MARKERS,
-    MAX_COLOURED_RUNS,
     MAX_LEGEND_NAME,
     PAGE_WIDTH,
-    PALE,
     new_figure,
     share_axis,
     short_name,
 )
 from roboeval.report.runs import JudgedRun
 
-LABELLED_POWERS = (0.1, 0.01, 0.001)  # tick labels of the threshold axis
-MAX_SHORT_AXIS, EXTRA_LABELS = 20, (0.5, 0.2)  # add tick labels if no prompt has more completions than this
+LABELLED_THRESHOLDS = (0.5, 0.2, 0.1, 0.01, 0.001)  # tick labels of the threshold axis
 MIN_LABEL_RATIO = 1.6  # two labels with a smaller ratio would overlap
 
 Points: TypeAlias = Sequence[tuple[float, float]]
@@ -39,10 +35,9 @@ def draw_thresholds(runs: Sequence[JudgedRun]) -> Figure:
     """Draw the share of prompts that reach each threshold of pass@1, with one line per model."""
     most = most_completions(runs)
     lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()]), most) for run in runs}
-    means = [run.mean for run in runs]
-    figure = _plot_lines(lines, means, 2.75, drawstyle="steps-post", markevery=[0, -1])
+    figure = _plot_lines(lines, 2.75, drawstyle="steps-post", markevery=[0, -1])
     _threshold_axes(figure.axes[0], most)
-    _threshold_labels(figure.axes[0], most)
+    _threshold_labels(figure.axes[0])
     return figure
 
 
@@ -54,7 +49,7 @@ def most_completions(runs: Sequence[JudgedRun]) -> int:
 def draw_accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
     """Draw the share of accepted programs by number of retries, with one line per model."""
     lines = {name: [*enumerate(those)] for name, those in shares.items()}
-    figure = _plot_lines(lines, [those[-1] for those in shares.values()], 2.6, markevery=[*LIMITS])
+    figure = _plot_lines(lines, 2.6, markevery=[*LIMITS])
     axes = figure.axes[0]
     axes.set_xscale("symlog", linthresh=1)
     axes.set_xlim(0, LIMITS[-1])
@@ -66,30 +61,15 @@ def draw_accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
     return figure
 
 
-def _plot_lines(
-    lines: Mapping[str, Points],
-    quality: Sequence[float],
-    height: float,
-    **style: Any,  # noqa: ANN401 - passed on to matplotlib
-) -> Figure:
-    """Draw one line per model. If there are too many models, only the best ones are coloured."""
-    is_narrow = len(lines) <= MAX_COLOURED_RUNS
-    columns = 1 if is_narrow and max(len(short_name(name)) for name in lines) > MAX_LEGEND_NAME else 2
-    figure = new_figure(
-        COLUMN_WIDTH if is_narrow else PAGE_WIDTH, height + 0.13 * math.ceil(len(lines) / columns)
-    )
+def _plot_lines(lines: Mapping[str, Points], height: float, **style: Any) -> Figure:  # noqa: ANN401 - for matplotlib
+    """Draw one line per model."""
+    columns = 1 if max(len(short_name(name)) for name in lines) > MAX_LEGEND_NAME else 2
+    figure = new_figure(COLUMN_WIDTH, height + 0.13 * math.ceil(len(lines) / columns))
     axes = figure.add_subplot()
-    best = sorted(range(len(lines)), key=lambda number: -quality[number])[:MAX_COLOURED_RUNS]
-    for number, (name, points) in enumerate(lines.items()):
-        if number not in best:
-            axes.plot(*zip(*points, strict=True), color=PALE, linewidth=0.7, zorder=1, **style)
-            continue
-        at = number if is_narrow else best.index(number)
+    for at, (name, points) in enumerate(lines.items()):
         look = {"linestyle": DASHES[at % len(DASHES)], "marker": MARKERS[at % len(MARKERS)], **style}
         look |= {"color": COLOURS[at], "label": short_name(name), "markersize": 3.2, "clip_on": False}
         axes.plot(*zip(*points, strict=True), **look)
-    if not is_narrow:
-        axes.plot([], [], color=PALE, linewidth=0.7, label=f"{len(lines) - MAX_COLOURED_RUNS} others")
     figure.legend(loc="outside lower center", ncols=columns, handlelength=3.2)
     return figure
 
@@ -105,18 +85,13 @@ def _threshold_axes(axes: Axes, most: int) -> None:
     """Set the scale and labels of a threshold axis. Axes that share it follow."""
     axes.set_xscale("log")
     axes.set_xlim(1, 1 / most)
-    shown = (*(EXTRA_LABELS if most <= MAX_SHORT_AXIS else ()), *LABELLED_POWERS)
-    marked = [mark for mark in shown if mark * most >= MIN_LABEL_RATIO]
+    marked = [mark for mark in LABELLED_THRESHOLDS if mark * most >= MIN_LABEL_RATIO]
     axes.set_xticks([1, *marked, 1 / most], ["1", *(f"{power:g}" for power in marked), f"1/{most}"])
     share_axis(axes)
 
 
-def _threshold_labels(axes: Axes, most: int) -> None:
+def _threshold_labels(axes: Axes) -> None:
     axes.minorticks_off()  # drawing is much faster without minor ticks
-    marks = (digit * power for power in LABELLED_POWERS for digit in range(2, 10))
-    between = [mark for mark in marks if mark > 1 / most]
-    small: dict[str, Any] = {"marker": TICKDOWN, "markersize": 1.5, "markeredgewidth": 0.6}
-    axes.plot(between, [0] * len(between), color=FOREGROUND, clip_on=False, linestyle="none", **small)
     axes.grid(visible=True, axis="y")
     axes.set_xlabel("threshold of pass@1")
     axes.set_ylabel("prompts at or above it")
@@ -124,7 +99,7 @@ def _threshold_labels(axes: Axes, most: int) -> None:
 
 def draw_limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure:
     """Draw the share of prompts that reach each threshold of pass@1, by model and limit on retries."""
-    columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3 if len(curves) <= MAX_COLOURED_RUNS else 5)
+    columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3)
     rows = math.ceil(len(curves) / columns)
     figure = new_figure(PAGE_WIDTH if columns > 1 else COLUMN_WIDTH, 1.75 * rows + 0.55)
     all_axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
@@ -142,7 +117,7 @@ def draw_limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure
                 drawstyle="steps-post",
                 clip_on=False,
             )
-        _threshold_labels(axes, most)
+        _threshold_labels(axes)
         axes.set_title(short_name(name), loc="left")
         axes.label_outer()
     handles, labels = all_axes[0, 0].get_legend_handles_labels()

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import io
-import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap, to_hex
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from codebotler.core.terminal import visible
@@ -22,24 +20,13 @@ PAGE_WIDTH, COLUMN_WIDTH = 7.16, 3.5  # widths of a page and of a column of a pa
 DPI, POINTS = 300, 72  # pixels and points per inch
 
 BACKGROUND, FOREGROUND, PALE, MUTED = "#ffffff", "#1b1b1f", "#d5d5da", "#6f6f78"
-BLACK, WHITE = "#010101", "#fefefe"  # matplotlib omits #000000 from SVG, so `darken` would miss it
 DARKEST_SHADE = "#00507d"  # for a share of 1; a single hue suits colour-blind readers and print
 MIDDLE_SHADE = "#7fb5d5"
-DARK_MIDDLE = "#2b5f80"
-# The colours of data are the same on light and dark pages.
-DARK_COLOURS = {
-    BACKGROUND: "#17181c",
-    FOREGROUND: "#e6e6ea",
-    PALE: "#3d3f47",
-    MUTED: "#8f919b",
-    BLACK: "#ffffff",
-}
 # The palette by Okabe and Ito, whose colours can be told apart by colour-blind readers.
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", BLACK, "#F0E442")
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000", "#F0E442")
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 MAX_FIGURE_NAME = 26
-MAX_COLOURED_RUNS = len(COLOURS)
 MAX_LEGEND_NAME = 16  # characters; two of these names fit side by side below a narrow figure
 
 FIGURE_STYLE: dict[Any, Any] = {
@@ -78,40 +65,12 @@ def render(figure: Figure) -> dict[str, bytes]:
         files["pdf"], format="pdf", metadata=dict.fromkeys(("Creator", "Producer", "CreationDate"))
     )
     figure.savefig(files["svg"], format="svg", metadata=dict.fromkeys(("Creator", "Date")))
-    return {kind: file.getvalue() for kind, file in files.items()} | {"svg": _slim(files["svg"].getvalue())}
+    return {kind: file.getvalue() for kind, file in files.items()}
 
 
-def _slim(svg: bytes) -> bytes:
-    """Shrink an SVG file by removing comments, metadata and repeated definitions of letter shapes."""
-    seen: set[bytes] = set()
-
-    def once(shape: re.Match[bytes]) -> bytes:
-        is_new = shape[1] not in seen
-        seen.add(shape[1])
-        return shape[0] if is_new else b""
-
-    svg = re.sub(rb"<!--.*?-->|<metadata>.*?</metadata>", b"", svg, flags=re.DOTALL)
-    svg = re.sub(rb'<path id="(\w+-[0-9a-f]+)"[^>]*?/>', once, svg, flags=re.DOTALL)
-    return re.sub(rb"<defs>\s*</defs>|\s*\n\s*", b"\n", svg)
-
-
-def shades(paper: str = BACKGROUND, middle: str = MIDDLE_SHADE) -> LinearSegmentedColormap:
+def shades() -> LinearSegmentedColormap:
     """Return the colour map for shares from 0 to 1."""
-    return LinearSegmentedColormap.from_list("shades", [paper, middle, DARKEST_SHADE])
-
-
-@cache
-def dark_colours() -> dict[bytes, bytes]:
-    """Map the colours of a light page to those of a dark one."""
-    light, dark = shades(), shades(DARK_COLOURS[BACKGROUND], DARK_MIDDLE)
-    pairs = {to_hex(light(n)): to_hex(dark(n)) for n in range(light.N)} | DARK_COLOURS
-    return {old.encode(): new.encode() for old, new in pairs.items()}
-
-
-def darken(svg: bytes) -> bytes:
-    """Recolour an SVG file for dark pages."""
-    colours = dark_colours()
-    return re.sub(rb"#[0-9a-f]{6}\b", lambda colour: colours.get(colour[0], colour[0]), svg)
+    return LinearSegmentedColormap.from_list("shades", [BACKGROUND, MIDDLE_SHADE, DARKEST_SHADE])
 
 
 def short_name(name: str, most: int = MAX_FIGURE_NAME) -> str:

@@ -8,11 +8,11 @@ from roboeval.analysis.counts import tally_of
 from roboeval.analysis.failure_groups import FailureGroup, describe_groups, group_failures
 from roboeval.analysis.summary import ALL, Causes, causes, cut_off_replies
 from roboeval.analysis.summary import failures as count_failures
-from roboeval.analysis.verdict_changes import VerdictChanges, rank, sentences, verdict_changes
+from roboeval.analysis.verdict_changes import ranks, sentences, verdict_changes
 from roboeval.evaluation.failures import plural_of
 from roboeval.evaluation.runs.completions import name_of
 from roboeval.report import figures, paper
-from roboeval.report.runs import JudgedRun, coverage_of
+from roboeval.report.runs import JudgedRun, coverage_of, runs_to_draw
 from roboeval.report.sheets import Cell, Groups, Prose, ReportFigure, Section, Sheet, note, section, sheet
 from roboeval.suites.task import check_label
 
@@ -25,10 +25,11 @@ MAX_GROUPS_SHOWN = 200  # number of groups on the page
 
 def causes_section(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
     """Build the section on causes of failures (paper, section V.B)."""
-    found = all_causes(runs, with_published=with_published)
-    figure = ReportFigure("causes", lambda: figures.draw_causes(found), coverage_of(runs))
+    drawn, left_out = runs_to_draw(runs)
+    shown = all_causes(drawn, with_published=with_published)
+    figure = ReportFigure("causes", lambda: figures.draw_causes(shown), [*coverage_of(runs), *left_out])
     notes = Prose(published_notes(runs) if with_published else [])
-    return section("causes", figure, notes, causes_sheet(found))
+    return section("causes", figure, notes, causes_sheet(all_causes(runs, with_published=with_published)))
 
 
 def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple[str, Causes]]:
@@ -95,16 +96,11 @@ def failures_section(runs: Sequence[JudgedRun]) -> Section:
         if len(named) > most:
             notes.append(f"{run.name}: {most:,} of {len(named):,} groups are shown here; the table has all.")
     about = Prose([note("groups"), *notes] if shown else [])
-    return section("failures", about, Groups(shown), groups_sheet(every))
-
-
-def groups_sheet(every: Sequence[tuple[str, FailureGroup]]) -> Sheet:
-    """Build the table of all groups."""
     rows = [
         [name, len(one.members), *_cells(one), one.fix and one.fix.name, one.fix and one.fix.changed]
         for name, one in every
     ]
-    return sheet("failures", rows)
+    return section("failures", about, Groups(shown), sheet("failures", rows))
 
 
 def _cells(one: FailureGroup) -> list[Cell]:
@@ -121,38 +117,20 @@ def other_suite(runs: Sequence[JudgedRun]) -> Section:
     found = [
         verdict_changes(run.name, run.results, run.other_suite) for run in runs if run.other_suite is not None
     ]
-    sheets = changes_sheet(found), changed_tasks_sheet(found), reversals_sheet(found)
-    return section("beside", Prose(sentences(found)), *sheets)
-
-
-def changes_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """Build the table of pass@1 under both suites."""
-    here, there = ({one.name: one.pass_at_1[side] for one in found} for side in (0, 1))
-    rows: list[list[Cell]] = []
+    here, there = ranks(found)
+    scores: list[list[Cell]] = []
+    tasks: list[list[Cell]] = []
+    reversals: list[list[Cell]] = []
     for one in found:
         before, after = one.pass_at_1
-        over = one.comparison.over_tasks
-        ranks = rank(one.name, here), rank(one.name, there)
-        rows.append([one.name, before, after, after - before, over.low, over.high, *ranks])
-    return sheet("beside", rows)
-
-
-def changed_tasks_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """Build the table that counts, for each task, the completions that pass under each suite."""
-    rows = [
-        [task.task, one.name, task.both, task.first_only, task.second_only, task.neither]
-        for one in found
-        for task in one.tasks
-    ]
-    return sheet("beside-tasks", rows)
-
-
-def reversals_sheet(found: Sequence[VerdictChanges]) -> Sheet:
-    """Build the table of groups of completions that pass under only one of two suites."""
-    rows: list[list[Cell]] = []
-    for one in found:
+        over, places = one.comparison.over_tasks, (here[one.name], there[one.name])
+        scores.append([one.name, before, after, after - before, over.low, over.high, *places])
+        for task in one.tasks:
+            counts = task.both, task.first_only, task.second_only, task.neither
+            tasks.append([task.task, one.name, *counts])
         sides = zip(one.suites, (one.first_only, one.second_only), strict=True)
         those = [(suite, group) for suite, groups in sides for group in groups]
         for suite, group in sorted(those, key=lambda pair: -len(pair[1].members)):
-            rows.append([one.name, f"{suite} only", len(group.members), *_cells(group)])
-    return sheet("reversals", rows)
+            reversals.append([one.name, f"{suite} only", len(group.members), *_cells(group)])
+    sheets = sheet("beside", scores), sheet("beside-tasks", tasks), sheet("reversals", reversals)
+    return section("beside", Prose(sentences(found)), *sheets)

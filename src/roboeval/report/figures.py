@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import cycle
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -21,12 +21,10 @@ from roboeval.report.drawing import (
     BACKGROUND,
     COLOURS,
     FOREGROUND,
-    MAX_COLOURED_RUNS,
     MAX_LEGEND_NAME,
     MUTED,
     PAGE_WIDTH,
     PALE,
-    WHITE,
     new_figure,
     shades,
     share_axis,
@@ -39,11 +37,7 @@ TASKS_PER_ROW = 8
 MIN_TASK_SLOTS = 4  # minimum width in tasks, so that a single bar does not fill the page
 BAR_FILL = 0.82  # share of a task's width that its bars fill
 MAX_PANELS_PER_ROW = 3  # leaves enough room for the labels between panels
-MAX_NUMBERED_CELLS = 14  # tables with more rows or columns have no numbers in their cells
 DARK_CELL_SHARE = 0.75  # cells with a larger share have white text
-
-Cells: TypeAlias = Sequence[Sequence[float | None]]
-
 
 # --- pass@1 by run, and by task
 
@@ -79,8 +73,6 @@ def draw_task_scores(runs: Sequence[JudgedRun]) -> Figure:
     tasks = tasks_of(runs)
     judged = {score.task for run in runs for score in run.ablated_scores}
     ablated = [task for task in runs[0].suite.tasks if task in judged]
-    if len(runs) > MAX_COLOURED_RUNS:
-        return _heat_of_tasks(runs, tasks, ablated)
     lines = math.ceil(len(tasks) / TASKS_PER_ROW)
     sides = [("(a) all requirements", [run.scores for run in runs], _in_lines(tasks, lines))]
     if ablated:
@@ -156,33 +148,14 @@ def _two_lines(task: str) -> str:
     return "\n".join(short_name(part, 14) for part in (task[:last], task[last:]) if part)
 
 
-def _heat_of_tasks(runs: Sequence[JudgedRun], tasks: Sequence[str], ablated: Sequence[str]) -> Figure:
-    """Draw pass@1 by task as a heat map with one row per model, because bars would need too many colours."""
-    figure = new_figure(PAGE_WIDTH, 1.3 + 0.16 * len(runs))
-    widths = [len(tasks), *([len(ablated)] if ablated else [])]
-    grid = figure.add_gridspec(1, len(widths), width_ratios=widths)
-    names = [short_name(run.name) for run in runs]
-    draw_heat_map(figure.add_subplot(grid[0, 0]), [_means(run.scores, tasks) for run in runs], names, tasks)
-    if ablated:
-        axes = figure.add_subplot(grid[0, 1])
-        cells = [_means(run.ablated_scores, ablated) for run in runs]
-        draw_heat_map(axes, cells, [""] * len(runs), ablated)
-        axes.set_title("common sense only", loc="left")
-    return figure
-
-
-def _means(scores: Sequence[TaskScore], tasks: Sequence[str]) -> list[float | None]:
-    means = {score.task: score.pass_at(1).mean for score in scores}
-    return [means.get(task) for task in tasks]
-
-
 # --- tables of shares
 
 
-def draw_heat_map(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequence[str]) -> None:
-    """Draw shares as a heat map, with numbers if they fit."""
-    shown = np.ma.masked_invalid(np.array(cells, dtype=float))
-    axes.pcolormesh(shown, cmap=shades(), vmin=0, vmax=1, edgecolors=BACKGROUND, linewidth=0.6)
+def draw_heat_map(
+    axes: Axes, cells: Sequence[Sequence[float]], rows: Sequence[str], columns: Sequence[str]
+) -> None:
+    """Draw shares as a heat map with numbers."""
+    axes.pcolormesh(np.array(cells), cmap=shades(), vmin=0, vmax=1, edgecolors=BACKGROUND, linewidth=0.6)
     axes.invert_yaxis()
     middles = [at + 0.5 for at in range(max(len(rows), len(columns)))]
     axes.set_xticks(middles[: len(columns)], columns, rotation=38, ha="right", rotation_mode="anchor")
@@ -190,14 +163,11 @@ def draw_heat_map(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequen
     axes.tick_params(left=False, bottom=False, length=0)
     axes.spines[:].set_color(PALE)
     axes.spines[:].set_visible(True)
-    if len(columns) > MAX_NUMBERED_CELLS:
-        return
     for y, shares in zip(middles, cells, strict=False):
         for x, share in zip(middles, shares, strict=False):
-            if share is not None:
-                colour = MUTED if share == 0 else FOREGROUND if share < DARK_CELL_SHARE else WHITE
-                cell = axes.text(x, y, percent(share), ha="center", va="center", color=colour, fontsize=6)
-                cell.set_in_layout(False)  # the text is inside the axes, so layout may ignore it
+            colour = MUTED if share == 0 else FOREGROUND if share < DARK_CELL_SHARE else BACKGROUND
+            cell = axes.text(x, y, percent(share), ha="center", va="center", color=colour, fontsize=6)
+            cell.set_in_layout(False)  # the text is inside the axes, so layout may ignore it
 
 
 def draw_causes(found: Sequence[tuple[str, Causes]]) -> Figure:
@@ -206,11 +176,10 @@ def draw_causes(found: Sequence[tuple[str, Causes]]) -> Figure:
     shown = classes_to_show(happened)
     kinds = {name: kinds_in_order([one for _, one in found], name) for name in shown}
     tallest = max(3, *map(len, kinds.values()))
-    many = len(found) > MAX_NUMBERED_CELLS
-    longest = 0 if many else max(len(short_name(name, 18)) for name, _ in found)
+    longest = max(len(short_name(name, 18)) for name, _ in found)
     # Leave room below the panels for the slanted names of models.
-    below = 0.95 + (0.13 * len(found) if many else 0.155 * tallest) + 0.04 * max(0, longest - 8)
-    columns = len(shown) if many or len(shown) <= MAX_PANELS_PER_ROW else 2
+    below = 0.95 + 0.155 * tallest + 0.04 * max(0, longest - 8)
+    columns = len(shown) if len(shown) <= MAX_PANELS_PER_ROW else 2
     lines = math.ceil(len(shown) / columns)
     heights = [1.05 + 0.2 * len(found), below * lines]
     figure = new_figure(PAGE_WIDTH, sum(heights))
@@ -219,12 +188,12 @@ def draw_causes(found: Sequence[tuple[str, Causes]]) -> Figure:
     _classes(axes, found, shown)
     legend = {"ncols": max(4, 1 + len(shown)), "handlelength": 1.4}
     upper.legend(*axes.get_legend_handles_labels(), loc="outside lower center", **legend)
-    panels = lower.subplots(lines, columns, squeeze=False, sharey=many).flat
+    panels = lower.subplots(lines, columns, squeeze=False).flat
     for axes in panels[len(shown) :]:
         axes.set_visible(False)
     for axes, letter, name in zip(panels, "bcdefgh", shown, strict=False):
         axes.set_title(f"({letter}) {plural_of(name)}", loc="left")
-        _kinds(axes, found, name, kinds[name], many=many)
+        _kinds(axes, found, name, kinds[name])
     return figure
 
 
@@ -256,24 +225,17 @@ def _looks() -> dict[str, tuple[str, str]]:
     return {PASSED: (PALE, ""), NO_PROGRAM_CLASS: (MUTED, ""), **looks}
 
 
-def _kinds(
-    axes: Axes, found: Sequence[tuple[str, Causes]], cause: str, kinds: Sequence[str], *, many: bool
-) -> None:
-    shown_runs = [(short_name(name, 18), one) for name, one in found if many or one.kinds.get(cause)]
+def _kinds(axes: Axes, found: Sequence[tuple[str, Causes]], cause: str, kinds: Sequence[str]) -> None:
+    shown_runs = [(short_name(name, 18), one) for name, one in found if one.kinds.get(cause)]
     if not kinds:
         axes.text(0.5, 0.5, "none", ha="center", va="center", transform=axes.transAxes)
         axes.set_xticks([])
         axes.set_yticks([])
         return
-    shares = [one.kinds.get(cause) for _, one in shown_runs]
-    cells = [[each.get(kind, 0.0) if each else None for kind in kinds] for each in shares]
+    cells = [[one.kinds[cause].get(kind, 0.0) for _, one in shown_runs] for kind in kinds]
     counts = [one.counts.get((cause, ALL)) for _, one in shown_runs]
     names = [
         name if count is None else f"{name} (n = {count:,})"
         for (name, _), count in zip(shown_runs, counts, strict=True)
     ]
-    labels = [short_name(kind, 24) for kind in kinds]
-    if many:
-        draw_heat_map(axes, cells, names, labels)
-    else:
-        draw_heat_map(axes, [*zip(*cells, strict=True)], labels, names)
+    draw_heat_map(axes, cells, [short_name(kind, 24) for kind in kinds], names)

@@ -18,7 +18,6 @@ from roboeval.report.sheets import (
     Card,
     Cards,
     Cell,
-    Code,
     Column,
     Groups,
     Part,
@@ -38,8 +37,7 @@ LONG_CELL = 70  # characters; longer cells are wrapped
 PAGE_STYLE = Path(__file__).with_name("page.css")
 PAGE_SCRIPT = Path(__file__).with_name("page.js")
 GENERATOR = '<meta name="generator" content="RoboEval">'  # marks a page as a report
-DrawnFigure = tuple[bytes, bytes]  # SVG files for light and dark pages
-DrawnFigures = Mapping[str, DrawnFigure]
+DrawnFigures = Mapping[str, bytes]  # SVG files by name
 
 
 def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawings: DrawnFigures) -> str:
@@ -93,8 +91,6 @@ def _part(part: Part, drawings: DrawnFigures) -> str:
             return _figure(part, drawings)
         case Prose(paragraphs):
             return "".join(f"<p>{_prose(words)}</p>\n" for words in paragraphs)
-        case Code(text):
-            return f"<pre>{_text(text)}</pre>\n"
         case Cards(cards):
             return f'<div class="cards">{"".join(map(_card, cards))}</div>\n'
         case Groups(shown):
@@ -124,15 +120,13 @@ def _card(card: Card) -> str:
 def _figure(figure: ReportFigure, drawings: DrawnFigures) -> str:
     if figure.name not in drawings:
         return ""
-    links = (base64.b64encode(svg).decode() for svg in drawings[figure.name])
-    light, dark = (f"data:image/svg+xml;base64,{link}" for link in links)
+    link = f"data:image/svg+xml;base64,{base64.b64encode(drawings[figure.name]).decode()}"
     caption = _text(" ".join([page_text("figures", figure.name), *figure.about]))
     name = _text(figure.name)
     return (
         f'<figure id="figure-{name}">'
-        f'<div class="wide" tabindex="0" role="region" aria-label="Figure: {name}"><picture>'
-        f'<source media="screen and (prefers-color-scheme: dark)" srcset="{dark}">'
-        f'<img src="{light}" alt="{caption}"></picture></div>'
+        f'<div class="wide" tabindex="0" role="region" aria-label="Figure: {name}">'
+        f'<img src="{link}" alt="{caption}"></div>'
         f'<figcaption>{caption} <span class="files">figures/{name}.pdf, .png</span>'
         "</figcaption></figure>\n"
     )

@@ -20,6 +20,7 @@ from roboeval.report.drawing import short_name
 from roboeval.suites.load import Suite
 
 MAX_RUN_NAME = 100
+MAX_DRAWN_RUNS = 8  # readers cannot tell apart more colours
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +101,13 @@ def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
     """Return the tasks that have completions in any run, in the order of the suite."""
     judged = {score.task for run in runs for score in run.scores}
     return [task for task in dict.fromkeys([*runs[0].suite.tasks, *sorted(judged)]) if task in judged]
+
+
+def runs_to_draw(runs: Sequence[JudgedRun]) -> tuple[list[JudgedRun], list[str]]:
+    """Return the best runs that fit into a figure, and a sentence for its caption if others are left out."""
+    best = sorted(runs, key=lambda run: -run.mean)[:MAX_DRAWN_RUNS]
+    left_out = [f"Only the {len(best)} best of {len(runs)} runs are shown."] if len(best) < len(runs) else []
+    return [run for run in runs if run in best], left_out
 
 
 def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:

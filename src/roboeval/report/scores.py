@@ -25,7 +25,7 @@ from roboeval.analysis.missions import has_missions
 from roboeval.analysis.statistics import MIN_CLUSTERS, by_bootstrap
 from roboeval.report import figures, paper
 from roboeval.report.curves import draw_thresholds
-from roboeval.report.runs import JudgedRun, coverage_of, tasks_of
+from roboeval.report.runs import JudgedRun, coverage_of, runs_to_draw, tasks_of
 from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, note, section, sheet
 
 
@@ -33,7 +33,8 @@ def results(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on pass@1 by run and task."""
     coverage = coverage_of(runs)
     by_run = ReportFigure("overall", lambda: figures.draw_overall(runs), coverage)
-    by_task = ReportFigure("tasks", lambda: figures.draw_task_scores(runs), coverage)
+    drawn, left_out = runs_to_draw(runs)
+    by_task = ReportFigure("tasks", lambda: figures.draw_task_scores(drawn), [*coverage, *left_out])
     return section("results", by_run, overall_sheet(runs), by_task, task_sheet(runs))
 
 
@@ -49,16 +50,7 @@ def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         counts = coverage.judged, coverage.total, len(run.by_prompt), len(tasks)
         rows.append([run.name, *counts, found[0].mean, *ends])
     missions = [note("missions")] if any(has_missions(run.table) for run in runs) else []
-    return sheet("overall", rows, notes=[*missions, *_unknown(runs), *_few_tasks(runs), *_unfinished(runs)])
-
-
-def _unknown(runs: Sequence[JudgedRun]) -> list[str]:
-    found = ((run.name, overall(run.scores, 1)) for run in runs)
-    return [
-        f"{name}: the interval over tasks is {passed.ends()}."
-        for name, passed in found
-        if not passed.is_known
-    ]
+    return sheet("overall", rows, notes=[*missions, *_few_tasks(runs), *_unfinished(runs)])
 
 
 def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
@@ -103,7 +95,9 @@ def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
 
 def thresholds(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on the share of prompts that reach each pass@1 (paper, section V.A)."""
-    return section("thresholds", ReportFigure("thresholds", lambda: draw_thresholds(runs)), curve_sheet(runs))
+    drawn, left_out = runs_to_draw(runs)
+    figure = ReportFigure("thresholds", lambda: draw_thresholds(drawn), left_out)
+    return section("thresholds", figure, curve_sheet(runs))
 
 
 def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -154,11 +148,7 @@ def leader(runs: Sequence[JudgedRun]) -> list[str]:
 
 def prompts(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on pass@1 by prompt, with the published results."""
-    unknown = ", ".join(run.name for run in runs if paper.model_of(run) is None)
-    published = paper.published_sheet(runs)
-    nothing = f"The paper has no results for {unknown}."
-    prose = Prose([nothing] if unknown and published.rows else [])
-    return section("prompts", prompt_sheet(runs), published, prose)
+    return section("prompts", prompt_sheet(runs), paper.published_sheet(runs))
 
 
 def prompt_sheet(runs: Sequence[JudgedRun]) -> Sheet:

@@ -79,12 +79,6 @@ class Prose(NamedTuple):
     paragraphs: Sequence[str]
 
 
-class Code(NamedTuple):
-    """Preformatted text, such as a command."""
-
-    text: str
-
-
 class Groups(NamedTuple):
     """Groups of similar failures, each with the name of a run."""
 
@@ -108,7 +102,7 @@ class Cards(NamedTuple):
     cards: Sequence[Card]
 
 
-Part: TypeAlias = Sheet | ReportFigure | Prose | Code | Groups | Cards
+Part: TypeAlias = Sheet | ReportFigure | Prose | Groups | Cards
 
 
 class Section(NamedTuple):

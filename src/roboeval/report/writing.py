@@ -14,14 +14,13 @@ from roboeval.evaluation.requests import batches
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.evaluation.runs.table import Price
 from roboeval.report import breakdown, cost, failures, house, modes, question, scores
-from roboeval.report.drawing import darken, render, use_style
-from roboeval.report.page import GENERATOR, DrawnFigure, page
+from roboeval.report.drawing import render, use_style
+from roboeval.report.page import GENERATOR, page
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import (
     Card,
     Cards,
     Cell,
-    Code,
     Prose,
     ReportFigure,
     Section,
@@ -40,7 +39,9 @@ GENERATOR_WITHIN = 4_000  # bytes at the start of a page that are searched for i
 
 def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
     """Return the title of a report and its introductory paragraphs."""
-    title = runs[0].name if len(runs) == 1 else _models(runs)
+    models = {run.model for run in runs}
+    one_model = len(models) == 1 and runs[0].model
+    title = runs[0].name if len(runs) == 1 else one_model or f"{len(models)} models"
     each = [run.results.coverage for run in runs]
     count = Coverage(
         *(sum(counts) for counts in zip(*((c.judged, c.there, c.total) for c in each), strict=True))
@@ -98,14 +99,9 @@ def glance(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
     return section("glance", Cards(cards), Prose(scores.leader(runs)))
 
 
-def _models(runs: Sequence[JudgedRun]) -> str:
-    models = {run.model for run in runs}
-    return str(runs[0].model) if len(models) == 1 and runs[0].model else f"{len(models)} models"
-
-
 def origin(runs: Sequence[JudgedRun], command: str) -> Section:
     """Build the section on the runs, the suite, and the command that reproduces the report."""
-    return section("origin", origin_sheet(runs), Prose(about_suite(runs)), Code(command))
+    return section("origin", origin_sheet(runs), Prose([*about_suite(runs), f"`{command}`"]))
 
 
 def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -147,7 +143,7 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
     (out / "tables").mkdir(parents=True, exist_ok=True)
     if not (out / PAGE_FILE).exists():
         write_whole(out / PAGE_FILE, page(title, UNFINISHED, [], {}).encode())
-    drawings: dict[str, DrawnFigure] = {}
+    drawings: dict[str, bytes] = {}
     for part in parts:
         if isinstance(part, Sheet):
             write_csv(part, out / "tables")
@@ -184,9 +180,9 @@ def pieces(sections: Sequence[Section]) -> int:
     return 1 + sum(isinstance(part, Sheet | ReportFigure) for section in sections for part in section.parts)
 
 
-def _draw(figure: ReportFigure, folder: Path) -> DrawnFigure:
+def _draw(figure: ReportFigure, folder: Path) -> bytes:
     with use_style():
         files = render(figure.draw())
     for kind in FIGURE_FORMATS:
         write_whole(folder / f"{figure.name}.{kind}", files[kind])
-    return files["svg"], darken(files["svg"])
+    return files["svg"]

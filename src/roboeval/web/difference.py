@@ -23,13 +23,11 @@ from roboeval.analysis.missions import has_missions
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of
 from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.snapshot import Snapshot
-from roboeval.web.widgets import interval_text
 
 MAX_PAIR_TASKS, MAX_DIFFERING = 100, 30
 RUNS_IN_PAIR = 2
 DIFFERENCE_HEADS = ("95% confidence interval", "Different verdicts")
 INTERVAL_NOTE = "The interval for all tasks is over tasks; other intervals are over the prompts of a task."
-UNKNOWN_NOTE = " An interval is unknown if there is only one prompt or no variation."
 
 
 @dataclass(frozen=True)
@@ -118,8 +116,7 @@ def _draw_difference(difference: Difference) -> None:
         with html.tbody():
             for row in (overall, *rows):
                 _draw_row(row, runs)
-    is_unknown = any(not row.difference.is_known for row in rows)
-    PlainText("p", INTERVAL_NOTE + UNKNOWN_NOTE * is_unknown, "quiet")
+    PlainText("p", INTERVAL_NOTE, "quiet")
 
 
 def _draw_row(row: TaskRow, runs: Sequence[Snapshot]) -> None:
@@ -129,7 +126,7 @@ def _draw_row(row: TaskRow, runs: Sequence[Snapshot]) -> None:
         for share in row.shares:
             PlainText("td", f"{share:.2f}", "number")
         PlainText("td", f"{estimate.mean:+.2f}", "number strong")
-        PlainText("td", interval_text(estimate, "+.2f"), "number")
+        PlainText("td", estimate.ends("+.2f"), "number")
         with html.td():
             if row.differing:
                 _draw_differing(row, runs)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
-from datetime import datetime
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -16,28 +15,21 @@ from codebotler.web.frame import Button, PlainText, outside
 from roboeval.analysis.metrics import Estimate
 from roboeval.web.heat_map import MAX_NAME, MISSING, run_address
 from roboeval.web.serializers import RunList
-from roboeval.web.widgets import REFRESH_SECONDS, count_text, date_text, interval_text, show_state, tasks_text
+from roboeval.web.widgets import REFRESH_SECONDS, count_text, date_text, show_state, tasks_text
 
 MAX_READ_SECONDS = 0.5  # seconds to wait before the page shows runs that are not read yet
 
-SortKey: TypeAlias = Callable[[Mapping[str, Any]], tuple[float, str]]
+SortKey: TypeAlias = Callable[[Mapping[str, Any]], Any]
 SORT_ORDERS: Mapping[str, tuple[str, SortKey]] = {
-    "Run": ("ascending", lambda run: (0, run["run"].lower())),
-    "pass@1": ("descending", lambda run: (-(run.get("pass@1") or {"mean": -1})["mean"], run["run"])),
-    "Started": ("descending", lambda run: (-_moment(run.get("date")), run["run"])),
-    "Completions": ("descending", lambda run: (-run.get("completions", 0), run["run"])),
+    "Run": ("ascending", lambda run: run["run"].lower()),
+    "pass@1": ("descending", lambda run: (run.get("pass@1") or {"mean": -1})["mean"]),
+    "Started": ("descending", lambda run: run.get("date") or ""),
+    "Completions": ("descending", lambda run: run.get("completions", 0)),
 }
 TABLE_HEADS = ("Run", "Suite", "Tasks", "State", "Completions", "pass@1", "Started")
 TABLE_NOTE = "pass@1 with its 95% confidence interval over tasks; times are in UTC."
 NO_RUNS_SENTENCE = "There are no runs yet. This command creates one without an API key or a network:"
 EXAMPLE_COMMAND = "run --model recorded:hasty --num-completions 3"
-
-
-def _moment(date: str | None) -> float:
-    try:
-        return 0.0 if date is None else datetime.fromisoformat(date).timestamp()
-    except ValueError:
-        return 0.0
 
 
 async def draw_runs(folder: Path, runs: RunList) -> None:
@@ -92,7 +84,9 @@ class _Table:
             self._show(data, self._order)
 
     def _show(self, data: list[dict[str, Any]], order: str) -> None:
-        self._data, self._order = sorted(data, key=SORT_ORDERS[order][1]), order
+        direction, key = SORT_ORDERS[order]
+        by_name = sorted(data, key=lambda run: run["run"])
+        self._data, self._order = sorted(by_name, key=key, reverse=direction == "descending"), order
         for name, head in self._heads.items():
             head.props(f"aria-sort={SORT_ORDERS[name][0] if name == order else 'none'}")
         self._empty.set_visibility(not data)
@@ -147,6 +141,6 @@ class _RunRow:
         self._count.say(count_text(run))
         mean = run.get("pass@1")
         self._score.say(MISSING if mean is None else f"{mean['mean']:.3f}")
-        self._interval.say("" if mean is None else interval_text(Estimate(**mean)))
+        self._interval.say("" if mean is None else Estimate(**mean).ends(".2f"))
         self._meter.set_visibility(mean is not None)
         self._meter.style(f"--share: {0 if mean is None else mean['mean']:.3f}")

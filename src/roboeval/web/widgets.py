@@ -130,11 +130,6 @@ def date_text(data: Mapping[str, Any]) -> str:
     return (data.get("date") or MISSING)[:16].replace("T", " ")
 
 
-def interval_text(estimate: Estimate, form: str = ".2f") -> str:
-    """Format an interval briefly."""
-    return estimate.ends(form) if estimate.is_known else "interval unknown"
-
-
 def score_text(data: Mapping[str, Any]) -> str:
     """Format pass@1 of a run. Return an empty string if nothing was judged."""
     mean = data.get("pass@1")

@@ -23,7 +23,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import read_world
 from codebotler.prompts import prompt_for
 from codebotler.rtl import RtlSyntaxError, holds, parse
-from codebotler.rtl.syntax import LAST_LOOKS, LOOK_RESULTS, QUESTIONS, TEXT_WORDS, WRAPPERS
+from codebotler.rtl.syntax import LAST_LOOKS, LOOK_RESULTS, QUESTIONS, TEXT_WORDS, WRAPPED_FIELDS
 from codebotler.simulator.house_rule import Rule, RuleViolationError
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
@@ -191,7 +191,7 @@ def test_formulas_compare_all_arguments_and_results(every: SkillTable, formula: 
 
 
 def test_names_that_formulas_use_otherwise_are_refused() -> None:
-    assert {*WRAPPERS, *LOOK_RESULTS, *LAST_LOOKS, *QUESTIONS, *TEXT_WORDS, INSIDE, "tr"} == RTL_WORDS
+    assert {*WRAPPED_FIELDS, *LOOK_RESULTS, *LAST_LOOKS, *QUESTIONS, *TEXT_WORDS, INSIDE, "tr"} == RTL_WORDS
 
 
 SWITCHES = """

@@ -40,10 +40,6 @@ def elements_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.EventPatt
         drawn = draw(anything)
         if drawn.kind == "ask" and draw(st.booleans()):
             drawn = replace(drawn, to=draw(texts))
-        if drawn.kind == "ask" and draw(st.integers(0, 2)) == 0:
-            drawn = replace(
-                drawn, offers=draw(st.sampled_from([(0, 0), (1, 1), (1, None), (2, 3), (2, None)]))
-            )
         if draw(st.integers(0, 3)) == 0:
             drawn = replace(drawn, holding=draw(texts))
         return replace(drawn, place=draw(patterns)) if draw(st.booleans()) else drawn

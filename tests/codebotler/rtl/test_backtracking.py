@@ -122,7 +122,7 @@ def test_the_functions_that_read_texts_take_linear_time(name: str) -> None:
 @pytest.mark.parametrize("suite", ["paper", "plus"])
 def test_the_regexes_of_a_suite_take_linear_time(suite: str) -> None:
     tasks = load_suite(suite).tasks.values()
-    found = {one.pattern for task in tasks for one in searched_regexes(task)}
+    found = {pattern for task in tasks for pattern in searched_regexes(task)}
     assert len(found) > 50
     assert not {pattern for pattern in found if slow_text(pattern) is not None}
 

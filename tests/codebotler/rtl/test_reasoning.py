@@ -14,7 +14,6 @@ from codebotler.rtl.formulas import EventPattern, ScopeName
 from codebotler.rtl.reasoning import (
     Reasoner,
     Undecided,
-    are_equivalent,
     conflict,
     distinguishing_trace,
     is_implied,
@@ -48,8 +47,6 @@ A, B = Regex("a"), Regex("b")
         EventPattern("ask", A, found=True),
         EventPattern("ask", A, holding=A),
         EventPattern("ask", A, to=A),
-        EventPattern("ask", A, offers=(1, 1)),
-        EventPattern("ask", A, A, offers=(2, None)),
         EventPattern("ask", A, more=(A, B)),
         EventPattern("ask", A, A, place="b", answer=B, found=False, holding=B, to=B, more=(B,)),
     ],
@@ -145,7 +142,6 @@ def test_whether_formulas_mean_the_same_and_what_tells_them_apart(
     one: str, other: str, length: int | None
 ) -> None:
     first, second = parse(one), parse(other)
-    assert are_equivalent(first, second) == (length is None)
     trace = distinguishing_trace(first, second)
     assert (None if trace is None else len(trace)) == length
     assert trace is None or holds(first, trace) != holds(second, trace)
@@ -155,7 +151,6 @@ def test_whether_formulas_mean_the_same_and_what_tells_them_apart(
     "ask",
     [
         *(is_satisfiable, satisfying_trace, conflict, is_implied),
-        lambda formula: are_equivalent(formula, SPEAKS),
         lambda formula: distinguishing_trace(SPEAKS, formula),
     ],
 )
@@ -256,7 +251,6 @@ def single_tests() -> st.SearchStrategy[str]:
                 'ask("x", "y")',
             ),
             *('found("x")', 'missed("x")', 'holding("x", goto("a"))', 'to("x", ask(".*", "y"))'),
-            *('options(2, mention("x"))', 'options(0, 1, ask(".*", "y"))'),
         ]
     )
     scope = st.builds("{}({})".format, st.sampled_from(get_args(ScopeName)), elements)
@@ -291,29 +285,6 @@ def test_options_may_match_what_no_single_one_can() -> None:
         'tr.Exists(ask("^yes$", ".*")) and tr.Exists(ask("^no$", ".*")) and tr.Count(ask(".*", ".*"), 1)'
     )
     assert not is_satisfiable(none)
-
-
-@pytest.mark.parametrize(
-    ("text", "numbers"),
-    [
-        ('tr.Exists(options(3, mention(".*")))', {3}),
-        ('tr.Exists(options(3, mention("tea"))) and not tr.Exists(options(4, mention(".*")))', {3}),
-        ('tr.Exists(ask(".*", ".*")) and not tr.Exists(options(3, 5, mention(".*")))', {1, 2, 6}),
-        ('tr.Exists(mention("x")) and not tr.Exists(options(1, mention(".*")))', {0}),
-        ('tr.Exists(options(0, 0, mention("x"))) and tr.Exists(options(0, 0, ask(".*", ".*")))', None),
-        ('tr.Exists(options(3, mention("tea"))) and not tr.Exists(options(2, mention("tea")))', None),
-        ('tr.Exists(options(2, mention("a"))) and tr.Count(options(0, 1, mention("a")), 1)', {1, 2}),
-        ('tr.Last(options(2, mention("a"))) and tr.Last(options(0, 1, ask(".*", "a")))', None),
-    ],
-)
-def test_how_many_options_a_question_may_have(text: str, numbers: set[int] | None) -> None:
-    trace = satisfying_trace(parse(text))
-    if numbers is None:
-        assert trace is None
-    else:
-        assert trace is not None
-        assert holds(parse(text), trace)
-        assert {len(event.options) for event in trace} <= numbers
 
 
 def test_a_conflict_holds_no_more_than_it_must() -> None:

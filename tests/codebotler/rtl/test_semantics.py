@@ -90,10 +90,6 @@ def same(element: EventPattern, placed: tuple[int, Event]) -> bool:
             return False
     if element.found is not None and event.found is not element.found:
         return False
-    if element.offers is not None:
-        least, most = element.offers
-        if len(event.options) < least or (most is not None and len(event.options) > most):
-            return False
     return matches_text(element, event, at)
 
 

@@ -34,8 +34,8 @@ def found(question: TraceQuery, rows: list[dict[str, Any]] | None = None) -> lis
     return [one for one in search(ROWS if rows is None else rows, question) if one.worlds]
 
 
-def search(rows: list[dict[str, Any]], question: TraceQuery, *, workers: int = 1) -> list[TraceMatch]:
-    return [*searching.search(list(map(to_line, rows)), question, workers=workers)]
+def search(rows: list[dict[str, Any]], question: TraceQuery) -> list[TraceMatch]:
+    return [*searching.search(map(to_line, rows), question)]
 
 
 HALL = 'tr.Exists(goto("hall"))'
@@ -66,12 +66,6 @@ def test_what_cannot_be_judged_does_not_match() -> None:
 
 
 @pytest.mark.slow
-def test_other_processes_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(searching, "ROWS_FOR_PROCESSES", 50)
-    rows = [{**ROWS[n % 4], "index": n} for n in range(50)]
-    assert search(rows, TraceQuery(HALL), workers=2) == search(rows, TraceQuery(HALL))
-
-
 def test_places_are_those_of_the_row_and_not_of_requests() -> None:
     formula = 'tr.Exists(at("hall", say("x")))'
     old = row(0, [["goto", "hall"], ["say", "x"]])

@@ -1,9 +1,11 @@
 """Shapes of programs, what two share, and the shortest way from one to another."""
 
+import ast
 from collections import Counter
 
 import pytest
 
+from codebotler.core.program import parse
 from roboeval.analysis.failure_groups import (
     MAX_COMPARED_CHARACTERS,
     normalised_lines,
@@ -36,6 +38,13 @@ def test_names_comments_and_layout_are_no_shape() -> None:
     assert "    name1 = get_current_location()" in normalised_lines(ONE)
     assert normalised_lines(ONE) != normalised_lines(ONE.replace("range(3)", "range(4)"))
     assert normalised_lines(ONE) != normalised_lines(ONE.replace("say", "ask"))
+
+
+def test_a_shape_leaves_the_parsed_program_as_it_is() -> None:
+    program = f"{ONE}# parsed by no other test\n"
+    before = ast.dump(parse(program))
+    normalised_lines(program)
+    assert ast.dump(parse(program)) == before
 
 
 def test_different_names_stay_different() -> None:

@@ -50,7 +50,7 @@ def shown(runs: list[JudgedRun]) -> str:
     """The page, with a dot for each figure: what figures look like is not asked here."""
     dot = b'<svg xmlns="http://www.w3.org/2000/svg"/>'
     names = [part.name for section in parts(runs) for part in section.parts if isinstance(part, ReportFigure)]
-    return page("a report", ["about it"], parts(runs), dict.fromkeys(names, (dot, dot)))
+    return page("a report", ["about it"], parts(runs), dict.fromkeys(names, dot))
 
 
 def written(folder: Path) -> Path:

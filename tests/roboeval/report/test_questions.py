@@ -22,7 +22,6 @@ from roboeval.report.breakdown import (
     ability_sheet,
     distinct_words,
     phrasing_sheet,
-    report_back_sentences,
     report_back_sheet,
     spread_sheet,
 )
@@ -62,22 +61,19 @@ def test_abilities_of_several_runs_stand_together() -> None:
     assert ability_sheet(usual()).rows == []
 
 
-def test_coming_back_in_a_table_and_in_a_sentence() -> None:
+def test_coming_back() -> None:
     run = made_up("a", {"Visit": (3,), "FindBook": (2,)}, suite=ABLE)
     table = report_back_sheet([run])
     with_report, others = as_dicts(table)
     assert (with_report["failed"], with_report["never returned"], with_report["no such room"]) == (7, 0, 1)
     assert with_report["share no such room"] == pytest.approx(1 / 7)
     assert (others["tasks"], others["completions"]) == ("others", 10)
-    (sentence,) = report_back_sentences(table)
-    assert re.search(r"^a: of 7 failures .*\b0 never returned\b.*\b1 .*\bdoes not exist", sentence)
     assert report_back_sheet(usual()).rows == []
 
 
 def test_coming_back_without_failures() -> None:
     table = report_back_sheet([made_up("a", {"Visit": (10,)}, suite=ABLE)])
     assert as_dicts(table)[0]["share never returned"] is None
-    assert report_back_sentences(table) == []
 
 
 # --- phrasing

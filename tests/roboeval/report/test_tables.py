@@ -17,7 +17,7 @@ from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import read_results
 from roboeval.evaluation.runs.source import open_source
 from roboeval.report import paper
-from roboeval.report.cost import rejection_sampling, retries_sheet
+from roboeval.report.cost import rejection_sampling
 from roboeval.report.failures import all_causes, causes_sheet, published_notes
 from roboeval.report.runs import JudgedRun, name_runs, read_labels
 from roboeval.report.scores import curve_sheet, overall_sheet, prompt_sheet, task_sheet
@@ -68,22 +68,18 @@ def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
     assert "bootstrap interval of a " in note
 
 
-def test_an_interval_without_width_is_called_unknown() -> None:
+def test_an_interval_without_width_is_in_the_table() -> None:
     alike = made_up("a", {"Visit": (5, 5), "CountMugs": (5,)})
     others = made_up("b", {"Visit": (4, 5), "CountMugs": (5,)})
     table = overall_sheet([alike, others])
-    assert [note for note in table.notes if "unknown" in note] == [
-        "a: the interval over tasks is unknown: no variation between tasks."
-    ]
-    assert column(table, "tasks: low")[0] == column(table, "tasks: high")[0] == 0.5  # in the file it stays
+    assert column(table, "tasks: low")[0] == column(table, "tasks: high")[0] == 0.5
 
 
 def test_retries_as_they_are_elsewhere() -> None:
     run, other = made_up("a", {"Visit": (5,)}), made_up("b", {"Visit": (5,)}, accepted=UNCHECKED)
-    table = retries_sheet({"a": run.trials})
     share = accepted_after(run.trials, 100)
-    assert column(table, "at the limit") == pytest.approx([1 - share[n] for n in (0, 2, 4, 8, 100)])
     found = [part for part in rejection_sampling([run, other]).parts if isinstance(part, Sheet)]
+    assert column(found[0], "at the limit") == pytest.approx([1 - share[n] for n in (0, 2, 4, 8, 100)])
     assert [part.name for part in found] == ["rejection-sampling", "rejection-sampling-curves", "accepted"]
     assert {row[0] for row in found[0].rows} == {"a"}
     assert column(found[2], "a") == share

@@ -15,7 +15,6 @@ from codebotler.rtl.reasoning.satisfiability import Reasoner
 __all__ = [
     "Reasoner",
     "Undecided",
-    "are_equivalent",
     "conflict",
     "distinguishing_trace",
     "is_implied",
@@ -43,11 +42,6 @@ def conflict(*formulas: Formula) -> list[Formula] | None:
 def is_implied(formula: Formula, *premises: Formula) -> bool:
     """Whether a formula holds on every trace on which all premises hold."""
     return Reasoner([formula, *premises]).trace([*premises, Not(formula)]) is None
-
-
-def are_equivalent(one: Formula, other: Formula) -> bool:
-    """Whether two formulas hold on the same traces."""
-    return is_implied(one, other) and is_implied(other, one)
 
 
 def distinguishing_trace(one: Formula, other: Formula) -> Trace | None:

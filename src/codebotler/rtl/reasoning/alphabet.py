@@ -93,9 +93,7 @@ def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
     """Split a pattern into one pattern for each aspect, so that it matches an event if all of them do."""
     kind = element.kind
     return (
-        EventPattern(
-            kind, element.text, element.options, element.mention, more=element.more, offers=element.offers
-        ),
+        EventPattern(kind, element.text, element.options, element.mention, more=element.more),
         EventPattern(kind, _MATCH_ANY, answer=element.answer, found=element.found),
         EventPattern(kind, _MATCH_ANY, place=element.place),
         EventPattern(kind, _MATCH_ANY, holding=element.holding, to=element.to),
@@ -161,20 +159,13 @@ def _held(wanted: Sequence[TextPattern | None]) -> list[str]:
 
 
 def _options(wanted: Sequence[EventPattern]) -> Iterable[tuple[Option, ...]]:
-    """Yield options for all combinations of patterns and all required numbers of options."""
+    """Return options for all combinations of patterns."""
     texts = _distinct([*(e.options for e in wanted), *(e.text for e in wanted if e.mention)])
     found: dict[frozenset[TextPattern], tuple[Option, ...]] = {frozenset(): ()}
-    other: tuple[Option, ...] = ()
     for string in distinct_strings(texts, outer=True):
         matched = frozenset(text for text in texts if text.matches(string))
-        other = other if matched else (Option(string),)
         for already, options in tuple(found.items()):
             longer = (*options, Option(string))
             if len(found.setdefault(already | matched, longer)) > len(longer):
                 found[already | matched] = longer
-    ranges = {e.offers for e in wanted if e.offers is not None}
-    numbers = sorted({n for least, most in ranges for n in (least, least if most is None else most + 1)})
-    for options in found.values():
-        more = other or options[-1:]
-        yield options
-        yield from ((*options, *more * (n - len(options))) for n in numbers if more and n > len(options))
+    return found.values()

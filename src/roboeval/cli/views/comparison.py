@@ -20,7 +20,7 @@ from roboeval.analysis.compare import (
 )
 from roboeval.analysis.failure_groups import FailureGroup
 from roboeval.analysis.statistics import MIN_CLUSTERS
-from roboeval.analysis.verdict_changes import VerdictChanges, rank, sentences
+from roboeval.analysis.verdict_changes import VerdictChanges, ranks, sentences
 from roboeval.cli.views.groups import failure_group_view
 from roboeval.cli.views.results import ruled
 from roboeval.evaluation.failures import classes_to_show, plural_of
@@ -83,13 +83,13 @@ def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableTyp
 def _scores(found: Sequence[VerdictChanges]) -> Table:
     first, second = found[0].suites
     table = ruled("pass@1", first, second, "difference", "95% over tasks", "rank", "completions")
-    scores = [{one.name: one.pass_at_1[side] for one in found} for side in (0, 1)]
+    ranked = ranks(found)
     for one in found:
         before, after = one.pass_at_1
         ends = one.comparison.over_tasks
         numbers = f"{before:.3f}", f"{after:.3f}", f"{after - before:+.3f}"
         interval = ends.ends("+.3f")
-        places = " -> ".join(dict.fromkeys(str(rank(one.name, of)) for of in scores))
+        places = " -> ".join(dict.fromkeys(str(of[one.name]) for of in ranked))
         of = f"{one.completions:,} of {one.completions + one.left_out:,}"
         table.add_row(Text(visible(one.name)), *numbers, interval, places, of)
     return table

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
-import polars as pl
 from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table
@@ -18,7 +17,7 @@ from roboeval.analysis.search import TraceMatch
 from roboeval.cli.views.completions import kind_view
 from roboeval.cli.views.results import ruled
 from roboeval.evaluation.explanation import PROGRAM_GONE
-from roboeval.evaluation.runs.completions import how_many, name_of
+from roboeval.evaluation.runs.completions import CompletionKey, how_many, name_of
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.suites.task import check_label
 
@@ -27,7 +26,7 @@ MAX_PRINTED_CHANGES = 60  # lines of a diff between programs
 
 def found_view(
     found: Sequence[TraceMatch],
-    counts: pl.DataFrame,
+    passed: Container[CompletionKey],
     total: int,
     told: Sequence[FailureGroup],
     *,
@@ -35,11 +34,11 @@ def found_view(
     is_search: bool,
 ) -> RenderableType:
     """Show groups of failures. After a search, first list the completions found in each task."""
-    failed = len(found) - int(counts["passed"].sum())
+    failed = sum(one.key not in passed for one in found)
     parts: list[RenderableType] = []
     if is_search:
         parts += [Text(f"found {len(found):,} of {how_many(total)}", "bold"), Text()]
-        parts += [_by_task(found, counts), Text()] if found else []
+        parts += [_by_task(found, passed), Text()] if found else []
     if failed or not is_search:
         of = "these" if is_search else f"{total:,}"
         grouped = f", in {counted(groups, 'group')}" * (groups > 0)
@@ -51,13 +50,16 @@ def found_view(
     return Group(*parts)
 
 
-def _by_task(found: Sequence[TraceMatch], counts: pl.DataFrame) -> Table:
+def _by_task(found: Sequence[TraceMatch], passed: Container[CompletionKey]) -> Table:
     table = ruled("task", "found", "passed")
     table.add_column("such as")
-    for task, count, passed in counts.iter_rows():
-        first = next(one for one in found if one.key[0] == task)
-        example = f"{name_of(first.key)}, world {first.worlds[0][0]}"
-        table.add_row(Text(visible(task)), f"{count:,}", f"{passed:,}", Text(visible(example), "dim"))
+    by_task: dict[str, list[TraceMatch]] = {}
+    for one in found:
+        by_task.setdefault(one.key[0], []).append(one)
+    for task, those in by_task.items():
+        example = f"{name_of(those[0].key)}, world {those[0].worlds[0][0]}"
+        counts = len(those), sum(one.key in passed for one in those)
+        table.add_row(Text(visible(task)), *(f"{count:,}" for count in counts), Text(visible(example), "dim"))
     return table
 
 
