@@ -69,15 +69,6 @@ class Table:
             (0.0, across, -math.pi / 2),
         ]
 
-    def cells(self, count: int) -> tuple[list[XY], float]:
-        """Divide the top into at least `count` cells. Return their centres and a cell's shorter side."""
-        columns = math.ceil(math.sqrt(count))
-        rows = math.ceil(count / columns)
-        left, low, _, _ = self.area.bounds
-        width, depth = self.size[0] / columns, self.size[1] / rows
-        grid = itertools.product(range(rows), range(columns))
-        return [(left + (i + 0.5) * width, low + (j + 0.5) * depth) for j, i in grid], min(width, depth)
-
 
 @dataclass(frozen=True)
 class Floorplan:

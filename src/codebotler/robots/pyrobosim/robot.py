@@ -5,10 +5,12 @@ from __future__ import annotations
 import importlib.util
 import logging
 from collections.abc import Sequence
+from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from codebotler.core.errors import UserError
+from codebotler.core.trace import Trace
 from codebotler.robots.base import (
     ROS_PYTHON,
     Feedback,
@@ -19,14 +21,13 @@ from codebotler.robots.base import (
     ignore_feedback,
 )
 from codebotler.robots.simulated import Simulated, perform_at_once
-from codebotler.simulator.entities import Thing
 
 if TYPE_CHECKING:
     from codebotler.robots.pyrobosim.world import DrivableWorld
 
 
 class Pyrobosim(Simulated):
-    """A simulated robot whose position and objects are kept in pyrobosim."""
+    """A simulated robot that pyrobosim drives around walls. It goes to a table to pick or place an object."""
 
     name = "pyrobosim"
     if_tool_dies, rooms_are_regexes = "the robot in pyrobosim ended as well", True
@@ -41,39 +42,22 @@ class Pyrobosim(Simulated):
 
         super().connect()
         self._drivable = DrivableWorld(self._world, self.clock)
-        self._things = {
-            body: thing
-            for room, bodies in self._drivable.objects.items()
-            for body, thing in zip(bodies, self._robot.contents[room], strict=True)
-        }
+
+    def resume(self, past: Trace) -> None:
+        """Bring the robot and the world to where they were after the steps of an earlier mission."""
+        super().resume(past)
+        self._drivable.put_robot(self._robot.room)
 
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Perform a skill. Driving, picking and placing run in pyrobosim."""
+        """Perform a skill. To pick or place something, first drive to the table in the room."""
         self._wait(0.0)
-        self._update()
-        if skill not in {"pick", "place"}:
-            return super().perform(skill, arguments, feedback)
-        request, room = str(arguments[0]), self._robot.room
-        perform_at_once(self._robot, skill, arguments)  # raises if there is no object to pick or place
-        if skill == "place":
-            self._drivable.place(room, request, feedback)
-            return None
-        objects = self._drivable.objects_in(room)
-        body = next(body for body in objects if self._things[body] is self._robot.taken)
-        self._drivable.pick(body, request, feedback)
-        self._things[body] = Thing(request, is_pattern=False)
-        return None
-
-    def _update(self) -> None:
-        """Copy the robot's room, the held object and all other objects from pyrobosim to the simulator."""
-        world, robot = self._drivable, self._robot
-        robot.room = world.room or robot.room
-        robot.contents = {
-            room: [self._things[body] for body in world.objects_in(room)] for room in robot.rooms
-        }
-        robot.held = None if world.held is None else self._things[world.held].label
+        room = self._robot.room = self._drivable.room or self._robot.room  # a drive may have been stopped
+        if skill in {"pick", "place"}:
+            perform_at_once(deepcopy(self._robot), skill, arguments)  # raises if it is impossible
+            self._drivable.approach_table(room, skill, str(arguments[0]), feedback)
+        return super().perform(skill, arguments, feedback)
 
     def _drive(self, room: str, feedback: Feedback) -> None:
         self._drivable.drive(room, feedback)

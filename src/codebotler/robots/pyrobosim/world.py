@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import TypeVar
 
 import shapely
-from pyrobosim.core import Entity, Object, ObjectSpawn, Robot, Room
+from pyrobosim.core import Entity, ObjectSpawn, Robot, Room
 from pyrobosim.core import World as Pyroworld
 from pyrobosim.navigation.types import PathExecutor
 from pyrobosim.navigation.world_graph import WorldGraphPlanner
@@ -21,7 +21,6 @@ from pyrobosim.utils.trajectory import Trajectory, get_constant_speed_trajectory
 from shapely.geometry import LineString
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import World
 from codebotler.robots.base import CancelledError, Feedback, ignore_feedback
 from codebotler.robots.clock import Clock
@@ -32,13 +31,14 @@ RADIANS_PER_SECOND = math.pi / 2
 STEP_SECONDS = 0.05  # the real time between two positions of a drive
 WALL_WIDTH = 0.001  # the wall width in metres for pyrobosim, since the floor plan already subtracts walls
 TOLERANCE = 1e-6  # the rounding error in metres that is allowed between a point and an edge
+TABLE_ACTIONS = {"pick": "pick up", "place": "place"}  # the skills for which the robot drives to a table
 T = TypeVar("T")
 
 
 class DrivableWorld:
-    """A pyrobosim world with a robot that can drive, pick and place.
+    """A pyrobosim world with tables, and with a robot that can drive.
 
-    Everything is deterministic: objects lie in fixed cells of tables, and paths are planned on a graph.
+    Everything is deterministic, since paths are planned on a graph.
     """
 
     def __init__(self, world: World, clock: Clock) -> None:
@@ -54,15 +54,6 @@ class DrivableWorld:
             for (name, floor), table in zip(self._rooms.items(), plan.tables, strict=True)
             if table is not None
         }
-        count = sum(len(room.objects) for room in world.rooms)
-        divided = {n: t.cells(count) for n, t in zip(names, plan.tables, strict=True) if t is not None}
-        self._cells = {name: cells for name, (cells, _) in divided.items()}
-        size = min((width for _, width in divided.values()), default=0.0) / 2
-        self.objects = {
-            room.name: self._add_objects(room.name, len(room.objects), size) for room in world.rooms
-        }
-        """The initial objects in each room, in the order of the world."""
-
         for number, floor in enumerate(self._floors):
             places = [*plan.stands[number].coords, *plan.corners(number)]
             floor.nav_poses = [Pose(x, y) for x, y in places]
@@ -77,44 +68,30 @@ class DrivableWorld:
         pose = self.robot.get_pose()
         return next((name for name, floor in self._rooms.items() if floor.is_inside(pose)), None)
 
-    @property
-    def held(self) -> Object | None:
-        """The object that the robot holds, or None."""
-        return self.robot.manipulated_object
-
-    def objects_in(self, room: str) -> list[Object]:
-        """Return the objects in a room, in the order in which they were put there."""
-        return list(self._tables[room].children) if room in self._tables else []
+    def put_robot(self, room: str) -> None:
+        """Put the robot at its stopping position in a room, without a drive."""
+        self.robot.set_pose(self._pose(room))
 
     def drive(self, room: str, feedback: Feedback) -> None:
         """Drive to the robot's stopping position in a room."""
         self._navigate(self._pose(room), feedback, "GoToInvalidLocation", f'drive to "{room}"')
 
-    def pick(self, thing: Object, name: str, feedback: Feedback) -> None:
-        """Drive to the table with the object and pick it up. `name` is the program's name for the object."""
-        action = f'pick up "{name}"'
-        self._navigate(thing.parent, feedback, "PickFailed", action)
-        self._wait(SKILLS["pick"].seconds)
-        _succeed(self.robot.pick_object(thing), "PickFailed", action)
-
-    def place(self, room: str, name: str, feedback: Feedback) -> None:
-        """Drive to the table in a room and put the held object there."""
-        action, table = f'place "{name}"', self._tables.get(room)
+    def approach_table(self, room: str, skill: str, thing: str, feedback: Feedback) -> None:
+        """Drive to the table in a room to pick or place a thing."""
+        kind, action = f"{skill.capitalize()}Failed", f'{TABLE_ACTIONS[skill]} "{thing}"'
+        table = self._tables.get(room)
         if table is None:
-            raise RobotError("PlaceFailed", f'the robot cannot {action}: no table fits into "{room}"')
-        self._navigate(table, feedback, "PlaceFailed", action)
-        self._wait(SKILLS["place"].seconds)
-        occupied = {(thing.pose.x, thing.pose.y) for thing in table.children}
-        x, y = next(cell for cell in self._cells[room] if cell not in occupied)
-        _succeed(self.robot.place_object(Pose(x, y)), "PlaceFailed", action)
+            raise RobotError(kind, f'the robot cannot {action}: no table fits into "{room}"')
+        self._navigate(table, feedback, kind, action)
 
     def _navigate(self, goal: Pose | Entity, feedback: Feedback, kind: str, action: str) -> None:
+        """Drive to a goal. Raise CancelledError if the drive was stopped, and RobotError if it failed."""
         self._motor.feedback = feedback
-        _succeed(self.robot.navigate(goal=goal), kind, action)
-
-    def _wait(self, seconds: float) -> None:
-        if not self._clock.wait(seconds):
+        result = self.robot.navigate(goal=goal)
+        if result.status == ExecutionStatus.CANCELED:
             raise CancelledError
+        if not result.is_success():
+            raise RobotError(kind, f"the robot cannot {action}: {result.message}")
 
     def _pose(self, room: str) -> Pose:
         return Pose(self._stands[room].x, self._stands[room].y)
@@ -150,16 +127,6 @@ class DrivableWorld:
         added = _expect_added(self._world.add_location(category=kind, parent=floor, pose=Pose(*table.centre)))
         (top,) = added.children
         return top
-
-    def _add_objects(self, room: str, count: int, size: float) -> list[Object]:
-        metadata = self._world.get_object_metadata().data
-        metadata["thing"] = {"footprint": {"type": "box", "dims": [size, size]}}
-        return [
-            _expect_added(
-                self._world.add_object(category="thing", parent=self._tables[room], pose=Pose(x, y))
-            )
-            for x, y in self._cells.get(room, [])[:count]
-        ]
 
 
 class Roadmap(WorldGraphPlanner):
@@ -203,8 +170,6 @@ class Motor(PathExecutor):
         for moment in self._moments(corners):
             pose = _pose_at(way, moment)
             self.robot.set_pose(pose)
-            if self.robot.manipulated_object is not None:
-                self.robot.manipulated_object.set_pose(_pose_at(way, moment))
             phrase, now = f"at ({pose.x:.1f}, {pose.y:.1f})", time.monotonic()
             is_due = now >= due or moment >= corners[-1] or self.clock.speed is None
             if is_due and phrase != last:
@@ -246,11 +211,3 @@ def _pose_at(way: Trajectory, moment: float) -> Pose:
 def _expect_added(part: T | None) -> T:
     assert part is not None, "pyrobosim accepts the floor plan"
     return part
-
-
-def _succeed(result: ExecutionResult, kind: str, action: str) -> None:
-    """Raise CancelledError if an action was stopped, and RobotError if it failed."""
-    if result.status == ExecutionStatus.CANCELED:
-        raise CancelledError
-    if not result.is_success():
-        raise RobotError(kind, f"the robot cannot {action}: {result.message}")
