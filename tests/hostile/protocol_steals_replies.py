@@ -14,4 +14,5 @@ def frame(text):
 def task_program():
     os.write(3, frame('["get_all_rooms", [], 0]'))
     marshal = inspect.importlib._bootstrap_external.marshal
-    say(str(marshal.loads(os.read(3, 10_000)[4:])))
+    size = int.from_bytes(os.read(3, 4), "big")
+    say(str(marshal.loads(os.read(3, size))))

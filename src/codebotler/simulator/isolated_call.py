@@ -12,7 +12,6 @@ import json
 import os
 import pickle
 import signal
-import socket
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -21,10 +20,10 @@ from typing import Any, Generic, NoReturn, ParamSpec, TypeVar
 
 from codebotler.simulator.process.errors import EngineError, LostProcessError, ProtocolError
 from codebotler.simulator.process.exit_status import cause_of_death
-from codebotler.simulator.process.isolated_process import IsolatedProcess
+from codebotler.simulator.process.isolated_process import IsolatedProcess, channel_pair
 from codebotler.simulator.process.spawn import start_module
 from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS
-from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
+from codebotler.simulator.sandbox.channel import receive, send_frames
 from codebotler.simulator.sandbox.isolation import enclose, give_up_rights, usable_filter
 from codebotler.simulator.sandbox.start import forget_the_shell
 
@@ -105,7 +104,7 @@ class ClosedProcess:
     """A closed process in which the isolated functions of one module are called."""
 
     def __init__(self, module: str) -> None:
-        ours, theirs = socket.socketpair()
+        ours, theirs = channel_pair()
         with theirs:
             self._process = start_module(SERVE_CODE, [module], [theirs.fileno()])
         self._channel = IsolatedProcess(
@@ -117,7 +116,7 @@ class ClosedProcess:
 
     def call(self, name: str, arguments: bytes) -> Any:  # noqa: ANN401 - a function may return any type
         """Call a function in the process, and return its result."""
-        self._channel.send((name, arguments), at_once=True)
+        self._channel.send((name, arguments))
         try:
             answer = self._channel.receive_bytes(len(RESULT) + MAX_RESULT)
         except TimeoutError:  # our own functions never wait, so the machine is to blame
@@ -188,7 +187,7 @@ def serve(module: str, descriptor: str) -> NoReturn:
     enclose(seccomp, round(time.process_time()) + CPU_SECONDS)
     send_frames([RESULT])  # tells the engine that this process is ready
     while True:
-        name, call = receive_at_once()
+        name, call = receive()
         send_frames([_answer(functions[name], call)])
 
 

@@ -21,7 +21,7 @@ from codebotler.simulator.ledger import RememberingLedger
 from codebotler.simulator.robot import Argument, SimulatedRobot
 from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, BATCH_MEMORY, MAX_FRAME
-from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
+from codebotler.simulator.sandbox.channel import receive, send_frames
 from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun, robot_error
 from codebotler.simulator.sandbox.fork_server import RUN_DOOR, serve
@@ -77,7 +77,7 @@ def execute(run: TranscribedRun, rehearsal: Batch) -> NoReturn:
     """
     transcripts(run, rehearsal)
     while True:
-        transcripts(run, receive_at_once(), send_frames)
+        transcripts(run, receive(), send_frames)
 
 
 def transcripts(
@@ -221,7 +221,7 @@ class TranscribedRun(ProgramRun):
             raise MemoryError
         send_frames([data])
         self._forget_calls()
-        kind, value, self.now = receive_at_once()
+        kind, value, self.now = receive()
         if kind == "error":
             self.ledger.errors.append(RobotError(*value[1:]))  # keeps the numbering in step with the engine's
             raise robot_error(*value)

@@ -71,7 +71,7 @@ def outcomes(child: IsolatedProcess, programs: Programs) -> Iterator[Outcome | N
     An outcome is None if the run must be repeated in its own process. Raise LostProcessError, ProtocolError
     or TimeoutError if the child can no longer be used.
     """
-    child.send(message(programs), at_once=True)
+    child.send(message(programs))
     for _, robots in programs:
         for robot in robots:
             yield _outcome(child, robot)
@@ -98,7 +98,7 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
                     REPLAYED.clear()
                 REPLAYED[key] = outcome, robot.skills, robot.setup
             return outcome
-        child.send((*answer, robot.now), at_once=True)
+        child.send((*answer, robot.now))
         frame = _frame(child)
     return None
 

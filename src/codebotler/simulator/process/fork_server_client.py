@@ -13,7 +13,7 @@ from pathlib import Path
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import message
 from codebotler.simulator.process.errors import LostProcessError
-from codebotler.simulator.process.isolated_process import IsolatedProcess
+from codebotler.simulator.process.isolated_process import IsolatedProcess, channel_pair
 from codebotler.simulator.process.spawn import start_fork_server, start_module
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCES
@@ -62,7 +62,7 @@ class ForkServer:
 
     def fork(self) -> IsolatedProcess:
         """Return a newly forked child."""
-        ours, theirs = socket.socketpair()
+        ours, theirs = channel_pair()
         try:
             with theirs:
                 socket.send_fds(self._door, [b"x"], [theirs.fileno()])

@@ -15,10 +15,11 @@ from pathlib import Path
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
-from codebotler.simulator.sandbox import HEADER, MAX_FRAME, MORE, PIECE, WITHOUT_REFERENCES
+from codebotler.simulator.sandbox import HEADER, MAX_FRAME, WITHOUT_REFERENCES
 
 PROCESS_WAIT_SECONDS = 60.0  # total time to wait for a process; no computation takes this long
 SILENCE_SECONDS = 1  # time until a silent process is examined
+WHOLE_MESSAGE = 2**31 - 1  # bytes, more than any message has
 SECCOMP_MODES = "\nSeccomp:\t2\n", "\nSeccomp:\t3\n"  # a filter is active, or has killed the process
 
 
@@ -50,23 +51,10 @@ class IsolatedProcess:
             self.hang_up()
             raise
 
-    def send(self, message: object, *, at_once: bool = False) -> None:
-        """Send a message. If the process has ended, only `receive` reports it.
-
-        The sizes of the pieces that a process reads change its heap, which wild programs can observe. So it
-        requests each piece after the first, and the sizes do not depend on its speed.
-        """
+    def send(self, message: object) -> None:
+        """Send a message. If the process has ended, only `receive` reports it."""
         data = marshal.dumps(message, WITHOUT_REFERENCES)  # type: ignore[arg-type]  # strings, numbers and containers of them
-        whole = len(data).to_bytes(HEADER, "big") + data
-        size = len(whole) if at_once else PIECE
-        for start in range(0, len(whole), size):
-            if start and (reply := self.receive()) != MORE:
-                if reply is None:
-                    return
-                raise ProtocolError("it sent something in the middle of a message")
-            self._send_piece(memoryview(whole)[start : start + size])
-
-    def _send_piece(self, rest: memoryview) -> None:
+        rest = memoryview(len(data).to_bytes(HEADER, "big") + data)
         used: int | None = None
         while rest:
             began = time.monotonic()
@@ -170,6 +158,17 @@ class IsolatedProcess:
         except OSError:
             return False
         return any(mode in status for mode in SECCOMP_MODES)
+
+
+def channel_pair() -> tuple[socket.socket, socket.socket]:
+    """Return both ends of a channel, of which the second is for the process.
+
+    On Linux, each `read` of the process returns as many bytes as it asks for, however fast we send them. The
+    sizes of what it reads change its heap, which wild programs can observe.
+    """
+    ours, theirs = socket.socketpair()
+    theirs.setsockopt(socket.SOL_SOCKET, socket.SO_RCVLOWAT, WHOLE_MESSAGE)
+    return ours, theirs
 
 
 def _stat(pid: int) -> list[str]:

@@ -13,7 +13,6 @@ BATCH_SERVER, FORK_SERVER, LIVE_SERVER = "batch-fork-server", "fork-server", "li
 
 CHANNEL = 3  # the descriptor that connects a closed process to the engine
 HEADER, MAX_FRAME = 4, 1_000_000  # bytes of the length that precedes a frame, and of the frame
-PIECE, MORE = 16_384, "more"  # bytes that a child reads at a time, and its request for the next piece
 WITHOUT_REFERENCES = 2  # marshal format; the output of later formats depends on reference counts
 
 MEMORY = 512 * 1024 * 1024  # bytes of address space of an isolated process

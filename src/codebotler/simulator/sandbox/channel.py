@@ -10,7 +10,7 @@ import builtins
 from marshal import loads
 from posix import _exit, read, write
 
-from codebotler.simulator.sandbox import CHANNEL, HEADER, MAX_FRAME, MORE, PIECE
+from codebotler.simulator.sandbox import CHANNEL, HEADER, MAX_FRAME
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -39,28 +39,17 @@ def send_frames(frames: list[bytes]) -> None:
 
 
 def receive() -> Any:  # noqa: ANN401 - any message from the engine
-    """Read one message piece by piece."""
-    pieces = [read_piece()]
-    missing = HEADER + int.from_bytes(pieces[0][:HEADER], "big") - len(pieces[0])
-    while missing > 0:
-        send(f'"{MORE}"')
-        pieces.append(read_piece())
-        missing -= len(pieces[-1])
-    return loads(b"".join(pieces)[HEADER:])  # noqa: S302 - written by the engine
-
-
-def receive_at_once() -> Any:  # noqa: ANN401 - any message from the engine
-    """Read one message in a single piece."""
-    missing = int.from_bytes(read_piece(HEADER), "big")
+    """Read one message."""
+    missing = int.from_bytes(_read(HEADER), "big")
     pieces = []
-    while missing > 0:
-        pieces.append(read_piece(missing))
+    while missing > 0:  # more than once on macOS only; see `channel_pair`
+        pieces.append(_read(missing))
         missing -= len(pieces[-1])
     return loads(b"".join(pieces))  # noqa: S302 - written by the engine
 
 
-def read_piece(most: int = PIECE) -> bytes:
-    """Read a piece of the engine's message, or exit the process if the engine has ended."""
+def _read(most: int) -> bytes:
+    """Read a part of the engine's message, or exit the process if the engine has ended."""
     piece = read(CHANNEL, most)
     if not piece:
         _exit(1)
