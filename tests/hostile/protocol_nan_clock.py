@@ -13,5 +13,5 @@ def frame(text):
 
 def task_program():
     os.write(3, frame('["say", ["a"], NaN]'))
-    os.read(3, 100)
+    os.read(3, int.from_bytes(os.read(3, 4), "big"))
     say("b")

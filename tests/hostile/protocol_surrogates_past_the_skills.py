@@ -12,4 +12,4 @@ def frame(text):
 
 def task_program():
     os.write(3, frame('["say", ["open \\ud800sesame"], 0]'))
-    os.read(3, 100)
+    os.read(3, int.from_bytes(os.read(3, 4), "big"))

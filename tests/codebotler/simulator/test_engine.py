@@ -533,7 +533,8 @@ def test_requests_beyond_a_limit_are_not_read_for_ever(monkeypatch: pytest.Monke
     program = (
         "import os\n"
         f"frame = {len(frame).to_bytes(4, 'big') + frame!r}\n"
-        "def task_program():\n    for _ in range(5_000): os.write(3, frame), os.read(3, 1000)\n"
+        "def task_program():\n    for _ in range(5_000):\n"
+        "        os.write(3, frame), os.read(3, int.from_bytes(os.read(3, 4), 'big'))\n"
     )
     (outcome,) = run([(program, WORLD)], workers=1)
     assert outcome.status == Status.TIMEOUT
