@@ -470,7 +470,7 @@ class Taken(IsolatedProcess):
     def __init__(self, *frames: bytes) -> None:
         self.frames = list(frames)
 
-    def send(self, message: object, *, at_once: bool = False) -> None:
+    def send(self, message: object) -> None:
         """Listen to nobody."""
 
     def receive_bytes(self, most: int) -> bytes | None:  # noqa: ARG002 - as theirs
@@ -478,47 +478,47 @@ class Taken(IsolatedProcess):
         return self.frames.pop(0) if self.frames else None
 
 
-SAY = b'["say",["x"],"ok",null]'
-FAILS = b'["pick",["x"],"error",%s]'
+SAY = b'["say",["x"],0,"ok",null]'
+FAILS = b'["pick",["x"],0,"error",%s]'
 END = b'{"end":"finished"}'
 DEEP = b"[" * 100_000 + b"]" * 100_000
 LONG = b"1" * 900_000
-TRANSCRIPT = b"[[%s],[%s],%s]"
+TRANSCRIPT = b"[[%s],%s,%s]"
 MALFORMED = {
     "nothing": b"",
     "two": b"null null",
-    "no end": TRANSCRIPT % (SAY, b"", b"null"),
-    "an end that is none": TRANSCRIPT % (SAY, b"", b"[]"),
-    "too few parts": b"[[],[]]",
-    "too many parts": b"[[],[],{},5]",
-    "no UTF-8": TRANSCRIPT % (b'["say",["\xff"],"ok",null]', b"", END),
-    "half a character": TRANSCRIPT % (b'["say",["\\ud800"],"ok",null]', b"", END),
-    "a deep argument": TRANSCRIPT % (b'["say",[%s],"ok",null]' % DEEP, b"", END),
-    "a deep answer": TRANSCRIPT % (b'["say",["x"],"ok",%s]' % DEEP, b"", END),
-    "a deep end": TRANSCRIPT % (SAY, b"", b'{"end":%s}' % DEEP),
-    "a moment that is none": TRANSCRIPT % (SAY, b"[0,NaN]", END),
-    "a moment of no end": TRANSCRIPT % (SAY, b"[0,1e999]", END),
-    "a moment of a number that is too long": TRANSCRIPT % (SAY, b"[0,%s]" % LONG, END),
-    "no such skill": TRANSCRIPT % (b'["fly",[],"ok",null]', b"", END),
-    "too few arguments": TRANSCRIPT % (b'["say",[],"ok",null]', b"", END),
-    "an argument of another type": TRANSCRIPT % (b'["say",[["x"]],"ok",null]', b"", END),
-    "an option that is none": TRANSCRIPT % (b'["ask",["","",[["x",1]]],"ok",0]', b"", END),
-    "options that are texts": TRANSCRIPT % (b'["ask",["","",["x"]],"ok",0]', b"", END),
-    "a number for a string": TRANSCRIPT % (b'["say",[3],"ok",null]', b"", END),
-    "another answer": TRANSCRIPT % (b'["say",["x"],"ok",true]', b"", END),
-    "an answer to wait for": TRANSCRIPT % (b'["say",["x"],"ask",null]', b"", END),
-    "an error that is none": TRANSCRIPT % (FAILS % b"5", b"", END),
-    "an error that says nothing": TRANSCRIPT % (FAILS % b"null", b"", END),
-    "an error of another kind": TRANSCRIPT % (FAILS % b'["PlaceNoObject","x"]', b"", END),
-    "more than all calls": TRANSCRIPT % (b",".join([SAY] * 1_006), b"", END),
-    "more than all time": TRANSCRIPT % (b",".join([SAY] * 3), b"[0,1.0],[1,9999.0]", END),
+    "no end": TRANSCRIPT % (SAY, b"0", b"null"),
+    "an end that is none": TRANSCRIPT % (SAY, b"0", b"[]"),
+    "too few parts": b"[[],0]",
+    "too many parts": b"[[],0,{},5]",
+    "no UTF-8": TRANSCRIPT % (b'["say",["\xff"],0,"ok",null]', b"0", END),
+    "half a character": TRANSCRIPT % (b'["say",["\\ud800"],0,"ok",null]', b"0", END),
+    "a deep argument": TRANSCRIPT % (b'["say",[%s],0,"ok",null]' % DEEP, b"0", END),
+    "a deep answer": TRANSCRIPT % (b'["say",["x"],0,"ok",%s]' % DEEP, b"0", END),
+    "a deep end": TRANSCRIPT % (SAY, b"0", b'{"end":%s}' % DEEP),
+    "a moment that is none": TRANSCRIPT % (SAY, b"NaN", END),
+    "a moment of no end": TRANSCRIPT % (SAY, b"1e999", END),
+    "a moment of a number that is too long": TRANSCRIPT % (SAY, LONG, END),
+    "no such skill": TRANSCRIPT % (b'["fly",[],0,"ok",null]', b"0", END),
+    "too few arguments": TRANSCRIPT % (b'["say",[],0,"ok",null]', b"0", END),
+    "an argument of another type": TRANSCRIPT % (b'["say",[["x"]],0,"ok",null]', b"0", END),
+    "an option that is none": TRANSCRIPT % (b'["ask",["","",[["x",1]]],0,"ok",0]', b"0", END),
+    "options that are texts": TRANSCRIPT % (b'["ask",["","",["x"]],0,"ok",0]', b"0", END),
+    "a number for a string": TRANSCRIPT % (b'["say",[3],0,"ok",null]', b"0", END),
+    "another answer": TRANSCRIPT % (b'["say",["x"],0,"ok",true]', b"0", END),
+    "an answer to wait for": TRANSCRIPT % (b'["say",["x"],0,"ask",null]', b"0", END),
+    "an error that is none": TRANSCRIPT % (FAILS % b"5", b"0", END),
+    "an error that says nothing": TRANSCRIPT % (FAILS % b"null", b"0", END),
+    "an error of another kind": TRANSCRIPT % (FAILS % b'["PlaceNoObject","x"]', b"0", END),
+    "more than all calls": TRANSCRIPT % (b",".join([SAY] * 1_006), b"0", END),
+    "more than all time": TRANSCRIPT % (SAY + b"," + SAY.replace(b"0", b"9999.0"), b"9999.0", END),
 }
 
 
 @pytest.mark.parametrize("frame", MALFORMED.values(), ids=MALFORMED)
 def test_malformed_transcript_is_no_outcome(frame: bytes) -> None:
     robots = [SimulatedRobot(world, AS_WRITTEN) for world in WORLDS]
-    good = TRANSCRIPT % (SAY + b"," + SAY, b"[1,5.0]", END)
+    good = TRANSCRIPT % (SAY + b"," + SAY.replace(b"0", b"5.0"), b"5.0", END)
     told = outcomes(Taken(good, frame, good), [(b"", robots)])
     first = next(told)
     assert first is not None
@@ -549,9 +549,9 @@ MISFITS = {
 @pytest.mark.parametrize("values", MISFITS.values(), ids=MISFITS)
 def test_what_an_own_skill_does_not_take_is_refused_outside_of_the_sandbox(values: list[Any]) -> None:
     robots = [SimulatedRobot(WORLDS[0], AS_WRITTEN, PAINT)] * 2
-    asked = TRANSCRIPT % (b'["paint",%s,"ask",null]', b"", b"null")
+    asked = TRANSCRIPT % (b'["paint",%s,0,"ask",null]', b"0", b"null")
     good = asked % json.dumps(["red", 1, 2, ["a"]]).encode()
-    told = outcomes(Taken(good, TRANSCRIPT % (b"", b"", END)), [(b"", robots[:1])])
+    told = outcomes(Taken(good, TRANSCRIPT % (b"", b"0", END)), [(b"", robots[:1])])
     outcome = next(told)
     assert outcome is not None
     assert trace_data(outcome.trace) == [["paint", "red", ["1", "2", "a"]]]

@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 
     from codebotler.simulator.sandbox.execution import SkillDescriptions
 
-    Called: TypeAlias = tuple[str, Sequence[Argument], str, Any]  # skill, arguments, kind and value of answer
+    # Skill, arguments, the program's clock, and kind and value of the answer.
+    Called: TypeAlias = tuple[str, Sequence[Argument], float, str, Any]
     Batch: TypeAlias = tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]
 
 # A run that recurses too deep here is repeated in its own process, where it may recurse far deeper.
@@ -135,16 +136,12 @@ class TranscribedRun(ProgramRun):
         self.ledger = RememberingLedger(robot)
         self.namespace = ModuleType("__main__")
         vars(self.namespace).update(self.provided)
-        self.now = self._reported_time = 0.0
+        self.now = 0.0
+        self._calls: list[Called] = []
         self.spent = self.entered = self.is_undecided = False
         self.refused_at = None
         self.codes.clear()
         self.refuel()
-        self._forget_calls()
-
-    def _forget_calls(self) -> None:
-        self._calls: list[Called] = []
-        self._moments: list[tuple[int, float]] = []
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
         """Execute a skill on this process's copy of the robot."""
@@ -152,7 +149,7 @@ class TranscribedRun(ProgramRun):
             _robot_argument(kind, value) for kind, value in zip(self.kinds[name], arguments, strict=True)
         ]
         try:
-            if self.now != self._reported_time:
+            if self.now != self.ledger.robot.now:
                 self._let_time_pass()
             answer = None if name in self.elsewhere else self.ledger.perform(name, given)
         except BaseException:  # the program is not at fault unless it reached a limit
@@ -162,9 +159,9 @@ class TranscribedRun(ProgramRun):
             return self._ask_engine(name, given)
         kind, value = answer
         if kind == "error":
-            self._calls.append((name, given, kind, value[1:]))
+            self._calls.append((name, given, self.now, kind, value[1:]))
             raise robot_error(*value)
-        self._calls.append((name, given, kind, value))
+        self._calls.append((name, given, self.now, kind, value))
         if kind == "stop":
             self.spent = True
             raise LimitReachedError
@@ -172,11 +169,8 @@ class TranscribedRun(ProgramRun):
 
     def _let_time_pass(self) -> None:
         """Report the program's clock to the ledger, and end the run if its time is up."""
-        self._reported_time = self.now
-        self._moments.append((len(self._calls), float(self.now)))
         self.ledger.let_time_pass(self.now)
         if self.ledger.limit is not None:
-            self._calls.append(("", (), "time", None))
             self.spent = True
             raise LimitReachedError
 
@@ -206,21 +200,21 @@ class TranscribedRun(ProgramRun):
         return super().ended_by(error)
 
     def _written(self, end: str) -> bytes:
-        data = f"[{encoded([self._calls, self._moments])[1:-1]},{end}]".encode("ascii")
+        data = f"[{encoded([self._calls, self.now])[1:-1]},{end}]".encode("ascii")
         if len(data) > MAX_CALL_BYTES or SURROGATE_ESCAPE in data:
             self.is_undecided = self.is_undecided or not all(
-                _is_plain(each) for _, given, _, _ in self._calls for each in given
+                _is_plain(each) for _, given, *_ in self._calls for each in given
             )
         return data
 
     def _ask_engine(self, name: str, given: list[Argument]) -> Any:  # noqa: ANN401 - a skill may return any type
         """Let the engine's robot execute a skill, after it has repeated all earlier calls."""
-        self._calls.append((name, given, "ask", None))
+        self._calls.append((name, given, self.now, "ask", None))
         data = self._written("null")
         if self.is_undecided:
             raise MemoryError
         send_frames([data])
-        self._forget_calls()
+        self._calls = []
         kind, value, self.now = receive()
         if kind == "error":
             self.ledger.errors.append(RobotError(*value[1:]))  # keeps the numbering in step with the engine's

@@ -28,7 +28,8 @@ class Call(NamedTuple):
 
     skill: str
     arguments: tuple[Scalar | tuple[Option | Scalar, ...], ...]
-    kind: str  # kind of answer; `ask` if only the engine can give it, `time` if the program only waits
+    now: float  # the time on the program's clock
+    kind: str  # kind of answer; `ask` if only the engine can give it
     value: Any
 
 
@@ -36,7 +37,7 @@ class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """A child's report on a run: the program's skill calls, and how it ended."""
 
     calls: list[Call]
-    moments: list[tuple[int, float]]  # number of a call, and the clock's time from that call on
+    now: float  # the time on the clock when the report was written
     end: dict[str, Any] | None  # None if the child is waiting for the answer to the last call
 
 
@@ -44,8 +45,6 @@ ReplayKey: TypeAlias = tuple[Any, ...]  # a received transcript, and the ids of 
 MAX_REPLAYS, MAX_REPLAY_BYTES = 2_048, 4_096  # cached transcripts, and bytes of each
 # Cached outcomes. Each entry keeps the objects of its key alive so that their ids are not reused.
 REPLAYED: dict[ReplayKey | None, tuple[Outcome, SkillTable, Setup]] = {}
-LAST_MOMENT = (-1, 0.0)  # marks the end of a transcript's moments
-ONLY_TIME: SkillAnswer = ("time", None)
 TRANSCRIPT_DECODER = msgspec.json.Decoder(Transcript | None)
 
 
@@ -135,19 +134,15 @@ class Replay:
     def follow(self, transcript: Transcript) -> SkillAnswer:
         """Repeat all calls, and return the last answer. Raise ProtocolError if any answer differs."""
         calls = [self._expected(call) for call in transcript.calls]
-        if transcript.end is None and (not calls or calls[-1][2] is not None):
+        if transcript.end is None and (not calls or calls[-1][-1] is not None):
             raise ProtocolError("the child is waiting, but has asked for nothing")
-        ledger, moments = self.ledger, iter((*transcript.moments, LAST_MOMENT))
-        changes, later = next(moments)
+        ledger = self.ledger
         answer: SkillAnswer = ("ok", None)
-        for number, (skill, arguments, expected) in enumerate(calls):
+        for skill, arguments, now, expected in calls:
+            if now != self.robot.now:
+                self._let_time_pass(now)
             if ledger.limit is not None:
                 raise ProtocolError("the program continues beyond a limit")
-            if number == changes:
-                self._let_time_pass(later, is_last=expected == ONLY_TIME)
-                changes, later = next(moments)
-            if expected == ONLY_TIME:
-                continue
             answer = ledger.perform(skill, arguments)
             if ledger.broken is not None:
                 return answer
@@ -155,21 +150,18 @@ class Replay:
                 answer if answer[0] != "error" else ("error", answer[1][1:])
             ):
                 raise ProtocolError("the robot gives a different answer")
-        if next(moments, None) is not None:
-            raise ProtocolError("moments are out of order")
+        if transcript.end is not None:
+            self._let_time_pass(transcript.now)
         return answer
 
-    def _let_time_pass(self, now: float, *, is_last: bool) -> None:
+    def _let_time_pass(self, now: float) -> None:
         if now < self.robot.now:
             raise ProtocolError("time runs backwards")
-        self.ledger.let_time_pass(now)
-        if self.ledger.limit is not None and not is_last:
-            raise ProtocolError("the program continues after its time is up")
+        if self.ledger.limit is None:
+            self.ledger.let_time_pass(now)
 
-    def _expected(self, call: Call) -> tuple[str, Sequence[Argument], SkillAnswer | None]:
-        """Return a call with its expected answer, or with None if only the engine knows the answer."""
-        if call.kind == "time":
-            return "", (), ONLY_TIME
+    def _expected(self, call: Call) -> tuple[str, Sequence[Argument], float, SkillAnswer | None]:
+        """Return a call with its time and expected answer, which is None if only the engine knows it."""
         signature = self._signatures.get(call.skill)
         if signature is None or (tuple(map(type, call.arguments)) != signature and not self._fits(call)):
             raise ProtocolError("there is no skill with this name and these parameters")
@@ -177,7 +169,7 @@ class Replay:
             raise ProtocolError("the child could have answered this call itself")
         value = tuple(call.value) if call.kind == "error" and isinstance(call.value, list) else call.value
         arguments: Any = call.arguments  # checked above
-        return call.skill, arguments, None if call.kind == "ask" else (call.kind, value)
+        return call.skill, arguments, call.now, None if call.kind == "ask" else (call.kind, value)
 
     def _fits(self, call: Call) -> bool:
         parameters = self.robot.skills[call.skill].parameters
