@@ -24,7 +24,6 @@ from codebotler.core.words import listed
 from codebotler.prompts.rendering import stub
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_facts import RandomOutcome
 from codebotler.simulator.sampled_robot import SampledRobot
 
 WORLD_COUNT = 40  # the number of sampled worlds to try each skill in
@@ -68,12 +67,7 @@ def try_skill(row: Skill, skills: SkillTable) -> list[SkillTrial]:
         except RobotError as error:
             outcome = f"fails with {error.kind}: {str(error).removeprefix(f'{row.name}: ')}"
         event = robot.trace[-1] if robot.trace else None
-        drawn = [
-            fact
-            for fact in robot.facts
-            if not (isinstance(fact, RandomOutcome) and fact.statement == row.call)
-        ]
-        facts = tuple(fact.sentence for fact in drawn)
+        facts = tuple(fact.sentence for fact in robot.facts if fact.names[0] != row.call)
         found.setdefault(outcome, SkillTrial(outcome, facts, event))
     return list(found.values())
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from _blake2 import blake2b  # `hashlib` would load OpenSSL into every child
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
+DrawMethod: TypeAlias = Literal["answer", "outcome", "is_there"]
 EIGHTS = 8
 
 
@@ -26,41 +27,39 @@ class FactSampler:
         named = "".join(f"{len(text)}:{text}" for text in texts).encode(errors="surrogatepass")
         return int.from_bytes(blake2b(named, digest_size=8).digest(), "big") % count
 
-    def answer(self, count: int, agreeing: int, *question: str) -> int:
-        """Draw which of `count` options a person chooses. `agreeing` is the most affirmative option."""
-        known = self._forced("answer", count, agreeing, *question)
-        if known is not None:
-            return known
+    def decide(self, method: DrawMethod, *arguments: str | int) -> Draw:
+        """Draw a fact, unless its result is given.
+
+        Args:
+            method: `answer`, `outcome` or `is_there`.
+            arguments: for an answer, the number of options, the position of the most affirmative one, and
+                the question; for an outcome, the number of outcomes, the first of which is desired, and the
+                statement; for the presence of a person or thing, the room and the name.
+        """
+        for given in self.forced:
+            if (given.method, given.arguments) == (method, arguments):
+                return given
+        return Draw(method, arguments, getattr(self, f"_{method}")(*arguments))
+
+    def _answer(self, count: int, agreeing: int, *question: str) -> int:
         if self.lucky and self.draw(EIGHTS, "agrees", *question) < EIGHTS - 1:
             return agreeing
         return self.draw(count, "answer", *question)
 
-    def outcome(self, count: int, statement: str) -> int:
-        """Draw one of `count` outcomes for a statement. Outcome 0 is the desired one."""
-        known = self._forced("outcome", count, statement)
-        if known is not None:
-            return known
+    def _outcome(self, count: int, statement: str) -> int:
         if self.lucky and self.draw(EIGHTS, "is hoped for", statement) < EIGHTS - 1:
             return 0
         return self.draw(count, "outcome", statement)
 
-    def is_there(self, room: str, name: str) -> bool:
-        """Draw whether a person or thing is in a room."""
-        known = self._forced("is_there", room, name)
-        if known is not None:
-            return bool(known)
+    def _is_there(self, room: str, name: str) -> bool:
         return self.draw(EIGHTS, "is there", room, name) < (EIGHTS - 1 if self.lucky else EIGHTS // 2)
-
-    def _forced(self, method: str, *arguments: object) -> int | None:
-        same = (fact.result for fact in self.forced if (fact.method, fact.arguments) == (method, arguments))
-        return next(same, None)
 
 
 @dataclass(frozen=True)
 class Draw:
-    """A random fact: the sampler's method that drew it, the arguments and the result."""
+    """A random fact: its kind, the arguments of `FactSampler.decide`, and the result."""
 
-    method: Literal["answer", "outcome", "is_there"]
+    method: DrawMethod
     arguments: tuple[Any, ...]
     result: int
 
@@ -72,4 +71,4 @@ class Draw:
 
     def holds_in(self, sampler: FactSampler) -> bool:
         """Return whether a sampler draws the same result."""
-        return bool(getattr(sampler, self.method)(*self.arguments) == self.result)
+        return sampler.decide(self.method, *self.arguments).result == self.result

@@ -3,62 +3,36 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
 from codebotler.core.words import brief
 from codebotler.simulator.matching import SOMEBODY, contains
 
 
 @dataclass(frozen=True)
-class Whereabouts:
-    """The fact that a person or thing is, or is not, in a room."""
+class SampledFact:
+    """A fact of a sampled world.
 
-    name: str  # the canonical name, as returned by `normalized`
-    room: str
-    is_there: bool
-    is_random: bool = True  # False if it holds because the program assumed it
+    Args:
+        form: the fact in words, with `{}` in place of each name or text.
+        names: these names and texts.
+        is_random: False if it holds because the program assumed it.
+    """
 
-    @property
-    def sentence(self) -> str:
-        """The fact in words."""
-        if self.name == SOMEBODY:
-            subject = f"{SOMEBODY} is" if self.is_there else "nobody is"
-        else:
-            subject = f'"{brief(self.name)}" is' if self.is_there else f'"{brief(self.name)}" is not'
-        return f'{subject} in "{brief(self.room)}"'
-
-
-@dataclass(frozen=True)
-class GivenAnswer:
-    """The fact that a person answers a question in a particular way."""
-
-    room: str
-    question: str
-    answer: str
+    form: str
+    names: tuple[str, ...]
     is_random: bool = True
 
     @property
     def sentence(self) -> str:
         """The fact in words."""
-        where = f'in "{brief(self.room)}" to "{brief(self.question)}"'
-        return f'the answer {where} is "{brief(self.answer)}"'
+        return self.form.format(*map(brief, self.names))
 
 
-@dataclass(frozen=True)
-class RandomOutcome:
-    """The fact that a statement is true or false, or that a skill has a particular result."""
-
-    statement: str
-    outcome: str
-    is_random: bool = True
-
-    @property
-    def sentence(self) -> str:
-        """The fact in words."""
-        return f"{brief(self.statement)} {self.outcome}"
-
-
-SampledFact: TypeAlias = Whereabouts | GivenAnswer | RandomOutcome
+def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True) -> SampledFact:
+    """Return the fact that a person or thing is, or is not, in a room. The name is canonical."""
+    if name == SOMEBODY:
+        return SampledFact(f'{SOMEBODY if is_there else "nobody"} is in "{{}}"', (room,), is_random)
+    return SampledFact(f'"{{}}" {"is" if is_there else "is not"} in "{{}}"', (name, room), is_random)
 
 
 # --- the program's knowledge, by canonical names

@@ -17,7 +17,7 @@ from codebotler.core.skills.values import as_text
 from codebotler.core.trace import Event, to_options
 from codebotler.core.world import Room, World
 from codebotler.simulator.entities import NO_WORDS, Thing
-from codebotler.simulator.fact_sampler import Draw, FactSampler
+from codebotler.simulator.fact_sampler import Draw, DrawMethod, FactSampler
 from codebotler.simulator.matching import (
     SOMEBODY,
     WORDS_FOR_PEOPLE,
@@ -32,14 +32,7 @@ from codebotler.simulator.matching import (
 )
 from codebotler.simulator.robot import SimulatedRobot, SkillGuard
 from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_facts import (
-    ExploredRoom,
-    GivenAnswer,
-    RandomOutcome,
-    RoomSearch,
-    SampledFact,
-    Whereabouts,
-)
+from codebotler.simulator.sampled_facts import ExploredRoom, RoomSearch, SampledFact, whereabouts
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.simulated_world import NO_SUCH_THING
 
@@ -200,13 +193,16 @@ class SampledRobot(SimulatedRobot):
         """Decide whether a person or thing is in a room: at random, or as the program assumes."""
         is_there = True
         if is_random:
-            is_there = self.sampler.is_there(room, name)
-            self.draws.append(Draw("is_there", (room, name), is_there))
+            is_there = bool(self._draw("is_there", room, name))
         self.has_assumed |= not is_random
-        self.facts.append(Whereabouts(name, room, is_there, is_random))
+        self.facts.append(whereabouts(name, room, is_there=is_there, is_random=is_random))
         if not is_there:
             self.explored[room].missed.add(name)
         return is_there
+
+    def _draw(self, method: DrawMethod, *arguments: str | int) -> int:
+        self.draws.append(self.sampler.decide(method, *arguments))
+        return self.draws[-1].result
 
     def answer(self, options: Sequence[str], *question: str) -> str:
         """Draw the answer to a question from its options."""
@@ -217,18 +213,14 @@ class SampledRobot(SimulatedRobot):
                 self.questions[name].append(question)
             question = (*name, str(self.questions[name].index(question)))
         agreeing = next((i for i, text in enumerate(options) if AGREEING_TEXT.match(text)), 0)
-        drawn = self.sampler.answer(len(options), agreeing, *question)
-        self.draws.append(Draw("answer", (len(options), agreeing, *question), drawn))
-        return options[drawn]
+        return options[self._draw("answer", len(options), agreeing, *question)]
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], errors: Sequence[str] = ()) -> int:
         """Draw an outcome for a statement, or return the outcome drawn earlier."""
         possible = [*outcomes, *errors]
         if statement not in self.outcomes:
-            drawn = self.sampler.outcome(len(possible), statement)
-            self.draws.append(Draw("outcome", (len(possible), statement), drawn))
-            self.facts.append(RandomOutcome(statement, possible[drawn]))
-            self.outcomes[statement] = drawn
+            drawn = self.outcomes[statement] = self._draw("outcome", len(possible), statement)
+            self.facts.append(SampledFact("{} {}", (statement, possible[drawn])))
         return self.outcomes[statement]
 
     # --- effects of skills
@@ -359,7 +351,8 @@ class SampledRobot(SimulatedRobot):
         texts = [option.text for option in options]
         if self.answers.get(asked) not in texts:
             self.answers[asked] = self.answer(texts, *asked)
-            self.facts.append(GivenAnswer(self.room, question, self.answers[asked]))
+            names = self.room, question, self.answers[asked]
+            self.facts.append(SampledFact('the answer in "{}" to "{}" is "{}"', names))
         chosen = texts.index(self.answers[asked])
         self.amend(texts[chosen])
         return chosen

@@ -17,7 +17,7 @@ from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.matching import normalized
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_facts import Whereabouts
+from codebotler.simulator.sampled_facts import whereabouts
 from codebotler.simulator.sampled_robot import SampledRobot
 
 ROOMS = RoomMap(("start_loc", "kitchen", "lab"), "start_loc")
@@ -110,7 +110,10 @@ def test_what_is_looked_for_is_there_in_about_every_second_world_and_differs_by_
 
 
 def test_a_lucky_world_has_most_of_what_is_looked_for() -> None:
-    seen = [FactSampler(sample=number, lucky=True).is_there("kitchen", "mug") for number in range(200)]
+    seen = [
+        FactSampler(sample=number, lucky=True).decide("is_there", "kitchen", "mug").result
+        for number in range(200)
+    ]
     assert 155 < sum(seen) < 195
 
 
@@ -170,7 +173,7 @@ def test_what_it_never_looked_for_is_as_the_program_takes_it() -> None:
         robot.perform("pick", ["stapler"])
         assert robot.perform("ask", ["alice", "Tea?", YES_NO]) in {0, 1}
         assert look(robot, "person") is True
-        fact = Whereabouts("alice", "kitchen", is_there=True, is_random=False)
+        fact = whereabouts("alice", "kitchen", is_there=True, is_random=False)
         assert fact in robot.facts
         assert fact.sentence == '"alice" is in "kitchen"'
 
@@ -223,7 +226,7 @@ def test_strict_draws_what_the_program_takes_for_granted() -> None:
 
 def test_strict_has_no_second_one_to_take() -> None:
     robots = (robot_in(sample=number, strict=True) for number in range(100))
-    robot = next(robot for robot in robots if robot.sampler.is_there("kitchen", "mug"))
+    robot = next(robot for robot in robots if robot.sampler.decide("is_there", "kitchen", "mug").result)
     robot.perform("pick", ["mug"])
     robot.perform("go_to", ["lab"])
     robot.perform("place", ["mug"])
