@@ -107,9 +107,7 @@ class ClosedProcess:
         ours, theirs = channel_pair()
         with theirs:
             self._process = start_module(SERVE_CODE, [module], [theirs.fileno()])
-        self._channel = IsolatedProcess(
-            lambda: self._process.pid, ours, self._process.wait, has_seccomp=False
-        )
+        self._channel = IsolatedProcess(lambda: self._process.pid, ours, self._process.wait)
         if self._channel.receive_bytes(len(RESULT)) != RESULT:
             self.end()
             raise LostProcessError("a closed process did not start")

@@ -31,7 +31,6 @@ class SkillProtocol:
     def __init__(self, child: IsolatedProcess, code: bytes, robot: SkillPerformer) -> None:
         self.child, self.robot, self.limits = child, robot, robot.settings.limits
         self.ledger = Ledger(robot)
-        self._heard = False
         self._skills = {skill.name: skill for skill in robot.skills.rows}
         child.send((code, describe_skills(robot), run_parameters(robot)))
 
@@ -59,9 +58,10 @@ class SkillProtocol:
 
     def talk(self) -> dict[str, object] | None:
         """Answer requests, and return the child's last message, which says how it ended, or None."""
+        if self.child.receive() is None:
+            raise LostProcessError("a child ended before it was isolated")
         overrun = 0
         while (message := self.child.receive()) is not None:
-            self._heard = True
             if isinstance(message, dict):
                 return message
             match message:
@@ -102,8 +102,6 @@ class SkillProtocol:
         return STOP
 
     def _died(self, status: int) -> Outcome:
-        if not self._heard and not self.child.was_isolated():
-            raise LostProcessError("a child ended before it was isolated")
         cause, error = cause_of_death(status, LIVE_CPU_SECONDS if self.robot.is_live else CPU_SECONDS)
         return Outcome(cause, self.robot.trace, error)
 

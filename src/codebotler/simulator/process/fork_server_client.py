@@ -69,7 +69,7 @@ class ForkServer:
         except OSError:
             ours.close()
             raise LostProcessError("the fork server has ended") from None
-        return IsolatedProcess(self._pid_of_child, ours, self._end_of_child, has_seccomp=self.has_seccomp)
+        return IsolatedProcess(self._pid_of_child, ours, self._end_of_child)
 
     @property
     def pid(self) -> int:

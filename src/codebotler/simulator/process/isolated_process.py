@@ -20,7 +20,6 @@ from codebotler.simulator.sandbox import HEADER, MAX_FRAME, WITHOUT_REFERENCES
 PROCESS_WAIT_SECONDS = 60.0  # total time to wait for a process; no computation takes this long
 SILENCE_SECONDS = 1  # time until a silent process is examined
 WHOLE_MESSAGE = 2**31 - 1  # bytes, more than any message has
-SECCOMP_MODES = "\nSeccomp:\t2\n", "\nSeccomp:\t3\n"  # a filter is active, or has killed the process
 
 
 class IsolatedProcess:
@@ -31,14 +30,11 @@ class IsolatedProcess:
         find_pid: Callable[[], int],  # returns the process id, which is unique until the next run
         channel: socket.socket,
         wait: Callable[[], int],  # waits, and returns the exit status or negative signal number
-        *,
-        has_seccomp: bool,  # whether it uses seccomp, so that /proc shows whether it is isolated
     ) -> None:
         self._find_pid, self._channel, self._wait = find_pid, channel, wait
         silence = struct.pack("ll", SILENCE_SECONDS, 0)
         for direction in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):  # one system call fewer than settimeout
             channel.setsockopt(socket.SOL_SOCKET, direction, silence)
-        self._has_seccomp = has_seccomp
         self._buffer = bytearray()
         self.patience = PROCESS_WAIT_SECONDS  # seconds left to wait
 
@@ -148,16 +144,6 @@ class IsolatedProcess:
     def hang_up(self) -> None:
         """Close the channel."""
         self._channel.close()
-
-    def was_isolated(self) -> bool:
-        """Return whether the filter was installed, or True if unknown. Call this before the next run."""
-        if not self._has_seccomp:
-            return True
-        try:
-            status = Path(f"/proc/{self.pid}/status").read_text(encoding="ascii", errors="replace")
-        except OSError:
-            return False
-        return any(mode in status for mode in SECCOMP_MODES)
 
 
 def channel_pair() -> tuple[socket.socket, socket.socket]:

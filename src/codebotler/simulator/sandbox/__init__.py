@@ -13,6 +13,7 @@ BATCH_SERVER, FORK_SERVER, LIVE_SERVER = "batch-fork-server", "fork-server", "li
 
 CHANNEL = 3  # the descriptor that connects a closed process to the engine
 HEADER, MAX_FRAME = 4, 1_000_000  # bytes of the length that precedes a frame, and of the frame
+READY = '"ready"'  # the first message of a child, once it is isolated
 WITHOUT_REFERENCES = 2  # marshal format; the output of later formats depends on reference counts
 
 MEMORY = 512 * 1024 * 1024  # bytes of address space of an isolated process

@@ -9,7 +9,7 @@ from _socket import CMSG_SPACE, socket
 from marshal import loads
 from posix import getpid, getppid
 
-from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, LIVE_CPU_SECONDS, LIVE_SERVER
+from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, LIVE_CPU_SECONDS, LIVE_SERVER, READY
 from codebotler.simulator.sandbox.channel import receive, send
 from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import ProgramRun
@@ -130,6 +130,7 @@ def isolate(line: int, seccomp: Filter | None, seconds: int, parent: bytes) -> N
 
 def execute(run: ProgramRun) -> None:
     """Run the program that the engine sends, and report how it ended."""
+    send(READY)
     code, skills, parameters = receive()
     if skills != run.skills:
         run.provide(skills)
