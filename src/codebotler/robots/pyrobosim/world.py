@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import bisect
 import math
 import time
 from collections.abc import Iterator
 from typing import TypeVar
 
+import numpy as np
 import shapely
 from pyrobosim.core import Entity, ObjectSpawn, Robot, Room
 from pyrobosim.core import World as Pyroworld
@@ -16,7 +16,7 @@ from pyrobosim.navigation.world_graph import WorldGraphPlanner
 from pyrobosim.planning.actions import ExecutionResult, ExecutionStatus
 from pyrobosim.utils.graph_types import Node
 from pyrobosim.utils.path import Path
-from pyrobosim.utils.pose import Pose, wrap_angle
+from pyrobosim.utils.pose import Pose
 from pyrobosim.utils.trajectory import Trajectory, get_constant_speed_trajectory
 from shapely.geometry import LineString
 
@@ -196,16 +196,10 @@ class Motor(PathExecutor):
 
 def _pose_at(way: Trajectory, moment: float) -> Pose:
     """Interpolate the pose at a time, in seconds since the start of a drive."""
-    number = min(bisect.bisect_right(way.t_pts, moment), len(way.t_pts) - 1)
-    start, end = way.poses[number - 1], way.poses[number]
-    begins, ends = way.t_pts[number - 1], way.t_pts[number]
-    share = 1.0 if moment >= ends else (moment - begins) / (ends - begins)
-    turned = wrap_angle(end.get_yaw() - start.get_yaw())
-    return Pose(
-        start.x + share * (end.x - start.x),
-        start.y + share * (end.y - start.y),
-        yaw=start.get_yaw() + share * turned,
-    )
+    poses = np.array([(pose.x, pose.y, pose.get_yaw()) for pose in way.poses])
+    poses[:, 2] = np.unwrap(poses[:, 2])
+    x, y, yaw = (float(np.interp(moment, way.t_pts, axis)) for axis in poses.T)
+    return Pose(x, y, yaw=yaw)
 
 
 def _expect_added(part: T | None) -> T:
