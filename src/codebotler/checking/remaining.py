@@ -55,11 +55,6 @@ class RepeatingRobot(SampledRobot):
         super().__init__(room_map, sampler, settings, skills)
         self.left = deque(event for event in room_map.past if not event.failed)
 
-    @property
-    def idle_skills(self) -> frozenset[str]:
-        """No skill as long as results are repeated, since these may differ."""
-        return frozenset() if self.left else super().idle_skills
-
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Return the result in the past. A call that is not in it failed."""
         if not self.left:

@@ -209,17 +209,12 @@ class SimulatedRobot(SimulatedWorld):
     def fail(self, kind: str) -> NoReturn:
         """End the current skill with an error that it declares in `fails`."""
         row = self._own_skill
-        declared = {} if row is None else dict(row.fails)
-        if row is not None and kind in declared:
-            raise RobotError(kind, f"{row.name}: {declared[kind]}")
-        from difflib import get_close_matches  # noqa: PLC0415 - children do not need it
-
-        alike = get_close_matches(kind, declared, 1)
-        hint = f"did you mean {alike[0]}?" if alike else "declare it in `fails`, and say when it happens"
-        sentence = f'{row.name if row else "the skill"} declares no error "{kind}"; {hint}'
         if row is None:
-            raise UserError(sentence)
-        row.wrong(sentence)
+            raise UserError(f'no skill is being executed that declares the error "{kind}"')
+        declared = dict(row.fails)
+        if kind not in declared:
+            row.wrong(f'{row.name} declares no error "{kind}"; declare it, and when it happens, in `fails`')
+        raise RobotError(kind, f"{row.name}: {declared[kind]}")
 
     def _own(self, row: Skill, arguments: Sequence[Argument]) -> Result:
         """Execute one of the user's own skills, and record its event."""

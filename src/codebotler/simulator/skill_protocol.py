@@ -51,7 +51,9 @@ class SkillProtocol:
                 self.child.end()
             raise
         if final is None and self.ledger.limit is None:
-            return self._died(self.child.end_gently())
+            seconds = LIVE_CPU_SECONDS if self.robot.is_live else CPU_SECONDS
+            cause, fault = cause_of_death(self.child.end_gently(), seconds)
+            return Outcome(cause, self.robot.trace, fault)
         self.child.kill()
         self.child.hang_up()
         return self.ledger.outcome_at_end(final or {})
@@ -100,10 +102,6 @@ class SkillProtocol:
             case _:
                 raise ProtocolError("there is no skill with this name")
         return STOP
-
-    def _died(self, status: int) -> Outcome:
-        cause, error = cause_of_death(status, LIVE_CPU_SECONDS if self.robot.is_live else CPU_SECONDS)
-        return Outcome(cause, self.robot.trace, error)
 
 
 def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
