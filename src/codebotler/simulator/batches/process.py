@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
-from _socket import socket
+from _socket import MSG_WAITALL, socket
 from collections.abc import Callable, Sequence
 from marshal import loads
 from pickle import loads as unpickled
@@ -20,7 +20,7 @@ from codebotler.core.trace import Option
 from codebotler.simulator.ledger import RememberingLedger
 from codebotler.simulator.robot import Argument, SimulatedRobot
 from codebotler.simulator.sampled_robot import SampledRobot
-from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, BATCH_MEMORY, MAX_FRAME
+from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, BATCH_MEMORY, HEADER, MAX_FRAME
 from codebotler.simulator.sandbox.channel import receive, send_frames
 from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun, robot_error
@@ -53,21 +53,14 @@ def main(*descriptors: str) -> None:
     door = socket(fileno=RUN_DOOR)
     run = TranscribedRun()
     simulate_environment(run)
-    rehearsal, lessons = loads(_receive_setup(door))  # noqa: S302 - from the engine
+    length = int.from_bytes(door.recv(HEADER), "big")
+    rehearsal, lessons = loads(door.recv(length, MSG_WAITALL))  # noqa: S302 - from the engine
     sys.meta_path.clear()
     give_up_rights(BATCH_MEMORY)
     seccomp = usable_filter()
     for _ in range(lessons):
         transcripts(run, rehearsal)
     serve(door, run, lambda run: execute(run, rehearsal), seccomp, BATCH_CPU_SECONDS)
-
-
-def _receive_setup(door: socket) -> bytes:
-    length = int.from_bytes(door.recv(4), "big")
-    data = b""
-    while len(data) < length:
-        data += door.recv(length - len(data))
-    return data
 
 
 def execute(run: TranscribedRun, rehearsal: Batch) -> NoReturn:
