@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Iterator, Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias
 
 import msgspec
 
 from codebotler.core.skills.table import Parameter, SkillTable
-from codebotler.core.skills.values import TEXT_TYPE, Scalar
+from codebotler.core.skills.values import Scalar
 from codebotler.core.trace import Option, Outcome, Status
 from codebotler.simulator.ledger import RememberingLedger, SkillAnswer, judge_end
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
@@ -129,7 +128,7 @@ class Replay:
 
     def __init__(self, robot: SimulatedRobot) -> None:
         self.robot, self.ledger = robot, RememberingLedger(robot)
-        self._signatures, self._own = signatures(robot.skills), robot.own_skills
+        self._own = robot.own_skills
 
     def follow(self, transcript: Transcript) -> SkillAnswer:
         """Repeat all calls, and return the last answer. Raise ProtocolError if any answer differs."""
@@ -162,8 +161,9 @@ class Replay:
 
     def _expected(self, call: Call) -> tuple[str, Sequence[Argument], float, SkillAnswer | None]:
         """Return a call with its time and expected answer, which is None if only the engine knows it."""
-        signature = self._signatures.get(call.skill)
-        if signature is None or (tuple(map(type, call.arguments)) != signature and not self._fits(call)):
+        skill = self.robot.skills.get(call.skill)
+        known = () if skill is None else skill.parameters
+        if skill is None or len(known) != len(call.arguments) or not all(map(_fits, known, call.arguments)):
             raise ProtocolError("there is no skill with this name and these parameters")
         if call.kind == "ask" and call.skill not in self._own:
             raise ProtocolError("the child could have answered this call itself")
@@ -171,21 +171,8 @@ class Replay:
         arguments: Any = call.arguments  # checked above
         return call.skill, arguments, call.now, None if call.kind == "ask" else (call.kind, value)
 
-    def _fits(self, call: Call) -> bool:
-        parameters = self.robot.skills[call.skill].parameters
-        return len(parameters) == len(call.arguments) and all(map(_fits, parameters, call.arguments))
-
 
 def _fits(parameter: Parameter, given: object) -> bool:
     if parameter.is_options:
         return isinstance(given, tuple) and all(isinstance(each, Option) for each in given)
     return parameter.type.fits(given)
-
-
-@lru_cache(maxsize=16)
-def signatures(skills: SkillTable) -> dict[str, tuple[type, ...]]:
-    """Return the argument types of each skill. `object` marks an argument that needs a further check."""
-    return {
-        skill.name: tuple(str if p.type == TEXT_TYPE else object for p in skill.parameters)
-        for skill in skills.rows
-    }
