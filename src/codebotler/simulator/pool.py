@@ -22,7 +22,6 @@ from codebotler.simulator.worker import EngineError, Worker
 
 _log = logging.getLogger("codebotler.engine")
 NO_SECCOMP = "programs are less isolated here: the kernel does not allow system call filters (seccomp)"
-NOT_LINUX = "programs are less isolated here: only Linux has system call filters (seccomp)"
 WINDOWS_UNSUPPORTED = "programs run on Linux and macOS only; on Windows, use WSL"
 
 RESULTS_IN_MEMORY = 8_000_000  # bytes of results, before they move to a file
@@ -68,8 +67,8 @@ class WorkerPool:
         if not first.has_seccomp:
             if require_isolation:
                 first.close()
-                raise EngineError(without_filter())
-            _log.warning(without_filter())
+                raise EngineError(NO_SECCOMP)
+            _log.warning(NO_SECCOMP)
         self._workers.append(first)
         self._idle.append(first)
 
@@ -210,11 +209,6 @@ def _next(queue: SimpleQueue[_Value]) -> _Value:
     while True:
         with contextlib.suppress(Empty):
             return queue.get(timeout=SIGNAL_POLL_SECONDS)
-
-
-def without_filter() -> str:
-    """Return the warning for systems without seccomp."""
-    return NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
 
 
 class DistinctKeys(Generic[_Key]):

@@ -10,7 +10,7 @@ from functools import cache
 from typing import Protocol, Self, TypeAlias, TypeVar
 
 from codebotler.simulator.engine import digest
-from codebotler.simulator.pool import WorkerPool, without_filter
+from codebotler.simulator.pool import NO_SECCOMP, WorkerPool
 from codebotler.simulator.worker import EngineError, Worker
 
 PYTHON_VERSION = ".".join(platform.python_version_tuple()[:2])  # verdicts depend on the version
@@ -76,5 +76,5 @@ def own_worker(*, require_isolation: bool = False, one_process_per_run: bool = F
     worker = Worker(one_process_per_run=one_process_per_run)
     if require_isolation and not worker.has_seccomp:
         worker.close()
-        raise EngineError(without_filter())
+        raise EngineError(NO_SECCOMP)
     return worker

@@ -89,12 +89,14 @@ class ForkServer:
         """Kill the fork server and close its descriptors. Call this only while nothing is running."""
         self._process.kill()
         self._process.wait()
-        os.close(self._report)
-        self._door.close()
+        self._close_descriptors()
 
     def forget(self) -> None:
         """After a fork, close the descriptors in the new process, which is not the fork server's parent."""
         self._process.returncode = 0  # stops `Popen` from waiting for it here
+        self._close_descriptors()
+
+    def _close_descriptors(self) -> None:
         os.close(self._report)
         self._door.close()
 
@@ -149,15 +151,8 @@ class BatchServer(ForkServer):
         with contextlib.suppress(LostProcessError):  # the next fork raises the error
             self._next = super().fork()
 
-    def close(self) -> None:
-        """Kill the fork server and the child that it forked in advance."""
-        super().close()
-        if self._next is not None:
-            self._next.hang_up()
-
-    def forget(self) -> None:
-        """After a fork, close the descriptors in the new process, which is not the fork server's parent."""
-        super().forget()
+    def _close_descriptors(self) -> None:
+        super()._close_descriptors()
         if self._next is not None:
             self._next.hang_up()
 
