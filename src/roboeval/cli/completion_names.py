@@ -30,13 +30,6 @@ def listed_task_names(context: typer.Context, incomplete: str) -> list[str]:
     return [",".join([*whole, name]) for name in task_names(context, last) if name not in whole]
 
 
-def split_names(incomplete: str) -> list[str]:
-    """Return the splits of task families."""
-    from roboeval.suites.families.suite import FIRST_SEEDS
-
-    return [name for name in FIRST_SEEDS if name.startswith(incomplete)]
-
-
 def engine_names(incomplete: str) -> list[str]:
     """Return the names of the engines."""
     return [name for name in ("local", "ray") if name.startswith(incomplete)]

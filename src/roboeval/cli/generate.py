@@ -22,13 +22,11 @@ from roboeval.cli.inputs import command, load
 from roboeval.cli.options import (
     BudgetOption,
     ConcurrencyOption,
-    FamiliesOption,
     IsolationOption,
     JsonOption,
     MissionTokensOption,
     ModeOption,
     NumOption,
-    NumTasksOption,
     OutOption,
     ProcessOption,
     RateOption,
@@ -95,8 +93,6 @@ def read_options(
     max_mission_tokens: MissionTokensOption = None,
     within: WithinOption = None,
     suite: SuiteOption = "paper",
-    families: FamiliesOption = None,
-    num_tasks: NumTasksOption = None,
     tasks: TasksOption = None,
     concurrency: ConcurrencyOption = 8,
     requests_per_minute: RateOption = None,
@@ -111,9 +107,6 @@ def read_options(
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import tasks_to_judge
 
-    if families is not None or num_tasks is not None:
-        suite = suite_of_families(suite, families, num_tasks, sampling["seed"])
-        sampling["seed"] = None
     chosen = choose_model(model, base_url)
     settings = chosen.add_server(model_settings(**sampling))
     pace = Pace(concurrency, requests_per_minute, token_budget)
@@ -146,18 +139,6 @@ def missions_of(
     limits = TurnLimits(turns or DEFAULT_TURNS[mode], tokens)
     contract = read_within(within, plan.suite.skills)
     return AgentPlan(plan.suite, plan.tasks, count, mode=mode, limits=limits, contract=contract)
-
-
-def suite_of_families(suite: str, families: str | None, num_tasks: int | None, seed: int | None) -> str:
-    """Return the name of the suite of task families that replaces --suite."""
-    from roboeval.suites.families.suite import FamilyTasks
-    from roboeval.suites.families.tasks import family_names
-
-    if families is None:
-        fail("--num-tasks needs --families; add it")
-    if suite != "paper":
-        fail("--families creates its own suite; leave out --suite")
-    return FamilyTasks(families, seed or 0, num_tasks or len(family_names())).name
 
 
 def complete_run(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace) -> Path:

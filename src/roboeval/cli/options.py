@@ -11,7 +11,6 @@ import typer
 from roboeval.cli.completion_names import (
     engine_names,
     listed_task_names,
-    split_names,
     suite_names,
     task_names,
 )
@@ -95,18 +94,6 @@ RequestsOption = Annotated[
         help="Write the requests to this file for a batch endpoint; query no model.",
         parser=path_to("a file"),
     ),
-]
-FamiliesOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="SPLIT",
-        help="Generate new tasks from this split (train, validation or test); --seed varies them.",
-        autocompletion=split_names,
-    ),
-]
-NumTasksOption = Annotated[
-    int | None,
-    typer.Option(min=1, max=100, help="With --families: number of tasks; by default one of each family."),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 OutOption = Annotated[

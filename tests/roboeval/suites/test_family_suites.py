@@ -93,7 +93,7 @@ def test_recorded_models_know_right_and_wrong_programs() -> None:
 # --- on the command line
 
 
-FRESH = ("--families", "test", "--seed", "7", "--num-tasks", "2")
+FRESH = ("--suite", SMALL)
 
 
 def test_from_fresh_tasks_to_tables_and_again_on_another_machine(tmp_path: Path) -> None:
@@ -135,11 +135,8 @@ def test_completions_of_another_seed_are_not_judged(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        (("--families", "exam"), '"exam"'),
-        (("--families", "test", "--suite", "plus"), "--suite"),
-        (("--num-tasks", "3"), "--families"),
-        (("--families", "test", "--seed", "-1"), "seed"),
-        (("--families", "test", "--num-tasks", "101"), "--num-tasks"),
+        (("--suite", "families-exam-0"), '"exam"'),
+        (("--suite", "families-test-0-101"), "101"),
     ],
 )
 @pytest.mark.parametrize("command", ["generate", "run"])
