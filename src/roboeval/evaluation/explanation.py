@@ -56,7 +56,7 @@ def completion_data(
         "reply": reply_data(completion),
         "lowered": suite is not None and suite.settings.literals == "lowercase",
         "worlds": [
-            _world_data(verdict, _scenario(suite, row, number, ablated=ablated), budget, suite)
+            _world_data(verdict, _scenario(suite, row, number, ablated=ablated), budget)
             for number, verdict in enumerate(row["verdicts"])
         ],
     }
@@ -105,15 +105,14 @@ def _scenario(suite: Suite | None, row: Mapping[str, Any], number: int, *, ablat
 
 
 def _world_data(
-    verdict: Mapping[str, Any], scenario: Scenario | None, budget: ExplanationBudget, suite: Suite | None
+    verdict: Mapping[str, Any], scenario: Scenario | None, budget: ExplanationBudget
 ) -> dict[str, Any]:
     trace, cut = trace_of(verdict), verdict.get("cut")
-    world, settings = None if scenario is None else scenario.world, None if suite is None else suite.settings
     return {
         **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
         "steps": steps_of(trace, has_places=True),
         **({} if cut is None else {"cut": cut}),
-        "remarks": remarks_on(verdict, trace, world, settings),
+        "remarks": remarks_on(verdict, trace),
         "failed_checks": [
             {"check": check, **_explained(check, scenario, verdict, trace, budget)}
             for check in verdict["failed_checks"]
