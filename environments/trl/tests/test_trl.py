@@ -26,8 +26,8 @@ from codebotler_trl import (
 from trl import chat_template_utils
 
 from codebotler.simulator.worker import EngineError
+from roboeval.evaluation import rewards
 from roboeval.suites.families.tasks import trained_task
-from roboeval.training import rollouts
 from roboeval.training.missions import TrainingMission, mission_tools
 from roboeval.training.prompts import PolicyReply
 
@@ -59,7 +59,7 @@ def test_a_failure_of_the_engine_is_an_error(monkeypatch: pytest.MonkeyPatch) ->
     def broken(*_: object) -> object:
         raise EngineError("no process can be started")
 
-    monkeypatch.setattr(rollouts, "_judge_batch", broken)
+    monkeypatch.setattr(rewards, "judge_batch", broken)
     rows = load_prompts("train", count=1, seed=77, only=[FAMILY])
     with pytest.raises(EngineError, match="no process"):
         reward(["    say('a')\n"], **columns(rows))

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from os import PathLike
 from statistics import fmean
-from typing import Generic, TypeVar
+from typing import NamedTuple, TypeAlias
 
-from codebotler.core.errors import UserError, expect_list
+from codebotler.core.errors import VIOLATION, UserError, expect_list
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import shared_pool
-from roboeval.evaluation.judge import are_met, is_met, may_satisfy, run_in
+from roboeval.evaluation.judge import are_met, is_met, may_satisfy, robot_in
 from roboeval.evaluation.runs.completions import find_key_fault
 from roboeval.suites.load import Scenario, Suite, load_suite
 
-Judged = TypeVar("Judged")
+AskedWorlds: TypeAlias = Sequence[tuple[Scenario, Sequence[bool]]]
+"""The worlds of a prompt with its requirements, and whether each requirement holds at the start."""
+
 ERROR_FACTOR = 0.5  # factor for a run that ends in an error, so that returning early would earn more
 
 MAX_CACHED_REWARDS = 100_000  # a policy often repeats a program
@@ -61,7 +63,14 @@ def reward(
         chosen = chosen.with_worlds(worlds, seed)
     if (problem := find_key_fault((task, prompt, 0), chosen)) is not None:
         raise UserError(problem)
-    return rewards_of(chosen, task, first_equal_prompt(chosen, task, prompt), programs)
+    names = [digest(chosen.digest, task, str(prompt), program) for program in programs]
+
+    def asking() -> tuple[Suite, AskedWorlds]:
+        return chosen, requirements_of(chosen, task, prompt)
+
+    works = {name: RewardWork(program, asking) for name, program in zip(names, programs, strict=True)}
+    found = judge_works(works)
+    return [found[name].reward for name in names]
 
 
 @dataclass(frozen=True)
@@ -83,15 +92,7 @@ class Share:
 
 
 @lru_cache(maxsize=160)  # twice the number of prompts in a suite
-def first_equal_prompt(suite: Suite, task: str, prompt: int) -> int:
-    """Return the number of the first prompt with the same requirements."""
-    scenarios = suite.tasks[task].scenarios
-    asked = [[scenario.asked_by(number) for scenario in scenarios] for number in range(prompt + 1)]
-    return asked.index(asked[prompt])
-
-
-@lru_cache(maxsize=160)
-def requirements_of(suite: Suite, task: str, prompt: int) -> list[tuple[Scenario, list[bool]]]:
+def requirements_of(suite: Suite, task: str, prompt: int) -> AskedWorlds:
     """Return a prompt's requirements in each world, and whether each holds at the start."""
     asked = [scenario.asked_by(prompt) for scenario in suite.tasks[task].scenarios]
     return [(scenario, [is_met(one, ()) for one in scenario.require]) for scenario in asked]
@@ -108,46 +109,89 @@ def total(shares: Sequence[Share]) -> float:
     return fmean([*earned, *(share.kept * elsewhere for share in shares if share.gained is None)])
 
 
-class RewardCache(Generic[Judged]):
-    """Caches results by name, so that equal programs are judged once.
+@dataclass(frozen=True)
+class Components:
+    """The reward of a program and its components, each from 0 to 1.
 
-    Each operation on the dictionary is atomic, so that threads and forks need no lock.
+    Args:
+        reward: the value of `roboeval.reward`: 1 if and only if the program passes, 0 if it does nothing.
+        passed: 1 if all requirements hold in all worlds.
+        requirements: the share of requirements that hold, averaged over worlds. It is not a reward by
+            itself, because some requirements hold for a program that does nothing.
+        without_errors: the share of worlds where the program ends without an error.
+        parses: 1 if the program is valid Python.
+        rules_kept: the share of worlds where the program breaks no house rule.
     """
 
-    def __init__(self) -> None:
-        self._known: dict[bytes, Judged] = {}
-
-    def among(self, names: Iterable[bytes]) -> dict[bytes, Judged]:
-        """Return the cached results for these names."""
-        return {name: found for name in names if (found := self._known.get(name)) is not None}
-
-    def add(self, results: Mapping[bytes, Judged]) -> None:
-        """Add results. A full cache is emptied first."""
-        if len(self._known) >= MAX_CACHED_REWARDS:
-            self._known.clear()
-        self._known.update(results)
+    reward: float
+    passed: float
+    requirements: float
+    without_errors: float
+    parses: float
+    rules_kept: float
 
 
-REWARD_CACHE: RewardCache[float] = RewardCache()
+def components_of(outcomes: Sequence[Outcome], asked: AskedWorlds, *, parses: bool = True) -> Components:
+    """Compute the reward and its components from what happened in some worlds.
+
+    `parses` says whether the program is valid Python.
+    """
+    ran = [(outcome, *one) for outcome, one in zip(outcomes, asked, strict=True)]
+    reward = total([Share.of(*one) for one in ran])
+    kinds = ["" if outcome.error is None else outcome.error.kind for outcome in outcomes]
+    return Components(
+        reward=reward,
+        passed=float(reward == 1),
+        requirements=fmean(fmean(are_met(outcome, scenario)) for outcome, scenario, _ in ran),
+        without_errors=fmean(may_satisfy(outcome, scenario) for outcome, scenario, _ in ran),
+        parses=float(parses),
+        rules_kept=fmean(kind != VIOLATION for kind in kinds),
+    )
 
 
-def rewards_of(suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
-    """Return the reward of each program, in input order. Equal programs are judged once."""
-    names = [digest(suite.digest, task, str(prompt), program) for program in programs]
-    rewards = REWARD_CACHE.among(names)
-    new = {name: program for name, program in zip(names, programs, strict=True) if name not in rewards}
-    judging = partial(judge_programs, suite, task, prompt)
-    found = shared_pool().map_distinct(judging, new.values(), name=digest)
-    rewards.update(zip(new, found, strict=True))
-    REWARD_CACHE.add(rewards)
-    return [rewards[name] for name in names]
+class RewardWork(NamedTuple):
+    """A program, with a function that returns what it is judged by. The function runs in another thread."""
+
+    program: str
+    asking: Callable[[], tuple[Suite, AskedWorlds]]
 
 
-def judge_programs(suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
-    """Compute the rewards of programs. The calling thread must have a worker."""
-    asked = requirements_of(suite, task, prompt)
-    ran = run_in(shared_pool().here(), programs, [scenario for scenario, _ in asked], suite)
-    return [
-        total([Share.of(outcome, *one) for outcome, one in zip(outcomes, asked, strict=True)])
-        for outcomes in ran
+REWARD_CACHE: dict[bytes, Components] = {}
+"""The results by name. Each operation on the dictionary is atomic, so that threads and forks need no lock."""
+
+
+def judge_works(
+    works: Mapping[bytes, RewardWork], progress: Callable[[int], object] = bool
+) -> dict[bytes, Components]:
+    """Judge named programs, a few batches at a time, and keep the results for programs of the same name.
+
+    `progress` is called with the number of results so far whenever there is a new one.
+    """
+    known = {name: found for name in works if (found := REWARD_CACHE.get(name)) is not None}
+    new = [name for name in works if name not in known]
+    judged = shared_pool().map_distinct(
+        lambda names: judge_batch([works[name] for name in names]), new, name=lambda name: name
+    )
+    for name, found in zip(new, judged, strict=True):
+        known[name] = found
+        progress(len(known))
+    if len(REWARD_CACHE) >= MAX_CACHED_REWARDS:
+        REWARD_CACHE.clear()
+    REWARD_CACHE.update(known)
+    return known
+
+
+def judge_batch(works: Sequence[RewardWork]) -> list[Components]:
+    """Judge programs. The calling thread must have a worker of the shared pool."""
+    worker = shared_pool().here()
+    asked = [work.asking() for work in works]
+    jobs = [
+        (work.program, [partial(robot_in, scenario.world, suite) for scenario, _ in worlds])
+        for work, (suite, worlds) in zip(works, asked, strict=True)
     ]
+    judged = []
+    for (program, robots), outcomes, (_, worlds) in zip(jobs, worker.run_all(jobs), asked, strict=True):
+        has_run = any(outcome.trace or outcome.error is None for outcome in outcomes)
+        parses = has_run or worker.compiles(program, robots[0]())
+        judged.append(components_of(outcomes, worlds, parses=parses))
+    return judged

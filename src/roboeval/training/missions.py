@@ -11,11 +11,10 @@ from typing import Any, Self
 from codebotler.core.skills.paper import SKILLS
 from codebotler.prompts.tools import agent_prompt, tools_for
 from roboeval.evaluation.agents.mission import AgentMission
-from roboeval.evaluation.rewards import requirements_of
+from roboeval.evaluation.rewards import Components, components_of, requirements_of
 from roboeval.evaluation.runs.endings import TURN_LIMIT
 from roboeval.suites.families.tasks import trained_prompts, trained_task
 from roboeval.training.prompts import load_prompts
-from roboeval.training.rollouts import Components, components_of
 
 MAX_MISSION_CALLS = 100
 """The number of calls after which a mission ends."""

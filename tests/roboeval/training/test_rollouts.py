@@ -12,10 +12,11 @@ import pytest
 from codebotler.core.errors import UserError
 from codebotler.simulator.worker import EngineError
 from roboeval import reward
+from roboeval.evaluation import rewards
 from roboeval.suites.families.suite import FIRST_SEEDS
 from roboeval.suites.families.tasks import TrainedTask, trained_task
 from roboeval.suites.house import HouseRules
-from roboeval.training import prompts, rollouts
+from roboeval.training import prompts
 from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Components, Rollout, judge
 
@@ -72,7 +73,7 @@ def test_a_failure_of_the_engine_is_an_error_and_no_reward(monkeypatch: pytest.M
     def broken(*_: object) -> object:
         raise EngineError("no process can be started")
 
-    monkeypatch.setattr(rollouts, "_judge_batch", broken)
+    monkeypatch.setattr(rewards, "judge_batch", broken)
     with pytest.raises(EngineError, match="no process"):
         judge([saying("never judged before")])
 
