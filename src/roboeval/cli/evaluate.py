@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -37,7 +38,6 @@ from roboeval.cli.show import house_of, print_summary
 if TYPE_CHECKING:
     from roboeval.analysis.summary import EvaluationSummary
     from roboeval.analysis.tally import Tally
-    from roboeval.evaluation.batches import ImportResult
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.completions import CompletionKey
     from roboeval.evaluation.runs.folder import RunFolder
@@ -203,42 +203,21 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
     """Add the answers from a batch endpoint to their run. Exit with status 1 if completions are missing."""
     with installed():
         from roboeval.evaluation.batches import import_answers
-    from roboeval.evaluation.runs.completions import how_many
+    from roboeval.evaluation.runs.completions import how_many, name_of
     from roboeval.evaluation.runs.folder import RunFolder
 
     with path.open("rb") as file:
         count = sum(1 for _ in file)
     with progress_meter("reading", count) as update:
         found = import_answers(RunFolder(out), load(suite), path, progress=lambda done: update(done, ""))
-    missing = len(found.failed) + len(found.unanswered)
-    again = command("evaluate", out, suite=suite)
+    there, again = found.total - len(found.missing), command("evaluate", out, suite=suite)
     note(
-        f"{found.total - missing:,} of {how_many(found.total)} are in {out}, {found.new:,} of them new; "
-        f"`{again}` judges them"
+        f"{there:,} of {how_many(found.total)} are in {out}, {found.new:,} of them new; `{again}` judges them"
     )
-    for sentence in missing_sentences(found):
-        note(sentence)
-    if missing:
-        note(f"roboeval: {how_many(missing)} missing; `roboeval generate --requests` requests them again")
+    examples = {why: key for key, why in reversed(found.missing.items())}
+    for why, count in Counter(found.missing.values()).items():
+        note(f"{counted(count, 'request')} failed, such as {name_of(examples[why])}: {why}")
+    if found.missing:
+        lacks = how_many(len(found.missing))
+        note(f"roboeval: {lacks} missing; `roboeval generate --requests` requests them again")
         raise SystemExit(1)
-
-
-def missing_sentences(found: ImportResult) -> Iterator[str]:
-    """Yield a sentence for each error with its requests, then a sentence about unanswered requests."""
-    by_error: dict[str, list[CompletionKey]] = {}
-    for key, error in found.failed.items():
-        by_error.setdefault(error, []).append(key)
-    for error, keys in by_error.items():
-        yield f"{counted(len(keys), 'request')} failed: {error}: {_named(keys)}"
-    if found.unanswered:
-        yield f"{counted(len(found.unanswered), 'request')} not answered: {_named(found.unanswered)}"
-
-
-MAX_NAMED_REQUESTS = 10  # listed in one sentence
-
-
-def _named(keys: Sequence[CompletionKey]) -> str:
-    from roboeval.evaluation.runs.completions import name_of
-
-    more = len(keys) - MAX_NAMED_REQUESTS
-    return ", ".join(map(name_of, keys[:MAX_NAMED_REQUESTS])) + (f" and {more:,} more" if more > 0 else "")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,7 +23,7 @@ from codebotler.core.files import (
     to_text,
     write_whole,
 )
-from codebotler.models.base import ModelError, Reply
+from codebotler.models.base import ModelError
 from codebotler.models.batch import BatchModel
 from codebotler.models.sampling import SamplingSettings
 from roboeval.evaluation.generate import reply_of_refusal
@@ -92,8 +92,7 @@ class ImportResult:
 
     new: int  # completions that the import added
     total: int  # completions that the run should have
-    failed: Mapping[CompletionKey, str] = field(repr=False)  # errors of the requests that failed
-    unanswered: Sequence[CompletionKey] = field(repr=False)  # requests with neither a completion nor an error
+    missing: Mapping[CompletionKey, str] = field(repr=False)  # why each other completion is missing
 
 
 BatchAnswer: TypeAlias = tuple[CompletionKey, int, object]  # to which request, the status, and the body
@@ -111,80 +110,60 @@ def import_answers(
     about = _expect_begun(run, suite)
     plans = [_plan(suite, batch) for batch in batches(about)]
     expected = list(dict.fromkeys(key for plan in plans for key in plan.keys()))  # noqa: SIM118 - no mapping
-    ids = {request_id(about, key, plans[0].instruction(key)): key for key in expected}
+    plan = plans[0]
+    ids = {request_id(about, key, plan.instruction(key)): key for key in expected}
     with run.writing():
         usage, there = no_usage(), set()
-        for completion in plans[0].completed(run):
+        for completion in plan.completed(run):
             there.add(completion.key)
             add_usage(usage, completion.more.get("usage"))
-        settings = SamplingSettings(**batches(about)[-1]["settings"])
-        with closing(BatchModel(about["model"], settings)) as model:
-            found = _Replies(model, plans[0], there)
+        rows: dict[CompletionKey, dict[str, Any]] = {}
+        failed: dict[CompletionKey, ModelError] = {}
+        with closing(BatchModel(about["model"], SamplingSettings(**batches(about)[-1]["settings"]))) as model:
             for number, (key, status, body) in enumerate(_answers(path, ids), 1):
-                found.add(key, status, body)
+                if key not in there and key not in rows:
+                    try:
+                        rows[key] = _row(model, plan, key, status, body)
+                    except ModelError as error:
+                        failed[key] = error
                 progress(number)
-            found.keep_refused()
-        new = [found.lines[key] for key in expected if key in found.lines]
-        missing = [key for key in expected if key not in there and key not in found.lines]
-        if new:
-            _add(run, about, new, usage, is_whole=not missing)
-    failed = {key: found.failed[key] for key in missing if key in found.failed}
-    return ImportResult(len(new), len(expected), failed, [key for key in missing if key not in failed])
+        if there or rows:  # the endpoint accepted these, so it refused others because of their content
+            for key, error in failed.items():
+                if error.is_refusal and key not in rows:
+                    data = reply_of_refusal(error).data()
+                    rows[key] = row_for(key, plan.instruction(key), about["model"], data)
+        missing = {
+            key: failed[key].sentence if key in failed else "not answered"
+            for key in expected
+            if key not in there and key not in rows
+        }
+        if rows:
+            _add(run, about, [rows[key] for key in expected if key in rows], usage, is_whole=not missing)
+    return ImportResult(len(rows), len(expected), missing)
 
 
-BatchLine: TypeAlias = tuple[bytes, Mapping[str, Any]]  # a line of completions.jsonl, and its token counts
+def _row(
+    model: BatchModel, plan: GenerationPlan, key: CompletionKey, status: int, body: object
+) -> dict[str, Any]:
+    """Return the row of an answer. Raise ModelError if it contains no reply, or one that is too long."""
+    reply = model.reply(plan.prompt(key), number=plan.sample(key), status=status, body=body)
+    row = row_for(key, plan.instruction(key), model.name, reply.data())
+    if (size := len(to_line(row))) > MAX_ROW:
+        raise ModelError(f"the reply is too long to save: {size:,} bytes", may_pass=False)
+    return row
 
 
 def _add(
-    run: RunFolder, about: dict[str, Any], lines: list[BatchLine], usage: Counter[str], *, is_whole: bool
+    run: RunFolder, about: dict[str, Any], rows: list[dict[str, Any]], usage: Counter[str], *, is_whole: bool
 ) -> None:
     with closing(Appender(run.completions)) as file:
-        for line, used in lines:
-            file.append(line)
-            add_usage(usage, used)
+        for row in rows:
+            file.append(to_line(row))
+            add_usage(usage, row["usage"])
     about["usage"] = usage
     if is_whole:
         about["batches"][-1]["ended"] = timestamp()
     write_whole(run.about, to_text(about))
-
-
-@dataclass
-class _Replies:
-    """Converts the replies in answers to lines of completions.jsonl."""
-
-    model: BatchModel
-    plan: GenerationPlan
-    there: set[CompletionKey]  # the completions already in the run
-    lines: dict[CompletionKey, BatchLine] = field(default_factory=dict)
-    failed: dict[CompletionKey, str] = field(default_factory=dict)
-    refused: dict[CompletionKey, ModelError] = field(default_factory=dict)
-
-    def add(self, key: CompletionKey, status: int, body: object) -> None:
-        """Add an answer, unless its request already has a reply."""
-        if key in self.there or key in self.lines:
-            return
-        try:
-            prompt, number = self.plan.prompt(key), self.plan.sample(key)
-            self._keep(key, self.model.reply(prompt, number=number, status=status, body=body))
-        except ModelError as error:
-            self.failed[key] = error.sentence
-            if error.is_refusal:
-                self.refused[key] = error
-
-    def keep_refused(self) -> None:
-        """Record the requests that the endpoint refused permanently, if it accepted at least one request."""
-        if self.there or self.lines:
-            for key, error in self.refused.items():
-                if key not in self.lines:
-                    self._keep(key, reply_of_refusal(error))
-
-    def _keep(self, key: CompletionKey, reply: Reply) -> None:
-        row = row_for(key, self.plan.instruction(key), self.model.name, reply.data())
-        line = to_line(row)
-        if len(line) > MAX_ROW:
-            raise ModelError(f"the reply is too long to save: {len(line):,} bytes", may_pass=False)
-        self.lines[key] = line, row["usage"]
-        self.failed.pop(key, None)
 
 
 def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:

@@ -266,7 +266,7 @@ def test_refusals_of_all_requests_are_failures(tmp_path: Path) -> None:
     written(tmp_path / "answers.jsonl", [answer(one) | {"response": refusal} for one in requests])
     ended = take(tmp_path, "answers.jsonl")
     assert ended.status == 1
-    assert "10 requests failed: " in ended.err
+    assert "10 requests failed" in ended.err
     assert (tmp_path / "run" / "completions.jsonl").read_bytes() == b""
 
 
