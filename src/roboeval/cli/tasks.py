@@ -28,9 +28,6 @@ def tasks(
     accepted: Annotated[
         bool, typer.Option("--accepted", help="With --lint: also list accepted findings, with the reasons.")
     ] = False,
-    clauses: Annotated[
-        bool, typer.Option("--clauses", help="Show which checks cover each clause of each prompt.")
-    ] = False,
     new: Annotated[
         str | None,
         typer.Option(help="Create a task with this name in the folder --suite, which is created if needed."),
@@ -39,38 +36,33 @@ def tasks(
 ) -> None:
     """List, show or lint a suite's tasks, or create a new task."""
     if new is not None:
-        if task is not None or lint or accepted or clauses or json:
+        if task is not None or lint or accepted or json:
             fail("--new can only be combined with --suite; leave out the other options")
         start(new, suite)
         return
     if accepted and not lint:
         fail("--accepted needs --lint; add it")
-    if json and (lint or clauses):
-        fail(f"{'--lint' if lint else '--clauses'} has no JSON output; leave out --json")
+    if json and lint:
+        fail("--lint has no JSON output; leave out --json")
     known = load(suite)
     if lint:
         lint_tasks(known, task, accepted=accepted)
     elif json:
         print_json(suite_data(known, None if task is None else known.task(task).name))
     else:
-        show(known, task, clauses=clauses)
+        show(known, task)
 
 
-def show(suite: Suite, task: str | None, *, clauses: bool) -> None:
-    """Print the tasks of a suite, one task, or the clauses of their prompts."""
-    from roboeval.cli.views.tasks import clauses_view, suite_task_view, suite_view
+def show(suite: Suite, task: str | None) -> None:
+    """Print the tasks of a suite, or one task."""
+    from roboeval.cli.views.tasks import suite_task_view, suite_view
 
-    if clauses:
-        shown = suite.tasks.values() if task is None else [suite.task(task)]
-        if not any(one.covered_by for one in shown):
-            fail(f'the suite "{suite.name}" does not list which checks cover facts; add covered_by to a task')
-        print_rich(clauses_view(shown))
-    elif task is not None:
+    if task is not None:
         print_rich(suite_task_view(suite.task(task)))
-    else:
-        print_rich(suite_view(suite))
-        for sentence in other_suites(suite.name):
-            note(sentence)
+        return
+    print_rich(suite_view(suite))
+    for sentence in other_suites(suite.name):
+        note(sentence)
 
 
 def start(task: str, suite: str) -> None:

@@ -10,7 +10,6 @@ from rich.table import Table
 from rich.text import Text
 
 from codebotler.core.words import listed
-from roboeval.linting.clauses import clauses_of
 from roboeval.suites.load import Scenario, Suite, Task, TaskCheck
 from roboeval.suites.task import describe_contents, world_title
 
@@ -43,28 +42,6 @@ def suite_task_view(task: Task) -> RenderableType:
     for number, scenario in enumerate(task.scenarios, 1):
         parts += _section(world_title(number, None, scenario.world.about), _world_lines(scenario))
     return Group(*parts)
-
-
-def clauses_view(tasks: Iterable[Task]) -> RenderableType:
-    """Show the clauses of each prompt, with the checks that cover them or the reason why none does."""
-    parts: list[RenderableType] = []
-    for task in tasks:
-        table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
-        table.add_column("prompt", justify="right")
-        table.add_column("clause", ratio=3)
-        table.add_column("covered by", ratio=2)
-        last = None
-        for clause in clauses_of(task):
-            by = (
-                [Text(", ".join(clause.checks))]
-                if clause.checks
-                else [Text(why, "dim") for why in clause.because]
-            )
-            number = "" if clause.prompt == last else str(clause.prompt)
-            table.add_row(number, Text(clause.text), *(by[:1] or [Text("none", "bold")]))
-            last = clause.prompt
-        parts += [Text(task.name, "bold"), table, Text()]
-    return Group(*parts[:-1])
 
 
 def _section(title: str, lines: Iterable[RenderableType]) -> list[RenderableType]:
