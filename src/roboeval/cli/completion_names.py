@@ -28,8 +28,3 @@ def listed_task_names(context: typer.Context, incomplete: str) -> list[str]:
     """Complete the last of several comma-separated task names."""
     *whole, last = incomplete.split(",")
     return [",".join([*whole, name]) for name in task_names(context, last) if name not in whole]
-
-
-def engine_names(incomplete: str) -> list[str]:
-    """Return the names of the engines."""
-    return [name for name in ("local", "ray") if name.startswith(incomplete)]

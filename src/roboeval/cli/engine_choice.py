@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
-from typing import TYPE_CHECKING
-
-from roboeval.cli.output import fail
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
@@ -16,7 +14,9 @@ MIN_PROGRAMS_FOR_PROCESSES = 5_000  # with fewer programs, starting processes co
 
 
 @contextmanager
-def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[Callable[[int], OpenEngine]]:
+def engine_named(
+    name: Literal["local", "ray"], workers: int | None, **isolation: bool
+) -> Iterator[Callable[[int], OpenEngine]]:
     """Yield a function that returns the named engine, given the number of programs to run.
 
     A worker starts in parallel with the block; `WorkerPool` documents the isolation arguments.
@@ -38,8 +38,6 @@ def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[
 
             yield local
         return
-    if name != "ray":
-        fail(f'unknown engine "{name}"; use local or ray')
     from roboeval.evaluation.ray import RayCluster
 
     cluster = RayCluster(workers, **isolation)  # may fail, so create it before anything is written

@@ -293,9 +293,7 @@ class GenerationMeter(ExitStack):
             if progress.found:
                 note(f"{progress.found:,} of {counted(progress.total, 'completion')} already exist")
             if progress.interrupted:
-                note(
-                    f"{requests_under_way(progress.interrupted)} at the interruption, and may be billed twice"
-                )
+                note(f"{counted(progress.interrupted, 'pending request')} may be billed twice")
             self._draw = self.enter_context(progress_meter("generating", progress.total, progress.found))
         else:
             tokens = progress.usage.total()
@@ -307,11 +305,4 @@ class GenerationMeter(ExitStack):
         if self.progress is None:
             return "stopped before the first request; run the same command again"
         kept = f"{self.progress.done:,} of {counted(self.progress.total, 'completion')} are saved"
-        open_requests = self.progress.under_way
-        paid = f"; {requests_under_way(open_requests)}, and may be billed twice" if open_requests else ""
-        return f"stopped; {kept}{paid}; the same command continues where it stopped"
-
-
-def requests_under_way(requests: int) -> str:
-    """Format the number of pending requests, such as `1 request was pending`."""
-    return f"{counted(requests, 'request')} {'was' if requests == 1 else 'were'} pending"
+        return f"stopped; {kept}; the same command continues where it stopped"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,6 @@ from codebotler.core.words import counted
 from roboeval.cli.output import note, show_progress
 
 if TYPE_CHECKING:
-    from roboeval.evaluation.runs.folder import RunFolder
     from roboeval.evaluation.runs.results import Results
     from roboeval.suites.load import Suite
 
@@ -46,13 +45,6 @@ def command(
     words += ["--ablation"] if ablated else []
     words += [] if rules is None else ["--rules", str(rules)]
     return shlex.join(words)
-
-
-def note_houses(runs: Iterable[RunFolder], suite: str) -> None:
-    """Tell the user if runs were also judged with house rules, and which option shows those verdicts."""
-    if houses := dict.fromkeys(house for run in runs for house in run.houses(suite)):
-        files = " or ".join(f"--rules {house}.yaml" for house in houses)
-        note(f"also judged with house rules; {files} shows those verdicts")
 
 
 def expect_same_suite(opened: Sequence[Results], suite: str) -> None:

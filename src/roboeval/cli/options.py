@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 import typer
 
 from roboeval.cli.completion_names import (
-    engine_names,
     listed_task_names,
     suite_names,
     task_names,
@@ -64,11 +63,8 @@ HouseRulesOption = Annotated[
     ),
 ]
 EngineOption = Annotated[
-    str,
-    typer.Option(
-        help="Where to run programs: local (this machine) or ray (a Ray cluster).",
-        autocompletion=engine_names,
-    ),
+    Literal["local", "ray"],
+    typer.Option(help="Where to run programs: local (this machine) or ray (a Ray cluster)."),
 ]
 WorkersOption = Annotated[
     int | None, typer.Option(min=1, help="Number of programs to run in parallel; one per core by default.")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboeval.cli.compare import check_run
-from roboeval.cli.inputs import command, expect_same_suite, note_houses, open_current
+from roboeval.cli.inputs import command, expect_same_suite, open_current
 from roboeval.cli.options import (
     BesideOption,
     CheckOption,
@@ -80,8 +80,6 @@ def report(
     written = write_report(*headline(read), parts, out)
     for _ in show_progress(written, "writing", pieces(parts)):
         pass
-    if rules is None:
-        note_houses([one.run for one in opened], suite)
     note(f"the report is in {out / 'index.html'}")
 
 

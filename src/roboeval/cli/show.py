@@ -21,7 +21,6 @@ from roboeval.cli.inputs import (
     command,
     evaluate_again,
     load,
-    note_houses,
     open_current,
     open_run,
     stale_sentence,
@@ -82,8 +81,6 @@ def show(
     selection = parse_selection(what, judged.known_suite)
     if selection.task is None:
         show_run(judged, k or [], title=str(run), has_rules=rules is not None, as_json=json)
-        if rules is None:
-            note_houses([judged.run], suite)
     elif is_one:
         show_completion(judged, selection, suite, in_full=in_full, with_reply=with_reply, as_json=json)
     else:

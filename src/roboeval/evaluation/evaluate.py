@@ -155,20 +155,9 @@ def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[st
     was = load_json_object(path)
     for name, now in evaluation_metadata(suite, ablated=ablated, tasks=None).items():
         if was.get(name) != now and name != "tasks":
-            what = f"{METADATA_NAMES.get(name, name)} ({_brief(was.get(name))}, now {_brief(now)})"
-            raise UserError(f"was judged with a different {what}; --redo starts over", file=path)
+            change = f"{name.replace('_', ' ')} was {_brief(was.get(name))} and is now {_brief(now)}"
+            raise UserError(f"was judged differently: {change}; --redo starts over", file=path)
     return was
-
-
-METADATA_NAMES = {
-    "version": "version of the suite",
-    "digest": "content of the suite",
-    "rules": "set of simulation rules",
-    "house_rules": "set of house rules",
-    "skills": "set of skills",
-    "codebotler": "version of this tool",
-    "python": "version of Python",
-}
 
 
 def _brief(value: object) -> str:

@@ -48,7 +48,6 @@ class GenerationProgress:
     found: int  # completions present at the start
     interrupted: int  # requests pending at the last interruption, which may be billed twice
     usage: Counter[str]  # token counts of all completions
-    under_way: int = 0  # requests still pending when this generation was interrupted
     failures: dict[CompletionKey, str] = field(default_factory=dict)  # error messages of failed requests
     stopped: str | None = None  # why generation stopped early
 
@@ -101,10 +100,7 @@ def generate_run(
             with log, _turns_of(plan, run, done) as turns:
                 on_progress(progress)
                 generation = _Generation(plan, model, pace, file, log, turns, progress, on_progress)
-                try:
-                    asyncio.run(generation.generate(todo))
-                finally:
-                    progress.under_way = len(log.under_way)
+                asyncio.run(generation.generate(todo))
             if todo and progress.missing is None:
                 metadata["batches"][-1]["ended"] = timestamp()
             write_whole(run.about, to_text(metadata))

@@ -251,7 +251,7 @@ def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        (["--engine", "steam"], ['"steam"', "local", "ray"]),
+        (["--engine", "steam"], ["'steam'", "local", "ray"]),
         (["--workers", "0"], ["invalid value", "'--workers'"]),
         (["--workers", "many"], ["invalid value", "'--workers'"]),
         (["--frobnicate"], ["--frobnicate"]),
@@ -499,7 +499,7 @@ def test_a_run_that_was_judged_by_another_suite(tmp_path: Path) -> None:
     for asked in (("export", "run"), ("show", "run", "--ablation"), ("show", "run", "MakeTea")):
         refusal = refused(*asked, cwd=tmp_path)
         assert refusal.at == ("run", None)
-        for name in ('"mine"', '"paper"', "--suite"):
+        for name in ("mine", '"paper', "--suite"):
             assert name in refusal.sentence
     assert roboeval("show", "run", "--suite", "mine", cwd=tmp_path).status == 0
 

@@ -72,11 +72,6 @@ class RunFolder:
         keys = (path.stem for path in self.rows("").parent.glob("*.jsonl"))
         return sorted({key.removesuffix(ABLATED) for key in keys})
 
-    def houses(self, suite: str) -> list[str]:
-        """Return the sorted names of the house rules with which a suite has judged the run."""
-        before = f"{suite}{RULES_INFIX}"
-        return [key.removeprefix(before) for key in self.judged_by() if key.startswith(before)]
-
     def read(self, suite: Suite | None = None) -> Iterator[Completion]:
         """Read the completions, which must belong to the suite if one is given."""
         return read_completions(self.completions, suite, growing=True)
@@ -250,15 +245,7 @@ def evaluation_of(
     if not run.completions.is_file():
         raise UserError("is not a run, because it has no completions.jsonl", file=path)
     if not run.rows(key).is_file():
-        others, houses = run.judged_by(), run.houses(suite.name)
-        if houses and suite.name not in others:
-            named = ", ".join(houses)
-            mend = f"give their file with --rules, or run `{again}`"
-            raise UserError(f"was judged only with house rules ({named}); {mend}", file=path)
-        if not others or suite.name in others:
-            raise UserError(f"has not been judged; run `{again}`", file=path)
-        judges, ours = " and ".join(f'"{name}"' for name in others), f'"{suite.name}"'
-        raise UserError(
-            f"was judged by the suite {judges}, not by {ours}; select the right suite with --suite", file=path
-        )
+        others = ", ".join(run.judged_by())
+        only = f' as "{key}", only as {others}; choose with --suite and --rules, or' if others else ";"
+        raise UserError(f"has not been judged{only} run `{again}`", file=path)
     return run, key, suite

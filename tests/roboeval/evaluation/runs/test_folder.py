@@ -232,10 +232,10 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
 @pytest.mark.parametrize(
     ("name", "value", "what"),
     [
-        ("digest", "0" * 64, "suite ("),
-        ("python", "2.7", 'Python ("2.7", now "3.'),
-        ("codebotler", "0.0.1", 'tool ("0.0.1", now '),
-        ("ablation", True, "ablation (true, now false)"),
+        ("digest", "0" * 64, "digest was"),
+        ("python", "2.7", 'python was "2.7" and is now "3.'),
+        ("codebotler", "0.0.1", 'codebotler was "0.0.1" and is now '),
+        ("ablation", True, "ablation was true and is now false"),
     ],
 )
 def test_what_was_judged_otherwise_is_refused_unless_all_is_redone(
