@@ -48,7 +48,7 @@ from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.judge import judge
-from roboeval.evaluation.recovery import Call, FaultyRobot, check_rest
+from roboeval.evaluation.recovery import Call, RecordingRobot, check_rest
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.source import recorded_completions, recorded_model_for
 from roboeval.mutation.mutants import mutants, originals, sample_mutants
@@ -254,7 +254,7 @@ def past_of(robot: SimulatedRobot, program: str) -> MissionPast:
 
 def calls_until(worker: Worker, program: str, world: World, events: int) -> tuple[Call, ...]:
     """Return the calls of a program in a world until it has so many events."""
-    robot = FaultyRobot(world, SUITE)
+    robot = RecordingRobot(world, SUITE)
     worker.run_alone(program, lambda: robot)
     count = next(n for n in range(len(robot.calls) + 1) if after(world, robot.calls[:n], events))
     return tuple(robot.calls[:count])
@@ -262,7 +262,7 @@ def calls_until(worker: Worker, program: str, world: World, events: int) -> tupl
 
 def after(world: World, made: Sequence[Call], events: int) -> bool:
     """Return whether calls have so many events."""
-    return len(FaultyRobot(world, SUITE, made=made).trace) >= events
+    return len(RecordingRobot(world, SUITE, made=made).trace) >= events
 
 
 def measure_continuations(worker: Worker) -> bool:
@@ -273,12 +273,12 @@ def measure_continuations(worker: Worker) -> bool:
     for number, case in enumerate(cases):
         scenario = SUITE.tasks[case["task"]].scenarios[case["world"]]
         made = calls_until(worker, case["begun"], scenario.world, case["cut"])
-        past = past_of(FaultyRobot(scenario.world, SUITE, made=made), case["begun"])
+        past = past_of(RecordingRobot(scenario.world, SUITE, made=made), case["begun"])
         room_map, _ = past.add_to(RoomMap.of(scenario.world), past.place)
         problems = check_rest(worker, SUITE, case["program"], room_map, case["begun"]).problems
         sort = "right" if case["right"] else case["wrong"]
         counts[sort, not problems] += 1
-        outcome = worker.run_alone(case["program"], partial(FaultyRobot, scenario.world, SUITE, made=made))
+        outcome = worker.run_alone(case["program"], partial(RecordingRobot, scenario.world, SUITE, made=made))
         unfit += case["right"] and not judge(outcome, scenario).satisfied
         if os.environ.get("VERBOSE") and case["right"] is bool(problems):
             why = problems[0].sentence if problems else "accepted"
@@ -299,7 +299,7 @@ def measure_continuations(worker: Worker) -> bool:
 # --- (c) crashes at each step
 
 
-class LoggingRobot(FaultyRobot):
+class LoggingRobot(RecordingRobot):
     """A robot that keeps a log of its skills, as a mission does."""
 
     def __init__(self, world: World) -> None:
@@ -382,7 +382,7 @@ def repeated(crash: Crash, rest: Trace) -> list[str]:
             if is_spoken(one.kind) or one.kind in {PICK, PLACE}
         )
 
-    done, again = keys(FaultyRobot(crash.world, SUITE, made=crash.made).trace), keys(rest)
+    done, again = keys(RecordingRobot(crash.world, SUITE, made=crash.made).trace), keys(rest)
     needed = keys(crash.whole)
     return [" ".join(key) for key in again if done[key] and done[key] + again[key] > max(1, needed[key])]
 
@@ -399,7 +399,7 @@ def measure_crashes(worker: Worker) -> bool:
                 rests = (model.rests.get((crash.past.instruction, step)) for model in models)
                 counts["crashes"] += 1
                 for program in filter(None, [one.program, *rests]):
-                    again = partial(FaultyRobot, crash.world, SUITE, made=crash.made)
+                    again = partial(RecordingRobot, crash.world, SUITE, made=crash.made)
                     robot = again()
                     room_map, _ = crash.past.add_to(RoomMap.of(crash.world), robot.place)
                     places = tuple((event.place, event.to) for event in room_map.past)

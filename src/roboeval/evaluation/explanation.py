@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from codebotler.checking.storyboard import steps_of
-from codebotler.core.skills.kinds import ASK, SAY
 from codebotler.core.terminal import shortened
-from codebotler.core.trace import Event, Trace
+from codebotler.core.trace import Trace
 from codebotler.core.words import counted
 from codebotler.rtl import explain
 from roboeval.evaluation.failures import no_program_sentence
@@ -27,8 +26,8 @@ TRACES_TOO_LONG = "the traces of this program are too long to explain this check
 
 LOWERCASED_NOTE = "This suite lower-cases strings before running; shown as judged."
 MAX_PROGRAM_LINES = 1_000
-MAX_EXPLAINED_SIZE = 1_000_000  # limit on all traces of a completion, measured with these weights
-EVENT_WEIGHT, SPOKEN_WEIGHT, OTHER_WEIGHT = 20, 10, 1  # per event, spoken character, other character
+MAX_EXPLAINED_SIZE = 100_000  # characters of all traces of a completion
+EVENT_SIZE = 10  # characters that each event counts for in addition to its texts
 
 
 def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dict[str, Any]:
@@ -88,13 +87,9 @@ class ExplanationBudget:
 
     def covers(self, trace: Trace) -> bool:
         """Subtract a trace from the budget, and return whether enough was left to explain a check on it."""
-        self._left -= sum(map(_weight, trace))
+        texts = [text for event in trace for text in (event.text, *(option.text for option in event.options))]
+        self._left -= EVENT_SIZE * len(trace) + sum(map(len, texts))
         return self._left >= 0
-
-
-def _weight(event: Event) -> int:
-    each = SPOKEN_WEIGHT if event.kind in {SAY, ASK} else OTHER_WEIGHT
-    return EVENT_WEIGHT + each * (len(event.text) + sum(len(option.text) for option in event.options))
 
 
 def _scenario(suite: Suite | None, row: Mapping[str, Any], number: int, *, ablated: bool) -> Scenario | None:

@@ -56,22 +56,35 @@ class RecordingRobot(SimulatedRobot):
         suite: the suite with the settings, skills and house rules.
         made: the calls that it repeats at the start. A call of `SLEEP` lets time pass.
         contracts: what it may do at most.
+        fault: the index of a later call that fails, but only once; None if none fails.
     """
 
     def __init__(
-        self, world: World, suite: Suite, *, made: Iterable[Call] = (), contracts: Sequence[Contract] = ()
+        self,
+        world: World,
+        suite: Suite,
+        *,
+        made: Iterable[Call] = (),
+        contracts: Sequence[Contract] = (),
+        fault: int | None = None,
     ) -> None:
         super().__init__(world, suite.settings, suite.skills, guard=guard_of(suite, contracts))
         self.calls: list[Call] = []
+        self._fault: int | None = None
         for skill, arguments in made:
             with suppress(RobotError):
                 if skill == SLEEP:
                     self.sleep_until(float(arguments[0]))  # type: ignore[arg-type]  # a number of seconds
                 else:
                     self.perform(skill, arguments)
+        self._fault = fault
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Record a call and make it. If it fails, say so in its events, which the rest of a mission reads."""
+        if self._fault is not None and sum(name != SLEEP for name, _ in self.calls) == self._fault:
+            self._fault, row = None, self.skills[skill]
+            kind = "" if row.recording is None else row.recording.kind
+            raise RobotError(*FAULTS.get(kind, (SKILL_FAILED, f"the robot failed in {skill}")))
         self.calls.append((skill, arguments))
         before = len(self.events)
         try:
@@ -84,25 +97,6 @@ class RecordingRobot(SimulatedRobot):
         """Record that time passes until `now` seconds since the start."""
         self.calls.append((SLEEP, (now,)))
         super().sleep_until(now)
-
-
-class FaultyRobot(RecordingRobot):
-    """A robot one of whose calls fails, but only once. `fault` is its index; None if none fails."""
-
-    def __init__(
-        self, world: World, suite: Suite, *, made: Iterable[Call] = (), fault: int | None = None
-    ) -> None:
-        self._fault: int | None = None  # not among the calls that it repeats
-        super().__init__(world, suite, made=made)
-        self._fault = fault
-
-    def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute a skill, or fail."""
-        if sum(name != SLEEP for name, _ in self.calls) == self._fault:
-            self._fault, row = None, self.skills[skill]
-            kind = "" if row.recording is None else row.recording.kind
-            raise RobotError(*FAULTS.get(kind, (SKILL_FAILED, f"the robot failed in {skill}")))
-        return super().perform(skill, arguments)
 
 
 @dataclass(frozen=True)
@@ -156,13 +150,13 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
     found: list[Interruption | FaultResult] = []
     task = suite.task(one.task)
     for number, scenario in enumerate(task.scenarios):
-        asked, robot = scenario.asked_by(one.prompt), FaultyRobot(scenario.world, suite)
+        asked, robot = scenario.asked_by(one.prompt), RecordingRobot(scenario.world, suite)
         whole = worker.run_alone(one.program, lambda robot=robot: robot)  # type: ignore[misc]  # mypy does not infer such lambdas
         if not judge(whole, asked).satisfied:
             return []
         skill_calls = sum(name != SLEEP for name, _ in robot.calls)
         for call in range(skill_calls if whole.status is Status.FINISHED else 0):
-            faulty = FaultyRobot(scenario.world, suite, fault=call)
+            faulty = RecordingRobot(scenario.world, suite, fault=call)
             outcome = worker.run_alone(one.program, lambda robot=faulty: robot)  # type: ignore[misc]  # mypy does not infer such lambdas
             result = FaultResult(one.task, number, call, len(whole.trace))
             if outcome.error is None:
@@ -199,7 +193,7 @@ def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: s
     problems = check_rest(worker, suite, program, one.room_map, one.past.program).problems
     if problems:
         return replace(one.result, end="rejected", why=problems[0].sentence)
-    outcome = worker.run_alone(program, partial(FaultyRobot, one.scenario.world, suite, made=one.made))
+    outcome = worker.run_alone(program, partial(RecordingRobot, one.scenario.world, suite, made=one.made))
     verdict = judge(outcome, one.scenario)
     faults = [requirement.text for requirement in verdict.failed]
     faults += [] if outcome.error is None else [f"{outcome.error.kind}: {outcome.error.message}"]
@@ -235,13 +229,13 @@ def write_continuations(
         update(len(programs), "")
 
     async def write_all() -> None:
-        tasks = [asyncio.create_task(write(prompt)) for prompt in dict.fromkeys(prompts)]
         try:
-            await asyncio.gather(*tasks)
+            async with asyncio.TaskGroup() as group:
+                for prompt in dict.fromkeys(prompts):
+                    group.create_task(write(prompt))
+        except BaseExceptionGroup as errors:
+            raise errors.exceptions[0] from None
         finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
             await model.close()
 
     asyncio.run(write_all())

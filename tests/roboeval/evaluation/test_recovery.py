@@ -21,8 +21,8 @@ from codebotler.simulator.worker import Worker
 from command_line import roboeval
 from roboeval.evaluation.recovery import (
     FaultResult,
-    FaultyRobot,
     Interruption,
+    RecordingRobot,
     find_first_right,
     find_interruptions,
     recovery_data,
@@ -83,7 +83,7 @@ def holding(worker: Worker, suite: Suite) -> Interruption:
 def test_a_skill_fails_once_without_an_event(
     suite: Suite, skill: str, arguments: list[Any], kind: str
 ) -> None:
-    robot = FaultyRobot(suite.task("GetDrink").scenarios[0].world, suite, made=[("say", ["a"])], fault=1)
+    robot = RecordingRobot(suite.task("GetDrink").scenarios[0].world, suite, made=[("say", ["a"])], fault=1)
     with pytest.raises(RobotError) as raised:
         robot.perform(skill, arguments)
     assert raised.value.kind == kind
