@@ -155,17 +155,14 @@ def _judged(
     engine: OpenEngine,
 ) -> Iterator[Row]:
     from roboeval.evaluation.evaluate import evaluate_run
-    from roboeval.evaluation.judge import judgements
-    from roboeval.evaluation.runs.rows import decode_row
-    from roboeval.evaluation.serialization import row_line
+    from roboeval.evaluation.judge import evaluate
 
     if run is not None:
         completions = source.completions
         return evaluate_run(
             run, suite, ablated=ablated, tasks=tasks, redo=redo, engine=engine, completions=completions
         )
-    found = judgements(source.of(tasks), suite, ablated=ablated, engine=engine)
-    return (decode_row(row_line(completion, one)) for completion, one in found if one is not None)
+    return evaluate(source.of(tasks), suite, ablated=ablated, engine=engine)
 
 
 def import_(

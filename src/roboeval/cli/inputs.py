@@ -89,7 +89,7 @@ def open_run(
         folder,
         key,
         suite,
-        task=parse_selection(completion, suite).task,
+        task=None if completion is None else parse_selection(completion, suite)[0],
         reuse_from=reuse_from,
         progress=lambda lines, total: show_progress(lines, "reading", total),
     )

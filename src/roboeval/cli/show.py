@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from roboeval.evaluation.runs.completions import CompletionKey
     from roboeval.evaluation.runs.folder import RunFolder
     from roboeval.evaluation.runs.results import Results
-    from roboeval.evaluation.runs.selection import Selection
     from roboeval.suites.load import Suite
 
 
@@ -67,7 +66,7 @@ def show(
     json: JsonOption = False,
 ) -> None:
     """Print a run's tables, or show why a completion fails."""
-    from roboeval.evaluation.runs.selection import names_completion, parse_selection
+    from roboeval.evaluation.runs.selection import expect_judged, names_completion, parse_selection
 
     if what and k:
         fail(f"--k applies to a whole run; leave out {what} or --k")
@@ -78,14 +77,16 @@ def show(
         option = "--all" if in_full else "--reply"
         fail(f"{option} applies to one completion; give TASK/PROMPT/INDEX, or leave out {option}")
     judged = open_run(run, suite, ablated=ablation, rules=rules, completion=what if is_one else None)
-    selection = parse_selection(what, judged.known_suite)
-    if selection.task is None:
+    if not what:
         show_run(judged, k or [], title=str(run), has_rules=rules is not None, as_json=json)
-    elif is_one:
-        show_completion(judged, selection, suite, in_full=in_full, with_reply=with_reply, as_json=json)
     else:
-        selection.expect_judged(judged)
-        show_part(judged, selection.task, selection.prompt, as_json=json)
+        part = task, *numbers = parse_selection(what, judged.known_suite)
+        expect_judged(part, judged.places)
+        if is_one:
+            key = task, numbers[0], numbers[1]
+            show_completion(judged, key, suite, in_full=in_full, with_reply=with_reply, as_json=json)
+        else:
+            show_part(judged, task, numbers[0] if numbers else None, as_json=json)
     again = evaluate_again(judged, suite, rules)
     if (complaint := stale_sentence(judged)) is not None:
         note(f"{complaint}; `{again} --redo` judges the current programs")
@@ -157,7 +158,7 @@ def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool)
 
 def show_completion(
     judged: Results,
-    selection: Selection,
+    key: CompletionKey,
     suite: str,
     *,
     in_full: bool,
@@ -171,8 +172,6 @@ def show_completion(
     from roboeval.evaluation.explanation import completion_data
     from roboeval.evaluation.failures import NO_PROGRAM_CLASS
 
-    selection.expect_judged(judged)
-    key = selection.key
     written = None if key in judged.stale else judged.completions.get(key)
     data = completion_data(judged.row(key), written, judged.suite, ablated=judged.is_ablated)
     if as_json:

@@ -6,15 +6,14 @@ import pytest
 
 from codebotler.core.errors import UserError
 from made_results import results_of
-from roboeval.evaluation.runs.selection import Selection, names_completion, parse_selection
+from roboeval.evaluation.runs.selection import Selection, expect_judged, names_completion, parse_selection
 from small_run import ROWS, SUITE
 
 
 def test_a_selection_is_read() -> None:
-    assert parse_selection(None, SUITE) == Selection()
-    assert parse_selection("Visit", SUITE) == Selection("Visit")
-    assert parse_selection("visit/1/", SUITE) == Selection("Visit", 1)
-    assert parse_selection("Visit/1/007", SUITE) == Selection("Visit", 1, 7)
+    assert parse_selection("Visit", SUITE) == ("Visit",)
+    assert parse_selection("visit/1/", SUITE) == ("Visit", 1)
+    assert parse_selection("Visit/1/007", SUITE) == ("Visit", 1, 7)
 
 
 @pytest.mark.parametrize(
@@ -38,13 +37,13 @@ def test_a_wrong_selection_is_explained(text: str, named: list[str]) -> None:
 @pytest.mark.parametrize(
     ("selection", "named"),
     [
-        (Selection("Wait"), "no completion of Wait "),
-        (Selection("Visit", 0, 9), "no completion Visit/0/9 "),
+        (("Wait",), "no completion of Wait "),
+        (("Visit", 0, 9), "no completion of Visit/0/9 "),
     ],
 )
 def test_a_selection_without_rows_is_an_error(selection: Selection, named: str) -> None:
     with pytest.raises(UserError, match=named):
-        selection.expect_judged(results_of(ROWS))
+        expect_judged(selection, results_of(ROWS).places)
 
 
 def test_only_all_three_parts_name_a_completion() -> None:
