@@ -89,8 +89,9 @@ def generate_run(
             done |= {one.key for one in given}
             keys = plan.keys()
             todo = [key for key in keys if key not in done]
-            log = RequestLog(run.in_flight, done, metadata["possibly_paid_twice"])
-            metadata |= {"usage": usage, "possibly_paid_twice": log.lost}
+            log = RequestLog(run.in_flight, done)
+            metadata["usage"] = usage
+            metadata["possibly_paid_twice"] += log.interrupted
             if todo:
                 metadata["batches"] = with_batch(metadata["batches"], plan, model.settings)
             write_whole(run.about, to_text(metadata))
@@ -173,7 +174,7 @@ class _Generation:
         except BudgetSpentError as error:
             self._budget, self.progress.stopped = error.budget, error.sentence
         except ModelError as error:
-            self.log.failed(key)
+            self.log.ended(key)
             self.error = error
             self.progress.failures[key] = error.sentence
             if error.is_refusal:
@@ -187,7 +188,7 @@ class _Generation:
         reply = await self._paced.reply(prompt, number=self.plan.sample(key), around=logged)
         if self.turns is not None:
             await self.turns.keep(key, reply)
-            self.log.answered(key)
+            self.log.ended(key)
         return reply
 
     @contextlib.contextmanager
@@ -197,7 +198,7 @@ class _Generation:
         try:
             yield
         except ModelError:
-            self.log.failed(key)
+            self.log.ended(key)
             raise
 
     def _earlier(self, key: CompletionKey) -> list[Reply]:

@@ -199,25 +199,20 @@ def timestamp() -> str:
 
 
 class RequestLog:
-    """Logs each request before it is sent, and each failure.
+    """Logs each request before it is sent, and each end of a request without a completion.
 
-    A request with neither a failure nor a completion was pending when the run was interrupted, and may be
-    billed twice. The first line counts the requests lost in earlier interruptions, so that none of them is
-    counted twice. The file is deleted when a run ends normally.
+    A request with neither an end nor a completion was pending when the run was interrupted, and may be billed
+    twice. The file starts anew with each command, and is deleted when a run ends normally.
     """
 
-    def __init__(
-        self, path: Path, done: set[CompletionKey], lost: int
-    ) -> None:  # `lost` is the number of lost requests in run.json
+    def __init__(self, path: Path, done: set[CompletionKey]) -> None:
         self.path = path
-        lost_before, pending = self._read()
-        self.interrupted = len(pending - done)  # requests pending at the last interruption
-        self.lost = max(lost, lost_before + self.interrupted)
+        self.interrupted = len(self._read() - done)  # requests pending at the last interruption
         self.under_way: set[CompletionKey] = set()
 
     def __enter__(self) -> Self:
-        """Start a new file, because run.json now counts the requests lost earlier."""
-        write_whole(self.path, to_line({"lost": self.lost}))
+        """Start a new file, because run.json now counts the pending requests."""
+        write_whole(self.path, b"")
         self._file = Appender(self.path)
         return self
 
@@ -232,36 +227,26 @@ class RequestLog:
         self._file.append(to_line({"sent": key}))
         self.under_way.add(key)
 
-    def failed(self, key: CompletionKey) -> None:
-        """Log that a request ended without a reply."""
+    def ended(self, key: CompletionKey) -> None:
+        """Log that a pending request has failed, or that its reply, a turn of a mission, has been saved."""
         if key in self.under_way:
             self.kept(key)
-            self._file.append(to_line({"failed": key}))
-
-    def answered(self, key: CompletionKey) -> None:
-        """Log that a turn of a mission has been saved."""
-        self.kept(key)
-        self._file.append(to_line({"answered": key}))
+            self._file.append(to_line({"ended": key}))
 
     def kept(self, key: CompletionKey) -> None:
         """Forget a request whose completion has been saved."""
         self.under_way.remove(key)
 
-    def _read(self) -> tuple[int, set[CompletionKey]]:
-        lost = 0
+    def _read(self) -> set[CompletionKey]:
         pending: set[CompletionKey] = set()
         for number, row in read_rows(self.path, growing=True) if self.path.exists() else ():
             match row:
-                case {"lost": int(lost)}:
-                    pass
                 case {"sent": [str(task), int(prompt), int(index)]}:
                     pending.add((task, prompt, index))
-                case {"failed": [str(task), int(prompt), int(index)]} | {
-                    "answered": [str(task), int(prompt), int(index)]
-                }:
+                case {"ended": [str(task), int(prompt), int(index)]}:
                     pending.discard((task, prompt, index))
                 case _:
                     raise UserError(
                         "this line is not a request; delete the file", file=self.path, line=number
                     )
-        return lost, pending
+        return pending

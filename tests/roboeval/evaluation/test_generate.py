@@ -364,9 +364,9 @@ def test_a_request_that_failed_is_no_longer_under_way_while_the_next_try_waits(
 
     generated(run, paper, Scripted(fails=fails), count=1, pace=Pace(concurrency=1))
     assert notes[:3] == [
-        ["lost", "sent"],
-        ["lost", "sent", "failed", "sent"],
-        ["lost", "sent", "failed", "sent", "sent"],
+        ["sent"],
+        ["sent", "ended", "sent"],
+        ["sent", "ended", "sent", "sent"],
     ]
 
 
@@ -459,7 +459,7 @@ def test_kill_minus_nine_loses_only_what_was_under_way(tmp_path: Path, paper: Su
         under_way = asked_of(log, process.pid, paper) - done
         assert len(under_way) <= 5
         # A request is noted before the model hears of it, so that at most those being sent are counted too.
-        assert len(under_way) <= RequestLog(run.in_flight, done, 0).interrupted <= 5
+        assert len(under_way) <= RequestLog(run.in_flight, done).interrupted <= 5
         lost.update(under_way)
     assert kills == 5
     generated(run, paper, Scripted(), count=60)
@@ -534,7 +534,7 @@ def test_a_full_disk_leaves_whole_rows_and_asks_no_further(tmp_path: Path, paper
 def test_a_note_that_somebody_broke_is_refused(tmp_path: Path, paper: Suite, line: str) -> None:
     run = RunFolder(tmp_path / "run")
     generated(run, paper, Scripted())
-    run.in_flight.write_text(f'{{"lost": 0}}\n{line}\n')
+    run.in_flight.write_text(f'{{"sent": ["A", 0, 0]}}\n{line}\n')
     with pytest.raises(UserError, match="request") as error:
         generated(run, paper, Scripted())
     assert (error.value.file, error.value.line) == (run.in_flight, 2)
