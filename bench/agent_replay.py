@@ -38,7 +38,7 @@ from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.generate import GenerationProgress, Pace, generate_run
 from roboeval.evaluation.judge import evaluate, judge
-from roboeval.evaluation.recovery import SLEEP, RecordingRobot
+from roboeval.evaluation.recording import SLEEP, RecordingRobot
 from roboeval.evaluation.runs.completions import Completion, CompletionKey
 from roboeval.evaluation.runs.endings import TIMEOUT
 from roboeval.evaluation.runs.folder import RunFolder

@@ -48,7 +48,8 @@ from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.judge import judge
-from roboeval.evaluation.recovery import Call, RecordingRobot, check_rest
+from roboeval.evaluation.recording import Call, RecordingRobot
+from roboeval.evaluation.recovery import check_rest
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.source import recorded_completions, recorded_model_for
 from roboeval.mutation.mutants import mutants, originals, sample_mutants

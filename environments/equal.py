@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Any, TypeAlias
 
 from codebotler.simulator.pool import shared_pool
-from roboeval.evaluation.recovery import SLEEP, RecordingRobot
+from roboeval.evaluation.recording import SLEEP, RecordingRobot
 from roboeval.suites.families.tasks import TrainedTask, trained_task
 from roboeval.training.missions import TrainingMission, load_missions
 from roboeval.training.prompts import load_prompts, program_in

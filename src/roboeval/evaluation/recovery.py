@@ -5,98 +5,29 @@ from __future__ import annotations
 import asyncio
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Literal, TypeAlias
+from typing import Literal
 
 from codebotler.checking.check import check_on
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.remaining import remaining_outcomes
 from codebotler.checking.repetition import hold_to_past
 from codebotler.checking.sampled import CheckSettings
-from codebotler.core.errors import RobotError
 from codebotler.core.phrases import is_spoken
-from codebotler.core.skills.calling import SKILL_FAILED
-from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE
+from codebotler.core.skills.kinds import PICK, PLACE
 from codebotler.core.trace import Status, Trace
-from codebotler.core.world import World
 from codebotler.missions.past import MissionPast
 from codebotler.models.base import Model, ModelError
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.recorded import is_recorded
 from codebotler.prompts import Prompt, prompt_for
-from codebotler.simulator.contract import Contract
-from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.worker import Worker
-from roboeval.evaluation.judge import guard_of, judge
+from roboeval.evaluation.judge import judge
+from roboeval.evaluation.recording import Call, RecordingRobot
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.suites.load import Scenario, Suite
-
-Call: TypeAlias = tuple[str, Sequence[Argument]]
-"""A skill and its arguments."""
-
-SLEEP = "time.sleep"
-"""The name of a call that lets time pass, until its only argument in seconds since the start."""
-
-FAULTS = {
-    GOTO: ("GoToInvalidLocation", "the door is locked"),
-    ASK: ("AskNoPerson", "the person is gone"),
-    PICK: ("PickInvalidObject", "the thing was moved"),
-}
-"""The kind and the reason of the error by which a skill fails, by the kind of event that it records."""
-
-
-class RecordingRobot(SimulatedRobot):
-    """A simulated robot that records its calls, and has made some already.
-
-    Args:
-        world: the world.
-        suite: the suite with the settings, skills and house rules.
-        made: the calls that it repeats at the start. A call of `SLEEP` lets time pass.
-        contracts: what it may do at most.
-        fault: the index of a later call that fails, but only once; None if none fails.
-    """
-
-    def __init__(
-        self,
-        world: World,
-        suite: Suite,
-        *,
-        made: Iterable[Call] = (),
-        contracts: Sequence[Contract] = (),
-        fault: int | None = None,
-    ) -> None:
-        super().__init__(world, suite.settings, suite.skills, guard=guard_of(suite, contracts))
-        self.calls: list[Call] = []
-        self._fault: int | None = None
-        for skill, arguments in made:
-            with suppress(RobotError):
-                if skill == SLEEP:
-                    self.sleep_until(float(arguments[0]))  # type: ignore[arg-type]  # a number of seconds
-                else:
-                    self.perform(skill, arguments)
-        self._fault = fault
-
-    def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Record a call and make it. If it fails, say so in its events, which the rest of a mission reads."""
-        if self._fault is not None and sum(name != SLEEP for name, _ in self.calls) == self._fault:
-            self._fault, row = None, self.skills[skill]
-            kind = "" if row.recording is None else row.recording.kind
-            raise RobotError(*FAULTS.get(kind, (SKILL_FAILED, f"the robot failed in {skill}")))
-        self.calls.append((skill, arguments))
-        before = len(self.events)
-        try:
-            return super().perform(skill, arguments)
-        except RobotError as error:
-            self.events[before:] = [replace(event, failed=error.kind) for event in self.events[before:]]
-            raise
-
-    def sleep_until(self, now: float) -> None:
-        """Record that time passes until `now` seconds since the start."""
-        self.calls.append((SLEEP, (now,)))
-        super().sleep_until(now)
 
 
 @dataclass(frozen=True)
@@ -154,8 +85,7 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
         whole = worker.run_alone(one.program, lambda robot=robot: robot)  # type: ignore[misc]  # mypy does not infer such lambdas
         if not judge(whole, asked).satisfied:
             return []
-        skill_calls = sum(name != SLEEP for name, _ in robot.calls)
-        for call in range(skill_calls if whole.status is Status.FINISHED else 0):
+        for call in range(robot.skill_calls if whole.status is Status.FINISHED else 0):
             faulty = RecordingRobot(scenario.world, suite, fault=call)
             outcome = worker.run_alone(one.program, lambda robot=faulty: robot)  # type: ignore[misc]  # mypy does not infer such lambdas
             result = FaultResult(one.task, number, call, len(whole.trace))

@@ -19,10 +19,10 @@ from codebotler.models.recorded import RecordedModel
 from codebotler.prompts import Prompt
 from codebotler.simulator.worker import Worker
 from command_line import roboeval
+from roboeval.evaluation.recording import RecordingRobot
 from roboeval.evaluation.recovery import (
     FaultResult,
     Interruption,
-    RecordingRobot,
     find_first_right,
     find_interruptions,
     recovery_data,

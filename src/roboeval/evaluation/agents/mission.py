@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-import builtins
 import json
-from ast import literal_eval
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import timedelta
 from typing import Any, Self
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import Skill
-from codebotler.core.skills.values import written_call
 from codebotler.core.terminal import shortened
-from codebotler.core.trace import Option, Outcome
+from codebotler.core.trace import Outcome
 from codebotler.prompts.tools import GIVE_UP, WAIT
-from codebotler.simulator.contract import CONTRACT, Contract
-from codebotler.simulator.house_rule import RuleViolationError
+from codebotler.simulator.contract import Contract
 from codebotler.simulator.ledger import Ledger, judge_end
 from codebotler.simulator.robot import Argument
-from codebotler.simulator.skill_protocol import named_arguments, named_result
-from roboeval.evaluation.judge import robot_in
+from codebotler.simulator.skill_protocol import named_arguments
+from roboeval.evaluation.recording import RecordingRobot
 from roboeval.evaluation.runs.endings import (
     ERROR,
     FINAL_ANSWER,
@@ -49,6 +44,7 @@ LONGEST_WAIT = 1_000_000
 """The longest time that one call waits."""
 
 _TASK = "def task_program():\n"
+FINISHED = {"end": "finished"}
 
 
 @dataclass
@@ -66,15 +62,12 @@ class AgentMission:
     contracts: Sequence[Contract] = ()
     ending: str | None = None  # one of `ENDINGS`; None before the end
     mistakes: Counter[str] = field(default_factory=Counter)  # and errors of the robot, by kind
-    _lines: list[str] = field(default_factory=list)  # of the program
     _in_a_row: int = 0  # mistakes
     _same: tuple[object, int] = (None, 0)  # the last call with its result, and how often it was made
-    _raised: tuple[str, str] | None = None  # the kind and the message of a program's Python error
-    _error: tuple[int, int] | None = None  # of the last call, if it failed: the error's number, and its line
 
     def __post_init__(self) -> None:
-        self._robot = robot_in(self.scenario.world, self.suite, self.contracts)
-        self._ledger = Ledger(self._robot)
+        self.robot = RecordingRobot(self.scenario.world, self.suite, contracts=self.contracts)
+        self._ledger = Ledger(self.robot)
 
     @classmethod
     def begin(
@@ -93,14 +86,14 @@ class AgentMission:
                 skill = self.suite.skills[name]
                 values = named_arguments(skill, self._lower(given))
             elif name == GIVE_UP:
-                return self._give_up(str(given.get("reason", "")))
+                return self.give_up(str(given.get("reason", "")))
             elif name == WAIT:
                 return self._wait(_read_seconds(given))
             else:
                 return self.refuse(UNKNOWN_TOOL, f'there is no tool "{shortened(name)}"', name)
         except UserError as error:
             return self.refuse(WRONG_ARGUMENTS, error.sentence, name)
-        text = self._perform(skill, values, [given[parameter.name] for parameter in skill.parameters])
+        text = self._perform(skill, values)
         self._watch_repeats((skill.name, values, text))
         return text
 
@@ -123,7 +116,7 @@ class AgentMission:
 
     def answer(self, text: str) -> None:
         """End the mission with the agent's last words."""
-        self.ending = FINAL_ANSWER if self._ledger.calls else NO_CALL
+        self.ending = FINAL_ANSWER if self.robot.skill_calls else NO_CALL
         if text:
             self._note(f"In the end: {text}")
 
@@ -133,64 +126,47 @@ class AgentMission:
         if why:
             self._note(f"{ending}: {why}")
 
-    def crash(self, kind: str, message: str) -> None:
-        """End the mission with a Python error of a program that made its calls."""
-        self._raised = kind, message
-        self._lines.append(f"raise {kind if _is_raised_with_text(kind) else 'Exception'}({message!r})")
-        self.ending = ERROR
-
-    def repeat(self, skill: Skill, values: Sequence[Argument]) -> None:
-        """Make a call that a program made."""
-        if self.ending is None:
-            self._perform(skill, values, [_written(value) for value in values])
+    def give_up(self, reason: str) -> str:
+        """End the mission: with the robot's error if the last call failed, since that is the cause."""
+        at, lines = self.robot.try_at, self.robot.lines
+        self.ending = GAVE_UP if at is None else ERROR
+        if at is not None:
+            lines[at : at + 4] = [lines[at + 1].strip()]  # without `try`
+        if reason:
+            self._note(f"The agent gives up: {reason}")
+        return "the mission is over"
 
     @property
     def program(self) -> str:
         """The calls as a program, which does the same in this world."""
-        needs_time = any("time.sleep(" in line for line in self._lines)
-        is_empty = all(line.startswith("#") for line in self._lines)
-        lines = [*self._lines, *(["pass"] if is_empty else [])]
-        return ("import time\n\n" if needs_time else "") + _TASK + "".join(f"    {line}\n" for line in lines)
+        lines = self.robot.lines
+        needs_time = any("time.sleep(" in line for line in lines)
+        is_empty = all(line.startswith("#") for line in lines)
+        body = "".join(f"    {line}\n" for line in [*lines, *(["pass"] if is_empty else [])])
+        return ("import time\n\n" if needs_time else "") + _TASK + body
 
     @property
     def outcome(self) -> Outcome:
         """The outcome so far, which is that of the program."""
-        end: dict[str, object] = {"end": "finished"}
-        if self._error is not None and self.ending == ERROR:
-            end = {"end": "robot-error", "number": self._error[0]}
-        elif self._raised is not None:
-            end = {"end": "python-error", "kind": self._raised[0], "message": self._raised[1]}
-        return apply_ending(
-            judge_end(self._ledger.outcome_at_end(end), self._robot), self.ending or FINAL_ANSWER
-        )
+        has_failed = self.ending == ERROR
+        end = {"end": "robot-error", "number": len(self._ledger.errors) - 1} if has_failed else FINISHED
+        outcome = judge_end(self._ledger.outcome_at_end(end), self.robot)
+        return apply_ending(outcome, self.ending or FINAL_ANSWER)
 
-    def _perform(self, skill: Skill, values: Sequence[Argument], given: Sequence[object]) -> str:
-        source = written_call(skill.name, given).encode(errors="backslashreplace").decode()  # lone surrogates
-        self._error, self._in_a_row = None, 0
+    def _perform(self, skill: Skill, values: Sequence[Argument]) -> str:
+        self._in_a_row = 0
         match self._ledger.perform(skill.name, values):
             case ("ok", result):
-                told = json.dumps(named_result(skill, values, result), ensure_ascii=False)
-                self._lines.append(source if told == "null" else f"{source}  # {shortened(told)}")
-                text = "done" if told == "null" else told
-            case ("error", (number, kind, message)):
-                text = f"{kind}: {message}"
+                told = self.robot.result_text(skill.name, values, result)
+                return "done" if told == "null" else told
+            case ("error", (_, kind, message)):
                 self.mistakes[kind] += 1
-                self._error = number, len(self._lines)
-                self._lines += [
-                    "try:",
-                    f"    {source}",
-                    f"except Exception:  # {shortened(text)}",
-                    "    pass",
-                ]
-            case _:
-                broken = self._ledger.broken
-                is_outside = isinstance(broken, RuleViolationError) and broken.rule == CONTRACT
-                self._lines.append(f"# {OUTSIDE_CONTRACT}: {source}" if is_outside else source)
-                kind = TIMEOUT if broken is None else OUTSIDE_CONTRACT if is_outside else broken.kind
-                self.mistakes[kind] += 1
-                self.ending = kind if kind in {TIMEOUT, OUTSIDE_CONTRACT} else ERROR
-                return f"the mission is over: {self._ledger.limit}"
-        return text
+                return f"{kind}: {message}"
+        broken = self._ledger.broken
+        kind = TIMEOUT if broken is None else OUTSIDE_CONTRACT if self.robot.is_outside else broken.kind
+        self.mistakes[kind] += 1
+        self.ending = kind if kind in {TIMEOUT, OUTSIDE_CONTRACT} else ERROR
+        return f"the mission is over: {self._ledger.limit}"
 
     def _watch_repeats(self, call: object) -> None:
         last, times = self._same
@@ -198,63 +174,23 @@ class AgentMission:
         if self._same[1] >= MAX_REPEATS and self.ending is None:
             self.ending = REPEATED_CALLS
 
-    def sleep_until(self, now: float) -> None:
-        """Let time pass until `now` seconds since the start, as a program did."""
-        if self.ending is None:
-            self._wait(max(0.0, now - self._robot.now))
-
     def _wait(self, seconds: float) -> str:
-        self._in_a_row, self._error = 0, None
-        seconds = min(seconds, self._ledger.limits.seconds)
-        self._ledger.let_time_pass(self._robot.now + seconds)
-        self._lines.append(f"time.sleep({seconds!r})")
+        self._in_a_row = 0
+        self._ledger.let_time_pass(self.robot.now + seconds)
         if self._ledger.limit is not None:
             self.ending = TIMEOUT
             return f"the mission is over: {self._ledger.limit}"
-        now = self.suite.settings.clock_starts + timedelta(seconds=self._robot.now)
+        now = self.suite.settings.clock_starts + timedelta(seconds=self.robot.now)
         return f"it is {now:%A %H:%M:%S}"
 
-    def _give_up(self, reason: str) -> str:
-        """End the mission: with the robot's error if the last call failed, since that is the cause."""
-        self.ending = GAVE_UP if self._error is None else ERROR
-        if self._error is not None:
-            at = self._error[1]
-            self._lines[at : at + 4] = [self._lines[at + 1].strip()]  # without `try`
-        if reason:
-            self._note(f"The agent gives up: {reason}")
-        return "the mission is over"
-
     def _note(self, text: str) -> None:
-        self._lines.append(f"# {shortened(' '.join(text.split()))}")
+        self.robot.lines.append(f"# {shortened(' '.join(text.split()))}")
 
     def _lower(self, given: Mapping[str, object]) -> Mapping[str, object]:
         """Lower-case texts as the suite does those in programs."""
         if self.suite.settings.literals != "lowercase":
             return given
         return {name: _lowered(value) for name, value in given.items()}
-
-
-def _is_raised_with_text(kind: str) -> bool:
-    """Whether a kind is a built-in exception that takes one text."""
-    known = getattr(builtins, kind, None)
-    try:
-        return isinstance(known, type) and issubclass(known, Exception) and str(known("text")) != ""
-    except TypeError:
-        return False
-
-
-def _written(value: Argument) -> object:
-    """Return an argument as it is written in a program."""
-    if not isinstance(value, tuple):
-        return value
-    return [_option(each) if isinstance(each, Option) else each for each in value]
-
-
-def _option(option: Option) -> object:
-    """Return an option as a program offered it: its text, or else the number or truth value itself."""
-    with suppress(ValueError, SyntaxError):
-        return option.text if option.is_text else literal_eval(option.text)
-    return option.text
 
 
 def _lowered(value: object) -> object:
