@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from codebotler.cli.ending import STOPPED
 from codebotler.cli.options import SkillsOption
 from codebotler.core.errors import installed
 from codebotler.core.words import counted
@@ -32,12 +31,11 @@ from roboeval.cli.options import (
     WorldsOption,
     path_to,
 )
-from roboeval.cli.output import fail, note, progress_meter, show_progress
+from roboeval.cli.output import fail, note, progress_meter, show_progress, stoppable
 from roboeval.cli.show import house_of, print_summary
 
 if TYPE_CHECKING:
     from roboeval.analysis.summary import EvaluationSummary
-    from roboeval.analysis.tally import Tally
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.completions import CompletionKey
     from roboeval.evaluation.runs.folder import RunFolder
@@ -80,10 +78,10 @@ def evaluate(
         if left:
             note(f"not judged because they have no ablation: {', '.join(left)}")
         tally, table = Tally(), None if rules is None else _new_table()
-        run = None if out is None else RunFolder(out)
-        try:
-            opened = open_source(source, judged_by)
-            run = run or opened.run
+        opened = open_source(source, judged_by)
+        run = opened.run if out is None else RunFolder(out)
+        again = f"the same command {'without --redo ' * redo}continues where it stopped"
+        with stoppable("nothing was saved (add --out RUN to save verdicts)" if run is None else again):
             about = {} if opened.run is None else about_of(opened.run)
             scope = JudgingScope.of(opened.completions, wanted, about, judged_by)
             if scope.total == 0:
@@ -99,9 +97,6 @@ def evaluate(
             counted = summarise(tally, judged_by, scope, ablated=ablation)
             house = None if table is None else house_of(run, judged_by, table.table(), ablated=ablation)
             print_summary(counted, title=source, as_json=json, house=house)
-        except KeyboardInterrupt:
-            note(f"roboeval: {stop_sentence(run, tally, redo=redo)}")
-            raise SystemExit(STOPPED) from None
         _name_next_command(run, tally.first_failed, suite=suite, ablated=ablation, rules=rules)
         _expect_all_judged(counted, scope.total, is_kept=run is not None)
 
@@ -133,15 +128,6 @@ def _name_next_command(
     again = command("show", run.path, *shown, suite=suite, ablated=ablated, rules=rules)
     does = "explains the first failure" if shown else "prints these tables again"
     note(f"the verdicts are in {run.path}; `{again}` {does}")
-
-
-def stop_sentence(run: RunFolder | None, tally: Tally, *, redo: bool) -> str:
-    """Return a sentence about what was saved before Ctrl-C, and how to continue."""
-    if run is None:
-        return "stopped; nothing was saved (add --out RUN to save verdicts)"
-    if redo and not tally.judged:  # earlier verdicts may still be there
-        return "stopped; run the same command again"
-    return f"stopped; the same command {'without --redo ' * redo}continues where it stopped"
 
 
 def _judged(

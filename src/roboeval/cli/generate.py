@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from codebotler.cli.ending import STOPPED
 from codebotler.cli.model_options import inherit_options, model_settings, note_unsent
 from codebotler.cli.options import BaseUrlOption, ModelOption, WithinOption, read_within
 from codebotler.core.errors import install_command, installed
@@ -36,7 +35,7 @@ from roboeval.cli.options import (
     TurnsOption,
     WorkersOption,
 )
-from roboeval.cli.output import fail, note, progress_meter
+from roboeval.cli.output import fail, note, progress_meter, stoppable
 from roboeval.cli.report import report
 from roboeval.cli.rounds import further_rounds
 
@@ -146,13 +145,8 @@ def complete_run(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace)
     from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
     from roboeval.evaluation.generate import generate_run
 
-    meter = GenerationMeter()
-    try:
-        with meter:
-            progress = generate_run(run, plan, model, pace, on_progress=meter.show)
-    except KeyboardInterrupt:
-        note(f"roboeval: {meter.stop_sentence()}")
-        raise SystemExit(STOPPED) from None
+    with stoppable(), GenerationMeter() as meter:
+        progress = generate_run(run, plan, model, pace, on_progress=meter.show)
     if progress.missing is not None:
         note(f"roboeval: {progress.missing}; the same command continues where it stopped")
         raise SystemExit(1)
@@ -257,7 +251,8 @@ def run(
                 complete=lambda run, plan: complete_run(run, plan, what.open(), what.pace),
             )
     if with_report:
-        write_report_of(paths, suite, workers)
+        with stoppable():
+            report(paths, path / "report", suite=suite, workers=workers)
 
 
 def expect_rounds_fit(plan: GenerationPlan, repair: int, retries: int, *, as_json: bool) -> None:
@@ -268,17 +263,6 @@ def expect_rounds_fit(plan: GenerationPlan, repair: int, retries: int, *, as_jso
         fail("--json does not work with --repair or --retries; run `evaluate --json` on each round's folder")
     if plan.has_turns and (repair or retries):
         fail("--repair and --retries are for programs; leave them or --mode out")
-
-
-def write_report_of(paths: list[Path], suite: str, workers: int | None) -> None:
-    """Write the report of a run and its rounds into the folder of the run."""
-    folder = paths[0] / "report"
-    try:
-        report(paths, folder, suite=suite, workers=workers)
-    except KeyboardInterrupt:
-        again = command("report", *paths, "--out", folder, suite=suite)
-        note(f"roboeval: stopped; the verdicts are in {paths[0]}; `{again}` writes the report")
-        raise SystemExit(STOPPED) from None
 
 
 class GenerationMeter(ExitStack):
@@ -299,10 +283,3 @@ class GenerationMeter(ExitStack):
             tokens = progress.usage.total()
             rate = f"{progress.rate:.1f} per second"
             self._draw(progress.done, f"{rate}, {tokens:,} tokens" if tokens else rate)
-
-    def stop_sentence(self) -> str:
-        """Return a sentence about what was saved before Ctrl-C, and how to continue."""
-        if self.progress is None:
-            return "stopped before the first request; run the same command again"
-        kept = f"{self.progress.done:,} of {counted(self.progress.total, 'completion')} are saved"
-        return f"stopped; {kept}; the same command continues where it stopped"

@@ -8,9 +8,19 @@ from datetime import timedelta
 from time import monotonic
 from typing import NoReturn, TypeVar
 
+from codebotler.cli.ending import STOPPED
 from codebotler.core.terminal import QUIET_S, note, print_json, print_rich, print_text, progress
 
-__all__ = ["fail", "note", "print_json", "print_rich", "print_text", "progress_meter", "show_progress"]
+__all__ = [
+    "fail",
+    "note",
+    "print_json",
+    "print_rich",
+    "print_text",
+    "progress_meter",
+    "show_progress",
+    "stoppable",
+]
 
 MIN_DONE_FOR_ESTIMATE = 5  # the number of items before the remaining time is estimated
 
@@ -52,6 +62,16 @@ def _left(done: int, to_do: int, seconds: float) -> str:
     # The first items are slow, because processes must start.
     is_reliable = to_do and done >= MIN_DONE_FOR_ESTIMATE and done * 50 >= done + to_do
     return f"{timedelta(seconds=round(seconds * to_do / done))} left" if is_reliable else ""
+
+
+@contextmanager
+def stoppable(sentence: str = "the same command continues where it stopped") -> Iterator[None]:
+    """After Ctrl-C in the block, print how to go on, and exit."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        note(f"roboeval: stopped; {sentence}")
+        raise SystemExit(STOPPED) from None
 
 
 def fail(sentence: str) -> NoReturn:

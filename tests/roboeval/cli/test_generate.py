@@ -68,8 +68,7 @@ def test_a_report_that_is_interrupted_costs_nothing(tmp_path: Path) -> None:
     _, err = process.communicate()
     assert process.returncode == 130
     last = err.splitlines()[-1]
-    assert last.startswith("roboeval: stopped; ")
-    assert "`roboeval report run --out run/report`" in last
+    assert last.startswith("roboeval: stopped; the same command continues")
     assert not (tmp_path / "run" / "report").exists()
     kept = checks.read_bytes()
     assert roboeval("resample", "run", cwd=tmp_path).status == 0
@@ -294,14 +293,14 @@ def test_kill_minus_nine_at_random_moments_costs_only_what_was_under_way(tmp_pat
     assert ended.status == 0
     assert Counter(keys(tmp_path / "run")).most_common(1)[0][1] == 1
     assert len(keys(tmp_path / "run")) == 200
-    assert re.search(r"^[1-4] requests? ", ended.err, re.MULTILINE)
+    assert re.search(r"^[1-4] pending requests? ", ended.err, re.MULTILINE)
     twice = json.loads((tmp_path / "run" / "run.json").read_text())["possibly_paid_twice"]
     assert len(server.requests) - 200 == lost
     assert lost <= twice <= lost + times  # a request that was noted need not have arrived
 
 
 @pytest.mark.slow
-def test_control_c_says_what_is_kept(tmp_path: Path) -> None:
+def test_control_c_says_how_to_go_on(tmp_path: Path) -> None:
     with Server(delay=0.1, fault=lambda _: Fault.SLOW) as server:
         words = served(server.url, "--concurrency", "4")
         process = Forked("roboeval", *words, cwd=tmp_path, environment=ENVIRONMENT)
@@ -310,9 +309,8 @@ def test_control_c_says_what_is_kept(tmp_path: Path) -> None:
         process.send_signal(signal.SIGINT)
         _, err = process.communicate()
     assert process.returncode == 130
-    said = re.fullmatch(r"roboeval: stopped; (\d+) of 500 completions .*\b[1-4] requests? .*\n", err)
-    assert said is not None, err
-    assert len(keys(tmp_path / "run")) == int(said[1])
+    assert re.fullmatch(r"roboeval: stopped; the same command .*\n", err), err
+    assert 0 < len(keys(tmp_path / "run")) < 500
 
 
 @pytest.mark.slow
