@@ -17,10 +17,10 @@ from roboeval.analysis.counts import tally_of, task_scores
 from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of, pass_at_1
 from roboeval.analysis.missions import comparable_tables
 from roboeval.analysis.statistics import SampleSizes, by_bootstrap, p_by_signs, sample_sizes
-from roboeval.analysis.summary import cut_off_replies, failures
+from roboeval.analysis.summary import failures
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.scope import Coverage, CutOff
+from roboeval.evaluation.runs.scope import Coverage, JudgingScope
 
 SIGNIFICANCE = 0.05
 MIN_SHOWN_P = 0.001  # smaller values are shown as "p < 0.001"
@@ -186,20 +186,20 @@ class ComparedRun:
 
     name: str
     coverage: Coverage
-    cut_off: CutOff
+    scope: JudgingScope
     classes: Mapping[str, float]  # shares of judged completions, by class of failure
 
     @classmethod
     def of(cls, name: str, results: Results, table: pl.DataFrame | None = None) -> ComparedRun:
-        """Collect the coverage, cut-off replies and failure classes of a run, by default of its own table."""
+        """Collect the coverage, the scope and the failure classes of a run, by default of its own table."""
         found = failures(tally_of(results.table if table is None else table))
         shares = {one.name: one.share for one in found}
-        return cls(name, results.coverage, cut_off_replies(found, results.scope), shares)
+        return cls(name, results.coverage, results.scope, shares)
 
     @property
     def data(self) -> dict[str, Any]:
         """Convert the run to plain data, without its name."""
-        return {**asdict(self.coverage), "cut_off": self.cut_off.replies, "failures": dict(self.classes)}
+        return {**asdict(self.coverage), "cut_off": self.scope.cut_off, "failures": dict(self.classes)}
 
 
 def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:

@@ -11,9 +11,9 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from roboeval.analysis.metrics import Estimate, PromptScore, TaskScore, overall, prompts_of
 from roboeval.analysis.tally import Tally
-from roboeval.evaluation.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES, NO_PROGRAM_CLASS
+from roboeval.evaluation.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES
 from roboeval.evaluation.runs.completions import how_many
-from roboeval.evaluation.runs.scope import Coverage, CutOff, JudgingScope
+from roboeval.evaluation.runs.scope import Coverage, JudgingScope
 from roboeval.suites.load import Suite
 
 
@@ -53,18 +53,6 @@ class EvaluationSummary:
     def coverage(self) -> Coverage:
         """The numbers of judged, existing and requested completions."""
         return self.scope.coverage(self.judged)
-
-    @property
-    def cut_off(self) -> CutOff:
-        """The replies that were cut off."""
-        return cut_off_replies(self.failures, self.scope)
-
-
-def cut_off_replies(failures: Iterable[Failures], scope: JudgingScope) -> CutOff:
-    """Count the replies of a run that were cut off, given its failures."""
-    kinds = (kind for one in failures if one.name == NO_PROGRAM_CLASS for kind in one.kinds)
-    without = sum(kind.count for kind in kinds if kind.name == "cut-off")
-    return CutOff(max(scope.cut_off, without), without, scope.total, scope.limit)
 
 
 def summarise(
@@ -151,7 +139,7 @@ def summary_data(summary: EvaluationSummary) -> dict[str, Any]:
         "judged": summary.judged,
         "to_judge": summary.scope.total,
         "requested": summary.coverage.requested,
-        "cut_off": summary.cut_off.replies,
+        "cut_off": summary.scope.cut_off,
         "max_tokens": summary.scope.limit,
         **({"endings": dict(ends), "turns": summary.scope.turns} if (ends := summary.scope.endings) else {}),
         "completions": summary.judged,

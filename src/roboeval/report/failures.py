@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 from roboeval.analysis.counts import tally_of
 from roboeval.analysis.failure_groups import FailureGroup, describe_groups, group_failures
-from roboeval.analysis.summary import ALL, Causes, causes, cut_off_replies
-from roboeval.analysis.summary import failures as count_failures
+from roboeval.analysis.summary import ALL, Causes, causes
 from roboeval.analysis.verdict_changes import ranks, sentences, verdict_changes
 from roboeval.evaluation.failures import plural_of
 from roboeval.evaluation.runs.completions import name_of
@@ -53,7 +52,7 @@ def most_frequent(run: JudgedRun) -> str:
 
 def cut_off_warnings(run: JudgedRun) -> list[str]:
     """Return a warning if many replies of a run were cut off."""
-    warning = cut_off_replies(count_failures(tally_of(run.table)), run.results.scope).warning
+    warning = run.results.scope.cut_off_warning
     return [] if warning is None else [f"{warning}."]
 
 

@@ -71,7 +71,7 @@ def run_data(run: Snapshot) -> dict[str, Any]:
         "requested": coverage.requested,
         "judged": run.judged,
         "to_judge": coverage.there,
-        "cut_off": run.cut_off.replies,
+        "cut_off": results.scope.cut_off,
         "tasks_there": len({task for task, _, _ in results.completions}),
         "tasks_of_suite": None if run.suite is None else len(run.suite.tasks),
         "date": date_of(results.about),
@@ -111,7 +111,7 @@ def notes(run: Snapshot) -> list[str]:
         found.append("All other rows are shown.")
     if (missions := results.scope.missions_sentence) is not None:
         found.append(f"{missions[0].upper()}{missions[1:]}.")
-    if (warning := run.cut_off.warning) is not None:
+    if (warning := results.scope.cut_off_warning) is not None:
         found.append(f"{warning}.")
     if stale:
         found.append(f"{how_many(stale)} changed since the verdict; use `roboeval evaluate --redo`.")

@@ -14,11 +14,10 @@ from codebotler.core.cachedproperty import cached_property
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from roboeval.analysis.counts import tally_of, task_scores
 from roboeval.analysis.metrics import Estimate, TaskScore, overall
-from roboeval.analysis.summary import Failures, cut_off_replies, failures
+from roboeval.analysis.summary import Failures, failures
 from roboeval.evaluation.failures import NO_PROGRAM_CLASS
 from roboeval.evaluation.runs.completions import KEY, CompletionKey
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.scope import CutOff
 from roboeval.evaluation.runs.table import storable
 from roboeval.suites.load import Suite
 from roboeval.suites.task import check_label
@@ -167,11 +166,6 @@ class Snapshot:
     def passed(self) -> int:
         """The number of judged completions that passed."""
         return len(self.results.passed)
-
-    @property
-    def cut_off(self) -> CutOff:
-        """The replies that were cut off."""
-        return cut_off_replies(self.failures, self.results.scope)
 
     @cached_property
     def scores(self) -> tuple[TaskScore, ...]:

@@ -19,7 +19,7 @@ from roboeval.analysis.summary import causes as causes_of
 from roboeval.cli.views.results import summary_view
 from roboeval.evaluation.failures import FAILURE_CLASSES
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.scope import CutOff, JudgingScope
+from roboeval.evaluation.runs.scope import JudgingScope
 from roboeval.suites.load import Suite
 from small_run import ROWS, SUITE, TASK, printed, row
 
@@ -174,14 +174,12 @@ def test_requested_completions_that_are_missing_are_counted() -> None:
     text = printed(summary_view(counted, title="x"), 200)
     assert "\n3 of 6 completions (2 missing, 1 not judged)," in text
     assert re.search(r"\nVisit +3 of 6 ", text)
-    assert re.search(
-        r"\n3 of 4 replies \(75\.0%\) .*512 tokens, 3 .* complete program; .*--max-tokens\n", text
-    )
+    assert re.search(r"\n3 of 4 replies \(75\.0%\) .*512 tokens; .*--max-tokens\n", text)
 
 
 @pytest.mark.parametrize(("cut_off", "is_said"), [(2, False), (3, True)])
 def test_more_than_one_in_fifty_cut_off_is_said(cut_off: int, *, is_said: bool) -> None:
-    warning = CutOff(cut_off, 1, 100, None).warning
+    warning = JudgingScope({"Visit": 100}, cut_off=cut_off).cut_off_warning
     assert (warning is not None) == is_said
     if warning is not None:
         assert "--max-tokens" in warning
@@ -191,7 +189,6 @@ def test_more_than_one_in_fifty_cut_off_is_said(cut_off: int, *, is_said: bool) 
 def test_replies_without_a_program_are_a_class_with_kinds() -> None:
     rows = [row(0, 0), row(0, 1, ("NoProgram", "cut-off")), row(1, 0, ("NoProgram", "refusal"))]
     counted = summary(rows, SUITE)
-    assert counted.cut_off.replies == counted.cut_off.without_program == 1
     text = printed(summary_view(counted, title="x"))
     assert re.search(r"\nwithout a program +2 +66\.7%", text)
     assert re.search(r"\n  cut-off +1 +33\.3%", text)

@@ -55,7 +55,7 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
     warnings = [
         Text(f"{visible(run.name)}: {warning}", "yellow")
         for run in runs
-        if (warning := run.cut_off.warning) is not None
+        if (warning := run.scope.cut_off_warning) is not None
     ]
     needed = map(Text, sample_size_sentences(comparison))
     return Group(sentence, Text(), rows, Text(), *needed, *warnings, Text(), _ends(runs), Text(), table)

@@ -42,7 +42,7 @@ def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
     n, failed = summary.judged, sum(each.count for each in summary.failures)
     parts: list[RenderableType] = [head, Text(), _TaskTable(summary), Text()]
     parts += [*_overall(summary), *_missed(summary.missing)]
-    if (warning := summary.cut_off.warning) is not None:
+    if (warning := summary.scope.cut_off_warning) is not None:
         parts.append(Text(warning, style="yellow"))
     if failed:
         sentence = f"{failed:,} of {how_many(n)} failed ({failed / n:.1%}); shares are of all judged:"

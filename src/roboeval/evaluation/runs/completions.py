@@ -108,7 +108,7 @@ class Completion:
     @property
     def is_cut_off(self) -> bool:
         """Whether the reply ended at the token limit, even if the program is complete."""
-        return is_cut_off(self.finish_reason)
+        return is_cut_off(self.finish_reason) or self.more.get(NO_PROGRAM_COLUMN) == "cut-off"
 
     @property
     def acted(self) -> Acted | None:

@@ -11,6 +11,8 @@ from roboeval.evaluation.requests import batches
 from roboeval.evaluation.runs.completions import Completion, how_many
 from roboeval.suites.load import Suite
 
+MAX_CUT_OFF_SHARE = 0.02  # share of replies that may be cut off without a warning
+
 
 @dataclass(frozen=True)
 class Coverage:
@@ -95,6 +97,17 @@ class JudgingScope:
         turns = f"{self.turns / count:.1f} turns on average"
         return f"each completion is one mission in one world: {turns}; how they ended: {ended}"
 
+    @property
+    def cut_off_warning(self) -> str | None:
+        """Return a warning that says what to do, or None if only few replies were cut off."""
+        share = self.cut_off / self.total if self.total else 0.0
+        if share <= MAX_CUT_OFF_SHARE:
+            return None
+        at = "the model's own limit" if self.limit is None else f"{self.limit:,} tokens"
+        return (
+            f"{self.cut_off:,} of {self.total:,} replies ({share:.1%}) were cut off at {at}; see --max-tokens"
+        )
+
     def coverage(self, judged: int, task: str | None = None) -> Coverage:
         """Return the coverage of a task or of all selected tasks, given the number of judged completions."""
         if task is not None:
@@ -127,34 +140,3 @@ def limit_of(about: Mapping[str, Any]) -> int | None:
     settings = about.get("settings")
     limit = settings.get("max_tokens") if isinstance(settings, dict) else None
     return limit if type(limit) is int else None
-
-
-MAX_CUT_OFF_SHARE = 0.02  # share of replies that may be cut off without a warning
-
-
-@dataclass(frozen=True)
-class CutOff:
-    """The replies of a run that ended at the token limit."""
-
-    replies: int  # replies that were cut off, even after a complete program
-    without_program: int  # replies that were cut off and contain no program
-    of: int
-    limit: int | None
-
-    @property
-    def share(self) -> float:
-        """Return the share of replies that were cut off."""
-        return self.replies / self.of if self.of else 0.0
-
-    @property
-    def warning(self) -> str | None:
-        """Return a warning that says what to do, or None if only few replies were cut off."""
-        if self.share <= MAX_CUT_OFF_SHARE:
-            return None
-        at = "the model's own limit" if self.limit is None else f"{self.limit:,} tokens"
-        how = "set" if self.limit is None else "raise or leave out"
-        whole = self.replies - self.without_program
-        return (
-            f"{self.replies:,} of {self.of:,} replies ({self.share:.1%}) were cut off at {at}, "
-            f"{whole:,} of them after a complete program; {how} --max-tokens"
-        )
