@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,6 @@ from codebotler.core.files import Appender, to_text, write_whole
 from codebotler.core.skills.files import files_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.words import brief
-from codebotler.simulator.settings import PAPER_SETTINGS
 from roboeval.evaluation.engines import PYTHON_VERSION, Local, OpenEngine
 from roboeval.evaluation.judge import judgements
 from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of
@@ -101,35 +101,20 @@ def _expect_of_run(
     raise UserError(f"{sentence}; --redo starts over", file=file, line=line.number)
 
 
-WORD_LISTS = ("words_for_people", "words_for_yes", "words_for_no")  # left out of KEY.json if empty
-
-
 def evaluation_metadata(
     suite: Suite, *, ablated: bool = False, tasks: frozenset[str] | None = None
 ) -> dict[str, Any]:
     """Return the content of KEY.json: the suite and tool that judge, and the selected tasks."""
-    settings = suite.settings
+    house = suite.house
     return {
         "suite": suite.name,
         "version": suite.version,
         "digest": suite.digest,
-        **({} if suite.worlds is None else {"worlds": suite.worlds, "seed": suite.seed}),
-        "rules": {
-            "literals": settings.literals,
-            "matching": settings.matching,
-            "people": settings.people,
-            **{name: list(words) for name in WORD_LISTS if (words := getattr(settings, name))},
-            **({"events": settings.events} if settings.events != PAPER_SETTINGS.events else {}),
-            "limits": {name: getattr(settings.limits, name) for name in ("seconds", "calls", "ticks")},
-            "skill_seconds": 0,
-            "clock_starts": settings.clock_starts.isoformat(),
-        },
-        **(
-            {}
-            if (house := suite.house) is None
-            else {"house_rules": {house.name or suite.name: house.digest}}
-        ),
-        **({} if suite.skills is SKILLS else {"skills": files_of(suite.skills)}),
+        "worlds": suite.worlds,
+        "seed": suite.seed,
+        "rules": json.loads(json.dumps(asdict(suite.settings), default=str)),
+        "house_rules": None if house is None else {house.name or suite.name: house.digest},
+        "skills": None if suite.skills is SKILLS else files_of(suite.skills),
         "codebotler": __version__,
         "python": PYTHON_VERSION,
         "ablation": ablated,
