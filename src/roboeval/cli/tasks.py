@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -56,25 +55,23 @@ def tasks(
 def show(suite: Suite, task: str | None) -> None:
     """Print the tasks of a suite, or one task."""
     from roboeval.cli.views.tasks import suite_task_view, suite_view
+    from roboeval.suites.load import known_suites
 
     if task is not None:
         print_rich(suite_task_view(suite.task(task)))
         return
     print_rich(suite_view(suite))
-    for sentence in other_suites(suite.name):
-        note(sentence)
+    others = ", ".join(name for name in known_suites() if name != suite.name)
+    note(f"other suites for --suite: {others}; or a folder of your own")
 
 
 def start(task: str, suite: str) -> None:
     """Create a task in the folder of a suite."""
-    from roboeval.suites.installed import installed_suites
-    from roboeval.suites.load import shipped_suites
+    from roboeval.suites.load import known_suites
     from roboeval.suites.new_task import new_task
 
-    brought = [one.package for one in installed_suites() if one.name == suite]
-    if suite in shipped_suites() or brought:
-        whose = f"belongs to the package {brought[0]}" if brought else "ships with RoboEval"
-        fail(f'the suite "{suite}" {whose} and cannot be changed; name your own folder with --suite')
+    if suite in known_suites():
+        fail(f'the suite "{suite}" is installed and cannot be changed; name your own folder with --suite')
     path = new_task(Path(suite), task)
     lint = command("tasks", "--lint", suite=suite)
     note(f"{path} is a complete task; edit it, then check it with `{lint}`")
@@ -111,24 +108,3 @@ def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
         if only in {None, task.name}
     ]
     return {"suite": suite.name, "version": suite.version, "digest": suite.digest, "tasks": tasks}
-
-
-def other_suites(name: str) -> Iterator[str]:
-    """Yield sentences about other suites that --suite accepts, and about suites that fail to load."""
-    from codebotler.core.errors import UserError
-    from roboeval.suites.installed import installed_suites
-    from roboeval.suites.load import load_suite, shipped_suites
-
-    others = [one for one in shipped_suites() if one != name]
-    for suite in installed_suites():
-        if suite.name in shipped_suites():
-            yield f'the suite "{suite.name}" from {suite.package} has the name of a built-in suite; rename it'
-            continue
-        try:
-            load_suite(suite.name)
-        except UserError as error:
-            yield str(error)
-        else:
-            others += [f"{suite.name} ({suite.package})"] * (suite.name != name)
-    if others:
-        yield f"other suites for --suite: {', '.join(others)}; or a folder of your own"

@@ -8,7 +8,6 @@ import pytest
 
 from codebotler.core.errors import UserError
 from command_line import ENVIRONMENT, roboeval
-from roboeval.cli.tasks import other_suites
 from roboeval.suites.installed import installed_suites
 from roboeval.suites.load import load_suite
 from roboeval.suites.new_task import new_task
@@ -60,7 +59,7 @@ def test_a_suite_is_found_by_its_name_without_running_its_package(install: Insta
     ended = roboeval("tasks", "--lint", "--suite", "garden", environment=ENVIRONMENT | dict(os.environ))
     assert (ended.status, ended.out) == (0, "no findings\n"), ended
     listed = roboeval("tasks", environment=ENVIRONMENT | dict(os.environ))
-    assert "garden (garden-suite 1.0)" in listed.err
+    assert "garden" in listed.err
 
 
 def test_it_may_lie_in_a_folder_of_the_package(install: Install) -> None:
@@ -107,7 +106,6 @@ def test_a_folder_here_with_the_name_of_a_package(install: Install) -> None:
 def test_a_package_cannot_take_the_name_of_a_suite_that_ships(install: Install) -> None:
     folder = install(name="paper")
     assert load_suite("paper").folder != folder
-    assert any("garden-suite 1.0" in each and '"paper"' in each for each in other_suites("paper"))
 
 
 @pytest.mark.parametrize(
@@ -130,12 +128,9 @@ def test_a_broken_package(install: Install, changed: dict[str, str], named: str)
 
 def test_nobody_starts_a_task_in_a_suite_of_somebody_else(install: Install) -> None:
     install()
-    for suite, why in (
-        ("garden", "garden-suite 1.0"),
-        ("plus", "RoboEval"),
-    ):
+    for suite in ("garden", "plus"):
         ended = roboeval(
             "tasks", "--new", "MakeTea", "--suite", suite, environment=ENVIRONMENT | dict(os.environ)
         )
-        assert (ended.status, why in ended.err) == (2, True)
+        assert (ended.status, "cannot be changed" in ended.err) == (2, True)
         assert not Path(suite).exists()
