@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from random import Random
 from statistics import fmean
@@ -47,29 +47,42 @@ class ClarifySettings:
     seed: int = 0
 
 
-@dataclass(frozen=True)
-class ClarifyTrial:
-    """The verdicts on one group of candidates."""
+class ClarifyShares(TypedDict):
+    """Shares of groups of candidates. Prompts count equally.
 
-    one: float  # the share of the candidates that pass
-    majority: bool  # whether the largest cluster passes
-    question: bool  # whether the program passes that results from the question, if there is one
-    asked: bool
+    `mattered` is the share of the questions whose answer changed the verdict on the largest cluster. It is
+    null if there was no question.
+    """
+
+    one: float  # of the candidates that pass
+    majority: float  # of the largest clusters that pass
+    question: float  # of the programs that pass and result from the question, if there is one
+    asked: float
+    mattered: float | None
+    tokens: float | None  # the mean number for a group; null if the run does not count tokens
 
 
-@dataclass(frozen=True)
-class ClarifiedPrompt:
-    """The trials of one prompt, with the mean number of tokens for a group if the run counts tokens."""
+class PromptShares(ClarifyShares):
+    """Shares of the groups of a prompt."""
 
     task: str
     prompt: int
-    trials: tuple[ClarifyTrial, ...] = field(repr=False)
-    tokens: float | None = None
+
+
+class ClarifyMeasurement(ClarifyShares):
+    """A measurement with its settings, and with hashes of the suite and the completions."""
+
+    digest: str
+    completions: str
+    candidates: int
+    noise: float
+    seed: int
+    prompts: list[PromptShares]
 
 
 def clarify(
     completions: Iterable[Completion], suite: Suite, pool: WorkerPool, settings: ClarifySettings
-) -> Iterator[ClarifiedPrompt]:
+) -> Iterator[PromptShares]:
     """Yield the results of each prompt that has several completions.
 
     Candidates are compared in imagined worlds only. The worlds of the task are only for the verdicts and for
@@ -91,7 +104,17 @@ def clarify(
     for (task, prompt), some in groups.items():
         random = Random(f"answers {settings.seed} {task} {prompt}")  # noqa: S311 - not for cryptography
         trials = [_trial(group, next(offers), passed, random, settings.noise) for group in some]
-        yield ClarifiedPrompt(task, prompt, tuple(trials), _tokens(by_prompt[task, prompt], settings))
+        changed = [question != majority for _, majority, question, asked in trials if asked]
+        yield {
+            "task": task,
+            "prompt": prompt,
+            "one": fmean(one for one, *_ in trials),
+            "majority": fmean(majority for _, majority, *_ in trials),
+            "question": fmean(question for *_, question, _ in trials),
+            "asked": len(changed) / len(trials),
+            "mattered": fmean(changed) if changed else None,
+            "tokens": _tokens(by_prompt[task, prompt], settings),
+        }
 
 
 def _by_prompt(completions: Iterable[Completion], least: int) -> dict[tuple[str, int], list[Completion]]:
@@ -129,16 +152,17 @@ def _trial(
     passed: Mapping[CompletionKey, bool],
     random: Random,
     noise: float,
-) -> ClarifyTrial:
+) -> tuple[float, bool, bool, bool]:
+    """Return the share that passes, the verdicts without and with the question, and whether it is asked."""
     passes = {one.program: passed.get(one.key, False) for one in group}  # no verdict if judging took too long
     one = fmean(passes[each.program] for each in group)
     majority, *answers = (passes[program] for program in offer)
     if not answers:
-        return ClarifyTrial(one, majority, majority, asked=False)
+        return one, majority, majority, False
     chosen = answers.index(True) if any(answers) else None
     if random.random() < noise:
         chosen = random.choice([choice for choice in (*range(len(answers)), None) if choice != chosen])
-    return ClarifyTrial(one, majority, chosen is not None and answers[chosen], asked=True)
+    return one, majority, chosen is not None and answers[chosen], True
 
 
 def _tokens(some: Sequence[Completion], settings: ClarifySettings) -> float | None:
@@ -148,73 +172,32 @@ def _tokens(some: Sequence[Completion], settings: ClarifySettings) -> float | No
     return settings.candidates * total.total() / len(some) if total.total() else None
 
 
-def clarified_data(prompts: Sequence[ClarifiedPrompt]) -> dict[str, Any]:
-    """Return the results overall, where prompts count equally, and for each prompt, as plain data.
-
-    `mattered` is the share of the questions whose answer changed the verdict on the largest cluster. It is
-    null if there was no question.
-    """
-    trials = [trial for one in prompts for trial in one.trials]
-    each = [
-        {"task": one.task, "prompt": one.prompt, **_shares(one.trials), "tokens": one.tokens}
-        for one in prompts
-    ]
-    known = [one.tokens for one in prompts if one.tokens is not None]
-    return {**_shares(trials), "tokens": fmean(known) if known else None, "prompts": each}
-
-
-def _shares(trials: Sequence[ClarifyTrial]) -> dict[str, float | None]:
-    changed = [trial.question != trial.majority for trial in trials if trial.asked]
-    return {
-        "one": fmean(trial.one for trial in trials),
-        "majority": fmean(trial.majority for trial in trials),
-        "question": fmean(trial.question for trial in trials),
-        "asked": fmean(trial.asked for trial in trials),
-        "mattered": fmean(changed) if changed else None,
-    }
-
-
 # --- measurements that are stored in a run
-
-
-class ClarifyShares(TypedDict):
-    """Shares of trials, as in `clarified_data`."""
-
-    one: float
-    majority: float
-    question: float
-    asked: float
-    mattered: float | None
-    tokens: float | None
-
-
-class PromptShares(ClarifyShares):
-    """Shares of the trials of a prompt."""
-
-    task: str
-    prompt: int
-
-
-class ClarifyMeasurement(ClarifyShares):
-    """A measurement with its settings, and with hashes of the suite and the completions."""
-
-    digest: str
-    completions: str
-    candidates: int
-    noise: float
-    seed: int
-    prompts: list[PromptShares]
 
 
 def measurement_data(
     completions: Iterable[Completion],
     suite: Suite,
     settings: ClarifySettings,
-    prompts: Sequence[ClarifiedPrompt],
+    prompts: Sequence[PromptShares],
 ) -> dict[str, Any]:
     """Return a measurement as plain data, which depends only on the arguments."""
-    measured = {"suite": suite.name, "digest": suite.digest, "completions": _hash_of(completions)}
-    return {**measured, **asdict(settings), **clarified_data(prompts)}
+    questions = [(one["asked"], one["mattered"]) for one in prompts if one["mattered"] is not None]
+    asked = sum(share for share, _ in questions)
+    tokens = [one["tokens"] for one in prompts if one["tokens"] is not None]
+    return {
+        "suite": suite.name,
+        "digest": suite.digest,
+        "completions": _hash_of(completions),
+        **asdict(settings),
+        "one": fmean(one["one"] for one in prompts),
+        "majority": fmean(one["majority"] for one in prompts),
+        "question": fmean(one["question"] for one in prompts),
+        "asked": fmean(one["asked"] for one in prompts),
+        "mattered": sum(share * mattered for share, mattered in questions) / asked if questions else None,
+        "tokens": fmean(tokens) if tokens else None,
+        "prompts": prompts,
+    }
 
 
 def store_measurement(run: RunFolder, suite: Suite, data: dict[str, Any]) -> Path:

@@ -11,11 +11,8 @@ from codebotler.core.errors import UserError
 from codebotler.simulator.pool import WorkerPool
 from made_results import results_of
 from roboeval.evaluation.clarify import (
-    DRAWS_PER_PROMPT,
-    ClarifiedPrompt,
     ClarifySettings,
-    ClarifyTrial,
-    clarified_data,
+    PromptShares,
     clarify,
     measurement_data,
     read_measurements,
@@ -55,28 +52,27 @@ def completions(*programs: str, usage: int | None = None) -> list[Completion]:
 
 def measured(
     programs: Sequence[Completion], paper: Suite, pool: WorkerPool, candidates: int = 4, noise: float = 0.0
-) -> ClarifiedPrompt:
+) -> PromptShares:
     (found,) = clarify(programs, paper, pool, ClarifySettings(candidates, noise))
-    assert len(found.trials) == DRAWS_PER_PROMPT
     return found
 
 
 @pytest.mark.slow
 def test_a_person_takes_the_option_that_passes(paper: Suite, pool: WorkerPool) -> None:
     found = measured(completions(WRONG, WRONG, RIGHT, SILENT), paper, pool)
-    assert {*found.trials} == {ClarifyTrial(0.25, majority=False, question=True, asked=True)}
+    assert found == shares(0.25, majority=0, question=1, mattered=1)
 
 
 @pytest.mark.slow
 def test_none_of_the_options_counts_as_failed(paper: Suite, pool: WorkerPool) -> None:
     found = measured(completions(WRONG, WRONG, SILENT), paper, pool, 3)
-    assert {*found.trials} == {ClarifyTrial(0.0, majority=False, question=False, asked=True)}
+    assert found == shares(0, majority=0, question=0, mattered=0)
 
 
 @pytest.mark.slow
 def test_without_a_question_the_largest_cluster_counts(paper: Suite, pool: WorkerPool) -> None:
     found = measured(completions(RIGHT, RIGHT, RIGHT, WRONG), paper, pool)
-    assert {*found.trials} == {ClarifyTrial(0.75, majority=True, question=True, asked=False)}
+    assert found == shares(0.75, majority=1, question=1, asked=0)
 
 
 @pytest.mark.slow
@@ -84,13 +80,13 @@ def test_a_person_who_is_always_wrong_never_takes_the_option_that_passes(
     paper: Suite, pool: WorkerPool
 ) -> None:
     found = measured(completions(RIGHT, RIGHT, WRONG, SILENT), paper, pool, noise=1.0)
-    assert {*found.trials} == {ClarifyTrial(0.5, majority=True, question=False, asked=True)}
+    assert found == shares(0.5, majority=1, question=0, mattered=1)
 
 
 @pytest.mark.slow
 def test_tokens_are_counted_for_a_group(paper: Suite, pool: WorkerPool) -> None:
-    assert measured(completions(RIGHT, SILENT, usage=9), paper, pool, 2).tokens == 20
-    assert measured(completions(RIGHT, SILENT), paper, pool, 2).tokens is None
+    assert measured(completions(RIGHT, SILENT, usage=9), paper, pool, 2)["tokens"] == 20
+    assert measured(completions(RIGHT, SILENT), paper, pool, 2)["tokens"] is None
 
 
 def test_too_few_completions_are_refused(paper: Suite, pool: WorkerPool) -> None:
@@ -98,36 +94,40 @@ def test_too_few_completions_are_refused(paper: Suite, pool: WorkerPool) -> None
         next(clarify(completions(RIGHT, WRONG), paper, pool, ClarifySettings(3)))
 
 
-def trial(*, one: float = 0.5, majority: bool, question: bool, asked: bool = True) -> ClarifyTrial:
-    return ClarifyTrial(one, majority, question, asked)
-
-
-def test_shares_are_of_all_trials_but_what_mattered_is_of_questions() -> None:
-    gains = trial(majority=False, question=True)
-    silent = trial(one=1.0, majority=True, question=True, asked=False)
-    useless = trial(one=0.0, majority=True, question=True)
-    data = clarified_data(
-        [ClarifiedPrompt("A", 0, (gains, silent)), ClarifiedPrompt("A", 1, (useless, useless), 30)]
-    )
-    first, second = data["prompts"]
-    assert {
-        name: first[name] for name in ("task", "prompt", "one", "majority", "question", "asked", "mattered")
-    } == {
-        "task": "A",
+def shares(
+    one: float = 0.5,
+    *,
+    majority: float = 0,
+    question: float = 0,
+    asked: float = 1,
+    mattered: float | None = None,
+    tokens: float | None = None,
+) -> PromptShares:
+    return {
+        "task": TASK,
         "prompt": 0,
-        "one": 0.75,
-        "majority": 0.5,
-        "question": 1.0,
-        "asked": 0.5,
-        "mattered": 1.0,
+        "one": one,
+        "majority": majority,
+        "question": question,
+        "asked": asked,
+        "mattered": mattered,
+        "tokens": tokens,
     }
-    assert (second["mattered"], second["tokens"]) == (0.0, 30)
-    assert (data["one"], data["asked"], data["mattered"], data["tokens"]) == (0.375, 0.75, 1 / 3, 30)
 
 
-def test_nothing_mattered_without_a_question() -> None:
-    silent = trial(majority=True, question=True, asked=False)
-    assert clarified_data([ClarifiedPrompt("A", 0, (silent,))])["mattered"] is None
+def test_prompts_count_equally_but_what_mattered_is_of_questions(paper: Suite) -> None:
+    prompts = [
+        shares(0.75, majority=0.5, question=1, asked=0.5, mattered=1),
+        shares(0, majority=1, question=1, mattered=0, tokens=30),
+        shares(0, asked=0),
+    ]
+    found = measurement_data([], paper, ClarifySettings(), prompts)
+    assert (found["one"], found["majority"], found["question"], found["asked"]) == (0.25, 0.5, 2 / 3, 0.5)
+    assert (found["mattered"], found["tokens"], found["prompts"]) == (1 / 3, 30, prompts)
+
+
+def test_nothing_mattered_without_a_question(paper: Suite) -> None:
+    assert measurement_data([], paper, ClarifySettings(), [shares(asked=0)])["mattered"] is None
 
 
 # --- measurements in a run
@@ -142,7 +142,7 @@ def test_a_stored_measurement_is_outdated_when_programs_or_the_suite_change(
     paper: Suite, tmp_path: Path
 ) -> None:
     written = completions(RIGHT, SILENT)
-    prompts = [ClarifiedPrompt(TASK, 0, (trial(majority=False, question=True),))]
+    prompts = [shares(question=1, mattered=1)]
     data = measurement_data(written, paper, ClarifySettings(2, 0.1, 7), prompts)
     path = store_measurement(RunFolder(tmp_path), paper, data)
     assert (path.parent, json.loads(path.read_text())) == (RunFolder(tmp_path).questions("paper"), data)

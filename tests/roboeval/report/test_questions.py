@@ -11,9 +11,8 @@ import pytest
 from codebotler.core.errors import UserError
 from made_up_runs import SUITE, made_up, usual
 from roboeval.evaluation.clarify import (
-    ClarifiedPrompt,
     ClarifySettings,
-    ClarifyTrial,
+    PromptShares,
     measurement_data,
     store_measurement,
 )
@@ -203,8 +202,14 @@ def test_where_it_comes_from() -> None:
 
 def test_what_a_question_gains_by_run_and_by_prompt(tmp_path: Path) -> None:
     measured, plain = made_up("a", {"Visit": (5, 5)}, folder=str(tmp_path), key="small"), made_up("b", {})
-    trials = [ClarifyTrial(0.5, majority=False, question=asked, asked=asked) for asked in (True, False)]
-    prompts = [ClarifiedPrompt("Visit", 0, tuple(trials), 30), ClarifiedPrompt("Visit", 1, (trials[1],))]
+    silent: PromptShares = {
+        "task": "Visit", "prompt": 1, "one": 0.5, "majority": 0, "question": 0, "asked": 0,
+        "mattered": None, "tokens": None,
+    }  # fmt: skip
+    prompts: list[PromptShares] = [
+        {**silent, "prompt": 0, "question": 0.5, "asked": 0.5, "mattered": 1, "tokens": 30},
+        silent,
+    ]
     data = measurement_data(measured.results.completions.values(), SUITE, ClarifySettings(3, 0.1, 7), prompts)
     store_measurement(measured.results.run, SUITE, data)
     by_run, by_prompt = question([measured, plain]).parts
@@ -215,8 +220,8 @@ def test_what_a_question_gains_by_run_and_by_prompt(tmp_path: Path) -> None:
             "candidates": 3,
             "one program": 0.5,
             "majority": 0.0,
-            "one question": pytest.approx(1 / 3),
-            "asked": pytest.approx(1 / 3),
+            "one question": 0.25,
+            "asked": 0.25,
             "mattered": 1.0,
             "noise": 0.1,
             "tokens per group": 30,
