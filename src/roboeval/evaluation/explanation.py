@@ -11,7 +11,6 @@ from codebotler.core.trace import Trace
 from codebotler.core.words import counted
 from codebotler.rtl import explain
 from roboeval.evaluation.failures import no_program_sentence
-from roboeval.evaluation.remarks import remarks_on
 from roboeval.evaluation.runs.completions import KEY, Completion
 from roboeval.evaluation.runs.replies import reply_data
 from roboeval.evaluation.runs.traces import trace_of
@@ -107,7 +106,6 @@ def _world_data(
         **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
         "steps": steps_of(trace, has_places=True),
         **({} if cut is None else {"cut": cut}),
-        "remarks": remarks_on(verdict, trace),
         "failed_checks": [
             {"check": check, **_explained(check, scenario, verdict, trace, budget)}
             for check in verdict["failed_checks"]

@@ -184,8 +184,6 @@ def _draw_reasons(data: Mapping[str, Any], anchor: str) -> None:
     with ui.element("ul").classes("failed-checks"):
         for check in data["failed_checks"]:
             _draw_check(check, anchor)
-    for remark in data["remarks"]:
-        PlainText("p", shortened(remark, MAX_SENTENCE), "quiet")
 
 
 def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> None:

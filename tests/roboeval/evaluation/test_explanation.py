@@ -200,14 +200,6 @@ def test_world_that_decided_comes_first_and_satisfied_ones_are_lines() -> None:
     assert [world["world"] for world in worlds] == ["nobody comes", "amy is in"]
 
 
-def test_remarks_are_shown_with_their_world() -> None:
-    waits = failed(Status.TIMEOUT, "TimeoutError", "1,000 skill calls", *[GOTO] * 9, line=1)
-    judged = row(completion(), waits)
-    (world,) = completion_data(judged, completion(), SUITE)["worlds"]
-    assert world["remarks"]
-    assert f"  {world['remarks'][0]}" in printed(completion_view(judged, completion(), SUITE), 160)
-
-
 @pytest.mark.parametrize(("recorded", "prompt"), [(None, 0), ("Visit her.", 0), (None, 7)])
 def test_text_of_the_suite_is_a_field_of_its_own(recorded: str | None, prompt: int) -> None:
     written = completion(instruction=recorded)

@@ -157,7 +157,6 @@ def _world(world: Mapping[str, Any]) -> list[RenderableType]:
             f": {shortened(check['explanation'], MAX_EXPLANATION)}",
         )
         parts.append(Padding(text, (0, 0, 0, 2)))
-    parts += [Padding(Text(shortened(one, MAX_EXPLANATION)), (0, 0, 0, 2)) for one in world["remarks"]]
     return parts
 
 
