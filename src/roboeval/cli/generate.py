@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from codebotler.models.base import Model
     from codebotler.models.batch import BatchModel
     from codebotler.models.sampling import SamplingSettings
-    from roboeval.evaluation.agents.plan import AgentMode, AgentPlan
     from roboeval.evaluation.generate import GenerationProgress, Pace
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import RunFolder
@@ -102,6 +101,8 @@ def read_options(
     """Convert the options that `generate` and `run` share to a request."""
     from codebotler.models.chosen import choose_model
     from codebotler.models.open import NOT_CALLING, kind_of
+    from roboeval.evaluation.agents.conversation import TurnLimits
+    from roboeval.evaluation.agents.plan import DEFAULT_TURNS, AgentPlan
     from roboeval.evaluation.generate import Pace
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import tasks_to_judge
@@ -113,7 +114,9 @@ def read_options(
     selected = tasks_to_judge(known, tasks, ablated=False)[0]
     plan = GenerationPlan(known, selected, num_completions or 50)
     if mode != "program":
-        plan = missions_of(plan, mode, num_completions or 1, max_turns, max_mission_tokens, within)
+        limits = TurnLimits(max_turns or DEFAULT_TURNS[mode], max_mission_tokens)
+        contract, count = read_within(within, known.skills), num_completions or 1
+        plan = AgentPlan(known, selected, count, mode=mode, limits=limits, contract=contract)
     elif max_turns or max_mission_tokens or within:
         fail("--max-turns, --max-mission-tokens and --within need --mode agent or replan; add it")
     if mode == "replan" and kind_of(chosen.name) == "recorded":
@@ -121,23 +124,6 @@ def read_options(
     if mode == "agent" and kind_of(chosen.name) in NOT_CALLING:
         fail(f"{chosen.name} cannot call tools; --mode agent needs a chat model, such as openai-chat:NAME")
     return GenerationRequest(chosen.name, settings, plan, pace, suite, out)
-
-
-def missions_of(
-    plan: GenerationPlan,
-    mode: AgentMode,
-    count: int,
-    turns: int | None,
-    tokens: int | None,
-    within: Path | None,
-) -> AgentPlan:
-    """Return the plan of the missions for the prompts of a plan."""
-    from roboeval.evaluation.agents.conversation import TurnLimits
-    from roboeval.evaluation.agents.plan import DEFAULT_TURNS, AgentPlan
-
-    limits = TurnLimits(turns or DEFAULT_TURNS[mode], tokens)
-    contract = read_within(within, plan.suite.skills)
-    return AgentPlan(plan.suite, plan.tasks, count, mode=mode, limits=limits, contract=contract)
 
 
 def complete_run(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
