@@ -51,18 +51,15 @@ def expect_same_suite(opened: Sequence[Results], suite: str) -> None:
     """Raise UserError if runs were judged by suites with different content."""
     from codebotler.core.errors import UserError
 
-    digests = [str(one.manifest.get("digest")) for one in opened]
-    if len({*digests}) == 1:
-        return
-    now = opened[0].known_suite.digest
-    stale = next(at for at, digest in enumerate(digests) if digest != now)
-    other = next(at for at, digest in enumerate(digests) if digest != digests[stale])
-    paths = " and ".join(str(opened[at].run.path) for at in (stale, other))
-    hashes = " and ".join(digests[at][:8] for at in (stale, other))
-    raise UserError(
-        f"{paths} were judged by different versions of a suite ({hashes}); "
-        f"`{evaluate_again(opened[stale], suite)} --redo` judges with the current suite"
-    )
+    digests = [one.manifest.get("digest") for one in opened]
+    if len({*digests}) > 1:
+        now = opened[0].known_suite.digest
+        stale = next(one for one, digest in zip(opened, digests, strict=True) if digest != now)
+        raise UserError(
+            "was judged by another version of the suite than other runs; "
+            f"`{evaluate_again(stale, suite)} --redo` judges with the current one",
+            file=stale.run.path,
+        )
 
 
 def open_run(

@@ -28,7 +28,6 @@ class FailureClass:
     label: str  # the name shown to users
     plural: str
     kinds: tuple[str, ...]  # kinds that tables always show; other kinds appear only if they occurred
-    ending: str = ""  # how a program of this class ends; by default "in a" plus the label
     is_always_shown: bool = True  # whether tables show the class even if it did not occur
 
 
@@ -40,7 +39,6 @@ FAILURE_CLASSES: Mapping[str, FailureClass] = {
             "no program",
             "without a program",
             NO_PROGRAM_KINDS,
-            ending="without a program",
             is_always_shown=False,
         ),
         FailureClass(
@@ -94,11 +92,6 @@ def label_of(name: str) -> str:
 def plural_of(name: str) -> str:
     """Return the plural label of a class, or its name if it is unknown."""
     return FAILURE_CLASSES[name].plural if name in FAILURE_CLASSES else name
-
-
-def ending_of(name: str) -> str:
-    """Return how programs in this class end, such as `in a Python error`."""
-    return (FAILURE_CLASSES[name].ending if name in FAILURE_CLASSES else "") or f"in a {label_of(name)}"
 
 
 def classes_to_show(happened: Collection[str]) -> list[str]:

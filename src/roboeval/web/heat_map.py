@@ -10,7 +10,7 @@ from urllib.parse import quote
 from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import mean_of, percent
 from roboeval.analysis.summary import Failures
-from roboeval.evaluation.failures import NO_PROGRAM_CLASS, ending_of, plural_of
+from roboeval.evaluation.failures import NO_PROGRAM_CLASS, label_of, plural_of
 from roboeval.evaluation.runs.completions import recorded_suffix
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 
@@ -46,10 +46,11 @@ def failure_text(chosen: CompletionFilter) -> str | None:
     """Describe the failure that a filter selects, e.g. `in NameError`, or return None if it selects none."""
     kind = None if chosen.failure_kind is None else shortened(chosen.failure_kind, MAX_NAME)
     if chosen.failure_class == NO_PROGRAM_CLASS:
-        return ending_of(NO_PROGRAM_CLASS) + ("" if kind is None else f" ({kind})")
+        return plural_of(NO_PROGRAM_CLASS) + ("" if kind is None else f" ({kind})")
     if kind is not None:
         return f"in {kind}"
-    return None if chosen.failure_class is None else shortened(ending_of(chosen.failure_class), MAX_NAME)
+    name = chosen.failure_class
+    return None if name is None else shortened(f"in a {label_of(name)}", MAX_NAME)
 
 
 def verb_of(chosen: CompletionFilter) -> str:

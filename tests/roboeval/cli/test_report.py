@@ -1,7 +1,6 @@
 """`roboeval report` as a person meets it."""
 
 import json
-import re
 import shutil
 import subprocess
 import sys
@@ -143,7 +142,7 @@ def test_runs_of_different_suites_are_not_set_side_by_side(runs: Path) -> None:
     ended = roboeval("report", "hasty", "careful", "--out", "mixed", cwd=runs)
     head.write_text(kept)
     assert ended.status == 2
-    assert re.search(r"versions of a suite \(ffffffff and [0-9a-f]{8}\)", ended.err), ended
+    assert "another version of the suite" in ended.err, ended
     assert "`roboeval evaluate careful --tasks LunchTime,SayGoodDay --redo`" in ended.err
     assert not (runs / "mixed").exists()
 
