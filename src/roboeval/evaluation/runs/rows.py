@@ -13,12 +13,9 @@ import msgspec
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_lines, read_rows, to_line
-from codebotler.core.skills.declaration import by_event
-from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Status
 
 MAX_LINE_BYTES = 1_000_000_000  # enough for a row with very many worlds
-EVENT_KINDS = frozenset(SKILLS.recordings)
 NO_ROW = "this line is not an evaluation row"
 BROKEN = "was damaged or changed after the evaluation was finished"
 # The group matches escapes of lone surrogates. The alternatives before it match backslashes and whole pairs.
@@ -62,7 +59,7 @@ class WorldVerdict(TypedDict):
     error: ErrorOfRun | None
     line: int | None
     failed_checks: list[str]
-    trace: list[list[Any]]
+    trace: list[Annotated[list[Any], msgspec.Meta(min_length=2)]]  # a kind, a text and more
     places: Numbered
     holding: NotRequired[Numbered]
     to: NotRequired[Numbered]
@@ -112,14 +109,12 @@ def failure_of(row: Row) -> Failure:
     return row["failure"]
 
 
-def decode_row(line: bytes, *, check_kinds: bool = False) -> Row:
-    """Decode and validate a row of an evaluation, including the kinds of its events if `check_kinds`."""
+def decode_row(line: bytes) -> Row:
+    """Decode and validate a row of an evaluation."""
     try:
         data = _decoded(line)
         row = msgspec.convert(data, Row)
         _expect_consistent(row, data)
-        if check_kinds:
-            _expect_known_kinds(row)
     except (msgspec.DecodeError, UnicodeDecodeError, ValueError, TypeError, LookupError) as error:
         raise UserError(f"{NO_ROW} ({error})") from None
     return row
@@ -143,15 +138,6 @@ def _expect_consistent(row: Row, data: object) -> None:
         raise ValueError("the world of the failure does not exist")
     for verdict in row["verdicts"]:
         Status(verdict["status"])
-
-
-def _expect_known_kinds(row: Row) -> None:
-    for verdict in row["verdicts"]:
-        for event in verdict["trace"]:
-            if event[0] not in EVENT_KINDS and by_event(event[0]) is None:
-                raise ValueError(
-                    f'unknown event type "{event[0]}"; give the file that defines its skill with --skills'
-                )
 
 
 def event_count(verdict: WorldVerdict) -> int:
@@ -185,7 +171,7 @@ def read_lines_of(
         seal.add(line)
         try:
             if name in line and line.strip():
-                yield LocatedRow(number, at, len(line), decode_row(line, check_kinds=not is_sealed(manifest)))
+                yield LocatedRow(number, at, len(line), decode_row(line))
         except UserError as error:
             if not line.endswith(b"\n"):
                 break

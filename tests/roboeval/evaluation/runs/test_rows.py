@@ -165,7 +165,6 @@ def test_who_goes_on_takes_the_seal_away_until_all_is_judged(run: RunFolder, pap
         (("passed",), True),
         (("verdicts", 1, "more"), 1),
         (("verdicts", 1, "status"), "finishee"),
-        (("verdicts", 1, "trace"), [["goto", "lab"], ["no_such_skill", "amy"]]),
         (("verdicts", 1, "trace"), [["goto", "lab"], []]),
         (("verdicts", 1, "cut"), {"events": 1}),
     ],
