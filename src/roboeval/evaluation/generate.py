@@ -98,7 +98,8 @@ def generate_run(
             for completion in given:
                 file.append(to_line(completion.row))
             progress = GenerationProgress(len(keys), len(keys) - len(todo), log.interrupted, usage)
-            with log, _turns_of(plan, run, done) as turns:
+            turns = TurnLog(run.turns, done) if plan.has_turns else None
+            with log, contextlib.closing(turns) if turns else contextlib.nullcontext():
                 on_progress(progress)
                 generation = _Generation(plan, model, pace, file, log, turns, progress, on_progress)
                 asyncio.run(generation.generate(todo))
@@ -111,15 +112,6 @@ def generate_run(
             run.about.unlink()
             raise generation.error
     return progress
-
-
-@contextlib.contextmanager
-def _turns_of(plan: GenerationPlan, run: RunFolder, done: set[CompletionKey]) -> Iterator[TurnLog | None]:
-    if not plan.has_turns:
-        yield None
-        return
-    with contextlib.closing(TurnLog(run.turns, done)) as turns:
-        yield turns
 
 
 def reply_of_refusal(error: ModelError) -> Reply:
