@@ -115,7 +115,7 @@ def shipped_suites() -> tuple[str, ...]:
 
 def known_suites() -> tuple[str, ...]:
     """Return the names of the suites that ship with RoboEval or with installed packages."""
-    return tuple(dict.fromkeys([*shipped_suites(), *(suite.name for suite in installed_suites())]))
+    return tuple(dict.fromkeys([*shipped_suites(), *sorted(installed_suites().names)]))
 
 
 def suite_folder(name: str) -> Path:
