@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from mcp.server.lowlevel import Server
@@ -44,7 +43,6 @@ class MissionDesk:
     todo: list[CompletionKey]
     _current: tuple[CompletionKey, AgentMission] | None = None
     _calls: int = 0
-    _lock: asyncio.Lock = field(default_factory=asyncio.Lock)
 
     def tools(self) -> list[ClientTool]:
         """Return the tools: the robot's skills, and those that begin and end a mission."""
@@ -59,12 +57,8 @@ class MissionDesk:
             for name, words, schema in offered
         ]
 
-    async def call(self, name: str, arguments: dict[str, Any]) -> str:
+    def call(self, name: str, arguments: dict[str, Any]) -> str:
         """Make one call, and return its result for the client."""
-        async with self._lock:
-            return await asyncio.to_thread(self._call, name, arguments)
-
-    def _call(self, name: str, arguments: dict[str, Any]) -> str:
         if self._current is None:
             return self._begin() if name == NEXT else f"There is no mission; call {NEXT}."
         key, mission = self._current
@@ -86,7 +80,7 @@ class MissionDesk:
     def leave(self) -> None:
         """End the mission that the client has left, so that it cannot be tried again."""
         if self._current is not None:
-            self._call(GIVE_UP, {"reason": "the client has left"})
+            self.call(GIVE_UP, {"reason": "the client has left"})
 
     def _begin(self) -> str:
         if not self.todo:
@@ -129,7 +123,7 @@ async def serve_agent(desk: MissionDesk) -> None:
         return ListToolsResult(tools=desk.tools())
 
     async def call_tool(_: object, asked: CallToolRequestParams) -> CallToolResult:
-        told = await desk.call(asked.name, asked.arguments or {})
+        told = desk.call(asked.name, asked.arguments or {})
         return CallToolResult(content=[TextContent(text=told)])
 
     server: Server[Any] = Server(
