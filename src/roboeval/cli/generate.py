@@ -15,7 +15,6 @@ from codebotler.cli.model_options import inherit_options, model_settings, note_u
 from codebotler.cli.options import BaseUrlOption, ModelOption, WithinOption, read_within
 from codebotler.core.errors import install_command, installed
 from codebotler.core.words import counted
-from roboeval.cli.engine_choice import engine_named
 from roboeval.cli.evaluate import evaluate
 from roboeval.cli.inputs import command, load
 from roboeval.cli.options import (
@@ -215,27 +214,30 @@ def run(
     note_unsent(what.settings, model)
     first = what.run_of(model)
     expect_same_judge(first, plan.suite, ablated=False)  # check this before requests cost money
-    path = complete_run(first, plan, model, what.pace)
-    evaluate(
-        str(path),
-        suite=suite,
-        tasks=tasks,
+
+    def judge(path: Path) -> Path:
+        evaluate(
+            str(path),
+            suite=suite,
+            tasks=tasks,
+            workers=workers,
+            require_isolation=require_isolation,
+            one_process_per_run=one_process_per_run,
+            json=json,
+        )
+        return path
+
+    path = judge(complete_run(first, plan, model, what.pace))
+    rounds = further_rounds(
+        first,
+        plan,
+        repair or retries,
+        repairs=bool(repair),
         workers=workers,
         require_isolation=require_isolation,
-        one_process_per_run=one_process_per_run,
-        json=json,
+        complete=lambda run, plan: complete_run(run, plan, what.open(), what.pace),
     )
-    paths = [path]
-    if repair or retries:
-        with engine_named("local", workers, require_isolation=require_isolation) as engine_for:
-            paths += further_rounds(
-                first,
-                plan,
-                repair or retries,
-                repairs=bool(repair),
-                engine=lambda: engine_for(0),
-                complete=lambda run, plan: complete_run(run, plan, what.open(), what.pace),
-            )
+    paths = [path, *map(judge, rounds)]
     if with_report:
         with stoppable():
             report(paths, path / "report", suite=suite, workers=workers)

@@ -54,9 +54,3 @@ class RoundPlan(GenerationPlan):
     def folder(self, run: RunFolder) -> RunFolder:
         """Return the run of this round, a subfolder of the first run."""
         return RunFolder(run.path / f"{'repair' if self.repairs else 'retry'}-{self.number}")
-
-
-def round_of(completion: Completion) -> int:
-    """Return the round in which a program was written, from 0."""
-    number = completion.more.get(ROUND, 0)
-    return number if type(number) is int else 0
