@@ -197,7 +197,7 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
     note(
         f"{there:,} of {how_many(found.total)} are in {out}, {found.new:,} of them new; `{again}` judges them"
     )
-    examples = {why: key for key, why in reversed(found.missing.items())}
+    examples = {why: key for key, why in reversed([*found.missing.items()])}
     for why, count in Counter(found.missing.values()).items():
         note(f"{counted(count, 'request')} failed, such as {name_of(examples[why])}: {why}")
     if found.missing:

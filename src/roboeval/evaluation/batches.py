@@ -128,9 +128,9 @@ def import_answers(
                         failed[key] = error
                 progress(number)
         if there or rows:  # the endpoint accepted these, so it refused others because of their content
-            for key, error in failed.items():
-                if error.is_refusal and key not in rows:
-                    data = reply_of_refusal(error).data()
+            for key, refusal in failed.items():
+                if refusal.is_refusal and key not in rows:
+                    data = reply_of_refusal(refusal).data()
                     rows[key] = row_for(key, plan.instruction(key), about["model"], data)
         missing = {
             key: failed[key].sentence if key in failed else "not answered"
