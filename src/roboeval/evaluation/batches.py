@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -33,7 +32,6 @@ from roboeval.evaluation.requests import (
     batches,
     no_usage,
     run_metadata,
-    timestamp,
     with_batch,
 )
 from roboeval.evaluation.runs.completions import CompletionKey, how_many, row_for
@@ -138,7 +136,11 @@ def import_answers(
             if key not in there and key not in rows
         }
         if rows:
-            _add(run, about, [rows[key] for key in expected if key in rows], usage, is_whole=not missing)
+            with closing(Appender(run.completions)) as file:
+                for row in [rows[key] for key in expected if key in rows]:
+                    file.append(to_line(row))
+                    add_usage(usage, row["usage"])
+            write_whole(run.about, to_text(about | {"usage": usage}))
     return ImportResult(len(rows), len(expected), missing)
 
 
@@ -151,19 +153,6 @@ def _row(
     if (size := len(to_line(row))) > MAX_ROW:
         raise ModelError(f"the reply is too long to save: {size:,} bytes", may_pass=False)
     return row
-
-
-def _add(
-    run: RunFolder, about: dict[str, Any], rows: list[dict[str, Any]], usage: Counter[str], *, is_whole: bool
-) -> None:
-    with closing(Appender(run.completions)) as file:
-        for row in rows:
-            file.append(to_line(row))
-            add_usage(usage, row["usage"])
-    about["usage"] = usage
-    if is_whole:
-        about["batches"][-1]["ended"] = timestamp()
-    write_whole(run.about, to_text(about))
 
 
 def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:

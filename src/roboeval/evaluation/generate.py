@@ -21,7 +21,6 @@ from roboeval.evaluation.requests import (
     add_usage,
     no_usage,
     run_metadata,
-    timestamp,
     with_batch,
 )
 from roboeval.evaluation.runs.completions import CompletionKey, how_many
@@ -103,8 +102,6 @@ def generate_run(
                 on_progress(progress)
                 generation = _Generation(plan, model, pace, file, log, turns, progress, on_progress)
                 asyncio.run(generation.generate(todo))
-            if todo and progress.missing is None:
-                metadata["batches"][-1]["ended"] = timestamp()
             write_whole(run.about, to_text(metadata))
         is_empty = not run.completions.stat().st_size and not run.turns.exists()
         if generation.error is not None and is_empty:

@@ -145,7 +145,7 @@ def _recorded(settings: SamplingSettings) -> dict[str, Any]:
 def with_batch(
     earlier: list[dict[str, Any]], plan: GenerationPlan, settings: SamplingSettings
 ) -> list[dict[str, Any]]:
-    """Append the batch of a plan, unless the last batch is the same one and was interrupted."""
+    """Append the batch of a plan, unless the last batch is the same one."""
     batch = {
         "tasks": None if plan.tasks is None else sorted(plan.tasks),
         "num_completions": plan.num_completions,
@@ -153,7 +153,6 @@ def with_batch(
         "settings": asdict(settings),
         "codebotler": __version__,
         "python": platform.python_version(),
-        "ended": None,
     }
     if earlier and earlier[-1].items() >= batch.items():
         return earlier

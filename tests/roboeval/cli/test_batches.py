@@ -101,7 +101,7 @@ def test_requests_hold_what_is_set_and_need_no_key(tmp_path: Path) -> None:
         "seed": 4,
     }
     about = json.loads((tmp_path / "run" / "run.json").read_text())
-    assert (about["settings"]["seed"], about["batches"][0]["ended"]) == (3, None)
+    assert about["settings"]["seed"] == 3
     assert about["batches"][0]["settings"]["base_url"] is None
 
 
@@ -158,7 +158,6 @@ def test_rows_are_those_of_generate(tmp_path: Path, model: str) -> None:
     used = [row["usage"]["output_tokens"] for row in found if row["index"] == 0]
     assert all(used)
     assert about["usage"]["output_tokens"] == sum(used)
-    assert about["batches"][0]["ended"] is not None
     again = roboeval(*words, "--out", "run", cwd=tmp_path)
     assert f"{COUNT} of {COUNT} completions already exist" in again.err
 

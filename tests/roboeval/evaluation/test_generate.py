@@ -94,7 +94,7 @@ def test_a_run_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite
     assert batch["settings"] == asdict(sent)
     assert re.fullmatch("[0-9a-f]{64}", metadata["template"])
     assert metadata["usage"] == {"input_tokens": 3000, "output_tokens": 300}
-    assert batch["started"] <= batch["ended"]
+    assert batch["started"]
     assert metadata["possibly_paid_twice"] == 0
     assert sorted(path.name for path in run.path.iterdir()) == [".lock", "completions.jsonl", "run.json"]
 
@@ -272,11 +272,10 @@ def test_what_fails_is_missing_and_asked_for_again_later(tmp_path: Path, paper: 
     assert progress.missing is not None
     assert progress.missing.startswith("2 completions ")
     assert "SCRIPTED_API_KEY" in progress.missing
-    assert about(run)["batches"][-1]["ended"] is None
     model = Scripted()
     assert generated(run, paper, model).missing is None
     assert (len(model.asked), keys(run)) == (2, expected(3))
-    assert [batch["ended"] is not None for batch in about(run)["batches"]] == [True]
+    assert len(about(run)["batches"]) == 1
     assert about(run)["possibly_paid_twice"] == 0
 
 
