@@ -28,9 +28,7 @@ from codebotler.models.sampling import SamplingSettings
 from roboeval.evaluation.generate import reply_of_refusal
 from roboeval.evaluation.requests import (
     GenerationPlan,
-    add_usage,
     batches,
-    no_usage,
     run_metadata,
     with_batch,
 )
@@ -111,10 +109,7 @@ def import_answers(
     plan = plans[0]
     ids = {request_id(about, key, plan.instruction(key)): key for key in expected}
     with run.writing():
-        usage, there = no_usage(), set()
-        for completion in plan.completed(run):
-            there.add(completion.key)
-            add_usage(usage, completion.more.get("usage"))
+        there = {completion.key for completion in plan.completed(run)}
         rows: dict[CompletionKey, dict[str, Any]] = {}
         failed: dict[CompletionKey, ModelError] = {}
         with closing(BatchModel(about["model"], SamplingSettings(**batches(about)[-1]["settings"]))) as model:
@@ -135,12 +130,9 @@ def import_answers(
             for key in expected
             if key not in there and key not in rows
         }
-        if rows:
-            with closing(Appender(run.completions)) as file:
-                for row in [rows[key] for key in expected if key in rows]:
-                    file.append(to_line(row))
-                    add_usage(usage, row["usage"])
-            write_whole(run.about, to_text(about | {"usage": usage}))
+        with closing(Appender(run.completions)) as file:
+            for row in [rows[key] for key in expected if key in rows]:
+                file.append(to_line(row))
     return ImportResult(len(rows), len(expected), missing)
 
 

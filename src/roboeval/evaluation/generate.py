@@ -46,7 +46,7 @@ class GenerationProgress:
     total: int
     found: int  # completions present at the start
     interrupted: int  # requests pending at the last interruption, which may be billed twice
-    usage: Counter[str]  # token counts of all completions
+    usage: Counter[str] = field(default_factory=no_usage)  # token counts of the new completions
     failures: dict[CompletionKey, str] = field(default_factory=dict)  # error messages of failed requests
     stopped: str | None = None  # why generation stopped early
 
@@ -79,30 +79,24 @@ def generate_run(
     with run.writing():
         metadata = run_metadata(run, plan, model.name, model.settings)
         with contextlib.closing(Appender(run.completions)) as file:
-            done, usage = set(), no_usage()
-            for completion in plan.completed(run):
-                done.add(completion.key)
-                if plan.mark().items() <= completion.more.items():  # written in this round
-                    add_usage(usage, completion.more.get("usage"))
+            done = {completion.key for completion in plan.completed(run)}
             given = [one for one in plan.given() if one.key not in done]
             done |= {one.key for one in given}
             keys = plan.keys()
             todo = [key for key in keys if key not in done]
             log = RequestLog(run.in_flight, done)
-            metadata["usage"] = usage
             metadata["possibly_paid_twice"] += log.interrupted
             if todo:
                 metadata["batches"] = with_batch(metadata["batches"], plan, model.settings)
             write_whole(run.about, to_text(metadata))
             for completion in given:
                 file.append(to_line(completion.row))
-            progress = GenerationProgress(len(keys), len(keys) - len(todo), log.interrupted, usage)
+            progress = GenerationProgress(len(keys), len(keys) - len(todo), log.interrupted)
             turns = TurnLog(run.turns, done) if plan.has_turns else None
             with log, contextlib.closing(turns) if turns else contextlib.nullcontext():
                 on_progress(progress)
                 generation = _Generation(plan, model, pace, file, log, turns, progress, on_progress)
                 asyncio.run(generation.generate(todo))
-            write_whole(run.about, to_text(metadata))
         is_empty = not run.completions.stat().st_size and not run.turns.exists()
         if generation.error is not None and is_empty:
             run.completions.unlink()

@@ -129,7 +129,6 @@ def run_metadata(
         **fixed,
         **families,
         "batches": batches(earlier),
-        "usage": no_usage(),
         "possibly_paid_twice": earlier.get("possibly_paid_twice", 0),
     }
 

@@ -154,10 +154,8 @@ def test_rows_are_those_of_generate(tmp_path: Path, model: str) -> None:
     assert without(found, "latency_s", "usage") == without(expected, "latency_s", "usage")
     refusals = [row["index"] for row in found if row["no_program"] == "refusal"]
     assert (len(found), refusals) == (COUNT, [1] * 5)
-    about = json.loads((tmp_path / "run" / "run.json").read_text())
     used = [row["usage"]["output_tokens"] for row in found if row["index"] == 0]
     assert all(used)
-    assert about["usage"]["output_tokens"] == sum(used)
     again = roboeval(*words, "--out", "run", cwd=tmp_path)
     assert f"{COUNT} of {COUNT} completions already exist" in again.err
 
