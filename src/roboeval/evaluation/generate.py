@@ -188,7 +188,7 @@ class _Generation:
         return [] if self.turns is None else self.turns.replies(key)
 
     async def _keep(self, key: CompletionKey, row: dict[str, Any]) -> None:
-        line = self._line(row)
+        line = to_line(row)
         if len(line) > MAX_ROW:
             raise ModelError(f"the reply is too long to save: {len(line):,} bytes", may_pass=True)
         self.file.append(line)
@@ -209,10 +209,7 @@ class _Generation:
         for key, error in self._refused.items():
             replies = [*self._earlier(key), reply_of_refusal(error)]
             row = await self.plan.complete(key, self.model.name, partial(self._ask, key), replies)
-            self.file.append(self._line(row))
+            self.file.append(to_line(row))
             del self.progress.failures[key]
             self.progress.done += 1
         self._refused.clear()
-
-    def _line(self, row: dict[str, Any]) -> bytes:
-        return to_line({**row, **self.plan.mark()})

@@ -79,10 +79,6 @@ class GenerationPlan:
         reply = earlier[-1] if earlier else await ask(self.prompt(key))
         return row_for(key, self.instruction(key), model, reply.data())
 
-    def mark(self) -> Mapping[str, int]:
-        """Return extra entries to add to each row of completions.jsonl."""
-        return {}
-
     def completed(self, run: RunFolder) -> Iterator[Completion]:
         """Read the completions of a run. Raise UserError if an instruction differs from the suite's."""
         if not run.completions.is_file() or not run.completions.stat().st_size:
@@ -148,7 +144,6 @@ def with_batch(
     batch = {
         "tasks": None if plan.tasks is None else sorted(plan.tasks),
         "num_completions": plan.num_completions,
-        **plan.mark(),
         "settings": asdict(settings),
         "codebotler": __version__,
         "python": platform.python_version(),

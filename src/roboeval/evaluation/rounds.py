@@ -14,7 +14,6 @@ from roboeval.evaluation.requests import GenerationPlan
 from roboeval.evaluation.runs.completions import Completion, CompletionKey
 from roboeval.evaluation.runs.folder import RunFolder
 
-ROUND = "round"  # the entry of a row with its program's round; missing in the first round
 SAMPLE_STRIDE = 1_000_000  # offset of sample numbers between rounds, so that all seeds differ
 
 
@@ -46,10 +45,6 @@ class RoundPlan(GenerationPlan):
     def given(self) -> Iterator[Completion]:
         """Return the completions of the previous round that the check accepted."""
         return (one for key, one in self.earlier.items() if key not in self.problems)
-
-    def mark(self) -> Mapping[str, int]:
-        """Return the entry that marks the rows of this round."""
-        return {ROUND: self.number}
 
     def folder(self, run: RunFolder) -> RunFolder:
         """Return the run of this round, a subfolder of the first run."""

@@ -137,7 +137,7 @@ def test_rejected_programs_are_requested_again_in_rounds(option: str, tmp_path: 
         assert ended.status == 0, ended
         assert len(server.requests) == 10
         folder = tmp_path / "run" / ("repair-1" if option == "repair" else "retry-1")
-        assert {row["round"] for _, row in read_rows(folder / "completions.jsonl")} == {1}
+        assert len([*read_rows(folder / "completions.jsonl")]) == 5
         assert ended.out.count("5 completions, 5 prompts of 1 task") == 2  # of both rounds
         assert "round 1: the check rejects 5 completions of 5" in ended.err
         assert roboeval(*words, cwd=tmp_path).out == ended.out
