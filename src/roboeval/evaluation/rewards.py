@@ -63,7 +63,8 @@ def reward(
         chosen = chosen.with_worlds(worlds, seed)
     if (problem := find_key_fault((task, prompt, 0), chosen)) is not None:
         raise UserError(problem)
-    names = [digest(chosen.digest, task, str(prompt), program) for program in programs]
+    rules = "" if chosen.house is None else chosen.house.digest
+    names = [digest(chosen.digest, rules, task, str(prompt), program) for program in programs]
 
     def asking() -> tuple[Suite, AskedWorlds]:
         return chosen, requirements_of(chosen, task, prompt)
@@ -142,7 +143,7 @@ def components_of(outcomes: Sequence[Outcome], asked: AskedWorlds, *, parses: bo
     return Components(
         reward=reward,
         passed=float(reward == 1),
-        requirements=fmean(fmean(are_met(outcome, scenario)) for outcome, scenario, _ in ran),
+        requirements=fmean(fmean(are_met(outcome, scenario) or [True]) for outcome, scenario, _ in ran),
         without_errors=fmean(may_satisfy(outcome, scenario) for outcome, scenario, _ in ran),
         parses=float(parses),
         rules_kept=fmean(kind != VIOLATION for kind in kinds),

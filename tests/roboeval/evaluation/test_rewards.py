@@ -27,6 +27,7 @@ from processes import are_gone, children_of
 from roboeval.evaluation.judge import evaluate, is_met
 from roboeval.evaluation.rewards import Share, reward, total
 from roboeval.evaluation.runs.source import recorded_completions
+from roboeval.suites.house import HouseRules
 from roboeval.suites.load import Suite, load_suite
 from small_suite import a_suite
 
@@ -129,6 +130,33 @@ worlds:
         "def task_program():\n    go_to('lab')\n    say('x')\n",
     )
     assert [reward("T", prompt, [program], suite=suite) for prompt in range(3)] == [[1.0], [0.0], [1.0]]
+
+
+def test_a_prompt_may_ask_for_nothing_in_a_world(tmp_path: Path) -> None:
+    task = """\
+name: T
+summary: s
+prompts: [Go., Wait.]
+checks:
+  goes: {category: Location, rtl: 'tr.Exists(goto("lab"))'}
+worlds:
+  - about: w
+    robot: hall
+    rooms: [hall, lab]
+    require: [{check: goes, prompts: {0: go}}]
+"""
+    suite = load_suite(a_suite(tmp_path, task))
+    assert reward("T", 1, ["def task_program():\n    pass\n"], suite=suite) == [1.0]
+
+
+def test_house_rules_count_even_if_a_program_was_rewarded_without_them(tmp_path: Path, paper: Suite) -> None:
+    file = tmp_path / "quiet.yaml"
+    file.write_text('rules:\n  - {name: quiet, says: Hush., always: not tr.Exists(say(".*"))}\n')
+    (program,) = distinct(1, "with and without rules")
+    ruled = paper.with_house_rules(HouseRules.read(file))
+    with_rules, without = (reward("SayGoodDay", 0, [program], suite=suite) for suite in (ruled, paper))
+    assert with_rules < without == [1.0]
+    assert reward("SayGoodDay", 0, [program], suite=ruled) == with_rules
 
 
 def test_it_may_be_called_from_many_threads_at_once() -> None:
