@@ -245,7 +245,7 @@ def evaluation_of(
     if not run.completions.is_file():
         raise UserError("is not a run, because it has no completions.jsonl", file=path)
     if not run.rows(key).is_file():
-        others = ", ".join(run.judged_by())
+        others = ", ".join(name for name in run.judged_by() if name != suite.name)
         only = f' as "{key}", only as {others}; choose with --suite and --rules, or' if others else ";"
         raise UserError(f"has not been judged{only} run `{again}`", file=path)
     return run, key, suite
