@@ -19,7 +19,7 @@ from roboeval.evaluation.runs.completions import Completion, CompletionKey, read
 from roboeval.evaluation.runs.folder import RunFolder, evaluation_of, load_json_object, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, add_or_raise, key_of, read_checks, read_lines_of
 from roboeval.evaluation.runs.scope import Coverage, JudgingScope
-from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_cost
+from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_answers, with_cost
 from roboeval.suites.load import ABLATED, Suite, load_suite
 
 REPLACED = "was replaced in the meantime; try again"
@@ -181,13 +181,14 @@ def read_results(
     manifest = {} if key is None else _load_or_add_fault(run.manifest(key), faults)
     selected = selected_tasks(manifest) if task is None else {task}
     total = sum(selected is None or name in selected for name, _, _ in completions)
-    builder = TableBuilder(completions, _categories(suite), _accepted(run, key, faults))
+    builder = TableBuilder(completions, _categories(suite))
     places: dict[CompletionKey, tuple[int, int]] = {}
     rows = run.rows(key or "")
     lines = iter(()) if key is None else read_lines_of(rows, manifest, task=task, faults=faults)
     for line in progress(lines, total):
         builder.add(line.row)
         places[key_of(line.row)] = line.at, line.size
+    problems = _problems(run, key, faults)
     return Results(
         run=run,
         key=key,
@@ -197,7 +198,7 @@ def read_results(
         completions=completions,
         places=places,
         faults=tuple(faults or ()),
-        table=builder.table(),
+        table=with_answers(builder.table(), problems) if problems else builder.table(),
     )
 
 
@@ -211,18 +212,15 @@ def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:
     }
 
 
-def _accepted(
+def _problems(
     run: RunFolder, key: str | None, faults: list[UserError] | None
-) -> Mapping[tuple[str, str], bool]:
+) -> Mapping[tuple[str, str], Sequence[str]]:
     path = run.checks((key or "").removesuffix(ABLATED))
-    accepted: dict[tuple[str, str], bool] = {}
-    if not path.is_file():
-        return accepted
     try:
-        accepted |= {program: not problems for program, problems in read_checks(path)}
+        return dict(read_checks(path)) if path.is_file() else {}
     except UserError as error:
         add_or_raise(error, faults)
-    return accepted
+        return {}
 
 
 def read_written(

@@ -115,9 +115,8 @@ class TableBuilder:
         self,
         completions: Mapping[CompletionKey, Completion] = {},  # the completions now in the run
         categories: Mapping[tuple[str, str], str] = {},  # of requirements, by task and requirement text
-        accepted: Mapping[tuple[str, str], bool] = {},  # by task and hash of the program
     ) -> None:
-        self._completions, self._categories, self._accepted = completions, categories, accepted
+        self._completions, self._categories = completions, categories
         self._frame = pl.DataFrame(schema={**COMPLETION_COLUMNS, **WORLD_COLUMNS})
         self._start()
 
@@ -147,8 +146,7 @@ class TableBuilder:
                 *((None,) * 5 if written is None or is_stale else _texts(written)),
                 *reply_numbers(written).values(),
                 *_mission(written),
-                None,
-                self._accepted.get((row["task"], row["program_sha256"])),
+                *(None,) * 2,  # the cost, and whether the check accepted the program
             )
         )
         self._counts.append(len(row["verdicts"]))
