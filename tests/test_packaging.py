@@ -138,14 +138,7 @@ def test_the_wheel_judges_where_it_is_installed(wheel: Path, tmp_path: Path) -> 
         ("roboeval", "roboeval tasks --li", ["--lint"]),
         ("codebotler", "codebotler virt", ["virtual-robot"]),
         ("codebotler", "codebotler run p.py --robot ros", ["ros1", "rosbridge", "ros2"]),
-        ("roboeval", "roboeval evaluate runs/a --suite p", ["paper", "plus"]),
         ("roboeval", "roboeval evaluate runs/a --engine r", ["ray"]),
-        ("roboeval", "roboeval tasks Stapler", ["StaplerDelivery", "StaplerSupply"]),
-        ("roboeval", "roboeval mutate LunchTime Wea", ["WeatherPoll"]),
-        ("roboeval", "roboeval show runs/a Lu", ["LunchBreak", "LunchTime"]),
-        ("roboeval", "roboeval find runs/a --suite plus --task Lu", ["LunchBreak", "LunchTime"]),
-        ("roboeval", "roboeval run --tasks LunchTime,Lu", ["LunchTime,LunchBreak"]),
-        ("roboeval", "roboeval tasks --suite no-such-suite Lu", []),
     ],
 )
 def test_a_shell_completes_commands_options_and_names(name: str, words: str, completed: list[str]) -> None:

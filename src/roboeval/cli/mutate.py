@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.cli.completion_names import task_names
 from roboeval.cli.inputs import load
 from roboeval.cli.options import MutantWorldsOption, ProcessOption, SuiteOption, WorkersOption, path_to
 from roboeval.cli.output import note, print_rich, show_progress
@@ -24,9 +23,7 @@ if TYPE_CHECKING:
 def mutate(
     tasks: Annotated[
         list[str] | None,
-        typer.Argument(
-            help="Tasks of the suite; all by default.", metavar="TASK...", autocompletion=task_names
-        ),
+        typer.Argument(help="Tasks of the suite; all by default.", metavar="TASK..."),
     ] = None,
     suite: SuiteOption = "paper",
     also: Annotated[

@@ -8,11 +8,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from roboeval.cli.completion_names import (
-    listed_task_names,
-    suite_names,
-    task_names,
-)
 from roboeval.cli.output import fail
 
 
@@ -35,23 +30,18 @@ KeepOption = Annotated[
 RedoOption = Annotated[
     bool, typer.Option("--redo", help="Discard earlier verdicts and judge everything again.")
 ]
-TaskOption = Annotated[
-    str | None, typer.Option(help="Only completions for this task.", autocompletion=task_names)
-]
+TaskOption = Annotated[str | None, typer.Option(help="Only completions for this task.")]
 InWorldOption = Annotated[
     str | None, typer.Option(help="Only in the world with this number, from 1, or description.")
 ]
 RunArgument = Annotated[Path, typer.Argument(help="A run folder.", parser=path_to("a run"))]
 SuiteOption = Annotated[
     str,
-    typer.Option(
-        help="The name of a built-in or installed suite, or a suite folder.",
-        autocompletion=suite_names,
-    ),
+    typer.Option(help="The name of a built-in or installed suite, or a suite folder."),
 ]
 TasksOption = Annotated[
     str | None,
-    typer.Option(help="Only these tasks, separated by commas.", autocompletion=listed_task_names),
+    typer.Option(help="Only these tasks, separated by commas."),
 ]
 AblationOption = Annotated[bool, typer.Option("--ablation", help="Judge only the common-sense requirements.")]
 HouseRulesOption = Annotated[

@@ -16,7 +16,6 @@ from codebotler.cli.options import (
     PortOption,
     TokenOption,
 )
-from roboeval.cli.completion_names import task_names
 from roboeval.cli.inputs import (
     command,
     evaluate_again,
@@ -51,7 +50,7 @@ def show(
     run: RunArgument,
     what: Annotated[
         str | None,
-        typer.Argument(help="Show only TASK, TASK/PROMPT or TASK/PROMPT/INDEX.", autocompletion=task_names),
+        typer.Argument(help="Show only TASK, TASK/PROMPT or TASK/PROMPT/INDEX."),
     ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,

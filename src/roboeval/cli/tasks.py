@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roboeval.cli.completion_names import task_names
 from roboeval.cli.inputs import command, load
 from roboeval.cli.options import JsonOption, SuiteOption
 from roboeval.cli.output import fail, note, print_json, print_rich, print_text, show_progress
@@ -17,9 +16,7 @@ if TYPE_CHECKING:
 
 
 def tasks(
-    task: Annotated[
-        str | None, typer.Argument(help="Show only this task.", autocompletion=task_names)
-    ] = None,
+    task: Annotated[str | None, typer.Argument(help="Show only this task.")] = None,
     suite: SuiteOption = "paper",
     lint: Annotated[
         bool, typer.Option("--lint", help="Look for likely mistakes; exit with status 1 if there are any.")

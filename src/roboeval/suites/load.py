@@ -18,7 +18,6 @@ from roboeval.suites.suite import (
     rooms_in,
     shipped_suites,
     suite_folder,
-    task_files,
 )
 from roboeval.suites.task import Requirement, Scenario, Task, TaskCheck
 from roboeval.suites.taskfile import read_task
@@ -38,7 +37,6 @@ __all__ = [
     "rooms_in",
     "shipped_suites",
     "suite_folder",
-    "task_files",
 ]
 
 
