@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from datetime import timedelta
 from time import monotonic
 from typing import NoReturn, TypeVar
 
@@ -21,8 +20,6 @@ __all__ = [
     "show_progress",
     "stoppable",
 ]
-
-MIN_DONE_FOR_ESTIMATE = 5  # the number of items before the remaining time is estimated
 
 Watched = TypeVar("Watched")
 
@@ -51,17 +48,10 @@ def progress_meter(doing: str, total: int, before: int = 0) -> Iterator[Callable
             nonlocal next_line
             shown.update(job, completed=done, more=more)
             if shown.disable and monotonic() >= next_line:
-                left = _left(done - before, total - done, monotonic() - started)
-                note(", ".join(filter(None, (f"{doing}: {done:,} of {total:,}", more, left))))
+                note(", ".join(filter(None, (f"{doing}: {done:,} of {total:,}", more))))
                 next_line = monotonic() + max(QUIET_S, (monotonic() - started) / 10)
 
         yield update
-
-
-def _left(done: int, to_do: int, seconds: float) -> str:
-    # The first items are slow, because processes must start.
-    is_reliable = to_do and done >= MIN_DONE_FOR_ESTIMATE and done * 50 >= done + to_do
-    return f"{timedelta(seconds=round(seconds * to_do / done))} left" if is_reliable else ""
 
 
 @contextmanager
