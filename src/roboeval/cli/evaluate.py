@@ -98,16 +98,15 @@ def evaluate(
             house = None if table is None else house_of(run, judged_by, table.table(), ablated=ablation)
             print_summary(counted, title=source, as_json=json, house=house)
         _name_next_command(run, tally.first_failed, suite=suite, ablated=ablation, rules=rules)
-        _expect_all_judged(counted, scope.total, is_kept=run is not None)
+        _expect_all_judged(counted, scope.total)
 
 
-def _expect_all_judged(summary: EvaluationSummary, total: int, *, is_kept: bool) -> None:
+def _expect_all_judged(summary: EvaluationSummary, total: int) -> None:
     """Exit with status 1 if some completions could not be judged."""
     from roboeval.evaluation.runs.completions import how_many
 
     if (left_out := total - summary.judged) > 0:
-        again = "run the same command to try again" if is_kept else "all others are judged"
-        note(f"roboeval: not judged: {how_many(left_out)} of {total:,}; {again}")
+        note(f"roboeval: not judged: {how_many(left_out)} of {total:,}; the same command tries again")
         raise SystemExit(1)
 
 
@@ -176,10 +175,8 @@ def import_(
         return
     completions = open_source(path, load(suite)).completions
     RunFolder(out).keep(completions)
-    count = len(completions)
     again = command("evaluate", out, suite=suite)
-    they = ("is", "it") if count == 1 else ("are", "them")
-    note(f"{how_many(count)} {they[0]} in {out}; `{again}` judges {they[1]}")
+    note(f"{out} has {how_many(len(completions))}; `{again}` judges them")
 
 
 def import_batch(path: Path, out: Path, suite: str) -> None:

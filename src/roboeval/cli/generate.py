@@ -46,8 +46,6 @@ if TYPE_CHECKING:
     from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.runs.folder import RunFolder
 
-MAX_BATCH_REQUESTS = 50_000
-
 
 @dataclass(frozen=True)
 class GenerationRequest:
@@ -175,8 +173,6 @@ def write_batch(what: GenerationRequest, path: Path) -> None:
             count = write_requests(run, what.plan, model, path, progress=lambda done: update(done, ""))
     again = command("import", "ANSWERS.jsonl", "--out", run.path, suite=what.suite)
     note(f"{counted(count, 'request')} {'is' if count == 1 else 'are'} in {path}; `{again}` adds answers")
-    if count > MAX_BATCH_REQUESTS:
-        note(f"OpenAI accepts at most {MAX_BATCH_REQUESTS:,} requests per file; split the file")
 
 
 @inherit_options(read_options)
@@ -254,7 +250,7 @@ def expect_rounds_fit(plan: GenerationPlan, repair: int, retries: int, *, as_jso
 
 
 class GenerationMeter(ExitStack):
-    """Shows the progress of a run: its rate, its token count and the remaining time."""
+    """Shows the progress of a run: its completions, its token count and the remaining time."""
 
     progress: GenerationProgress | None = None
 
@@ -269,5 +265,4 @@ class GenerationMeter(ExitStack):
             self._draw = self.enter_context(progress_meter("generating", progress.total, progress.found))
         else:
             tokens = progress.usage.total()
-            rate = f"{progress.rate:.1f} per second"
-            self._draw(progress.done, f"{rate}, {tokens:,} tokens" if tokens else rate)
+            self._draw(progress.done, f"{tokens:,} tokens" if tokens else "")

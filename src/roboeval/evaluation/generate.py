@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field
@@ -52,12 +51,6 @@ class GenerationProgress:
 
     def __post_init__(self) -> None:
         self.done = self.found
-        self._started = time.monotonic()
-
-    @property
-    def rate(self) -> float:
-        """Return the number of completions per second."""
-        return (self.done - self.found) / max(time.monotonic() - self._started, 0.001)
 
     @property
     def missing(self) -> str | None:

@@ -570,7 +570,7 @@ def test_commands_in_sentences_can_be_pasted(tmp_path: Path) -> None:
 def test_commands_in_sentences_say_what_was_ablated(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row(task="LunchTime"))
     imported = roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path)
-    assert "1 completion is in run" in imported.err
+    assert "run has 1 completion" in imported.err
     unjudged = refused("show", "run", "--ablation", cwd=tmp_path)
     assert unjudged.commands == ["roboeval evaluate run --ablation"]
     judged = pasted(unjudged.sentence, tmp_path)

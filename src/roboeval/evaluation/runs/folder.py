@@ -138,23 +138,18 @@ class RunFolder:
     def keep(self, completions: Sequence[Completion]) -> None:
         """Copy completions into this run. Raise UserError, and change nothing, if it holds different ones."""
         models = {completion.model for completion in completions}
-        lines = (to_line(completion.row) for completion in completions)
         with self.writing():
             if self.completions.exists():
-                with self.completions.open("rb") as file:
-                    same = all(file.read(len(line)) == line for line in lines)
-                    if not same or file.read(1):
-                        other = (
-                            "this run holds different completions; name another folder, or copy the new ones "
-                            f"to {self.completions} and run `roboeval evaluate {self.path} --redo`"
-                        )
-                        raise UserError(other, file=self.path)
+                if [*self.read()] != [*completions]:
+                    again = f"copy them to {self.completions} and run `roboeval evaluate {self.path} --redo`"
+                    other = "this run holds different completions; name another folder for the new ones, or"
+                    raise UserError(f"{other} {again}", file=self.path)
                 return
             about = {"model": models.pop() if len(models) == 1 else None, "codebotler": __version__}
             write_whole(self.about, to_text(about))
             try:
                 with open_replacement(self.completions) as file:
-                    file.writelines(lines)
+                    file.writelines(to_line(completion.row) for completion in completions)
             except BaseException:
                 self.about.unlink()
                 raise
