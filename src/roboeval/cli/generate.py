@@ -64,7 +64,7 @@ class GenerationRequest:
 
         folder = re.sub(r"[^\w.]+", "-", model.name).strip("-.")
         folder += "".join(f"-{mode}" for name, mode in self.plan.describe().items() if name == "mode")
-        fresh = self.plan.suite.families is not None
+        fresh = self.plan.suite.is_generated
         return RunFolder(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
 
     def open(self) -> Model:

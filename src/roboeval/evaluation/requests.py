@@ -109,9 +109,6 @@ def run_metadata(
     """Return the content of run.json. Raise UserError if existing completions have other settings."""
     suite = plan.suite
     fixed = {"model": model, "settings": _recorded(settings), **plan.describe(), "suite": suite.name}
-    families = {}
-    if suite.families is not None:
-        families["families"] = {**suite.families, "version": suite.version, "digest": suite.digest}
     earlier: dict[str, Any] = {}
     if run.about.exists():
         earlier = load_json_object(run.about)
@@ -123,7 +120,6 @@ def run_metadata(
         raise UserError(f"{why}; name another folder", file=run.about)
     return {
         **fixed,
-        **families,
         "batches": batches(earlier),
         "possibly_paid_twice": earlier.get("possibly_paid_twice", 0),
     }

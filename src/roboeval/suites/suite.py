@@ -53,7 +53,7 @@ class Suite:
     seed: int | None = None  # the random seed of sampled worlds
     skills: SkillTable = SKILLS  # the skills that formulas may use
     house: HouseRules | None = None  # rules that stop a program
-    families: Mapping[str, object] | None = None  # split, seed and number of the tasks if they are generated
+    is_generated: bool = False  # whether the tasks are generated from families
     recorded: tuple[InstructionSolutions, ...] = field(default=(), repr=False)
 
     def __hash__(self) -> int:
@@ -87,7 +87,7 @@ class Suite:
             UserError: the worlds are not sampled, are determined by the suite's name, or are too many.
         """
         if self.worlds is None or self.folder is None:
-            why = "are written by hand" if self.families is None else "are determined by its name"
+            why = "are determined by its name" if self.is_generated else "are written by hand"
             raise UserError(f'the worlds of the suite "{self.name}" {why}; leave out --worlds and --seed')
         if count is not None and not 1 <= count <= MAX_WORLDS:
             raise UserError(f"the number of worlds is {count}, but it must be from 1 to {MAX_WORLDS:,}")

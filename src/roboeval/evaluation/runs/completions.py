@@ -207,7 +207,7 @@ def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completio
 
 def _is_of_other(completion: Completion, suite: Suite) -> str | None:
     """Return an error message if a completion belongs to another seed or version of the task families."""
-    if suite.families is None or completion.instruction is None:
+    if not suite.is_generated or completion.instruction is None:
         return None
     if completion.instruction == suite.tasks[completion.task].prompts[completion.prompt]:
         return None

@@ -63,21 +63,19 @@ class JudgingScope:
         suite: Suite | None = None,
     ) -> JudgingScope:
         """Count the completions of the selected tasks, or of all if `tasks` is None."""
-        counts: Counter[str] = Counter()
-        models: set[str | None] = set()
-        endings: Counter[str] = Counter()
-        cut_off = turns = 0
-        for completion in completions:
-            counts[completion.task] += 1
-            if tasks is None or completion.task in tasks:
-                models.add(completion.model)
-                cut_off += completion.is_cut_off
-                if completion.acted is not None:
-                    endings[completion.acted.ending] += 1
-                    turns += completion.turns
-        requested = requested_of(about, suite)
-        limit = limit_of(about)
-        return cls(counts, tasks, frozenset(models), requested, cut_off, limit, endings, turns)
+        every = list(completions)
+        selected = [one for one in every if tasks is None or one.task in tasks]
+        missions = [(one.acted.ending, one.turns) for one in selected if one.acted is not None]
+        return cls(
+            completions=Counter(one.task for one in every),
+            tasks=tasks,
+            models=frozenset(one.model for one in selected),
+            requested=requested_of(about, suite),
+            cut_off=sum(one.is_cut_off for one in selected),
+            limit=limit_of(about),
+            endings=Counter(ending for ending, _ in missions),
+            turns=sum(turns for _, turns in missions),
+        )
 
     @property
     def total(self) -> int:

@@ -6,7 +6,7 @@ import hashlib
 import re
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from codebotler.core.errors import UserError
@@ -105,7 +105,7 @@ def family_suite(which: FamilyTasks, skills: SkillTable = SKILLS) -> Suite:
         tasks={name: _named(name, one) for name, one in made.items()},
         digest=hashlib.sha256("\n".join([str(head.version), *digests]).encode()).hexdigest(),
         skills=skills,
-        families=asdict(which),
+        is_generated=True,
         recorded=tuple(solutions for one in made.values() for solutions in _recorded(one)),
     )
 
