@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from roboeval.evaluation.runs.folder import RunFolder
     from roboeval.evaluation.runs.rows import Row
     from roboeval.evaluation.runs.source import Source
-    from roboeval.evaluation.runs.table import TableBuilder
     from roboeval.suites.load import Suite
 
 
@@ -77,7 +76,11 @@ def evaluate(
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
         if left:
             note(f"not judged because they have no ablation: {', '.join(left)}")
-        tally, table = Tally(), None if rules is None else _new_table()
+        tally, table = Tally(), None
+        if rules is not None:
+            from roboeval.evaluation.runs.table import TableBuilder  # imports polars, which loads slowly
+
+            table = TableBuilder()
         opened = open_source(source, judged_by)
         run = opened.run if out is None else RunFolder(out)
         again = f"the same command {'without --redo ' * redo}continues where it stopped"
@@ -108,12 +111,6 @@ def _expect_all_judged(summary: EvaluationSummary, total: int) -> None:
     if (left_out := total - summary.judged) > 0:
         note(f"roboeval: not judged: {how_many(left_out)} of {total:,}; the same command tries again")
         raise SystemExit(1)
-
-
-def _new_table() -> TableBuilder:
-    from roboeval.evaluation.runs.table import TableBuilder  # imports polars, which loads slowly
-
-    return TableBuilder()
 
 
 def _name_next_command(

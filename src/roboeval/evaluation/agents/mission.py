@@ -44,7 +44,6 @@ LONGEST_WAIT = 1_000_000
 """The longest time that one call waits."""
 
 _TASK = "def task_program():\n"
-FINISHED = {"end": "finished"}
 
 
 @dataclass
@@ -148,8 +147,8 @@ class AgentMission:
     @property
     def outcome(self) -> Outcome:
         """The outcome so far, which is that of the program."""
-        has_failed = self.ending == ERROR
-        end = {"end": "robot-error", "number": len(self._ledger.errors) - 1} if has_failed else FINISHED
+        kind = "robot-error" if self.ending == ERROR else "finished"
+        end = {"end": kind, "number": len(self._ledger.errors) - 1}
         outcome = judge_end(self._ledger.outcome_at_end(end), self.robot)
         return apply_ending(outcome, self.ending or FINAL_ANSWER)
 
