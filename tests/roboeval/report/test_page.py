@@ -116,7 +116,7 @@ def test_a_card_says_of_how_many_completions_and_whether_replies_were_cut_off() 
     )
     text = card(cut)
     assert "30 of 30 completions, 3 prompts of 2 tasks" in text
-    assert re.search(r'class="warning">6 of 30 replies \(20\.0%\) .*64 tokens, .*--max-tokens', text)
+    assert re.search(r'class="warning">6 of 30 replies \(20\.0%\) .*64 tokens; .*--max-tokens', text)
     lacking = replace(cut, results=replace(cut.results, about=REQUESTED))
     assert "30 of 36 completions (6 missing)" in card(lacking)
     assert 'class="warning"' not in card(made_up("whole", {"Visit": (5,)}))

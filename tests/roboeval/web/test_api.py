@@ -207,7 +207,7 @@ def test_damaged_rows_are_said_and_the_others_are_there(runs: Path) -> None:
     lines = rows.read_bytes().splitlines(keepends=True)
     at = next(n for n, line in enumerate(lines) if json.loads(line)["failure"])
     row = json.loads(lines[at])
-    forged = {**row, "verdicts": [{**verdict, "trace": [["goto"]]} for verdict in row["verdicts"]]}
+    forged = {**row, "verdicts": [{**verdict, "trace": [["goto", 3]]} for verdict in row["verdicts"]]}
     rows.write_bytes(b"".join([*lines[:at], to_line(forged), *lines[at + 1 :], b"nonsense\n"]))
     with serving(runs) as server:
         (run,) = told(server, "/api/runs")
