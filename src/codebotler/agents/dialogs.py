@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from mcp.server.mcpserver import Context
@@ -11,7 +12,7 @@ from mcp.server.mcpserver.exceptions import ToolError
 from mcp.server.mcpserver.resolve import Elicit, Resolve
 from pydantic import BaseModel, Field
 
-from codebotler.agents.gatekeeper import Gatekeeper
+from codebotler.agents.gatekeeper import READING_PAST, Gatekeeper
 from codebotler.agents.reports import question, which_question
 from codebotler.candidates.question import ClarifyingQuestion
 from codebotler.core.errors import UserError
@@ -88,7 +89,7 @@ async def read_last_past(ctx: AgentContext) -> MissionPast:
     with as_tool_errors():
         if console.view.past is not None and not console.view.is_over:
             return console.view.past
-        return await gatekeeper.read(console.past_of, "last")
+        return await gatekeeper.alone(READING_PAST, partial(console.past_of, "last"))
 
 
 async def ask_whether(
@@ -100,7 +101,7 @@ async def ask_whether(
         return NotAsked()
     robot, home = gatekeeper.console.robot, gatekeeper.console.home
     with as_tool_errors():
-        evidence = await gatekeeper.read(ask_evidence, robot, home, past, ignore_text)
+        evidence = await gatekeeper.alone(READING_PAST, partial(ask_evidence, robot, home, past, ignore_text))
     return Elicit("\n".join((past.question, *evidence)), StepWord)
 
 

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from secrets import compare_digest
-from threading import Lock, Thread
-from typing import Any, ParamSpec, TypeVar
+from threading import Thread
+from typing import Any, TypeVar
 
 from codebotler.agents.reports import CheckReport, MissionReport, RobotReport, report_check
 from codebotler.agents.steps import NOT_RUNNING, Steps
@@ -31,11 +31,11 @@ from codebotler.models.base import ignore_text
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.web.console import Console
 
-_Given = ParamSpec("_Given")
 _Made = TypeVar("_Made")
 MAX_CONTRACT_CHARACTERS = 16_000  # a check reads no program of more than 20,000
 TOO_LONG = f"the contract is longer than {MAX_CONTRACT_CHARACTERS:,} characters; shorten it"
 MAX_REPORTED_EVENTS = 1_000  # in one report
+READING_PAST = "reading of missions"  # a kind of work
 MAX_WAITING_CALLS = 100  # each event wakes all of them
 MAX_ASKED_CHARACTERS = 4_000
 """The limit for a program and for its contract in a client's dialog. Longer ones are reviewed on the page."""
@@ -58,10 +58,8 @@ class Gatekeeper:
     page: str = ""
     _session: MissionSession | None = field(default=None, init=False)  # the latest one of an agent
     _steps: Steps | None = field(default=None, init=False)  # of that session, if it is step by step
-    _checking: Lock = field(default_factory=Lock, init=False)  # held while a program of an agent is checked
     _waiting: int = field(default=0, init=False)  # calls of agents that wait for a mission or a skill
-    _writing: Lock = field(default_factory=Lock, init=False)  # held while a model writes for an agent
-    _reading: Lock = field(default_factory=Lock, init=False)  # held while an agent reads past missions
+    _under_way: set[str] = field(default_factory=set, init=False)  # what threads do for agents
 
     def propose(self, order: MissionOrder, steps: Steps | None = None) -> MissionSession:
         """Begin a mission that waits for approval. Raise MissionError if the console is busy with another."""
@@ -146,10 +144,9 @@ class Gatekeeper:
         return self.asks_client and view.can_run and is_short
 
     def check(self, program: str) -> CheckReport:
-        """Check a program without a mission, in the rooms that are known now, but only one at a time."""
+        """Check a program without a mission, in the rooms that are known now."""
         room_map, rules = self.console.view.room_map, self.console.rules
-        with _one_at_a_time(self._checking, "check"):  # a person's check must not wait for many others
-            checked = self.console.check(program, room_map, rules)
+        checked = self.console.check(program, room_map, rules)
         missing = tuple(missing_skills(program, self.console.robot))
         view = SessionView(
             program=program, check=checked, missing_skills=missing, room_map=room_map, rules=rules
@@ -170,21 +167,36 @@ class Gatekeeper:
             self._waiting -= 1
 
     def write(self, author: ModelAuthor, prompt: Prompt) -> CheckReport:
-        """Have a model write a program, and check it, but only one at a time."""
-        with _one_at_a_time(self._writing, "request to the model"):
-            _, (made, *_) = author.write(prompt, 1, ignore_text)
+        """Have a model write a program, and check it."""
+        _, (made, *_) = author.write(prompt, 1, ignore_text)
         if made.programless is not None:
             raise UserError(made.programless.sentence)
         return self.check(made.reply.program)
 
-    async def read(self, work: Callable[_Given, _Made], *given: _Given.args, **named: _Given.kwargs) -> _Made:
-        """Read past missions, or what the robot says of one, on a thread, but only for one call at a time."""
+    async def alone(self, kind: str, work: Callable[[], _Made]) -> _Made:
+        """Do slow work on a thread of its own. Raise MissionError if work of this kind is under way.
 
-        def read_alone() -> _Made:
-            with _one_at_a_time(self._reading, "reading of missions"):
-                return work(*given, **named)
+        People need the threads of the SDK and of the event loop, which are few, and a person's check must not
+        wait for many others.
+        """
+        if kind in self._under_way:
+            raise MissionError(f"another {kind} is under way; try again when it is over")
+        self._under_way.add(kind)
+        made = Future[_Made]()
+        made.set_running_or_notify_cancel()
 
-        return await in_thread(read_alone)
+        def run() -> None:
+            try:
+                result = work()
+            except BaseException as error:  # noqa: BLE001 - raised again where the result is awaited
+                self._under_way.discard(kind)
+                made.set_exception(error)
+            else:
+                self._under_way.discard(kind)
+                made.set_result(result)
+
+        Thread(target=run, daemon=True).start()
+        return await asyncio.wrap_future(made)
 
     def report(self, session: MissionSession | None, after: int = 0) -> MissionReport:
         """Return a session's mission, with its first events after a position."""
@@ -234,31 +246,3 @@ class Gatekeeper:
         page = [f"on the page {self.page}, whose link with its token was printed at the start"]
         where = listed(dialog * self.may_ask_client(view) + page * bool(self.page), "or")
         return f"A person must approve this program {where}. Then call run_mission with its digest."
-
-
-async def in_thread(work: Callable[_Given, _Made], *given: _Given.args, **named: _Given.kwargs) -> _Made:
-    """Call a slow function on a thread of its own.
-
-    The threads of the SDK and of the event loop are few, people need them, and the process waits for them.
-    """
-    made = Future[_Made]()
-    made.set_running_or_notify_cancel()
-
-    def run() -> None:
-        try:
-            made.set_result(work(*given, **named))
-        except BaseException as error:  # noqa: BLE001 - raised again where the result is awaited
-            made.set_exception(error)
-
-    Thread(target=run, daemon=True).start()
-    return await asyncio.wrap_future(made)
-
-
-@contextmanager
-def _one_at_a_time(lock: Lock, what: str) -> Iterator[None]:
-    if not lock.acquire(blocking=False):
-        raise MissionError(f"another {what} is under way; try again when it is over")
-    try:
-        yield
-    finally:
-        lock.release()

@@ -11,6 +11,7 @@ import stat
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import asdict
+from functools import partial
 from io import BufferedWriter, FileIO, TextIOWrapper
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -24,7 +25,7 @@ from mcp_types import ToolAnnotations
 from starlette.routing import Route
 
 from codebotler import __version__
-from codebotler.agents.gatekeeper import Gatekeeper
+from codebotler.agents.gatekeeper import READING_PAST, Gatekeeper
 from codebotler.agents.tools import ACTING, READING
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
@@ -90,19 +91,19 @@ def _add_resources(server: MCPServer[Gatekeeper], gatekeeper: Gatekeeper) -> Non
     async def missions() -> str:
         """List the last missions, oldest first, without their programs."""
         with _as_resource_errors():
-            return await gatekeeper.read(_list_missions, home)
+            return await gatekeeper.alone(READING_PAST, partial(_list_missions, home))
 
     @server.resource("codebotler://missions/{mission}", mime_type="application/json")
     async def mission(mission: str) -> str:
         """Read a mission: its program, its state and the reason."""
         with _as_resource_errors():
-            return await gatekeeper.read(_read_file, home, mission, SUMMARY_FILE)
+            return await gatekeeper.alone(READING_PAST, partial(_read_file, home, mission, SUMMARY_FILE))
 
     @server.resource("codebotler://missions/{mission}/log", mime_type="application/jsonl")
     async def log(mission: str) -> str:
         """Read the log of a mission, one event per line."""
         with _as_resource_errors():
-            return await gatekeeper.read(_read_file, home, mission, EVENTS_FILE)
+            return await gatekeeper.alone(READING_PAST, partial(_read_file, home, mission, EVENTS_FILE))
 
 
 def _list_missions(home: Path) -> str:

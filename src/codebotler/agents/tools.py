@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import aclosing, contextmanager, suppress
+from functools import partial
 from typing import Annotated, Any
 
 import anyio
@@ -30,7 +31,7 @@ from codebotler.agents.dialogs import (
     gatekeeper_of,
     read_last_past,
 )
-from codebotler.agents.gatekeeper import MAX_REPORTED_EVENTS, Gatekeeper, in_thread
+from codebotler.agents.gatekeeper import MAX_REPORTED_EVENTS, Gatekeeper
 from codebotler.agents.reports import (
     CheckReport,
     MissionReport,
@@ -76,8 +77,9 @@ async def check_program(
 
     It changes nothing and needs no approval. Mend all problems before you propose the program.
     """
+    gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors():
-        return await in_thread(gatekeeper_of(ctx).check, program)
+        return await gatekeeper.alone("check", partial(gatekeeper.check, program))
 
 
 async def write_program(
@@ -100,7 +102,7 @@ async def write_program(
         author = ModelAuthor(console.open_model, console.models[0])
         prompt = prompt_of(asked, console.robot, repair=False)
         try:
-            return await in_thread(gatekeeper.write, author, prompt)
+            return await gatekeeper.alone("request to the model", partial(gatekeeper.write, author, prompt))
         finally:
             author.cancel()
 
