@@ -127,7 +127,7 @@ def entries_of(contract: Contract) -> Iterator[tuple[str, ...]]:
     """Yield an entry for each text that a contract allows."""
     for skill, bound in contract.skills.items():
         for name, templates in bound.texts:
-            if templates is None or any(one.is_any for one in templates):
+            if any(one.is_any for one in templates):
                 yield from ((skill, name, str(number)) for number in range(ANYTHING))
             else:
                 yield from ((skill, name, str(one).casefold()) for one in templates)

@@ -113,8 +113,8 @@ class Approved:
     def allowed(self, skill: str, parameter: str) -> list[str]:
         """Return exact texts that the contract allows for an argument."""
         bound = self.contract.skills.get(skill)
-        texts = dict(bound.texts).get(parameter) if bound is not None else ()
-        return [one.parts[0] for one in texts or () if len(one.parts) == 1]
+        texts = dict(bound.texts).get(parameter, ()) if bound is not None else ()
+        return [one.parts[0] for one in texts if len(one.parts) == 1]
 
     def outside(self) -> Iterator[tuple[str, list[Call]]]:
         """Yield kinds of calls outside of the contract, each with the allowed calls that lead to it."""

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.core.text_template import TextTemplate
+from codebotler.core.text_template import ANY_TEXT, TextTemplate
 from codebotler.core.yaml_files import YamlFile
 from codebotler.simulator.contract import Contract, SkillBound, Templates, has_place
 
@@ -84,9 +84,9 @@ def _read_bound(file: YamlFile, row: Skill, given: Mapping[str, Any]) -> SkillBo
     return SkillBound(texts, places, given.get(AT_MOST))
 
 
-def _templates(file: YamlFile, row: Skill, name: str, given: str | list[str]) -> Templates | None:
+def _templates(file: YamlFile, row: Skill, name: str, given: str | list[str]) -> Templates:
     if isinstance(given, str):
-        return None
+        return (ANY_TEXT,)
     found = []
     for number, text in enumerate(given):
         try:
@@ -103,7 +103,7 @@ def contract_data(contract: Contract) -> dict[str, Any]:
 
 def _bound_data(bound: SkillBound) -> dict[str, Any]:
     data: dict[str, Any] = {
-        name: ANY if templates is None else [*map(str, templates)] for name, templates in bound.texts
+        name: ANY if ANY_TEXT in templates else [*map(str, templates)] for name, templates in bound.texts
     }
     if bound.places is not None:
         data[IN] = [*bound.places]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from codebotler.checking.exploration import Exploration
-from codebotler.checking.written_arguments import ArgumentTexts, WrittenArguments
+from codebotler.checking.written_arguments import WrittenArguments
 from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.core.text_template import TextTemplate
+from codebotler.core.text_template import ANY_TEXT, TextTemplate
 from codebotler.simulator.contract import (
     TELLING_SKILLS,
     Contract,
@@ -54,18 +54,18 @@ def _bound(
     room_map: RoomMap,
 ) -> SkillBound:
     knows_all = found.is_complete and found.is_steady and not written.reads_clock
-    texts: list[tuple[str, Templates | None]] = []
+    texts: list[tuple[str, Templates]] = []
     for number, parameter in enumerate(row.parameters):
-        given = written.skills.get(row.name, {}).get(parameter.name, ArgumentTexts())
-        allowed = _without_covered(given.templates)
+        given = written.skills.get(row.name, {}).get(parameter.name, ())
+        if ANY_TEXT in given and not knows_all:
+            texts.append((parameter.name, (ANY_TEXT,)))
+            continue
+        allowed = _without_covered([one for one in given if one != ANY_TEXT])
         if is_goal(row, parameter.name):
             allowed = tuple(dict.fromkeys(room for one in allowed for room in _rooms(one, room_map)))
         met = sorted({text for call in calls for text in call.texts[number]})
         met = [text for text in met if not any(one.matches(text) for one in allowed)]
-        is_known = given.is_bounded or knows_all
-        texts.append(
-            (parameter.name, (*allowed, *(TextTemplate((text,)) for text in met)) if is_known else None)
-        )
+        texts.append((parameter.name, (*allowed, *(TextTemplate((text,)) for text in met))))
     places = {call.place for call in calls} if has_place(row) and knows_all else None
     return SkillBound(
         tuple(texts),
@@ -74,7 +74,7 @@ def _bound(
     )
 
 
-def _without_covered(templates: Templates) -> Templates:
+def _without_covered(templates: Sequence[TextTemplate]) -> Templates:
     """Return the templates that no other one covers."""
     return tuple(
         one

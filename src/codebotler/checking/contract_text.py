@@ -81,7 +81,7 @@ def contract_clauses(contract: Contract, skills: SkillTable) -> list[str]:
 def _texts_of(row: Skill, bound: SkillBound, show: Callable[[str], str], *, is_short: bool) -> str:
     words = []
     for (name, templates), parameter in zip(bound.texts, row.parameters, strict=True):
-        if templates is None or any(one.is_any for one in templates):
+        if any(one.is_any for one in templates):
             words.append("any room" if is_goal(row, name) else f"any {name.replace('_', ' ')}")
         elif templates:
             first = sorted(templates, key=lambda one: len(one.parts) == 1)  # those with gaps

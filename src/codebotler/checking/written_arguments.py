@@ -15,10 +15,9 @@ from codebotler.checking.possible_values import PossibleValues
 from codebotler.core.program import all_bound_names, nodes, parse_leniently
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import as_text
-from codebotler.core.text_template import TextTemplate
+from codebotler.core.text_template import ANY_TEXT, TextTemplate
 from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 
-ANY_TEXT = TextTemplate(("", ""))
 MAX_TEMPLATES, MAX_COMBINATIONS = 50, 8  # more become any text
 FIELD = re.compile(r"%[-+ #0]*\d*(?:\.\d+)?[a-zA-Z]|\{[^{}]*\}")
 """A gap in a text that is formatted with `%` or `format`, where any text may be."""
@@ -34,28 +33,16 @@ NOTHING: Templates = frozenset()
 
 
 @dataclass(frozen=True)
-class ArgumentTexts:
-    """The texts that an argument of a skill may have.
-
-    Args:
-        templates: the known ones.
-        is_bounded: whether there are no others.
-    """
-
-    templates: tuple[TextTemplate, ...] = ()
-    is_bounded: bool = True
-
-
-@dataclass(frozen=True)
 class WrittenArguments:
     """The arguments that the text of a program gives to its skills.
 
     Args:
-        skills: the texts of each argument, by the skill's and the parameter's name.
+        skills: the texts of each argument, by the skill's and the parameter's name. `ANY_TEXT` is among them
+            if there may be others.
         reads_clock: whether the program may depend on the time of day or on random numbers.
     """
 
-    skills: Mapping[str, Mapping[str, ArgumentTexts]]
+    skills: Mapping[str, Mapping[str, Sequence[TextTemplate]]]
     reads_clock: bool
 
 
@@ -65,14 +52,15 @@ def read_arguments(program: str, skills: SkillTable) -> WrittenArguments:
     try:
         found, reads_clock = _read(program, parameters)
     except IsolatedCallError:
-        found, reads_clock = [(skill, name, [], False) for skill, names in parameters for name in names], True
-    texts: defaultdict[str, dict[str, ArgumentTexts]] = defaultdict(dict)
-    for skill, name, parts, is_bounded in found:
-        texts[skill][name] = ArgumentTexts(tuple(TextTemplate(tuple(one)) for one in parts), is_bounded)
+        anything = [[*ANY_TEXT.parts]]
+        found, reads_clock = [(skill, name, anything) for skill, names in parameters for name in names], True
+    texts: defaultdict[str, dict[str, Sequence[TextTemplate]]] = defaultdict(dict)
+    for skill, name, parts in found:
+        texts[skill][name] = [TextTemplate(tuple(one)) for one in parts]
     return WrittenArguments(texts, reads_clock)
 
 
-_Found: TypeAlias = list[tuple[str, str, list[list[str]], bool]]
+_Found: TypeAlias = list[tuple[str, str, list[list[str]]]]
 
 
 @isolated("say('a')", [("say", ["message"])])
@@ -88,8 +76,7 @@ def _read(program: str, parameters: list[tuple[str, list[str]]]) -> tuple[_Found
     if named & TRICKS:
         given |= {(skill, name): UNKNOWN for skill, names in parameters for name in names}
     found = [
-        (skill, name, sorted([*one.parts] for one in templates - UNKNOWN), not templates & UNKNOWN)
-        for (skill, name), templates in given.items()
+        (skill, name, sorted([*one.parts] for one in templates)) for (skill, name), templates in given.items()
     ]
     return found, _reads_clock(tree)
 

@@ -78,6 +78,9 @@ class TextTemplate:
         return cls(tuple(parts))
 
 
+ANY_TEXT = TextTemplate(("", ""))
+
+
 @lru_cache(maxsize=256)  # a text is compared with many templates
 def _comparable(text: str) -> str:
     """Return a text between two spaces, in which equal texts are spelled alike."""

@@ -72,21 +72,21 @@ class SkillBound:
     """The upper bound of a program's calls of one skill.
 
     Args:
-        texts: the allowed texts of each argument, by the parameter's name; None for any.
+        texts: the allowed texts of each argument, by the parameter's name.
         places: the rooms in which it may be called; None for any.
         at_most: how many successful calls one run may make; None for any number.
     """
 
-    texts: tuple[tuple[str, Templates | None], ...] = ()
+    texts: tuple[tuple[str, Templates], ...] = ()
     places: tuple[str, ...] | None = None
     at_most: int | None = None
 
     def objection(self, call: RequestedCall) -> str:
         """Return why a call is not allowed, as the end of a sentence, or an empty string if it is."""
         for (name, allowed), texts in zip(self.texts, call.texts, strict=True):
-            for text in texts if allowed is not None else ():
-                if not any(template.matches(text) for template in allowed or ()):
-                    return f'since its {name} may be {_some(allowed or ())}, and not "{brief(text)}"'
+            for text in texts:
+                if not any(template.matches(text) for template in allowed):
+                    return f'since its {name} may be {_some(allowed)}, and not "{brief(text)}"'
         if self.places is not None and not call.place:
             return UNKNOWN_ROOM
         if self.places is None or call.place.casefold() in map(str.casefold, self.places):
@@ -98,15 +98,10 @@ class SkillBound:
 
         If several of its limits are wider, the part is the whole bound.
         """
-        added: list[tuple[str, Templates | None]] = []
+        added: list[tuple[str, Templates]] = []
         for (name, templates), (_, allowed) in zip(self.texts, other.texts, strict=True):
-            if allowed is None:
-                added.append((name, ()))
-            elif templates is None:
-                added.append((name, None))
-            else:
-                new = (one for one in templates if not any(each.covers(one) for each in allowed))
-                added.append((name, tuple(new)))
+            new = (one for one in templates if not any(each.covers(one) for each in allowed))
+            added.append((name, tuple(new)))
         places: tuple[str, ...] | None = ()
         if other.places is not None:
             known = {place.casefold() for place in other.places}

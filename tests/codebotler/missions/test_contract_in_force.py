@@ -43,11 +43,8 @@ def task_program():
 FETCH = "def task_program():\n    go_to('kitchen')\n    pick('mug')\n    go_to('hall')\n    place('mug')\n"
 
 
-def bound(**texts: list[str] | None) -> SkillBound:
-    templates = {
-        name: None if some is None else tuple(map(TextTemplate.parse, some)) for name, some in texts.items()
-    }
-    return SkillBound(tuple(templates.items()))
+def bound(**texts: list[str]) -> SkillBound:
+    return SkillBound(tuple((name, tuple(map(TextTemplate.parse, some))) for name, some in texts.items()))
 
 
 ALLOWED = Contract(

@@ -18,6 +18,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.paper import SKILLS
+from codebotler.core.text_template import ANY_TEXT
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.log import MissionState, MissionSummary, add_event, open_log, read_events
@@ -412,7 +413,7 @@ def test_equal_effects(one: Event, other: Event, is_same: bool) -> None:  # noqa
 
 
 def view(*, say: int | None = 1, skill: str = "say") -> SessionView:
-    bound = SkillBound((("message", None),), None, say)
+    bound = SkillBound((("message", (ANY_TEXT,)),), None, say)
     found = CheckResult((), (), ROOMS, contract=Contract({skill: bound}))
     return SessionView(check=found)
 
