@@ -70,7 +70,7 @@ def serve_agents(
     writes = bool(model) or not is_recorded(console.models[0])
     gatekeeper = Gatekeeper(console, asks_client=asks, writes=writes)
     agents = server.make_server(gatekeeper)
-    access = Access.from_options(token, None, open_to_all=False, is_private=True)
+    access = Access.from_options(token, agent=agent_token)
 
     def announce(address: str) -> None:
         gatekeeper.page = address
@@ -78,7 +78,6 @@ def serve_agents(
             note(f"Agents use {address}{AGENT_PATH[1:]} with\n\n    Authorization: Bearer {access.agent}\n")
 
     if streams is None:
-        access = access.with_agents(agent_token)
         companion = server.over_http(agents, announce)
     else:
         companion = server.over_stdio(agents, streams, announce)

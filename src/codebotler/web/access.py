@@ -11,7 +11,7 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from codebotler.core.errors import UserError
@@ -55,34 +55,33 @@ class Access:
 
     operator: str | None = field(default_factory=new_token)  # None if operators need no token
     face: str = field(default_factory=new_token)
+    agent: str = field(default_factory=new_token)
     unguessable: frozenset[Role] = frozenset()  # roles with random tokens, for which there is no limit
     now: Callable[[], float] = time.monotonic
-    agent: str | None = None  # None if there is no access for agents
     _wrong: dict[str, deque[float]] = field(default_factory=dict)
 
     @classmethod
     def from_options(
-        cls, operator: str | None, face: str | None, *, open_to_all: bool, is_private: bool
+        cls,
+        operator: str | None,
+        face: str | None = None,
+        agent: str | None = None,
+        *,
+        open_to_all: bool = False,
+        is_private: bool = True,
     ) -> Access:
         """Use the given tokens, and create those that are None. Raise UserError if a token is unsafe."""
-        if open_to_all and (operator or face or not is_private):
+        options = {Role.OPERATOR: operator, Role.FACE: face, Role.AGENT: agent}
+        given = [token for token in options.values() if token is not None]
+        if open_to_all and (any(given) or not is_private):
             raise UserError("--no-token cannot be combined with --host, --behind-proxy or your own tokens")
-        if any(token is not None and len(token) < MIN_TOKEN_LENGTH for token in (operator, face)):
+        if any(len(token) < MIN_TOKEN_LENGTH for token in given):
             raise UserError(f"this token is too short; use at least {MIN_TOKEN_LENGTH} characters")
-        if operator is not None and operator == face:
-            raise UserError("the face's token must differ from the operator's; choose another token")
-        made = {Role.OPERATOR: operator is None, Role.FACE: face is None}
-        unguessable = frozenset(role for role, is_new in made.items() if is_new)
-        return cls(None if open_to_all else operator or new_token(), face or new_token(), unguessable)
-
-    def with_agents(self, token: str | None) -> Access:
-        """Return a copy with a token for agents, by default a new one. Raise UserError if it is unsafe."""
-        if token is not None and len(token) < MIN_TOKEN_LENGTH:
-            raise UserError(f"this token is too short; use at least {MIN_TOKEN_LENGTH} characters")
-        if token is not None and token in {self.operator, self.face}:
-            raise UserError("the agents' token must differ from the others; choose another token")
-        unguessable = self.unguessable | ({Role.AGENT} if token is None else set())
-        return replace(self, agent=token or new_token(), unguessable=unguessable)
+        if len({*given}) < len(given):
+            raise UserError("two roles have the same token; choose another token for one of them")
+        unguessable = frozenset(role for role, token in options.items() if token is None)
+        of_operators = None if open_to_all else operator or new_token()
+        return cls(of_operators, face or new_token(), agent or new_token(), unguessable)
 
     def of_token(self, token: str, address: str) -> Role | None:
         """Return a token's role, or None for an invalid token, which counts towards the address's limit."""

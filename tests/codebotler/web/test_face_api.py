@@ -277,7 +277,7 @@ def test_there_is_no_face_unless_one_is_asked_for(tmp_path: Path) -> None:
     ("arguments", "named"),
     [
         (["--face-token", "short"], f"{MIN_TOKEN_LENGTH} characters"),
-        (["--token", "x" * 20, "--face-token", "x" * 20], "must differ from the operator's"),
+        (["--token", "x" * 20, "--face-token", "x" * 20], "two roles have the same token"),
         (["--no-token", "--face-token", "x" * 20], "--no-token cannot be combined"),
         (["--face-timeout", "0"], "'--face-timeout'"),
         (["--stop-when-alone", "0"], "'--stop-when-alone'"),
