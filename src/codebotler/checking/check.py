@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from functools import partial
 
 from codebotler.checking.problems import CheckResult, Sample
@@ -11,6 +10,7 @@ from codebotler.checking.proof import extend_check
 from codebotler.checking.rooms import add_visited_rooms, room_map_for
 from codebotler.checking.sampled import (
     DEFAULT_SAMPLES,
+    WORLDS_AT_ONCE,
     CheckSettings,
     RunInWorlds,
     SampledRuns,
@@ -31,7 +31,6 @@ from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.sampled_robot import AS_WRITTEN
 from codebotler.simulator.worker import Worker
 
-WORLDS_PER_WORKER = 16  # in each batch
 MAX_WIDENINGS = 3  # rounds that add rooms which the program visits but its source does not name
 
 
@@ -44,7 +43,6 @@ def check(
     seed: int = 0,
     strict: bool = False,
     skills: SkillTable = SKILLS,
-    workers: int | None = None,
     pool: WorkerPool | None = None,
     room_map: RoomMap | None = None,
     house_rules: Sequence[Rule] = (),
@@ -60,8 +58,7 @@ def check(
         seed: the random seed, which gives the same worlds on all machines.
         strict: whether to randomize even facts that the program takes for granted.
         skills: the skills that the program may call.
-        workers: the number of parallel runs in a new pool.
-        pool: the pool that runs the programs; without `workers`, it defaults to the pool of this process.
+        pool: the pool one of whose workers runs the program; by default the pool of this process.
         room_map: a map that replaces `rooms` and `start` if more is known about the rooms.
         house_rules: the rules that the program must keep in every world.
         explores: whether to explore all worlds that the program can tell apart, up to a budget, for its
@@ -76,31 +73,18 @@ def check(
     settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, tuple(house_rules))
     if room_map is None and (rooms, start) != (None, None):
         room_map = room_map_for(program, rooms, start, skills=skills)
-    with _open_pool(pool, workers) as opened:
-        if samples > WORLDS_PER_WORKER and not opened.is_here:
-            known = room_map or room_map_for(program, skills=skills)
-            run = _runner_on_pool(opened, program, settings)
-            found = _run_check(program, known, settings, run, WORLDS_PER_WORKER * opened.workers)
-        else:
-            found = opened.call(lambda: check_on(opened.here(), program, room_map, settings))
-        if not explores:
-            return found
-        return opened.call(lambda: extend_check(opened.here(), program, found, settings))
+    opened = pool or shared_pool()
 
+    def check_here() -> CheckResult:
+        found = check_on(opened.here(), program, room_map, settings)
+        return extend_check(opened.here(), program, found, settings) if explores else found
 
-@contextmanager
-def _open_pool(pool: WorkerPool | None, workers: int | None) -> Iterator[WorkerPool]:
-    if pool is not None:
-        yield pool
-    elif workers is not None:
-        with WorkerPool(workers) as opened:
-            yield opened
-    else:
-        try:
-            yield shared_pool()
-        except KeyboardInterrupt:  # else the program would continue and delay the exit of this process
+    try:
+        return opened.call(check_here)
+    except KeyboardInterrupt:  # else the program would continue and delay the exit of this process
+        if pool is None:
             SHARED_POOL.end()
-            raise
+        raise
 
 
 def check_on(
@@ -120,25 +104,13 @@ def check_together(
     worker: Worker, programs: Sequence[tuple[str, RoomMap]], settings: CheckSettings
 ) -> list[CheckResult]:
     """Check several programs on one worker, where their first runs may share a process."""
-    samplers = first_samplers(settings)[:WORLDS_PER_WORKER]
+    samplers = first_samplers(settings)[:WORLDS_AT_ONCE]
     runs = [SampledRuns(program, room_map, samplers, settings) for program, room_map in programs]
     found = []
     for one, first in zip(runs, run_together(worker, runs), strict=True):
         with worker.one_child():
             found.append(_run_check(one.program, one.room_map, settings, _runner_after(worker, one, first)))
     return found
-
-
-def _runner_on_pool(pool: WorkerPool, program: str, settings: CheckSettings) -> RunInWorlds:
-    def run_share(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
-        return run_samples(pool.here(), program, room_map, samplers, settings)
-
-    def run(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
-        shares = [samplers[start :: pool.workers] for start in range(pool.workers)]
-        futures = [pool.submit(run_share, room_map, each) for each in shares if each]
-        return [sample for future in futures for sample in future.result()]
-
-    return run
 
 
 def _runner_after(worker: Worker, runs: SampledRuns, first: list[Sample]) -> RunInWorlds:
@@ -152,22 +124,16 @@ def _runner_after(worker: Worker, runs: SampledRuns, first: list[Sample]) -> Run
     return run
 
 
-def _run_check(
-    program: str,
-    room_map: RoomMap,
-    settings: CheckSettings,
-    run: RunInWorlds,
-    width: int = WORLDS_PER_WORKER,
-) -> CheckResult:
+def _run_check(program: str, room_map: RoomMap, settings: CheckSettings, run: RunInWorlds) -> CheckResult:
     text = read_program(program, room_map, settings.skills)
     if not text.compiles:
         return CheckResult(text.problems, (), room_map, settings.seed, settings.strict)
-    ran = run_in_sampled_worlds(run, room_map, settings, width)
+    ran = run_in_sampled_worlds(run, room_map, settings)
     for _ in range(MAX_WIDENINGS if room_map.guessed else 0):
         wider = add_visited_rooms(room_map, ran)
         if wider == room_map:
             break
-        room_map, ran = wider, run_in_sampled_worlds(run, wider, settings, width)
+        room_map, ran = wider, run_in_sampled_worlds(run, wider, settings)
     blamed = {problem.line for problem in text.problems}
     failures = (problem for problem in group_failures(ran, room_map) if problem.line not in blamed)
     problems = sorted((*text.problems, *failures), key=lambda problem: problem.line or 0)

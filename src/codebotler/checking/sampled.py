@@ -27,6 +27,7 @@ DEFAULT_SAMPLES, MAX_SAMPLES = 5, 10_000
 EXPLORATION_FACTOR = 2  # worlds added per sample, at most, to try both values of each fact
 MAX_EXTRA_WORLDS = 20  # worlds added, at most, while every run waits without success
 MAX_SHOWN_FACTS = 4
+WORLDS_AT_ONCE = 16
 
 
 @dataclass(frozen=True)
@@ -114,13 +115,11 @@ RunInWorlds: TypeAlias = Callable[[RoomMap, Sequence[FactSampler]], Iterable[Sam
 """Runs a program in several worlds, but may skip worlds that would repeat a run."""
 
 
-def run_in_sampled_worlds(
-    run: RunInWorlds, room_map: RoomMap, settings: CheckSettings, width: int
-) -> list[Sample]:
+def run_in_sampled_worlds(run: RunInWorlds, room_map: RoomMap, settings: CheckSettings) -> list[Sample]:
     """Run a program in the first worlds, then in further ones until both values of each fact have been tried.
 
     Further worlds are also added as long as every run waits or searches without success. Worlds that would
-    repeat a run share its result. `run` is called with at most `width` worlds at a time.
+    repeat a run share its result. `run` is called with at most `WORLDS_AT_ONCE` worlds at a time.
     """
     known: list[Sample] = []
     ran: list[Sample] = []
@@ -128,8 +127,8 @@ def run_in_sampled_worlds(
 
     def add(samplers: Sequence[FactSampler]) -> None:
         drew.extend(samplers)
-        for start in range(0, len(samplers), width):
-            these = samplers[start : start + width]
+        for start in range(0, len(samplers), WORLDS_AT_ONCE):
+            these = samplers[start : start + WORLDS_AT_ONCE]
             known.extend(
                 run(room_map, [s for s in these if not any(one.would_repeat_in(s) for one in known)])
             )
