@@ -5,13 +5,12 @@ from __future__ import annotations
 import asyncio
 import io
 import json
-from collections.abc import AsyncIterator, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator
 from dataclasses import asdict
 from http import HTTPStatus
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Header, HTTPException, Query, Request
+from fastapi import APIRouter, Depends, Header, HTTPException, Query, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
@@ -105,7 +104,12 @@ def invalid_request(_request: Request, error: Exception) -> AsciiJSONResponse:
 
 def router(console: Console) -> APIRouter:
     """Create the routes of the API."""
-    api = APIRouter(prefix="/api", tags=["missions"], default_response_class=AsciiJSONResponse)
+    api = APIRouter(
+        prefix="/api",
+        tags=["missions"],
+        default_response_class=AsciiJSONResponse,
+        dependencies=[Depends(_raise_http_errors)],
+    )
     _add_missions(api, console)
     _add_changes(api, console)
     _add_rest(api, console)
@@ -116,25 +120,22 @@ def _add_missions(api: APIRouter, console: Console) -> None:
     @api.get("/missions")
     def list_missions() -> list[dict[str, Any]]:
         """List all missions, oldest first."""
-        with as_http_errors():
-            return [asdict(summary) for summary in read_missions(console.home)]
+        return [asdict(summary) for summary in read_missions(console.home)]
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
         """Begin a mission, unless another one runs, and prepare its program in the background."""
-        with as_http_errors():
-            session = console.begin(MissionOrder(new.instruction, new.model, new.program))
+        session = console.begin(MissionOrder(new.instruction, new.model, new.program))
         return await _begun_data(console, session)
 
     @api.post("/missions/{mission}/continue", status_code=201)
     async def continue_mission(mission: str, form: ContinueForm) -> dict[str, Any]:
         """Begin the rest of a mission as a new mission. Without an instruction, replace its program."""
         summary, _ = await asyncio.to_thread(_read_mission, console, mission)
-        with as_http_errors():
-            past = await asyncio.to_thread(console.past_of, summary.id)
-            if form.happened is not None:
-                past = past.resolve(happened=form.happened, answer=form.answer)
-            session = console.begin(console.rest_of(past))
+        past = await asyncio.to_thread(console.past_of, summary.id)
+        if form.happened is not None:
+            past = past.resolve(happened=form.happened, answer=form.answer)
+        session = console.begin(console.rest_of(past))
         return await _begun_data(console, session)
 
     @api.get("/missions/{mission}")
@@ -158,7 +159,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
         clock: Annotated[Literal["wall", "robot"], Query(description="`robot` for simulated time.")] = "wall",
     ) -> Response:
         """Download the events as MCAP, for Foxglove."""
-        with as_http_errors(), installed():
+        with installed():
             from codebotler.missions.mcap import write_mcap  # noqa: PLC0415 - part of an optional extra
 
         summary, events = _read_mission(console, mission)
@@ -173,15 +174,13 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     def edit(mission: str, new: NewProgram) -> dict[str, Any]:
         """Replace the program, and check it in the background."""
         _current_session(console, mission)
-        with as_http_errors():
-            return view_data(console.edit(new.program).view)
+        return view_data(console.edit(new.program).view)
 
     @api.post("/missions/{mission}/again", status_code=202)
     def ask_again(mission: str, again: AskAgainForm) -> dict[str, Any]:
         """Ask the model for another program, and check it."""
         session = _current_session(console, mission)
-        with as_http_errors():
-            session.ask_again(repair=again.repair, max_tokens=again.max_tokens or None)
+        session.ask_again(repair=again.repair, max_tokens=again.max_tokens or None)
         return view_data(session.view)
 
     @api.post("/missions/{mission}/answer", status_code=202)
@@ -189,16 +188,14 @@ def _add_changes(api: APIRouter, console: Console) -> None:
         """Say which of the behaviours in `question` is meant."""
         session = _current_session(console, mission)
         chosen = given.answer if isinstance(given.answer, str) else given.answer - 1
-        with as_http_errors():
-            session.answer(session.view.question, chosen, given.more)
+        session.answer(session.view.question, chosen, given.more)
         return view_data(session.view)
 
     @api.post("/missions/{mission}/approve")
     def approve(mission: str, approval: Approval) -> dict[str, Any]:
         """Run exactly the program that the person reviewed."""
         session = _current_session(console, mission)
-        with as_http_errors():
-            session.approve(approval.program, despite_problems=approval.despite_problems)
+        session.approve(approval.program, despite_problems=approval.despite_problems)
         return view_data(session.view)
 
     @api.post("/missions/{mission}/stop", status_code=202)
@@ -229,8 +226,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: NewProgram) -> dict[str, Any]:
         """Check a program against the house rules, in the rooms of the current mission, if any."""
-        with as_http_errors():
-            return console.check(new.program, console.view.room_map, console.rules).data()
+        return console.check(new.program, console.view.room_map, console.rules).data()
 
     @api.get("/robot", tags=["robot"])
     async def robot(
@@ -341,8 +337,7 @@ def _read_mission(console: Console, mission: str) -> tuple[MissionSummary, list[
         raise HTTPException(404, error.sentence) from None
 
 
-@contextmanager
-def as_http_errors() -> Iterator[None]:
+async def _raise_http_errors() -> AsyncIterator[None]:  # needs no thread, which STOP might have to wait for
     """Convert MissionError to status 409 and UserError to 422."""
     try:
         yield
