@@ -163,6 +163,6 @@ def test_without_the_option_stop_says_how_to_start(tmp_path: Path, browser: Brow
         page.goto(site.link())
         page.wait_for_load_state("networkidle")
         page.locator("#stop").click()
-        expect(page.locator("#stop-told")).to_contain_text(f"--behind-proxy {site.proxy.address}")
+        expect(page.locator("#stop-told")).to_contain_text("--behind-proxy")
         said = site.server.said
-    assert said.count(f"--behind-proxy {site.proxy.address}") == 1
+    assert said.count("use --behind-proxy") == 1

@@ -61,8 +61,9 @@ _NO_SCRIPT = "script-src 'none'"  # pages with this policy get no nonce
 _NO_CONTROL_CHARACTERS = "there is no such page; addresses cannot contain control characters"
 NO_PAGE = "there is no such page"
 _WRONG = "this token is wrong"
-_OTHER_SITE = "this request came from another site, which is not allowed"
-_HOST_CHANGED = "the proxy must pass on the browser's Host header unchanged"
+_OTHER_SITE = (
+    "this request came from another site; behind a proxy, use --behind-proxy and keep the Host header"
+)
 _TOO_MANY = f"{MAX_AGENT_REQUESTS} requests of agents are being answered already; wait for their answers"
 
 _REFUSAL_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8">
@@ -148,7 +149,10 @@ class Guard:
         origin = headers.get("origin")
         host = headers.get("host", "") if proxy is None else proxy.host
         if origin is not None and not _is_same(origin, host, request.scope):
-            raise RefusedError(HTTPStatus.FORBIDDEN, self._why_not(origin.lower(), request, proxy))
+            if not self._has_noted:  # also in the terminal, because the browser shows only a lost connection
+                self._has_noted = True
+                note(_OTHER_SITE)
+            raise RefusedError(HTTPStatus.FORBIDDEN, _OTHER_SITE)
         changes = is_socket or request.scope["method"] not in _SAFE_METHODS
         from_browser = "cookie" in headers or is_socket
         if changes and origin is None and from_browser and "authorization" not in headers:
@@ -156,22 +160,6 @@ class Guard:
         navigates = headers.get("sec-fetch-mode") == "navigate"
         if headers.get("sec-fetch-site") in {"cross-site", "same-site"} and not navigates:
             raise RefusedError(HTTPStatus.FORBIDDEN, _OTHER_SITE)
-
-    def _why_not(self, origin: str, request: HTTPConnection, proxy: OuterAddress | None) -> str:
-        """Explain why an origin was refused, since it may belong to a proxy that must be named."""
-        outer = OuterAddress.found_in(origin)
-        is_our_page = request.headers.get("sec-fetch-site") == "same-origin"
-        if outer is None or not (is_our_page or outer.name == _host(request)):
-            return _OTHER_SITE
-        if proxy is not None:
-            return f"open this page at {proxy.page}"
-        if outer.host in self._rules.proxies:
-            return _HOST_CHANGED
-        sentence = f"behind a proxy, start with --behind-proxy {outer.origin}, plus its path, if any"
-        if not self._has_noted:  # also in the terminal, because the browser shows only a lost connection
-            self._has_noted = True
-            note(f"a request was refused: {sentence}")
-        return sentence
 
     def _role(self, request: HTTPConnection) -> Role | None:
         access = self._rules.access

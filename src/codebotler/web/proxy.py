@@ -43,18 +43,10 @@ class OuterAddress:
     @classmethod
     def parse(cls, text: str) -> OuterAddress:
         """Parse an address such as https://host:8443/robot. Raise UserError if it is invalid."""
-        address = cls.found_in(text)
-        if address is None:
-            quoted = f'"{elide_middle(text, _MAX_QUOTED)}" is not the address of a proxy'
-            raise UserError(f"{quoted}; write https://HOST, with :PORT and /PATH if needed")
-        return address
-
-    @classmethod
-    def found_in(cls, text: str) -> OuterAddress | None:
-        """Parse an address, or return None if it is invalid."""
         found = _ADDRESS.fullmatch(text)
         if found is None:
-            return None
+            quoted = f'"{elide_middle(text, _MAX_QUOTED)}" is not the address of a proxy'
+            raise UserError(f"{quoted}; write https://HOST, with :PORT and /PATH if needed")
         scheme, port = found["scheme"].lower(), found["port"]
         suffix = "" if port in {None, _SCHEME_PORTS[scheme]} else f":{port}"
         return cls(scheme, found["host"].lower() + suffix, found["prefix"])
