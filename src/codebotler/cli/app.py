@@ -100,7 +100,6 @@ def check(
     save_contract: options.SaveContractOption = None,
     within: options.WithinOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
-    workers: Annotated[int, typer.Option(min=1, help="The number of programs to run in parallel.")] = 1,
     rules: options.RulesOption = None,
     skills: options.SkillsOption = None,
 ) -> None:
@@ -115,6 +114,7 @@ def check(
     from codebotler.cli.rules import rules_for
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
+    from codebotler.simulator.pool import WorkerPool
     from codebotler.simulator.room_map import RoomMap
 
     table = skills_from(*(skills or ()))
@@ -124,15 +124,15 @@ def check(
     house_rules = rules_for(known, rules, table)
     source, allowed = read_program(program), options.read_within(within, table)
     room_map = None if known is None else (RoomMap.of_places if world is None else RoomMap.of)(known)
-    with busy("checking"):
+    with busy("checking"), WorkerPool(1) as pool:
         found = check.check(
             source,
             room_map=room_map,
             samples=samples,
             seed=seed,
             strict=strict,
-            workers=workers,
             skills=table,
+            pool=pool,
             house_rules=house_rules,
             explores=contract or bool(house_rules) or save_contract is not None or within is not None,
         )
