@@ -13,17 +13,16 @@ from codebotler.checking.evasions import find_evasions
 from codebotler.checking.rule_review import Review
 from codebotler.checking.rules import read_rules
 from codebotler.checking.storyboard import grid, steps_of
-from codebotler.core.phrases import verb, verb_phrase
+from codebotler.core.phrases import phrase
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import note, visible
 from codebotler.core.trace import Event, Trace
-from codebotler.core.words import listed
 from codebotler.core.world import World
 from codebotler.simulator.house_rule import Rule
 
-ANY_ARGUMENT = ("", "x")  # in examples, these mean any text
+ANY_ARGUMENT = ("", "x")  # in examples, these mean any text, which is shown as "…"
 WHEN_WORDS = {
     "always": "at any time",
     "leaving": "when the robot leaves a room, and at the end",
@@ -90,25 +89,16 @@ def is_drive(event: Event) -> bool:
 
 def step_sentence(event: Event, room: str = "") -> str:
     """Describe a step of an example, but omit the start of a drive if it is `room`, the current room."""
+
+    def show(text: str) -> str:
+        return "…" if text in ANY_ARGUMENT else visible(text)
+
     drives = is_drive(event)
-    any_text = "another room" if drives else "something"
-    quote = "" if verb(event.kind).object else '"'
-    given = [
-        any_text if t in ANY_ARGUMENT else f"{quote}{visible(t)}{quote}" for t in (event.text, *event.more)
-    ]
-    parts = [verb_phrase(event.kind, "third", given, "")]
-    offered = [f'"{visible(option.text)}"' for option in event.options if option.text not in ANY_ARGUMENT]
-    more = len(event.options) - len(offered)
-    offered += [f"{more} {'more' if offered else 'options'}"] if more > 1 else []
-    parts += [f"offering {listed(offered)}"] if offered else []
+    parts = [phrase(event, "third", show=show)]
     parts += [f'of "{visible(event.to)}"'] if event.to and event.to not in ANY_ARGUMENT else []
-    where = "from" if drives else "in"
     is_known = event.place in ANY_ARGUMENT or (drives and event.place == room)
-    parts += [] if is_known else [f"{where} {visible(event.place)}"]
-    held = "something" if event.holding in ANY_ARGUMENT else f'"{visible(event.holding)}"'
-    parts += [f"holding {held}"] if event.holding else []
-    if event.found is not None:
-        parts.append(f"and {'finds it' if event.found else 'does not find it'}")
+    parts += [] if is_known else [f"{'from' if drives else 'in'} {visible(event.place)}"]
+    parts += [f'holding "{show(event.holding)}"'] if event.holding else []
     parts += [f'and hears "{visible(event.answer)}"'] if event.answer is not None else []
     return " ".join(parts)
 

@@ -190,10 +190,10 @@ def test_rules_that_cannot_be_kept_together_are_told() -> None:
 
 def test_steps_are_told_with_all_that_rules_speak_of() -> None:
     asked = Event("ask", "x", (Option("tea"),), "tea", place="hall", holding="mug", to="carol")
-    told = 'asks something offering "tea" of "carol" in hall holding "mug" and hears "tea"'
+    told = 'asks "…" [tea] of "carol" in hall holding "mug" and hears "tea"'
     assert step_sentence(asked) == told
-    assert step_sentence(Event("check", "mug", found=False)) == 'looks for "mug" and does not find it'
-    assert step_sentence(Event("goto", "")) == "drives to another room"
+    assert step_sentence(Event("check", "mug", found=False)) == 'looks for "mug": not found'
+    assert step_sentence(Event("goto", "")) == 'drives to "…"'
 
 
 def leaving(name: str, formula: str) -> Rule:
