@@ -17,6 +17,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_FILE_BYTES, decode_text, read_text
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import RunError
+from codebotler.core.words import counted
 from codebotler.prompts.extract import program_in
 
 STANDARD_INPUT = "standard input"
@@ -60,15 +61,13 @@ def _verdict(found: CheckResult, name: str) -> Text:
     if not count:
         verdict = Text.assemble(("accepted", "bold green"), f": no problem in {visible(name)}")
     else:
-        problems = "1 problem" if count == 1 else f"{count} problems"
-        verdict = Text.assemble(("rejected", "bold red"), f": {problems} in {visible(name)}")
+        verdict = Text.assemble(("rejected", "bold red"), f": {counted(count, 'problem')} in {visible(name)}")
     if not found.samples:
         run = "the program was not run"
     elif not any(sample.draws for sample in found.samples):
         run = "the program behaves the same in every world"
     else:
-        worlds = f"{len(found.samples)} imagined world{'s'[: len(found.samples) > 1]}"
-        run = f"run in {worlds} with random people and objects"
+        run = f"run in {counted(len(found.samples), 'imagined world')} with random people and objects"
     return verdict.append(f"\n{run}", "dim")
 
 

@@ -54,17 +54,13 @@ class OuterAddress:
     @property
     def name(self) -> str:
         """The name or IP address of the host, without the port."""
-        return host_name(self.host)
-
-    @property
-    def origin(self) -> str:
-        """The Origin header that browsers send."""
-        return f"{self.scheme}://{self.host}"
+        bare = self.host[: self.host.rindex("]") + 1] if "]" in self.host else self.host.partition(":")[0]
+        return bare.strip("[]")
 
     @property
     def page(self) -> str:
         """The address of the start page."""
-        return f"{self.origin}{self.prefix}/"
+        return f"{self.scheme}://{self.host}{self.prefix}/"
 
     def seen_from_outside(self, scope: Scope) -> dict[str, Any]:
         """Return a request with the scheme and path of the browser, even if the proxy removed the prefix."""
@@ -115,12 +111,6 @@ def addresses_by_host(addresses: Iterable[OuterAddress]) -> Mapping[str, OuterAd
         if ":" not in address.host.rpartition("]")[2]:
             found[f"{address.host}:{_SCHEME_PORTS[address.scheme]}"] = address
     return MappingProxyType(found)
-
-
-def host_name(host: str) -> str:
-    """Return a host without its port and brackets."""
-    bare = host[: host.rindex("]") + 1] if "]" in host else host.partition(":")[0]
-    return bare.strip("[]")
 
 
 def prefix_of(scope: Mapping[str, Any]) -> str:
