@@ -60,7 +60,7 @@ def _bound(
         if ANY_TEXT in given and not knows_all:
             texts.append((parameter.name, (ANY_TEXT,)))
             continue
-        allowed = _without_covered([one for one in given if one != ANY_TEXT])
+        allowed = tuple(one for one in given if one != ANY_TEXT)
         if is_goal(row, parameter.name):
             allowed = tuple(dict.fromkeys(room for one in allowed for room in _rooms(one, room_map)))
         met = sorted({text for call in calls for text in call.texts[number]})
@@ -71,17 +71,6 @@ def _bound(
         tuple(texts),
         tuple(sorted(places)) if places else None,
         found.most_calls.get(row.name) if knows_all else None,
-    )
-
-
-def _without_covered(templates: Sequence[TextTemplate]) -> Templates:
-    """Return the templates that no other one covers."""
-    return tuple(
-        one
-        for number, one in enumerate(templates)
-        if not any(
-            other.covers(one) for at, other in enumerate(templates) if at != number and not one.covers(other)
-        )
     )
 
 
