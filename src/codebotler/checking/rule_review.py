@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
-from codebotler.checking.rule_rooms import may_mean
+from codebotler.checking.rule_rooms import may_mean, unknown_rooms_in
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.kinds import GOTO, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
@@ -252,25 +252,13 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
     """Yield a sentence for each room, thing or person that a rule names but the world does not have."""
     if world is None:
         return
-    rooms = [room.name for room in world.rooms]
-    described = [*map(re.escape, world.descriptions)]
-    things = [*described, *(label for room in world.rooms for label in room.objects)]
-    people = [*described, *(person.name for room in world.rooms for person in room.people)]
-    sorts = {"room": rooms, "object": things, "object or person": [*things, *people, *WORDS_FOR_PEOPLE]}
+    yield from unknown_rooms_in(rule, [room.name for room in world.rooms])
+    known = [*map(re.escape, world.descriptions), *WORDS_FOR_PEOPLE]
+    known += [label for room in world.rooms for label in room.objects]
+    known += [person.name for room in world.rooms for person in room.people]
     for element in dict.fromkeys(elements(rule.formula)):
         row = by_event(element.kind)
         sort = row.recording.names if row is not None and row.recording is not None else ""
-        named: list[tuple[str, TextPattern | None, list[str] | None]] = [
-            ("thing", element.holding, things),
-            ("person", element.to, people),
-            ("room", None if element.place is None else Regex(element.place), rooms),
-            (SHOWN_SORTS.get(sort, sort), element.text, sorts.get(sort)),
-        ]
-        for what, text, known in named:
-            if known is None or not isinstance(text, Regex) or (what == "room" and rule.any_room):
-                continue
-            if not may_mean(text.pattern, known):
-                yield f'it names the {what} "{text.pattern}", which is not in this world'
-
-
-SHOWN_SORTS = {"object": "thing", "object or person": "thing or person"}
+        for text in (element.holding, element.to, element.text if "object" in sort else None):
+            if isinstance(text, Regex) and not may_mean(text.pattern, known):
+                yield f'it names "{text.pattern}", which is not in this world'
