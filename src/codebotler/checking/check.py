@@ -125,16 +125,16 @@ def _runner_after(worker: Worker, runs: SampledRuns, first: list[Sample]) -> Run
 
 
 def _run_check(program: str, room_map: RoomMap, settings: CheckSettings, run: RunInWorlds) -> CheckResult:
-    text = read_program(program, room_map, settings.skills)
-    if not text.compiles:
-        return CheckResult(text.problems, (), room_map, settings.seed, settings.strict)
+    compiles, flaws = read_program(program, room_map, settings.skills)
+    if not compiles:
+        return CheckResult(flaws, (), room_map, settings.seed, settings.strict)
     ran = run_in_sampled_worlds(run, room_map, settings)
     for _ in range(MAX_WIDENINGS if room_map.guessed else 0):
         wider = add_visited_rooms(room_map, ran)
         if wider == room_map:
             break
         room_map, ran = wider, run_in_sampled_worlds(run, wider, settings)
-    blamed = {problem.line for problem in text.problems}
+    blamed = {problem.line for problem in flaws}
     failures = (problem for problem in group_failures(ran, room_map) if problem.line not in blamed)
-    problems = sorted((*text.problems, *failures), key=lambda problem: problem.line or 0)
+    problems = sorted((*flaws, *failures), key=lambda problem: problem.line or 0)
     return CheckResult(tuple(problems), tuple(ran), room_map, settings.seed, settings.strict)

@@ -64,35 +64,32 @@ class HouseRuleFile(BaseModel):
 
     def rule(self, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Sets) -> Rule:
         """Convert the entry to a rule, or raise UserError if it is not valid."""
-        texts: dict[WhenJudged, str | None] = {
-            "always": self.always,
-            "leaving": self.leaving,
-            "finally": self.finally_,
-        }
-        given = [when for when, text in texts.items() if text is not None]
-        if not given:
-            mend = 'write one after "always", "leaving" or "finally"'
-            raise file.wrong(f'the rule "{self.name}" has no formula; {mend}', *at)
-        when = given[0]
-        if len(given) > 1:
-            sentence = f'the rule "{self.name}" has both "{when}" and "{given[-1]}"; split it into two rules'
-            raise file.wrong(sentence, *at, given[-1])
+        if len(self._texts) != 1:
+            needed = 'exactly one of "always", "leaving" and "finally"; write one rule for each'
+            raise file.wrong(f'the rule "{self.name}" needs {needed}', *at, *[*self._texts][-1:])
+        ((when, text),) = self._texts.items()
         if when == "finally" and self.refuse:
             sentence = 'a "finally" rule cannot have "refuse"; remove "refuse" or write "always"'
             raise file.wrong(sentence, *at, "refuse")
-        formula = self._formula(texts[when] or "", file, (*at, when), skills, sets)
+        formula = self._formula(text, file, (*at, when), skills, sets)
         if when == "always" and not holds(formula, ()):
-            whenever = f'not tr.Last(goto(".*")) or {_bracketed(formula)}'
             sentence = f'the rule "{self.name}" is broken before anything has happened'
-            mend = f'say when it counts, such as on each drive: {whenever}, or write "finally" for the end'
+            mend = 'begin with when it counts, as in: not tr.Last(goto(".*")) or ..., or write "finally"'
             raise file.wrong(f"{sentence}; {mend}", *at, "always")
         return Rule(self.name, self.says, formula, when, self.refuse, self.any_)
+
+    @property
+    def _texts(self) -> dict[WhenJudged, str]:
+        """The formulas, of which there should be one."""
+        texts: dict[WhenJudged, str | None] = {"always": self.always, "leaving": self.leaving}
+        texts["finally"] = self.finally_
+        return {when: text for when, text in texts.items() if text is not None}
 
     def with_single_names(
         self, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Sets
     ) -> Iterator[Rule]:
         """Yield the rule with each name of a set alone, so that a misspelled one is noticed."""
-        text = self.always or self.leaving or self.finally_ or ""
+        (text,) = self._texts.values()
         for used in {tag[1] for tag in SET_TAG.finditer(text)} & {*sets}:
             yield from (self.rule(file, at, skills, {**sets, used: [name]}) for name in sets[used])
 
@@ -170,8 +167,3 @@ def _regexes(element: EventPattern) -> Iterator[str]:
     yield from (pattern for text in texts if text is not None for pattern in patterns(text))
     if element.place is not None:
         yield element.place
-
-
-def _bracketed(formula: Formula) -> str:
-    text = str(formula)
-    return f"({text})" if " and " in text or " or " in text else text

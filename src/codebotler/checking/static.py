@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from codebotler.checking.problems import Problem, no_room
 from codebotler.checking.room_names import fixed_drives, lists_rooms, named_rooms
@@ -30,22 +30,14 @@ ENDING_NODES = (ast.Return, ast.Raise, ast.Continue, ast.Break)
 EXAMPLE_PROGRAM = "def task_program():\n    if is_in_rom('mug'):\n        say('a mug')\n"
 
 
-@dataclass(frozen=True)
-class TextFindings:
-    """The definite errors in a program, found without running it."""
-
-    compiles: bool
-    problems: tuple[Problem, ...]
-
-
-def read_program(program: str, room_map: RoomMap, skills: SkillTable) -> TextFindings:
-    """Find the definite errors in a program, one problem per line. Slow parsing is a problem, too."""
+def read_program(program: str, room_map: RoomMap, skills: SkillTable) -> tuple[bool, tuple[Problem, ...]]:
+    """Return whether a program compiles, and its definite errors, one per line. Slow parsing is one, too."""
     try:
         compiles, problems = _findings(program, room_map, _without_functions(skills))
     except IsolatedCallError as error:
         message = f"the program cannot be read: {error.message}"
-        return TextFindings(compiles=False, problems=(Problem(error.kind, message),))
-    return TextFindings(compiles, tuple(Problem(*each) for each in problems))
+        return False, (Problem(error.kind, message),)
+    return compiles, tuple(Problem(*each) for each in problems)
 
 
 def read_rooms(program: str, skills: SkillTable) -> tuple[tuple[str, ...], bool]:
