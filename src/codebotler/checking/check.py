@@ -3,35 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 from codebotler.checking.problems import CheckResult, Sample
 from codebotler.checking.proof import extend_check
-from codebotler.checking.rooms import add_visited_rooms, room_map_for
+from codebotler.checking.rooms import room_map_for
 from codebotler.checking.sampled import (
     DEFAULT_SAMPLES,
     WORLDS_AT_ONCE,
     CheckSettings,
-    RunInWorlds,
     SampledRuns,
     first_samplers,
     group_failures,
     run_in_sampled_worlds,
-    run_samples,
     run_together,
 )
 from codebotler.checking.static import read_program
 from codebotler.core.errors import expect_list
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
 from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.sampled_robot import AS_WRITTEN
 from codebotler.simulator.worker import Worker
-
-MAX_WIDENINGS = 3  # rounds that add rooms which the program visits but its source does not name
 
 
 def check(
@@ -92,12 +86,18 @@ def check_on(
     program: str,
     room_map: RoomMap | None = None,
     settings: CheckSettings | None = None,
+    known: Sequence[Sample] = (),
 ) -> CheckResult:
-    """Check one program on a worker that no other thread uses."""
+    """Check one program on a worker that no other thread uses. `known` are its runs so far, if any."""
     how = settings or CheckSettings()
     room_map = room_map or room_map_for(program, skills=how.skills)
     with worker.one_child():
-        return _run_check(program, room_map, how, partial(run_samples, worker, program, settings=how))
+        compiles, flaws = read_program(program, room_map, how.skills)
+        ran = run_in_sampled_worlds(worker, program, room_map, how, known) if compiles else []
+    blamed = {problem.line for problem in flaws}
+    failures = (problem for problem in group_failures(ran, room_map) if problem.line not in blamed)
+    problems = sorted((*flaws, *failures), key=lambda problem: problem.line or 0)
+    return CheckResult(tuple(problems), tuple(ran), room_map, how.seed, how.strict)
 
 
 def check_together(
@@ -106,35 +106,7 @@ def check_together(
     """Check several programs on one worker, where their first runs may share a process."""
     samplers = first_samplers(settings)[:WORLDS_AT_ONCE]
     runs = [SampledRuns(program, room_map, samplers, settings) for program, room_map in programs]
-    found = []
-    for one, first in zip(runs, run_together(worker, runs), strict=True):
-        with worker.one_child():
-            found.append(_run_check(one.program, one.room_map, settings, _runner_after(worker, one, first)))
-    return found
-
-
-def _runner_after(worker: Worker, runs: SampledRuns, first: list[Sample]) -> RunInWorlds:
-    """Return a function that runs a program on a worker and reuses its first runs."""
-
-    def run(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
-        if room_map == runs.room_map and samplers == runs.samplers:
-            return first
-        return run_samples(worker, runs.program, room_map, samplers, runs.settings)
-
-    return run
-
-
-def _run_check(program: str, room_map: RoomMap, settings: CheckSettings, run: RunInWorlds) -> CheckResult:
-    compiles, flaws = read_program(program, room_map, settings.skills)
-    if not compiles:
-        return CheckResult(flaws, (), room_map, settings.seed, settings.strict)
-    ran = run_in_sampled_worlds(run, room_map, settings)
-    for _ in range(MAX_WIDENINGS if room_map.guessed else 0):
-        wider = add_visited_rooms(room_map, ran)
-        if wider == room_map:
-            break
-        room_map, ran = wider, run_in_sampled_worlds(run, wider, settings)
-    blamed = {problem.line for problem in flaws}
-    failures = (problem for problem in group_failures(ran, room_map) if problem.line not in blamed)
-    problems = sorted((*flaws, *failures), key=lambda problem: problem.line or 0)
-    return CheckResult(tuple(problems), tuple(ran), room_map, settings.seed, settings.strict)
+    return [
+        check_on(worker, one.program, one.room_map, settings, first)
+        for one, first in zip(runs, run_together(worker, runs), strict=True)
+    ]

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
-from codebotler.checking.problems import Sample
-from codebotler.checking.room_names import MAX_NAMED_ROOMS
 from codebotler.checking.static import read_rooms
 from codebotler.core.errors import UserError
 from codebotler.core.labels import check_label
-from codebotler.core.skills.kinds import GOTO
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.simulator.room_map import RoomMap
@@ -54,12 +50,3 @@ def room_map_for(
     if len(named) < len(PLACEHOLDER_ROOMS) and lists_all:
         named += [room for room in PLACEHOLDER_ROOMS if room not in named]
     return RoomMap((*named, start), start, guessed=True)
-
-
-def add_visited_rooms(room_map: RoomMap, ran: Iterable[Sample]) -> RoomMap:
-    """Add the rooms that the program visited although its source does not name them."""
-    requests = (event.text for sample in ran for event in sample.outcome.trace if event.kind == GOTO)
-    driven = (room_map.room(request) for request in requests)
-    found = dict.fromkeys([*room_map.rooms, *(room for room in driven if room is not None)])
-    rooms = [room for room in found if room != room_map.start][:MAX_NAMED_ROOMS]
-    return replace(room_map, rooms=(*rooms, room_map.start))

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeAlias
 
 from codebotler.checking.problems import Problem, Sample, no_room
 from codebotler.core.errors import VIOLATION, UserError
@@ -111,17 +110,15 @@ def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
     return outcome.status is Status.TIMEOUT
 
 
-RunInWorlds: TypeAlias = Callable[[RoomMap, Sequence[FactSampler]], Iterable[Sample]]
-"""Runs a program in several worlds, but may skip worlds that would repeat a run."""
-
-
-def run_in_sampled_worlds(run: RunInWorlds, room_map: RoomMap, settings: CheckSettings) -> list[Sample]:
+def run_in_sampled_worlds(
+    worker: Worker, program: str, room_map: RoomMap, settings: CheckSettings, known: Sequence[Sample] = ()
+) -> list[Sample]:
     """Run a program in the first worlds, then in further ones until both values of each fact have been tried.
 
     Further worlds are also added as long as every run waits or searches without success. Worlds that would
-    repeat a run share its result. `run` is called with at most `WORLDS_AT_ONCE` worlds at a time.
+    repeat a run, or one of the `known` runs, share its result.
     """
-    known: list[Sample] = []
+    runs = [*known]  # which differ
     ran: list[Sample] = []
     drew: list[FactSampler] = []  # the samplers of these worlds
 
@@ -129,11 +126,10 @@ def run_in_sampled_worlds(run: RunInWorlds, room_map: RoomMap, settings: CheckSe
         drew.extend(samplers)
         for start in range(0, len(samplers), WORLDS_AT_ONCE):
             these = samplers[start : start + WORLDS_AT_ONCE]
-            known.extend(
-                run(room_map, [s for s in these if not any(one.would_repeat_in(s) for one in known)])
-            )
+            new = [s for s in these if not any(one.would_repeat_in(s) for one in runs)]
+            runs.extend(run_samples(worker, program, room_map, new, settings))
             for sampler in these:
-                same = next(one for one in known if one.would_repeat_in(sampler))
+                same = next(one for one in runs if one.would_repeat_in(sampler))
                 ran.append(replace(same, number=len(ran), is_chosen=bool(sampler.forced)))
 
     first = FactSampler(settings.seed, 0, settings.strict)

@@ -300,7 +300,7 @@ def test_rooms_are_guessed_from_the_program(checks: Checks) -> None:
     found = checks("go_to('lab')", "for n in (1, 2):", "    go_to(f'office {n}')", rooms=None)
     assert found.problems == ()
     assert found.rooms_are_guessed
-    assert found.rooms == ("lab", "office 1", "office 2", "start_loc")
+    assert found.rooms == ("lab", "start_loc"), "a room that the program computes exists, but is not listed"
     assert not checks("say('a')").rooms_are_guessed
 
 
