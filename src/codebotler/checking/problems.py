@@ -11,7 +11,7 @@ from codebotler.checking.contract_file import contract_data
 from codebotler.core.errors import VIOLATION
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.trace import Outcome, outcome_data
+from codebotler.core.trace import Outcome, Trace, outcome_data
 from codebotler.core.words import brief, counted, listed
 from codebotler.simulator.contract import Contract
 from codebotler.simulator.fact_sampler import Draw, FactSampler
@@ -98,6 +98,7 @@ class Sample:
     draws: tuple[Draw, ...] = field(default=(), repr=False)  # the draws that decided the facts, in order
     in_vain: bool = False  # whether it waited or searched without success, so that its end says little
     is_chosen: bool = False  # whether the world was chosen to try a fact that no random world had
+    repeated: Trace = ()  # the steps that a mission which the program continues has done already
 
     def would_repeat_in(self, sampler: FactSampler) -> bool:
         """Whether a run in another world would discover the same facts, and therefore be identical."""
@@ -126,7 +127,6 @@ class CheckResult:
         strict: whether all facts were random.
         proofs: what is proved of each house rule; empty unless all worlds were explored.
         contract: what the program may do at most; None unless all worlds were explored.
-        remaining: what the program of the mission that it continues would still do, if that is known.
     """
 
     problems: tuple[Problem, ...]
@@ -136,7 +136,6 @@ class CheckResult:
     strict: bool = False
     proofs: tuple[RuleProof, ...] = ()
     contract: Contract | None = None
-    remaining: tuple[Outcome, ...] = ()
 
     def __repr__(self) -> str:
         return (

@@ -46,11 +46,13 @@ def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = 
         begun: the program of that mission.
         remaining: what that program would still do, in several worlds; none if that is unknown.
     """
-    past, problems = found.room_map.past, list(found.problems)
+    past, problems, samples = found.room_map.past, list(found.problems), []
     if remaining and all(one.status is Status.TIMEOUT for one in remaining):
         problems = [problem for problem in problems if problem.kind != "TimeoutError"]
     for sample in found.samples:
-        for event in repeated_steps(sample.outcome.trace, found.room_map, remaining):
+        repeated = (*repeated_steps(sample.outcome.trace, found.room_map, remaining),)
+        samples.append(replace(sample, repeated=repeated))
+        for event in repeated:
             again = f'{phrase(event, "base")} in "{brief(event.place)}"'
             message = f"the robot has done this already and would do it again: {again}"
             if all(problem.message != message for problem in problems):
@@ -61,7 +63,7 @@ def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = 
     if held and puts_down and finished and all(map(_keeps, finished)):
         message = f'at the end, the robot still holds "{brief(held)}", which the first program puts down'
         problems.append(Problem("KeepsThing", message, samples=tuple(one.number for one in finished)))
-    return replace(found, problems=tuple(problems), remaining=tuple(remaining))
+    return replace(found, problems=tuple(problems), samples=tuple(samples))
 
 
 def repeated_steps(trace: Trace, room_map: RoomMap, remaining: Sequence[Outcome] = ()) -> Iterator[Event]:

@@ -9,7 +9,6 @@ from typing import Any
 from nicegui import ui
 
 from codebotler.checking.problems import CheckResult, Sample
-from codebotler.checking.repetition import repeated_steps
 from codebotler.checking.storyboard import event_from_step, select_steps, steps_of
 from codebotler.core.phrases import NO_ANSWER, is_question, is_spoken, phrase
 from codebotler.core.skills.kinds import CHECK, GOTO
@@ -184,11 +183,9 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
     else:
         ending = "Done."
     world = shortened(f"If {sample.world}", _MAX_WORLD_TEXT) if sample.facts else ""
-    trace = sample.outcome.trace
-    repeated = [*repeated_steps(trace, check.room_map, check.remaining)]
-    steps = steps_of(trace, has_places=True)
-    for step, event in zip(steps, trace, strict=True):
-        step["is_repeated"] = event in repeated
+    steps = steps_of(sample.outcome.trace, has_places=True)
+    for step, event in zip(steps, sample.outcome.trace, strict=True):
+        step["is_repeated"] = event in sample.repeated
     needed = [step["step"] for step in steps if step["is_repeated"]]
     shown = scenes(steps, check.room_map.start, needed)
     return Strip(world, shown, ending, error is None or sample.in_vain)
