@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from codebotler.checking.problems import closest_room
-from codebotler.core.errors import UserError
 from codebotler.core.skills.declaration import by_event
 from codebotler.rtl import Regex
 from codebotler.rtl.reasoning import samples
@@ -13,21 +12,6 @@ from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.matching import is_in_request
-
-
-def expect_rooms(rules: Sequence[Rule], rooms: Sequence[str]) -> None:
-    """Raise UserError if a rule names a room that the house does not have, unless it allows any room.
-
-    Args:
-        rules: the rules.
-        rooms: all rooms of the house; if this is empty, all rules pass.
-
-    Raises:
-        UserError: a rule names an unknown room.
-    """
-    for rule in rules:
-        for sentence in unknown_rooms_in(rule, rooms):
-            raise UserError(sentence)
 
 
 def unknown_rooms_in(rule: Rule, rooms: Sequence[str]) -> Iterator[str]:

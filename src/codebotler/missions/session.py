@@ -17,7 +17,7 @@ from pathlib import Path
 from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
 from codebotler.checking.evasions import find_evasions
 from codebotler.checking.problems import CheckResult
-from codebotler.checking.rule_rooms import expect_rooms
+from codebotler.checking.rule_rooms import unknown_rooms_in
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.core.world import World
@@ -249,7 +249,8 @@ class MissionSession(SharedView):
         self._show(room_map=limit_rooms(room_map, self._add_remark))
         rules, rooms = self._view.rules, () if room_map is None else room_map.goals
         regexes = () if room_map is None or room_map.plain else rooms
-        expect_rooms(rules, rooms)
+        for sentence in (one for rule in rules for one in unknown_rooms_in(rule, rooms)):
+            raise UserError(sentence)
         expect_poses(rules, self._robot, room_map)
         for sentence in find_evasions(rules, regexes, self._robot.skills):
             self._add_remark(sentence)
