@@ -198,13 +198,6 @@ def _add_changes(api: APIRouter, console: Console) -> None:
         session.approve(approval.program, despite_problems=approval.despite_problems)
         return view_data(session.view)
 
-    @api.post("/missions/{mission}/stop", status_code=202)
-    async def stop_mission(mission: str) -> dict[str, Any]:
-        """Stop the current mission. `state` shows when it has stopped."""
-        _current_session(console, mission)
-        console.stop(BY_PAGE)
-        return view_data(console.view)
-
     @api.post("/stop", status_code=202)
     async def stop(
         *, only_moving: Annotated[bool, Query(description="Stop only if a program is running.")] = False
