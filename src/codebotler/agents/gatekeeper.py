@@ -64,12 +64,8 @@ class Gatekeeper:
     def propose(self, order: MissionOrder, steps: Steps | None = None) -> MissionSession:
         """Begin a mission that waits for approval. Raise MissionError if the console is busy with another."""
         before = self.console.session
-        is_open = before is not None and not before.view.is_over
-        if (
-            before is not None
-            and is_open
-            and (before is not self._session or before.view.is_changed_by_person)
-        ):
+        is_own = before is self._session and not self.console.view.is_changed_by_person
+        if not (is_own or self.console.view.is_over):
             raise MissionError("a person is working on a mission of their own; wait until it is over")
         if len(order.program) > MAX_PROGRAM_LENGTH:  # it would have no contract
             raise UserError(f"the program has more than {MAX_PROGRAM_LENGTH:,} characters; shorten it")
