@@ -74,18 +74,12 @@ class RuleProof:
     @property
     def words(self) -> str:
         """The proof in words, without the rule."""
+        if self.sample is not None:
+            return f"can be broken, as in imagined world {self.sample}"
         worlds = counted(self.cases, "world")
         if self.verdict == "never":
             return f"cannot be broken, whatever the program meets ({worlds})"
-        if self.verdict == "possible":
-            return "can be broken"
         return f"was kept in {worlds}, but others are possible"
-
-    @property
-    def sentence(self) -> str:
-        """The proof in words."""
-        world = "" if self.sample is None else f", as in imagined world {self.sample}"
-        return f'the rule "{self.rule}" {self.words}{world}'
 
 
 @dataclass(frozen=True)

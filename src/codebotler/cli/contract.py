@@ -43,4 +43,4 @@ def proof_lines(found: CheckResult) -> Iterator[Text]:
     """Show what is proved of each house rule."""
     styles = {"never": "green", "possible": "red", "unknown": "yellow"}
     for proof in found.proofs:
-        yield Text(shortened(proof.sentence), styles[proof.verdict])
+        yield Text(f'the rule "{proof.rule}" {proof.words}', styles[proof.verdict])
