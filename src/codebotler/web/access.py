@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from codebotler.core.errors import UserError
-from codebotler.web.proxy import OuterAddress, addresses_by_host
+from codebotler.web.proxy import OuterAddress
 
 MAX_WRONG_TOKENS, WRONG_TOKEN_SECONDS = 10, 60.0
 """The number of invalid tokens accepted from one address per period, and the period in seconds."""
@@ -123,17 +123,6 @@ def _cookie_value(token: str) -> str:
 
 
 @dataclass(frozen=True)
-class GuardRules:
-    """The guard's settings."""
-
-    access: Access
-    hosts: frozenset[str] = LOCAL_HOST_NAMES  # accepted host names, without ports
-    any_address: bool = False  # whether to accept any IP address as a host, too
-    cookie: str = "codebotler"  # the name of the cookie, different for each port
-    proxies: Mapping[str, OuterAddress] = field(default_factory=dict)  # by Host header
-
-
-@dataclass(frozen=True)
 class PageAddress:
     """The address at which to serve the page."""
 
@@ -185,9 +174,8 @@ class PageAddress:
             raise
         return bound
 
-    def rules(self, access: Access, port: int) -> GuardRules:
-        """Return the guard's settings for this address."""
+    @property
+    def hosts(self) -> frozenset[str]:
+        """The host names that requests may have, without ports."""
         named = {name.lower() for name in (self.host, *self.names)} | {one.name for one in self.proxies}
-        hosts = LOCAL_HOST_NAMES | named | (set() if self.is_loopback else {socket.gethostname().lower()})
-        cookie, proxies = f"codebotler-{port}", addresses_by_host(self.proxies)
-        return GuardRules(access, frozenset(hosts), not self.is_loopback, cookie, proxies)
+        return LOCAL_HOST_NAMES | named | (set() if self.is_loopback else {socket.gethostname().lower()})

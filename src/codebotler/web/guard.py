@@ -17,8 +17,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
 from codebotler.core.terminal import note
-from codebotler.web.access import AGENT_PATH, GuardRules, Role, TooManyTriesError
-from codebotler.web.proxy import OuterAddress, path_of, prefix_of
+from codebotler.web.access import AGENT_PATH, Access, PageAddress, Role, TooManyTriesError
+from codebotler.web.proxy import OuterAddress, addresses_by_host, path_of, prefix_of
 
 MAX_BODY_BYTES = 2_000_000
 """The maximum size of a request body."""
@@ -83,8 +83,12 @@ class RefusedError(Exception):
 class Guard:
     """ASGI middleware that accepts or refuses requests."""
 
-    def __init__(self, app: ASGIApp, rules: GuardRules, has_page: Callable[[str], bool]) -> None:
-        self._app, self._rules, self._has_page = app, rules, has_page
+    def __init__(
+        self, app: ASGIApp, access: Access, place: PageAddress, port: int, has_page: Callable[[str], bool]
+    ) -> None:
+        self._app, self._access, self._has_page = app, access, has_page
+        self._hosts, self._takes_addresses = place.hosts, not place.is_loopback
+        self._proxies, self._cookie = addresses_by_host(place.proxies), f"codebotler-{port}"
         self._has_noted = False
         self._agent_requests = 0  # that are being answered
 
@@ -94,7 +98,7 @@ class Guard:
             await self._app(scope, receive, send)
             return
         is_http = scope["type"] == "http"
-        proxy = self._rules.proxies.get(_named_host(scope))
+        proxy = self._proxies.get(_named_host(scope))
         if proxy is not None:
             scope = proxy.seen_from_outside(scope)
         request = HTTPConnection(scope)
@@ -137,7 +141,7 @@ class Guard:
     def _check_host(self, request: HTTPConnection) -> None:
         """Refuse unknown host names, which a foreign page could use to reach us (DNS rebinding)."""
         name = _host(request)
-        if name not in self._rules.hosts and not (self._rules.any_address and _is_address(name)):
+        if name not in self._hosts and not (self._takes_addresses and _is_address(name)):
             raise RefusedError(
                 HTTPStatus.MISDIRECTED_REQUEST,
                 "unknown host name; open the printed link, or add the name with --name or --behind-proxy",
@@ -162,19 +166,18 @@ class Guard:
             raise RefusedError(HTTPStatus.FORBIDDEN, _OTHER_SITE)
 
     def _role(self, request: HTTPConnection) -> Role | None:
-        access = self._rules.access
         kind, _, given = request.headers.get("authorization", "").partition(" ")
         if kind.lower() == "bearer" and given:
             role = self._of_token(given.strip(), request)
             if role is None:
                 raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG)
             return role
-        role = access.of_cookie(request.cookies.get(self._rules.cookie, ""))
-        return Role.OPERATOR if role is None and access.operator is None else role
+        role = self._access.of_cookie(request.cookies.get(self._cookie, ""))
+        return Role.OPERATOR if role is None and self._access.operator is None else role
 
     def _of_token(self, token: str, request: HTTPConnection) -> Role | None:
         try:
-            return self._rules.access.of_token(token, request.client.host if request.client else "")
+            return self._access.of_token(token, request.client.host if request.client else "")
         except TooManyTriesError:
             raise RefusedError(
                 HTTPStatus.TOO_MANY_REQUESTS, "too many wrong tokens came from your address; wait a minute"
@@ -183,7 +186,7 @@ class Guard:
     def _let_in(self, token: str, request: HTTPConnection) -> Response:
         """Exchange the token in a link for a cookie, to keep the token out of the browser's history."""
         role = self._of_token(token, request)
-        if (role is None and self._rules.access.operator is not None) or role is Role.AGENT:
+        if (role is None and self._access.operator is not None) or role is Role.AGENT:
             raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG)
         path = "/" + path_of(request.scope).strip("/")  # a double slash would start a host name
         if _CONTROL_CHARACTERS.search(path):
@@ -198,10 +201,10 @@ class Guard:
         )
         answer.headers["location"] = where
         if role is not None:
-            value = self._rules.access.cookie(role)
+            value = self._access.cookie(role)
             is_secure = request.scope["scheme"] == "https"
             answer.set_cookie(
-                self._rules.cookie,
+                self._cookie,
                 value,
                 path=prefix or "/",
                 secure=is_secure,

@@ -82,7 +82,7 @@ def serve(
         app: ASGIApp = pages
         if console and alone_for is not None:
             app = Presence(app, alone_for, partial(console.stop, BY_LEAVING, only_moving=True))
-        guard = Guard(app, place.rules(access, port), partial(_has_page, pages))
+        guard = Guard(app, access, place, port, partial(_has_page, pages))
         settings = uvicorn.Config(
             guard,
             log_config=None,  # its messages go to our own log

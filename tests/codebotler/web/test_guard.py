@@ -18,11 +18,9 @@ from websockets.sync.client import connect
 
 from codebotler.core.errors import UserError
 from codebotler.web.access import (
-    LOCAL_HOST_NAMES,
     MAX_WRONG_TOKENS,
     WRONG_TOKEN_SECONDS,
     Access,
-    GuardRules,
     PageAddress,
     Role,
     TooManyTriesError,
@@ -83,6 +81,7 @@ def test_the_link_opens_the_page_and_leaves_no_token_in_it(server: PageServer) -
     answer = server.ask("GET", f"/missions?a=b&token={server.token}")
     assert (answer.status, answer.headers["location"]) == (303, "/missions?a=b")
     cookie = answer.headers["set-cookie"]
+    assert cookie.startswith(f"codebotler-{server.port}="), "pages of one machine share its cookies"
     assert server.token not in cookie
     assert {"httponly", "samesite=strict", "path=/"} <= {part.strip().lower() for part in cookie.split(";")}
     assert server.ask("GET", "/", cookie=cookie.partition(";")[0]).status == 200
@@ -438,7 +437,7 @@ def test_no_more_of_a_body_is_passed_on_than_is_taken() -> None:
     scope = {"type": "http", "method": "POST", "path": "/api/check", "query_string": b"", "scheme": "http"}
     scope["headers"] = headers
     asyncio.run(
-        Guard(behind, GuardRules(Access("an operator's", "a face's")), set().__contains__)(
+        Guard(behind, Access("an operator's", "a face's"), PageAddress(), 0, set().__contains__)(
             scope, receive, send
         )
     )
@@ -479,8 +478,8 @@ def test_agents_leave_room_for_people(monkeypatch: pytest.MonkeyPatch) -> None:
             if message["type"] == "http.response.start":
                 statuses.append(message["status"])
 
-        rules = GuardRules(Access("an operator's", "a face's", agent="an agent's"))
-        guard = Guard(behind, rules, set().__contains__)
+        access = Access("an operator's", "a face's", agent="an agent's")
+        guard = Guard(behind, access, PageAddress(), 0, set().__contains__)
 
         async def ask(path: str, token: str, length: int = 0) -> None:
             headers = [(b"host", b"localhost"), (b"authorization", f"Bearer {token}".encode())]
@@ -522,8 +521,8 @@ def passed(path: str, token: str, hosts: Sequence[str] = ("localhost",)) -> int:
     headers = [*named, (b"authorization", f"Bearer {token}".encode())]
     scope = {"type": "http", "method": "POST", "path": path, "query_string": b"", "scheme": "http"}
     scope["headers"] = headers
-    rules = GuardRules(Access("an operator's", "a face's"), LOCAL_HOST_NAMES | {"robot.local"})
-    guard = Guard(behind, rules, set().__contains__)
+    place = PageAddress(names=("robot.local",))
+    guard = Guard(behind, Access("an operator's", "a face's"), place, 0, set().__contains__)
     asyncio.run(guard(scope, receive, send))
     return int(sent[0]["status"])
 
@@ -542,11 +541,9 @@ def test_a_face_cannot_run_programs(path: str) -> None:
 
 
 def test_names_by_which_the_page_may_be_called() -> None:
-    here = PageAddress().rules(Access(), 1)
-    assert (here.any_address, "localhost" in here.hosts) == (False, True)
-    everywhere = PageAddress("0.0.0.0", names=("Robot.Local",)).rules(Access(), 2)
-    assert (everywhere.any_address, "robot.local" in everywhere.hosts) == (True, True)
-    assert here.cookie != everywhere.cookie
+    here, everywhere = PageAddress(), PageAddress("0.0.0.0", names=("Robot.Local",))
+    assert (here.is_loopback, "localhost" in here.hosts) == (True, True)
+    assert (everywhere.is_loopback, "robot.local" in everywhere.hosts) == (False, True)
 
 
 def test_the_default_port_moves_on_and_a_port_that_was_named_does_not(

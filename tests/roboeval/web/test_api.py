@@ -18,7 +18,7 @@ import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from codebotler.core.files import to_line
-from codebotler.web.access import Access, GuardRules
+from codebotler.web.access import Access, PageAddress
 from codebotler.web.guard import Guard
 from command_line import refused, roboeval
 from made_up_runs import made_up
@@ -302,7 +302,7 @@ def test_a_face_cannot_see_runs(path: str) -> None:
             "headers": headers,
         }
         asyncio.run(
-            Guard(behind, GuardRules(Access("an operator's", "a face's")), set().__contains__)(
+            Guard(behind, Access("an operator's", "a face's"), PageAddress(), 0, set().__contains__)(
                 scope, receive, send
             )
         )
