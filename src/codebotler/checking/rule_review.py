@@ -24,7 +24,6 @@ from codebotler.rtl import (
     Regex,
     Scope,
     TextPattern,
-    Without,
 )
 from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
@@ -85,13 +84,9 @@ def _review(rule: Rule, world: World | None) -> Review:
 
 
 def _breaking_trace(rule: Rule, world: World | None) -> Trace | None:
-    """Return a shortest trace that breaks a rule, if possible at a step rather than at the end."""
-    for parts in (_judged_each_step(rule, world), [*_conjuncts(rule.formula)]):
-        traces = [_trace([Not(part)], [], world) for part in parts]
-        found = [trace for trace in traces if trace is not None]
-        if found:
-            return min(found, key=len)
-    return None
+    """Return a shortest trace that breaks a rule."""
+    traces = [_trace([Not(part)], [], world) for part in _conjuncts(rule.formula)]
+    return min((trace for trace in traces if trace is not None), key=len, default=None)
 
 
 def _breaking_traces(rule: Rule, shortest: Trace, world: World | None) -> Iterator[Trace]:
@@ -124,12 +119,11 @@ def _is_by_result(rule: Rule, breaks: Trace) -> bool:
 
 def _keeping_trace(rule: Rule, world: World | None) -> Trace | None:
     spoken_of = [*dict.fromkeys(elements(rule.formula))]
+    if rule.when == "leaving":
+        spoken_of.reverse()  # such formulas name what must be undone last
     less = [replace(one, place=None) for one in spoken_of] + [replace(one, holding=None) for one in spoken_of]
     kinds = [EventPattern(kind, Regex(".*")) for kind in dict.fromkeys(one.kind for one in spoken_of)]
     happenings: list[Formula] = [*map(Exists, dict.fromkeys([*spoken_of, *less, *kinds])), ANY_EVENT]
-    if rule.when == "leaving":
-        drives = Last(_drive_away(world))
-        happenings = [*(And((Exists(one), drives)) for one in reversed(spoken_of)), *happenings]
     for happens in happenings:
         trace = _trace([happens], [rule], world)
         if trace is not None:
@@ -138,30 +132,18 @@ def _keeping_trace(rule: Rule, world: World | None) -> Trace | None:
 
 
 def _trace(wanted: Sequence[Formula], kept: Sequence[Rule], world: World | None) -> Trace | None:
-    """Return a shortest trace on which formulas hold and rules are kept, or None if there is none."""
-    at_end = [rule.formula for rule in kept if rule.when != "always"]
-    always = [part for rule in kept if rule.when != "finally" for part in _judged_each_step(rule, world)]
-    finally_ = [*chain.from_iterable(map(_conjuncts, at_end))]
+    """Return a shortest trace on which formulas hold and rules are kept, or None if there is none.
+
+    Of a rule for leaving a room, which is also judged at the end, only the end counts.
+    """
+    always = [part for rule in kept if rule.when == "always" for part in _conjuncts(rule.formula)]
+    finally_ = [part for rule in kept if rule.when != "always" for part in _conjuncts(rule.formula)]
     spoken_of = [*wanted, *always, *finally_]
     moves = None if world is None else {room: room for room in _rooms(spoken_of, world)}
     start = "" if world is None else world.robot
     possible = [*dict.fromkeys(chain.from_iterable(map(_holding_needs_a_pick, spoken_of)))]
     reasoner = Reasoner([*spoken_of, *possible], moves, start)
     return reasoner.trace([*wanted, *finally_], always=[*always, *possible], shortest=True)
-
-
-def _drive_away(world: World | None) -> EventPattern:
-    """Match drives, except those to the room where the robot starts."""
-    return EventPattern(GOTO, Regex(".*") if world is None else Without(world.robot))
-
-
-def _judged_each_step(rule: Rule, world: World | None) -> list[Formula]:
-    """Return the parts of the formula, for a `leaving` rule such that they fail right after a drive."""
-    parts = [*_conjuncts(rule.formula)]
-    if rule.when != "leaving":
-        return parts
-    drives = _drive_away(world)
-    return [Or((Not(Last(drives)), _before(drives, part))) for part in parts]
 
 
 def _conjuncts(formula: Formula) -> Iterator[Formula]:
@@ -173,16 +155,6 @@ def _conjuncts(formula: Formula) -> Iterator[Formula]:
             yield from chain.from_iterable(_conjuncts(Not(part)) for part in parts)
         case _:
             yield formula
-
-
-def _before(event: EventPattern, formula: Formula) -> Formula:
-    """Return a formula that holds if another one held before the last occurrence of an event."""
-    match formula:
-        case And(parts) | Or(parts):
-            return replace(formula, parts=tuple(_before(event, part) for part in parts))
-        case Not(part):
-            return Not(_before(event, part))
-    return replace(formula, scopes=(Scope("BeforeLast", event), *formula.scopes))
 
 
 def _rooms(formulas: Iterable[Formula], world: World) -> Iterator[str]:
