@@ -48,6 +48,16 @@ from codebotler.missions.wording import event_text
 from codebotler.prompts import clean_instruction
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS
 
+_Instruction = Annotated[
+    str, Field(max_length=MAX_ARGUMENT, description="What the robot should do, in plain words for people.")
+]
+_Program = Annotated[
+    str,
+    Field(
+        max_length=MAX_PROGRAM_CHARACTERS,
+        description="The whole program, which defines task_program(). If optional, a model writes it.",
+    ),
+]
 _Digest = Annotated[str, Field(description="The digest of the program, from propose_mission or begin_steps.")]
 _Key = Annotated[str, Field(description="The key `steps` from begin_steps.")]
 _After = Annotated[int, Field(ge=0, description="Leave out this many earlier events.")]
@@ -64,15 +74,7 @@ def read_robot(ctx: AgentContext) -> RobotReport:
     return gatekeeper_of(ctx).report_robot()
 
 
-async def check_program(
-    program: Annotated[
-        str,
-        Field(
-            max_length=MAX_PROGRAM_CHARACTERS, description="The whole program, which defines task_program()."
-        ),
-    ],
-    ctx: AgentContext,
-) -> CheckReport:
+async def check_program(program: _Program, ctx: AgentContext) -> CheckReport:
     """Check a program in imagined worlds without a robot: its problems, and what the robot would do.
 
     It changes nothing and needs no approval. Mend all problems before you propose the program.
@@ -82,12 +84,7 @@ async def check_program(
         return await gatekeeper.alone("check", partial(gatekeeper.check, program))
 
 
-async def write_program(
-    instruction: Annotated[
-        str, Field(max_length=MAX_ARGUMENT, description="What the robot should do, in plain words.")
-    ],
-    ctx: AgentContext,
-) -> CheckReport:
+async def write_program(instruction: _Instruction, ctx: AgentContext) -> CheckReport:
     """Have CodeBotler's own language model write a program, and check it. It runs nothing.
 
     You may also write the program yourself; read_robot explains how.
@@ -108,20 +105,11 @@ async def write_program(
 
 
 async def propose_mission(
-    ctx: AgentContext,
-    instruction: Annotated[
-        str, Field(max_length=MAX_ARGUMENT, description="What the robot should do, as people read it.")
-    ] = "",
-    program: Annotated[
-        str,
-        Field(
-            max_length=MAX_PROGRAM_CHARACTERS,
-            description="The program; if empty, CodeBotler's model writes it.",
-        ),
-    ] = "",
+    ctx: AgentContext, instruction: _Instruction = "", program: _Program = ""
 ) -> MissionReport:
     """Propose a mission, which checks the program and shows it to a person. The robot does not move.
 
+    Without a program, CodeBotler's model writes one, if a model is configured.
     The answer has the problems, storyboards, and a digest. You cannot approve it yourself. Call run_mission,
     which waits until a person has approved exactly this program.
     """
@@ -155,11 +143,12 @@ async def continue_mission(
     ctx: AgentContext,
     past: Annotated[MissionPast, Resolve(read_last_past)],
     answer: Annotated[ElicitationResult[StepWord | NotAsked], Resolve(ask_whether)],
-    program: Annotated[str, Field(description="The rest; if empty, CodeBotler's model writes it.")] = "",
+    program: _Program = "",
 ) -> MissionReport:
     """Propose the rest of the last mission, which failed or was stopped. The robot does not move.
 
-    `done_before` lists what the robot has done, which the rest must not repeat. Then call run_mission.
+    `done_before` lists what the robot has done, which the rest must not repeat. Without a program for the
+    rest, CodeBotler's model writes it. Then call run_mission.
     """
     gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors(), gatekeeper.waiting():
