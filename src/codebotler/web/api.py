@@ -276,34 +276,23 @@ async def _stream(console: Console, session: MissionSession, known: int) -> Asyn
 
 def view_data(view: SessionView) -> dict[str, Any]:
     """Return a view as plain data."""
-    return {
-        "id": view.id,
-        "state": view.state,
-        "phase": view.phase,
-        "busy": view.busy,
+    as_in_view = (
+        *("id", "state", "phase", "busy", "instruction", "model", "author", "digest", "is_written"),
+        *("problems", "unknown_rooms", "remarks", "reason", "line", "is_over"),
+    )
+    return {name: getattr(view, name) for name in as_in_view} | {
         "trouble": view.error,
-        "instruction": view.instruction,
-        "model": view.model,
-        "author": view.author,
         "past": None if view.past is None else {"mission": view.past.mission, "steps": view.past.steps},
         "program": view.arriving.code if view.is_written else view.program,
-        "digest": view.digest,
-        "is_written": view.is_written,
         "no_program": None if view.programless is None else asdict(view.programless),
         "question": None if view.question is None else asdict(view.question),
-        "problems": list(view.problems),
-        "unknown_rooms": list(view.unknown_rooms),
-        "remarks": list(view.remarks),
         "rules": [
             {"name": r.name, "says": r.says, "in_force": r.name not in view.disabled_rules}
             for r in view.rules
         ],
         "check": None if view.check is None else view.check.data(),
-        "reason": view.reason,
-        "line": view.line,
         "doing": view.progress.doing,
         "clock": view.progress.clock,
-        "is_over": view.is_over,
     }
 
 
