@@ -341,8 +341,8 @@ def test_missions_that_can_no_longer_be_kept_are_said_in_a_sentence(fresh: PageS
 def test_a_mission_of_before_can_be_read_and_no_longer_followed(server: PageServer) -> None:
     before = begun(server, HELLO)["id"]
     begun(server, HELLO)
-    for method, what in (("GET", "events"), ("POST", "stop")):
-        answer = server.call(method, f"/api/missions/{before}/{what}")
+    for method, what, body in (("GET", "events", None), ("POST", "again", {})):
+        answer = server.call(method, f"/api/missions/{before}/{what}", body)
         assert answer.status == 409
         assert before in answer.data["detail"]
         assert "only" in answer.data["detail"]
