@@ -27,7 +27,7 @@ NO_ARM = """class NoArm:
 def finish(server: PageServer, program: str) -> str:
     """Run a program to its end; the name of its mission."""
     server.run(program, despite_problems=True)
-    ended = server.call("GET", "/api/robot?once_over=true").data
+    ended = server.call("GET", "/api/robot?once=over").data
     assert ended["is_over"], ended
     return str(ended["mission"])
 

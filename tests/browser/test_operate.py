@@ -388,7 +388,7 @@ def test_a_stop_is_not_said_to_have_worked_before_it_has(server: PageServer, ope
     page = opened(server)
     run(page, FAR)
     answer = {"state": "stopping", "reason": "", "is_over": False}
-    page.route("**/api/robot?once_over=true", lambda route: route.fulfill(body=json.dumps(answer)))
+    page.route("**/api/robot?once=over", lambda route: route.fulfill(body=json.dumps(answer)))
     page.locator("#stop").click()
     expect(page.locator("#stop-told")).to_have_text("Stop sent. Waiting for the robot to confirm …")
     page.wait_for_timeout(500)

@@ -8,7 +8,7 @@ import json
 from collections.abc import AsyncIterator
 from dataclasses import asdict
 from http import HTTPStatus
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 from fastapi import APIRouter, Depends, Header, HTTPException, Query, Request
 from fastapi.exceptions import RequestValidationError
@@ -29,6 +29,12 @@ _CURRENT = "current"
 """The name of the current mission in a path."""
 
 _LimitedText = Annotated[str, Field(max_length=MAX_PROGRAM_CHARACTERS)]
+
+
+WhenToAnswer: TypeAlias = Annotated[
+    Literal["now", "begun", "over"],
+    Query(description="Wait until a mission has begun, or until it is over, at most 15 s."),
+]
 
 
 class _Form(BaseModel):
@@ -222,19 +228,9 @@ def _add_rest(api: APIRouter, console: Console) -> None:
         return console.check(new.program, console.view.room_map, console.rules).data()
 
     @api.get("/robot", tags=["robot"])
-    async def robot(
-        *,
-        once_over: Annotated[
-            bool, Query(description="Wait for the end of the mission, at most 15 s.")
-        ] = False,
-        once_begun: Annotated[
-            bool, Query(description="Wait for the beginning of a mission, at most 15 s.")
-        ] = False,
-    ) -> dict[str, Any]:
+    async def robot(once: WhenToAnswer = "now") -> dict[str, Any]:
         """Return the robot, its skills and the current mission."""
-        if once_begun:
-            await console.view_once(over=False)
-        view = await console.view_once(over=True) if once_over else console.view
+        view = console.view if once == "now" else await console.view_once(over=once == "over")
         return {
             "robot": console.robot.name,
             "skills": [skill.signature for skill in console.robot.skills.values()],

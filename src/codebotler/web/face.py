@@ -18,6 +18,7 @@ from codebotler.missions.mission import UNCONFIRMED_STOP
 from codebotler.robots.base import AnswerError
 from codebotler.robots.face import Face, FaceQuestion
 from codebotler.web.access import Role
+from codebotler.web.api import WhenToAnswer
 from codebotler.web.console import Console
 
 _FACE_PAGE = Path(__file__).with_name("static") / "face.html"
@@ -56,12 +57,10 @@ def router(console: Console, face: Face) -> APIRouter:
         return HTMLResponse(shown, headers=headers)
 
     @routes.get("/api/face")
-    async def show(*, once_over: bool = False, once_begun: bool = False) -> dict[str, Any]:
-        """Return what the robot does, says and asks. `once_over` waits for the end of the mission."""
-        if once_begun:
-            await console.view_once(over=False)
-        if once_over:
-            await console.view_once(over=True)
+    async def show(once: WhenToAnswer = "now") -> dict[str, Any]:
+        """Return what the robot does, says and asks."""
+        if once != "now":
+            await console.view_once(over=once == "over")
         return face_data(console, face)
 
     @routes.post("/api/face/answer")

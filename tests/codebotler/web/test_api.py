@@ -172,7 +172,7 @@ def test_a_stop_ends_the_mission_at_hand(server: PageServer) -> None:
     assert server.call("POST", "/api/missions", {"program": HELLO}).status == 409
     began = time.monotonic()
     assert server.call("POST", "/api/stop").status == 202
-    robot = server.call("GET", "/api/robot?once_over=true").data
+    robot = server.call("GET", "/api/robot?once=over").data
     assert (robot["is_over"], robot["state"]) == (True, "stopped")
     assert time.monotonic() - began < 2
     assert server.call("POST", "/api/stop").data == {"stopping": False}

@@ -117,7 +117,7 @@ def test_a_stop_takes_the_question_back_on_every_face(server: PageServer) -> Non
         server.run(TEA)
         number = until(server, lambda now: now["question"])["question"]["number"]
         server.call("POST", "/api/stop")
-        over = server.face("GET", "/api/face?once_over=true").data
+        over = server.face("GET", "/api/face?once=over").data
         assert (over["is_over"], over["state"]) == (True, "stopped")
         for socket in (one, other):
             assert ending(socket, number)["how"] == "withdrawn"

@@ -25,11 +25,11 @@
     output.className = kind;
   };
 
-  const ask = async (wait) => (await fetch(`${robotAt}?${wait}=true`)).json();
+  const ask = async (wait) => (await fetch(`${robotAt}?once=${wait}`)).json();
 
   const watch = async (which) => {
     for (;;) {
-      const now = await ask("once_over");
+      const now = await ask("over");
       if (which !== pressed) return;
       if (now.is_over) {
         const failed = now.reason ? `The mission failed: ${now.reason}` : "The mission failed.";
@@ -65,7 +65,7 @@
   const clearOnceBegun = async (which) => {
     try {
       while (which === pressed && showsOutcome) {
-        const now = await ask("once_begun");
+        const now = await ask("begun");
         if (which === pressed && showsOutcome && !now.is_over) say("");
       }
     } catch {
