@@ -29,6 +29,7 @@ from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.missions.wording import event_text
 from codebotler.models.base import ignore_text
 from codebotler.prompts import Prompt, prompt_for
+from codebotler.simulator.contract import Contract
 from codebotler.web.console import Console
 
 _Made = TypeVar("_Made")
@@ -127,29 +128,24 @@ class Gatekeeper:
         is_within = view.within is not None and view.contract is not None
         return is_agents and is_within and view.may_be_approved and not view.problems
 
-    def contract_text(self, view: SessionView) -> str:
+    def contract_text(self, contract: Contract | None) -> str:
         """Describe all that a program can do at most, or return "" if this is unknown."""
-        if view.contract is None:
+        if contract is None:
             return ""
         whole = partial(brief, most=MAX_PROGRAM_LENGTH)
-        return contract_sentence(view.contract, self.console.robot.skills, whole, is_short=False)
+        return contract_sentence(contract, self.console.robot.skills, whole, is_short=False)
 
     def may_ask_client(self, view: SessionView) -> bool:
         """Whether a client may ask its person to approve a program, which must fit into a dialog."""
-        is_short = max(len(view.program), len(self.contract_text(view))) <= MAX_ASKED_CHARACTERS
+        is_short = max(len(view.program), len(self.contract_text(view.contract))) <= MAX_ASKED_CHARACTERS
         return self.asks_client and view.can_run and is_short
 
     def check(self, program: str) -> CheckReport:
         """Check a program without a mission, in the rooms that are known now."""
-        room_map, rules = self.console.view.room_map, self.console.rules
-        checked = self.console.check(program, room_map, rules)
-        missing = tuple(missing_skills(program, self.console.robot))
-        view = SessionView(
-            program=program, check=checked, missing_skills=missing, room_map=room_map, rules=rules
-        )
-        report = report_check(view, self.contract_text(view))
-        assert report is not None, "it was checked"
-        return report
+        checked = self.console.check(program, self.console.view.room_map, self.console.rules)
+        problems = [problem.sentence for problem in checked.problems]
+        problems += missing_skills(program, self.console.robot)
+        return report_check(checked, program, problems, self.contract_text(checked.contract))
 
     @contextmanager
     def waiting(self) -> Iterator[None]:
@@ -199,12 +195,13 @@ class Gatekeeper:
         view = SessionView() if session is None else session.view
         events = [] if session is None else session.events()
         seen = min(len(events), after + MAX_REPORTED_EVENTS)
+        checked, contract = view.check, self.contract_text(view.contract)
         return MissionReport(
             mission=view.id,
             state=view.phase,
             reason=view.reason or view.error,
             digest=view.digest,
-            check=report_check(view, self.contract_text(view)),
+            check=report_check(checked, view.program, view.problems, contract) if checked else None,
             remarks=[*view.unknown_rooms, *view.remarks],
             events=[text for text in map(event_text, events[after:seen]) if text],
             event_count=seen,

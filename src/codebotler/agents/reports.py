@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from pydantic import BaseModel, Field, model_validator
 
 from codebotler.candidates.question import ClarifyingQuestion
+from codebotler.checking.problems import CheckResult
 from codebotler.core.terminal import shortened, visible_lines
 from codebotler.core.words import listed
 from codebotler.missions.view import SessionView
@@ -65,16 +67,14 @@ class SkillOutcome(_Report):
     error: str = Field(default="", description="Why the skill failed; empty if it succeeded.")
 
 
-def report_check(view: SessionView, contract: str) -> CheckReport | None:
-    """Return the result of a view's check, if any, with the storyboards that people see on the page."""
-    if view.check is None:
-        return None
+def report_check(check: CheckResult, program: str, problems: Sequence[str], contract: str) -> CheckReport:
+    """Return the result of a check, with the storyboards that people see on the page."""
     return CheckReport(
-        accepted=not view.problems,
-        problems=list(view.problems),
+        accepted=not problems,
+        problems=[*problems],
         contract=contract,
-        storyboards=[_board_text(strip) for strip in strips(view.check)],
-        program=view.program,
+        storyboards=[_board_text(strip) for strip in strips(check)],
+        program=program,
     )
 
 

@@ -8,8 +8,8 @@ import logging
 import os
 import signal
 import stat
-from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager, suppress
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
 from dataclasses import asdict
 from functools import partial
 from io import BufferedWriter, FileIO, TextIOWrapper
@@ -87,23 +87,28 @@ def make_server(gatekeeper: Gatekeeper) -> MCPServer[Gatekeeper]:
 def _add_resources(server: MCPServer[Gatekeeper], gatekeeper: Gatekeeper) -> None:
     home = gatekeeper.console.home
 
+    async def read(work: Callable[[], str]) -> str:
+        try:
+            return await gatekeeper.alone(READING_PAST, work)
+        except UserError as error:
+            raise ResourceNotFoundError(error.sentence) from None
+        except MissionError as error:
+            raise ResourceError(error.sentence) from None
+
     @server.resource("codebotler://missions", mime_type="application/json")
     async def missions() -> str:
         """List the last missions, oldest first, without their programs."""
-        with _as_resource_errors():
-            return await gatekeeper.alone(READING_PAST, partial(_list_missions, home))
+        return await read(partial(_list_missions, home))
 
     @server.resource("codebotler://missions/{mission}", mime_type="application/json")
     async def mission(mission: str) -> str:
         """Read a mission: its program, its state and the reason."""
-        with _as_resource_errors():
-            return await gatekeeper.alone(READING_PAST, partial(_read_file, home, mission, SUMMARY_FILE))
+        return await read(partial(_read_file, home, mission, SUMMARY_FILE))
 
     @server.resource("codebotler://missions/{mission}/log", mime_type="application/jsonl")
     async def log(mission: str) -> str:
         """Read the log of a mission, one event per line."""
-        with _as_resource_errors():
-            return await gatekeeper.alone(READING_PAST, partial(_read_file, home, mission, EVENTS_FILE))
+        return await read(partial(_read_file, home, mission, EVENTS_FILE))
 
 
 def _list_missions(home: Path) -> str:
@@ -120,16 +125,6 @@ def _list_missions(home: Path) -> str:
 
 def _read_file(home: Path, mission: str, name: str) -> str:
     return read_text(find_mission(home, mission) / name, limit=MAX_READ_BYTES)
-
-
-@contextmanager
-def _as_resource_errors() -> Iterator[None]:
-    try:
-        yield
-    except UserError as error:
-        raise ResourceNotFoundError(error.sentence) from None
-    except MissionError as error:
-        raise ResourceError(error.sentence) from None
 
 
 # --- transports
