@@ -151,28 +151,17 @@ class PageAddress:
             try:
                 return self._bind(port)
             except OSError as error:
-                if error.errno == errno.EADDRINUSE and port != ports[-1]:
-                    continue
-                raise UserError(
-                    f"port {port} is already in use; choose another --port"
-                    if error.errno == errno.EADDRINUSE
-                    else f"cannot listen on {self.host}, port {port}: {error.strerror}"
-                ) from None
-        raise AssertionError("there are ports")
+                if error.errno != errno.EADDRINUSE:
+                    why = str(error.strerror).partition(" (")[0]  # without the address once more
+                    raise UserError(f"cannot listen on {self.host}, port {port}: {why}") from None
+        raise UserError(f"port {ports[-1]} is already in use; choose another --port")
 
     def _bind(self, port: int) -> socket.socket:
-        family, kind, protocol, _, address = socket.getaddrinfo(
+        family, *_, address = socket.getaddrinfo(
             self.host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )[0]
-        bound = socket.socket(family, kind, protocol)
-        try:
-            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            bound.bind(address)
-            bound.listen(_LISTEN_BACKLOG)
-        except OSError:
-            bound.close()
-            raise
-        return bound
+        both = family is socket.AF_INET6 and socket.has_dualstack_ipv6()  # `::` also means IPv4
+        return socket.create_server(address, family=family, backlog=_LISTEN_BACKLOG, dualstack_ipv6=both)
 
     @property
     def hosts(self) -> frozenset[str]:
