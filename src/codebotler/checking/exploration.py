@@ -114,8 +114,8 @@ def explore(worker: Worker, program: str, room_map: RoomMap, settings: CheckSett
             for name in guard.violations:
                 violations.setdefault(name, FactSampler(settings.seed, strict=strict, forced=sample.draws))
             cases += 1
-        is_complete &= tree.is_complete
-        if not tree.has_assumed or not tree.is_complete:
+        is_complete = not tree.waiting
+        if not tree.has_assumed or not is_complete:
             break
     for guard in _failing_runs(worker, program, room_map, settings):
         is_steady &= calls.issuperset(guard.calls) and guard.violations <= violations.keys()
@@ -132,21 +132,16 @@ class _Tree:
 
     def __init__(self, worker: Worker, program: str, room_map: RoomMap, settings: CheckSettings) -> None:
         self._worker, self._program, self._room_map, self._settings = worker, program, room_map, settings
-        self._waiting: list[tuple[Draw, ...]] = [()]  # the facts with which the branches begin
+        self.waiting: list[tuple[Draw, ...]] = [()]  # the facts with which the branches still to run begin
         self._runs_left, self._lone_runs_left, self._calls_left = MAX_RUNS, MAX_LONE_RUNS, MAX_CALLS
         self.has_assumed = False  # whether a run took facts for granted
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether each branch was run to its end."""
-        return not self._waiting
 
     def runs(self) -> Iterator[tuple[Sample, ExploringGuard]]:
         """Run one branch after another, until the budget is spent."""
         with self._worker.one_child():
-            while self._waiting and min(self._runs_left, self._lone_runs_left, self._calls_left) > 0:
+            while self.waiting and min(self._runs_left, self._lone_runs_left, self._calls_left) > 0:
                 count = min(RUNS_AT_ONCE, self._runs_left)
-                some, self._waiting = self._waiting[-count:], self._waiting[:-count]
+                some, self.waiting = self.waiting[-count:], self.waiting[:-count]
                 yield from self._run_some(some)
 
     def _run_some(self, some: Sequence[tuple[Draw, ...]]) -> Iterator[tuple[Sample, ExploringGuard]]:
@@ -163,7 +158,7 @@ class _Tree:
             assert isinstance(robot.guard, ExploringGuard), "made for these runs"
             self.has_assumed |= robot.has_assumed
             self._calls_left -= len(robot.guard.calls)
-            self._waiting += _branches(forced, sample.draws)
+            self.waiting += _branches(forced, sample.draws)
             yield sample, robot.guard
 
 

@@ -55,8 +55,7 @@ def _findings(
     tree = parse_program(program, compiled=True)
     if isinstance(tree, Flaw):
         return False, [(tree.kind, tree.message, tree.line)]
-    found = static_problems(program, tree, room_map, skills)
-    return True, [(problem.kind, problem.message, problem.line) for problem in found]
+    return True, _definite_errors(program, tree, room_map, skills)
 
 
 @isolated(EXAMPLE_PROGRAM, SKILLS)
@@ -78,8 +77,10 @@ def _without_functions(skills: SkillTable) -> SkillTable:
     return SkillTable(tuple(one if SKILLS.get(one.name) is one else declared(one) for one in skills.rows))
 
 
-def static_problems(program: str, tree: ast.Module, room_map: RoomMap, skills: SkillTable) -> list[Problem]:
-    """Return the definite errors in a parsed program, one problem per line."""
+def _definite_errors(
+    program: str, tree: ast.Module, room_map: RoomMap, skills: SkillTable
+) -> list[tuple[str, str, int | None]]:
+    """Return the kind, message and line of the definite errors in a parsed program, one per line."""
     flaws = list(find_tree_flaws(tree, program, skills))
     try:
         if not room_map.guessed:
@@ -98,7 +99,7 @@ def static_problems(program: str, tree: ast.Module, room_map: RoomMap, skills: S
         if flaw.line not in never and not may_be_caught:
             by_line.setdefault(flaw.line, []).append(flaw)
     return [
-        Problem(same[0].kind, "; ".join(dict.fromkeys(flaw.message for flaw in same)), line)
+        (same[0].kind, "; ".join(dict.fromkeys(flaw.message for flaw in same)), line)
         for line, same in by_line.items()
     ]
 

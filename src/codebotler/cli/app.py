@@ -158,9 +158,10 @@ def rules(
 
     For each rule, it shows a short example that keeps the rule and one that breaks it.
     """
+    from codebotler.checking.evasions import find_evasions
     from codebotler.checking.rule_review import review_rules
     from codebotler.checking.rules import read_rules
-    from codebotler.cli.rules import note_evasions, review_data, review_view
+    from codebotler.cli.rules import review_data, review_view, rooms_of
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, note, print_json, print_rich
     from codebotler.core.world_file import read_world
@@ -168,7 +169,8 @@ def rules(
     table = skills_from(*(skills or ()))
     house_rules = read_rules(file, table)
     known = None if world is None else read_world(world, table)
-    note_evasions(house_rules, known, table)
+    for sentence in find_evasions(house_rules, rooms_of(known), table):
+        note(sentence)
     if any(rule.names_destination for rule in house_rules) and not any(rule.inside for rule in house_rules):
         note("goto covers destinations only; to keep the robot from driving through a room, use inside")
     with busy("looking for examples"):

@@ -33,19 +33,14 @@ WHEN_WORDS = {
 def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
     """Read a rules file, if given, and warn if programs could evade the rules; raise UserError if invalid."""
     rules = () if path is None else read_rules(path, skills, rooms_of(world))
-    note_evasions(rules, world, skills)
+    for sentence in find_evasions(rules, rooms_of(world), skills):
+        note(sentence)
     return rules
 
 
 def rooms_of(world: World | None) -> list[str]:
     """Return the names of the rooms in a world, or an empty list without a world."""
     return [] if world is None else [room.name for room in world.rooms]
-
-
-def note_evasions(rules: Sequence[Rule], world: World | None, skills: SkillTable) -> None:
-    """Warn if programs could evade rules; raise UserError if a rule covers only some names of a room."""
-    for sentence in find_evasions(rules, rooms_of(world), skills):
-        note(sentence)
 
 
 def review_view(found: Sequence[Review]) -> RenderableType:
