@@ -2,51 +2,38 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from rich.console import Group
 from rich.text import Text
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import is_interactive, note, print_rich, read_line, shortened
-from codebotler.core.world import World
-from codebotler.missions.past import MissionPast, read_past
+from codebotler.missions.past import MissionPast
 from codebotler.missions.recovery import ask_evidence
-from codebotler.missions.store import find_mission, recover_missions
-from codebotler.robots.base import Robot
+from codebotler.missions.store import recover_missions
+from codebotler.web.console import Console
 
 
-def choose_past(
-    robot: Robot,
-    home: Path,
-    name: str,
-    world: World | None = None,
-    *,
-    happened: bool | None,
-    answer: str = "",
-) -> MissionPast:
+def choose_past(console: Console, name: str, *, happened: bool | None, answer: str = "") -> MissionPast:
     """Read the past of a mission, show it, and ask whether an unsure step happened.
 
     Args:
-        robot: the robot, which is asked where it is if a step is unsure.
-        home: the folder that contains the missions.
+        console: the console with the robot, which is asked where it is if a step is unsure.
         name: the ID of the mission, or `last`.
-        world: the robot's map, or None if it has none.
         happened: whether the unsure step happened, or None to ask.
         answer: its answer, if it is a question.
 
     Raises:
         UserError: there is no such mission, it cannot be continued, or nobody can answer.
     """
-    recover_missions(home)
-    past = read_past(find_mission(home, name), robot.skills, robot.name, world)
+    recover_missions(console.home)
+    past = console.past_of(name)
     print_rich(past_view(past))
     if past.unsure is None:
         return past
     if happened is None:
         if not is_interactive():
             raise UserError(f"{past.question}; add --happened or --not-happened")
-        for sentence in (past.question, *ask_evidence(robot, home, past, note)):
+        for sentence in (past.question, *ask_evidence(console.robot, console.home, past, note)):
             note(sentence)
         happened = _ask_whether(past)
         if happened and past.answers:

@@ -66,7 +66,7 @@ def serve_agents(
     if agent_token is not None and not http:
         raise UserError("--agent-token is for --http; leave it out")
     streams = None if http else server.take_streams()
-    console = open_console(model, base_url, candidates, shared)
+    console = open_console(model, base_url, shared, candidates=candidates)
     writes = bool(model) or not is_recorded(console.models[0])
     gatekeeper = Gatekeeper(console, asks_client=asks, writes=writes)
     agents = server.make_server(gatekeeper)

@@ -9,20 +9,19 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from codebotler.cli import options
-from codebotler.cli.model_options import inherit_options, model_settings, options_for
+from codebotler.cli.model_options import inherit_options, model_settings
 from codebotler.core.terminal import note, print_text
 
 if TYPE_CHECKING:
-    from codebotler.core.world import World
-    from codebotler.robots.base import Robot
+    from codebotler.cli.run import Request
+    from codebotler.web.console import Console
 
 
 class RunSettings(NamedTuple):
-    """The robot and the way to run it, from the options that `run` and `continue` share."""
+    """What `run` and `continue` make of the options that they share."""
 
-    robot: Robot
-    world: World | None
-    carry_out: Callable[..., int]  # takes the fields of a `Request` that are left, returns the exit status
+    request: Callable[..., Request]  # takes the other fields of a request
+    open_console: Callable[..., Console]
 
 
 @inherit_options(options.robot_settings)
@@ -36,27 +35,16 @@ def run_settings(
     recover: options.RecoverOption = 0,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> RunSettings:
-    """Open the robot that the options name, or raise UserError if an option is invalid."""
+    """Return the request and the console that the options describe, without what they do not share."""
     from functools import partial
 
-    from codebotler.cli import run
-    from codebotler.core.files import home
+    from codebotler.cli.run import Request
+    from codebotler.cli.serving import open_console
     from codebotler.models.chosen import choose_model
-    from codebotler.models.open import open_model
-    from codebotler.robots.open import open_robot
 
-    chosen = choose_model(model, base_url)
-    kind, settings, rules, within = options.robot_settings(**options_for(options.robot_settings, shared))
-    asked = chosen.add_server(model_settings(**options_for(model_settings, shared)))
-    robot = open_robot(kind, settings)
-
-    def carry_out(what: str, **more: Any) -> int:  # noqa: ANN401 - of several kinds
-        how = chosen.name, yes, despite_problems, shows_all, rules, within
-        request = run.Request(what, *how, recoveries=recover, **more)
-        options.note_office(kind, shared["world"])
-        return run.run(robot, request, home(), partial(open_model, settings=asked), settings.world)
-
-    return RunSettings(robot, settings.world, carry_out)
+    request = partial(Request, yes=yes, despite_problems=despite_problems, shows_all=shows_all)
+    models = [choose_model(model, base_url).name]
+    return RunSettings(partial(request, recoveries=recover), partial(open_console, models, base_url, shared))
 
 
 @inherit_options(run_settings)
@@ -74,7 +62,11 @@ def run(
 
     Ctrl-C stops the robot, and the exit status is then 130.
     """
-    raise typer.Exit(run_settings(**shared).carry_out(program, candidates=candidates))
+    from codebotler.cli.run import run
+
+    request, open_console = run_settings(**shared)
+    wanted = request(program, candidates=candidates)
+    raise typer.Exit(run(open_console(candidates=candidates), wanted))
 
 
 @inherit_options(run_settings)
@@ -102,11 +94,12 @@ def continue_mission(
     A model is shown what the robot did and saw, and writes a program for the rest.
     """
     from codebotler.cli.continuing import choose_past
-    from codebotler.core.files import home
+    from codebotler.cli.run import run
 
-    robot, known, carry_out = run_settings(**shared)
-    past = choose_past(robot, home(), mission, known, happened=happened, answer=answer)
-    raise typer.Exit(carry_out(program or past.instruction, past=past))
+    request, open_console = run_settings(**shared)
+    console = open_console()
+    past = choose_past(console, mission, happened=happened, answer=answer)
+    raise typer.Exit(run(console, request(program or past.instruction, past=past)))
 
 
 def missions(
@@ -234,7 +227,7 @@ def serve_page(
     place = PageAddress(host, port, tuple(name or ()), proxies_in_front(behind_proxy))
     access = Access.from_options(token, face_token, open_to_all=no_token, is_private=place.is_private)
     shown = Face(face_timeout) if face else None
-    console = open_console(model, base_url, candidates, shared, face=shown, recoveries=recover)
+    console = open_console(model, base_url, shared, candidates=candidates, face=shown, recoveries=recover)
     serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
 
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from codebotler.checking.check import check
-from codebotler.checking.problems import CheckResult
 from codebotler.cli.candidates import ADD_SENTENCE, ask_which, line_reader
 from codebotler.cli.check import check_view, read_program
 from codebotler.cli.continuing import past_view
@@ -17,23 +15,17 @@ from codebotler.cli.contract import contract_view
 from codebotler.cli.generate import note_programless
 from codebotler.cli.views import EventPrinter, continue_view, ending_view, source_view
 from codebotler.core.errors import UserError
-from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, confirm, note, print_rich, read_line, shortened
-from codebotler.core.words import listed
-from codebotler.core.world import World
 from codebotler.missions.log import MissionState
 from codebotler.missions.mission import STOP_GRACE_SECONDS, MissionError
 from codebotler.missions.past import MissionPast
 from codebotler.missions.recovery import PriorApproval, past_to_recover
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import recover_missions
 from codebotler.missions.view import MissionOrder, SessionView
-from codebotler.models.base import Model, ModelError
+from codebotler.models.base import ModelError
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
 from codebotler.robots.base import Robot
-from codebotler.simulator.contract import Contract
-from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.room_map import RoomMap
+from codebotler.web.console import Console
 
 SIGNALS = {
     signal.SIGINT: "Ctrl-C",
@@ -42,9 +34,6 @@ SIGNALS = {
 }
 SIGNAL_EXIT_BASE = 128
 """By the convention of shells, the exit status after a signal is this plus the signal's number."""
-
-CLEANUP_SECONDS = 2.0
-"""The time limit for ending a mission after an error or Ctrl-C, if the robot has not moved yet."""
 
 
 @dataclass(frozen=True)
@@ -56,15 +45,11 @@ class Request:
     """
 
     what: str  # a file, `-` for standard input, or an instruction
-    model: str = "recorded"  # the model that writes the program for an instruction
     yes: bool = False  # whether to run the program without asking
     despite_problems: bool = False  # whether to run the program even if the check finds problems
     shows_all: bool = False  # whether to show all different outcomes in imagined worlds, not just one
-    rules: tuple[Rule, ...] = ()  # the house rules
-    within: Contract | None = None  # what the program may do at most
     past: MissionPast | None = None  # of the mission whose rest is requested
     recoveries: int = 0  # how many times a model may write the rest if a skill fails
-    approval: PriorApproval | None = None  # by which the rest needs no further approval
     candidates: int = 1  # how many programs to get from the model, of which the user chooses one
 
     def __post_init__(self) -> None:
@@ -81,20 +66,13 @@ class Request:
         if self.what == "-" and not self.yes:
             raise UserError("the program uses standard input, so approval cannot be read; add --yes")
 
-    @property
-    def order(self) -> MissionOrder:
-        """The order for a mission."""
+    def order_on(self, console: Console) -> MissionOrder:
+        """Return the order for a mission."""
         program = read_program(self.what) if self.is_program else ""
-        if self.past is not None and self.past.is_untouched and not program:
-            past = self.past
-            return MissionOrder(past.instruction, past.model, past.program, past.model, past=past)
         if self.past is not None:
-            model = "" if program else self.model
-            return MissionOrder(self.past.instruction, model, program, past=self.past)
-        if program:
-            return MissionOrder(program=program)
+            return console.rest_of(self.past, program)
         asks = line_reader(is_allowed=not self.yes) is not None
-        return MissionOrder(self.what, self.model, candidates=self.candidates, asks=asks)
+        return MissionOrder("" if program else self.what, program=program, asks=asks)
 
     @property
     def is_program(self) -> bool:
@@ -105,80 +83,55 @@ class Request:
             return False
 
 
-def run(
-    robot: Robot,
-    request: Request,
-    home: Path,
-    open_model: Callable[[str], Model],
-    world: World | None = None,
-) -> int:
+def run(console: Console, request: Request) -> int:
     """Carry out a user's request from the program to the end of the mission, and show each step.
 
-    Args:
-        robot: the robot that runs the program.
-        request: the user's request.
-        home: the folder that contains the missions.
-        open_model: a function that opens a model by its name.
-        world: the map for the check, or None.
+    If a skill fails, a model may write the rest, which is run in the same way.
 
     Returns:
         the exit status: 0 if the mission is done, 128 plus the number of a signal that stopped it, or else 1.
     """
-    order = request.order
-    tell_missing(robot)
-    recover_missions(home)
-    checked = checker(robot.skills)
-    session = MissionSession(
-        robot,
-        home,
-        order,
-        open_model=open_model,
-        check=checked,
-        rules=request.rules,
-        world=world,
-        within=request.within,
-    )
-    session.start()
-    try:
-        view = _prepared(session)
-        if view.programless is not None:
-            note_programless(view.programless)
-            session.reject(view.programless.sentence)
-        elif view.check is None:
-            note(f"not run: {shortened(view.reason)}")
-        elif _is_approved(session, view, robot, request):
-            status = _watched(session, view, robot, request)
-            rest = _recovery(session, robot, request, home) if status == 1 else None
-            if rest is None:
-                if session.view.state in {MissionState.STOPPED, MissionState.FAILED}:
+    order, approval = request.order_on(console), None
+    with console:
+        for left in range(request.recoveries, -1, -1):
+            session = console.begin(order)
+            try:
+                status = _carry_out(session, console.robot, request, approval)
+            except KeyboardInterrupt:
+                session.stop(SIGNALS[signal.SIGINT])
+                raise
+            except ModelError as error:  # without a rest, the status of the first mission counts
+                if left == request.recoveries:
+                    raise
+                note(error.sentence)
+                return 1
+            past = past_to_recover(session, console.robot, console.home) if left and status == 1 else None
+            if past is None:
+                if status and session.view.progress.has_begun:
                     print_rich(continue_view(session.view))
                 return status
-            try:
-                return run(robot, rest, home, open_model, world)
-            except ModelError as error:  # without a rest, the status of the first mission counts
-                note(error.sentence)
-                return status
-    except BaseException as error:
-        session.stop(SIGNALS[signal.SIGINT] if isinstance(error, KeyboardInterrupt) else "an error")
-        session.join(CLEANUP_SECONDS)
-        raise
+            approval = approval or PriorApproval.of(session.view)
+            order = console.rest_of(past)
+            print_rich(past_view(past))
+            note(f"recovering: asking {order.model} for the rest")
+            request = replace(request, despite_problems=False)  # accepted for the first program only
+        raise AssertionError("the last mission has no rest")
+
+
+def _carry_out(
+    session: MissionSession, robot: Robot, request: Request, approval: PriorApproval | None
+) -> int:
+    """Show a mission's program, run it if the user approves it, and return the exit status."""
+    view = _prepared(session)
+    if view.programless is not None:
+        note_programless(view.programless)
+        session.reject(view.programless.sentence)
+    elif view.check is None:
+        note(f"not run: {shortened(view.reason)}")
+    elif _is_approved(session, view, robot, request, approval):
+        return _watched(session, view, robot, request)
     session.join(STOP_GRACE_SECONDS)
     return 1
-
-
-def tell_missing(robot: Robot) -> None:
-    """Print a note about skills that are known to be missing before the robot is connected."""
-    if robot.missing:
-        note(f"{robot.name} has no {listed(list(robot.missing))}; models see only its other skills")
-
-
-def checker(skills: SkillTable) -> Callable[[str, RoomMap | None, tuple[Rule, ...]], CheckResult]:
-    """Return a function that checks programs for a robot with the given skills."""
-
-    def checked(program: str, room_map: RoomMap | None, rules: tuple[Rule, ...]) -> CheckResult:
-        return check(program, room_map=room_map, house_rules=rules, skills=skills, explores=True)
-
-    return checked
 
 
 def _prepared(session: MissionSession) -> SessionView:
@@ -202,17 +155,24 @@ def _prepared(session: MissionSession) -> SessionView:
 
 def _show_check(view: SessionView, request: Request) -> None:
     assert view.check is not None, "the program is checked"
-    if not request.is_program:
+    is_named = request.is_program and not view.author
+    if not is_named:
         if is_recorded(view.author):
             note(RECORDED_NOTICE)
         print_rich(source_view(view.program))
-    name = request.what if request.is_program and request.what != "-" else "the program"
+    name = request.what if is_named and request.what != "-" else "the program"
     print_rich(check_view(view.check, view.program, name, shows_all=request.shows_all))
     for sentence in (*view.missing_skills, *view.unknown_rooms):
         note(shortened(f"before the robot moves: {sentence}"))
 
 
-def _is_approved(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> bool:
+def _is_approved(
+    session: MissionSession,
+    view: SessionView,
+    robot: Robot,
+    request: Request,
+    approval: PriorApproval | None,
+) -> bool:
     """Show the result of the check, and return whether the user approves the program."""
     _show_check(view, request)
     if view.contract is not None:
@@ -222,8 +182,7 @@ def _is_approved(session: MissionSession, view: SessionView, robot: Robot, reque
         anyway = "; --despite-problems runs it anyway" if view.can_run else ""
         note(f"not run because of problems{anyway}")
         return False
-    approval, past = request.approval, request.past
-    if approval is not None and past is not None and approval.allows(view, past):
+    if approval is not None and view.past is not None and approval.allows(view, view.past):
         note("the rest stays within what was approved before")
     elif not request.yes and not confirm(f"run the program on the robot {robot.name}?"):
         session.stop("the person at the terminal")
@@ -245,24 +204,6 @@ def _watched(session: MissionSession, view: SessionView, robot: Robot, request: 
     if view.state is MissionState.STOPPED and got:
         return SIGNAL_EXIT_BASE + got[0]
     return 0 if view.state is MissionState.DONE else 1
-
-
-def _recovery(session: MissionSession, robot: Robot, request: Request, home: Path) -> Request | None:
-    """Return the request for the rest of a mission that failed, or None if a person must decide."""
-    past = past_to_recover(session, robot, home) if request.recoveries else None
-    if past is None:
-        return None
-    approval = request.approval or PriorApproval.of(session.view)
-    print_rich(past_view(past))
-    note(f"recovering: asking {request.model} for the rest")
-    return replace(
-        request,
-        what=past.instruction,
-        past=past,
-        despite_problems=False,  # the user accepted those of the first program only
-        recoveries=request.recoveries - 1,
-        approval=approval,
-    )
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Open the console that `codebotler serve` and `codebotler mcp` share."""
+"""Open the console of `codebotler run`, `continue`, `serve` and `mcp`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Any
 
 from codebotler.cli import options
 from codebotler.cli.model_options import model_settings, options_for
-from codebotler.cli.run import tell_missing
 from codebotler.core.files import home
+from codebotler.core.terminal import note
+from codebotler.core.words import listed
 from codebotler.models.chosen import choose_model, make_opener
 from codebotler.robots.face import Face
 from codebotler.robots.open import open_robot, open_with_face
@@ -18,9 +19,9 @@ from codebotler.web.console import Console
 def open_console(
     model: Sequence[str] | None,
     base_url: str | None,
-    candidates: int,
     shared: Mapping[str, Any],
     *,
+    candidates: int = 1,
     face: Face | None = None,
     recoveries: int = 0,
 ) -> Console:
@@ -34,7 +35,8 @@ def open_console(
     models = tuple(model or dict.fromkeys((choose_model().name, "recorded:careful", "recorded:hasty")))
     opener = make_opener(models, base_url, model_settings(**options_for(model_settings, shared)))
     robot = open_robot(kind, settings) if face is None else open_with_face(kind, settings, face)
-    tell_missing(robot)
+    if robot.missing:
+        note(f"{robot.name} has no {listed([*robot.missing])}; models see only its other skills")
     return Console(
         robot,
         home(),

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from codebotler.candidates.clusters import CandidateClusters, cluster_candidates
-from codebotler.checking.problems import CheckResult
+from codebotler.checking.check import check
 from codebotler.checking.proof import hold_within
 from codebotler.checking.remaining import remaining_outcomes
 from codebotler.checking.repetition import hold_to_past
@@ -18,31 +18,30 @@ from codebotler.robots.base import Robot
 from codebotler.simulator.pool import shared_pool
 
 
-def examine_draft(
-    check: CheckResult, program: str, view: SessionView, order: MissionOrder, robot: Robot
-) -> dict[str, Any]:
+def examine_draft(program: str, view: SessionView, order: MissionOrder, robot: Robot) -> dict[str, Any]:
     """Return the fields of a session's view that tell what a check and the robot say of a program.
 
     Args:
-        check: the check of the program, which knows neither the order nor the robot.
         program: the program.
         view: the view of the session.
         order: the order, which may have a past or drive the robot in place of the program.
         robot: the connected robot.
     """
+    rules, skills = view.rules_in_force, robot.skills
+    found = check(program, room_map=view.room_map, house_rules=rules, skills=skills, explores=True)
     if view.past is not None:
         begun, before = view.past.program, view.past.before
-        left = remaining_outcomes(begun, check.room_map, robot.skills, first=before)
-        check = hold_to_past(check, begun, left)
+        left = remaining_outcomes(begun, found.room_map, skills, first=before)
+        found = hold_to_past(found, begun, left)
     if order.drive is not None and program == order.program:
-        check = replace(check, contract=order.contract, proofs=(), samples=())
+        found = replace(found, contract=order.contract, proofs=(), samples=())
     if view.within is not None:
-        check = hold_within(check, view.within, robot.skills)
-    known = None if check.problems else view.room_map
+        found = hold_within(found, view.within, skills)
+    known = None if found.problems else view.room_map
     return {
-        "check": check,
+        "check": found,
         "missing_skills": tuple(missing_skills(program, robot)),
-        "unknown_rooms": tuple(unknown_rooms(program, known, robot.skills)) if known else (),
+        "unknown_rooms": tuple(unknown_rooms(program, known, skills)) if known else (),
         "busy": "",
     }
 

@@ -16,7 +16,6 @@ from pathlib import Path
 
 from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
 from codebotler.checking.evasions import find_evasions
-from codebotler.checking.problems import CheckResult
 from codebotler.checking.rule_rooms import unknown_rooms_in
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
@@ -54,9 +53,8 @@ _EXPECTED_ERRORS = (UserError, ModelError, NotReadyError, EngineError, MissionEr
 class MissionSession(SharedView):
     """Runs one mission on its own thread, with a robot that stays connected during the whole session.
 
-    `check` takes a program, the robot's rooms and the rules in force. `changed` is called whenever the view
-    changes, and must return at once. `before` is a session that must end first. `world` is the map, if any.
-    `within` is what every program may do, if a person has said so.
+    `changed` is called whenever the view changes, and must return at once. `before` is a session that must
+    end first. `world` is the map, if any. `within` is what every program may do, if a person has said so.
     """
 
     def __init__(
@@ -66,7 +64,6 @@ class MissionSession(SharedView):
         order: MissionOrder,
         *,
         open_model: Callable[[str], Model],
-        check: Callable[[str, RoomMap | None, tuple[Rule, ...]], CheckResult],
         rules: tuple[Rule, ...] = (),
         changed: Callable[[], None] = lambda: None,
         number: int = 1,
@@ -89,7 +86,7 @@ class MissionSession(SharedView):
         )
         super().__init__(view, changed)
         self._robot, self._home, self._order = robot, home, order
-        self._check, self._before, self._world = check, before, world
+        self._before, self._world = before, world
         self._author = ModelAuthor(open_model, order.model)
         self._stop_button = StopButton()
         self._checked: Contract | None = None  # of the last checked program
@@ -360,8 +357,7 @@ class MissionSession(SharedView):
             view = self._view
         try:
             mission.draft(program, view.author)
-            check = self._check(program, view.room_map, view.rules_in_force)
-            found = examine_draft(check, program, view, self._order, self._robot)
+            found = examine_draft(program, view, self._order, self._robot)
             mission.check(replace(view, **found).problems)
         except MissionError:
             if not mission.has_ended:

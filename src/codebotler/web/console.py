@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
-from contextlib import ExitStack, aclosing, suppress
+from contextlib import aclosing, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Self
@@ -28,7 +28,6 @@ from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
 from codebotler.simulator.contract import Contract
 from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.room_map import RoomMap
 
 MAX_PROGRAM_CHARACTERS = 200_000
@@ -36,6 +35,9 @@ MAX_PROGRAM_CHARACTERS = 200_000
 
 MAX_WAIT_SECONDS = 15.0
 """The longest time that a request waits for a change."""
+
+CLEANUP_SECONDS = 2.0
+"""The time limit for ending a mission if the robot has not moved yet."""
 
 
 class Console:
@@ -72,8 +74,6 @@ class Console:
         self._may_recover: MissionSession | None = None  # the current session, unless somebody pressed STOP
         self.unfinished = ""  # the mission that had begun and ended early before another one was written
         self._checking = threading.Lock()
-        self._held = ExitStack()
-        self._pool: WorkerPool | None = None
 
     def __enter__(self) -> Self:
         self.interrupted = tuple(find_interrupted(self.home))
@@ -83,15 +83,14 @@ class Console:
 
     def __exit__(self, *_: object) -> None:
         self.end()
-        self._held.close()  # ends a check that is under way
 
     def end(self) -> None:
-        """Stop the current mission, and wait until it is over."""
+        """Stop the current mission, and wait until it is over, but not for long if nothing has moved."""
         with self._lock:
             session, self._may_recover = self.session, None
         if session is not None:
             session.stop(BY_SHUTDOWN)
-            session.join(STOP_GRACE_SECONDS + 1)
+            session.join(STOP_GRACE_SECONDS + 1 if session.view.progress.has_begun else CLEANUP_SECONDS)
 
     @property
     def view(self) -> SessionView:
@@ -133,7 +132,6 @@ class Console:
                 self.home,
                 order,
                 open_model=self.open_model,
-                check=self.check,
                 rules=self.rules,
                 changed=self.notifier.change,
                 number=before.view.number + 1 if before else 1,
@@ -218,19 +216,10 @@ class Console:
     def check(
         self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()
     ) -> CheckResult:
-        """Check a program once no other check runs. Without a map, use the rooms that the program names."""
-        with self._checking:
-            if self._pool is None:
-                self._pool = self._held.enter_context(WorkerPool(1))
-            table = self.robot.skills
-            return check(
-                program,
-                room_map=room_map,
-                pool=self._pool,
-                house_rules=rules,
-                skills=table,
-                explores=True,
-            )
+        """Check a program for a client. Without a map, use the rooms that the program names."""
+        skills = self.robot.skills
+        with self._checking:  # the check of a mission must not wait for those of many clients
+            return check(program, room_map=room_map, house_rules=rules, skills=skills, explores=True)
 
 
 class Notifier:

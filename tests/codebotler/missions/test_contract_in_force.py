@@ -9,9 +9,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.checking.contract_file import contract_data
-from codebotler.cli.run import checker
 from codebotler.core.errors import RobotError
-from codebotler.core.skills.paper import SKILLS
 from codebotler.core.text_template import TextTemplate
 from codebotler.core.world import Room, World
 from codebotler.missions.log import EVENTS_FILE, LogLine, MissionState
@@ -184,7 +182,6 @@ def led(
         tmp_path,
         MissionOrder(program=program),
         open_model=open_recorded,
-        check=checker(SKILLS),
         world=HOUSE,
         within=within,
     )

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from codebotler.checking.check import check
-from codebotler.cli.run import checker
 from codebotler.core.skills.declaration import POSE_IN_ROOM
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
@@ -266,7 +265,6 @@ def test_a_rule_that_cannot_be_enforced_is_refused_before_anything_moves(
         tmp_path,
         MissionOrder(program="def task_program():\n    go_to('hall')\n"),
         open_model=open_recorded,
-        check=checker(SKILLS),
         rules=(VAULT,),
         world=world,
     )

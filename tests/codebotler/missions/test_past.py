@@ -12,7 +12,6 @@ from codebotler.checking.check import check
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.remaining import remaining_outcomes
 from codebotler.checking.repetition import has_same_effect, hold_to_past
-from codebotler.cli.run import checker
 from codebotler.core.errors import UserError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
@@ -351,7 +350,6 @@ def test_a_session_compares_the_rest_with_what_remained(tmp_path: Path) -> None:
         tmp_path,
         MissionOrder(program=poll(1), past=past),
         open_model=open_recorded,
-        check=checker(SKILLS),
         world=WORLD,
     )
     session.start()
@@ -371,7 +369,6 @@ def test_a_rest_that_was_done_meanwhile_is_not_done_again(tmp_path: Path) -> Non
             tmp_path,
             MissionOrder(program=rest, past=past),
             open_model=open_recorded,
-            check=checker(SKILLS),
             world=WORLD,
         )
         made.start()

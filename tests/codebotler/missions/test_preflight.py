@@ -15,8 +15,7 @@ import pytest
 import rich.progress  # noqa: F401 - by now, since an interrupt in the middle of an import leaves a file open
 
 from codebotler.checking.check import check
-from codebotler.cli.run import Request
-from codebotler.cli.run import run as run_mission
+from codebotler.cli.run import Request, run
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.world import Room, World
 from codebotler.missions.log import MissionState, read_events
@@ -31,6 +30,7 @@ from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
 from codebotler.simulator.house_rule import Rule
+from codebotler.web.console import Console
 from doubles import Answering, raising
 
 
@@ -130,6 +130,16 @@ def nobody(_name: str) -> Writing:
     raise AssertionError("there is a program")
 
 
+def run_mission(
+    robot: Answering,
+    request: Request,
+    home: Path,
+    open_model: Callable[[str], Writing],
+    rules: tuple[Rule, ...] = (),
+) -> int:
+    return run(Console(robot, home, open_model, models=("writing",), rules=rules), request)
+
+
 def test_a_check_sees_the_robots_own_words() -> None:
     plan, place = ask_rooms(Answering(knowing(["hall", LAB], LAB)), print)
     assert plan is not None
@@ -171,13 +181,13 @@ def test_a_model_is_offered_no_skill_that_the_robot_lacks(
 def test_a_rule_with_a_misspelt_room_lets_no_mission_begin(tmp_path: Path, *, any_room: bool) -> None:
     (tmp_path / "go.py").write_text("def task_program():\n    say('hello')\n")
     bob = Rule("bob", "Leave Bob alone.", parse('not tr.Exists(goto("bobs office"))'), any_room=any_room)
-    request = Request(str(tmp_path / "go.py"), yes=True, rules=(bob,))
+    request = Request(str(tmp_path / "go.py"), yes=True)
     robot = Answering(knowing(["hall", "bob's office"], "hall"))
     if any_room:
-        assert run_mission(robot, request, tmp_path, nobody) == 0
+        assert run_mission(robot, request, tmp_path, nobody, (bob,)) == 0
     else:
         with pytest.raises(UserError, match=r"bobs office.*bob's office"):
-            run_mission(robot, request, tmp_path, nobody)
+            run_mission(robot, request, tmp_path, nobody, (bob,))
         (mission,) = read_missions(tmp_path)
         assert (mission.state, robot.connections) == (MissionState.FAILED, 0)
         assert robot.done == ["get_all_rooms", "get_current_location"], "it has not moved"

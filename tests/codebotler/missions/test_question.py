@@ -9,8 +9,6 @@ from pathlib import Path
 import pytest
 
 from codebotler.candidates.question import ClarifyingAnswer
-from codebotler.cli.run import checker
-from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.log import MissionState, MissionSummary, read_events
 from codebotler.missions.mission import MissionError
@@ -36,7 +34,6 @@ def asking(
         home,
         MissionOrder("Do it.", name, candidates=len(programs), asks=asks),
         open_model=lambda _: model,
-        check=checker(SKILLS),
     )
     session.start()
     try:

@@ -8,10 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.cli.run import checker
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
-from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.log import EVENTS_FILE, LogLine, MissionState
 from codebotler.missions.mission import Mission, MissionError
@@ -536,7 +534,6 @@ def test_rules_hold_in_a_building_of_more_rooms_than_a_check_takes(tmp_path: Pat
         tmp_path,
         MissionOrder(program=program),
         open_model=recorded,
-        check=checker(SKILLS),
         rules=(rule,),
     )
     session.start()
@@ -553,7 +550,6 @@ def test_a_rule_that_was_switched_off_is_in_force_for_another_program(tmp_path: 
         tmp_path,
         MissionOrder(program=STUBBORN),
         open_model=recorded,
-        check=checker(SKILLS),
         rules=(VAULT,),
     )
     session.start()
@@ -574,9 +570,7 @@ def test_a_rule_stays_switched_off_if_no_other_program_comes(tmp_path: Path) -> 
         raise ModelError("the model is not there", may_pass=False)
 
     order = MissionOrder("Go to the vault.", "refuses", STUBBORN)
-    session = MissionSession(
-        knowing("hall", "vault"), tmp_path, order, open_model=refuses, check=checker(SKILLS), rules=(VAULT,)
-    )
+    session = MissionSession(knowing("hall", "vault"), tmp_path, order, open_model=refuses, rules=(VAULT,))
     session.start()
     session.wait_until(lambda now: now.may_be_approved)
     session.switch_off("vault", "the door is broken")
@@ -590,9 +584,7 @@ def test_a_rule_stays_switched_off_if_no_other_program_comes(tmp_path: Path) -> 
 
 def test_a_rule_that_was_switched_off_is_in_force_for_what_a_model_writes_next(tmp_path: Path) -> None:
     order = MissionOrder(next(iter(recorded("recorded").replies)), "recorded")
-    session = MissionSession(
-        knowing("hall", "vault"), tmp_path, order, open_model=recorded, check=checker(SKILLS), rules=(VAULT,)
-    )
+    session = MissionSession(knowing("hall", "vault"), tmp_path, order, open_model=recorded, rules=(VAULT,))
     session.start()
     session.wait_until(lambda now: now.may_be_approved)
     session.switch_off("vault", "the door is broken")

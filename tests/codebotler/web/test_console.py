@@ -8,9 +8,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from codebotler.checking.check import check
 from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender
@@ -29,7 +31,6 @@ from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, Robot, RobotResult
 from codebotler.robots.simulated import OFFICE, Simulated
-from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.room_map import RoomMap
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.panes.instruction import examples
@@ -513,16 +514,14 @@ def test_a_stop_between_the_approval_and_the_start_counts(tmp_path: Path) -> Non
 
 
 def test_a_draft_that_nobody_saw_is_no_draft_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    begun, go_on, check = threading.Event(), threading.Event(), Console.check
+    begun, go_on = threading.Event(), threading.Event()
 
-    def slow(
-        console: Console, program: str, plan: RoomMap | None = None, rules: tuple[Rule, ...] = ()
-    ) -> CheckResult:
+    def slow(program: str, **how: Any) -> CheckResult:  # noqa: ANN401 - passed on
         begun.set()
         go_on.wait(20)
-        return check(console, program, plan, rules)
+        return check(program, **how)
 
-    monkeypatch.setattr(Console, "check", slow)
+    monkeypatch.setattr("codebotler.missions.drafts.check", slow)
     with desk_of(tmp_path) as console:
         console.begin(MissionOrder(program=HELLO))
         assert begun.wait(20)
@@ -534,15 +533,13 @@ def test_a_draft_that_nobody_saw_is_no_draft_before(tmp_path: Path, monkeypatch:
 
 
 def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    go_on, check = threading.Event(), Console.check
+    go_on = threading.Event()
 
-    def slow(
-        console: Console, program: str, plan: RoomMap | None = None, rules: tuple[Rule, ...] = ()
-    ) -> CheckResult:
+    def slow(program: str, **how: Any) -> CheckResult:  # noqa: ANN401 - passed on
         go_on.wait(20)
-        return check(console, program, plan, rules)
+        return check(program, **how)
 
-    monkeypatch.setattr(Console, "check", slow)
+    monkeypatch.setattr("codebotler.missions.drafts.check", slow)
     with desk_of(tmp_path) as console:
         session = console.begin(MissionOrder(program=HELLO))
         until(console, lambda view: view.busy == "checking" and bool(view.id))
