@@ -1,18 +1,16 @@
-"""The page that lists all missions, with filters and live updates."""
+"""The page that lists all missions, with a search and live updates."""
 
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass
+from collections.abc import Sequence
 from datetime import datetime
-from typing import Annotated, Any
 from urllib.parse import urlencode
 
-from fastapi import Depends
 from nicegui import html, ui
 
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import shortened, visible
+from codebotler.core.terminal import shortened
 from codebotler.core.words import counted
 from codebotler.missions.log import MissionState, MissionSummary
 from codebotler.missions.store import last_rest, read_missions, rest_text
@@ -28,53 +26,30 @@ _MAX_TITLE, _MAX_LISTED_REASON = 160, 200
 _NO_MISSIONS = "No missions yet."
 
 
-@dataclass(frozen=True)
-class MissionFilter:
-    """A filter for missions: by state, by robot, and by text in the instruction, program or reason."""
-
-    state: str = ""
-    robot: str = ""
-    text: str = ""
-
-    @property
-    def query(self) -> str:
-        """The filter as a query string."""
-        chosen = {name: value for name, value in vars(self).items() if value}
-        return f"?{urlencode(chosen)}" if chosen else ""
-
-    def shows(self, summary: MissionSummary) -> bool:
-        """Whether a mission passes the filter."""
-        has_state = self.state in {"", summary.state} and self.robot in {"", summary.robot}
-        texts = (summary.instruction, summary.program, summary.reason)
-        return has_state and any(self.text.casefold() in text.casefold() for text in texts)
-
-
 def add(console: Console, frame: Frame) -> None:
     """Add the page."""
 
     @ui.page(_MISSIONS_PATH)
-    async def list_missions(chosen: Annotated[MissionFilter, Depends(MissionFilter)]) -> None:
+    async def list_missions(text: str = "") -> None:
         frame("Missions", _MISSIONS_PATH)
         with ui.element("div").classes("past"):
             PlainText("h1", "Missions")
-            shown = _MissionList(console, chosen)
+            shown = _MissionList(console, text)
             await shown.update()
             await follow(console.notifier, shown.update)
 
 
 class _MissionList:
-    """The filters and the list of missions, newest first."""
+    """The search and the list of missions, newest first."""
 
-    def __init__(self, console: Console, chosen: MissionFilter) -> None:
-        self._console, self._chosen = console, chosen
+    def __init__(self, console: Console, text: str) -> None:
+        self._console = console
         self._known: list[MissionSummary] = []
         self._seen: object = None
         self._rows: dict[str, _MissionRow] = {}
-        with ui.element("div").classes("filters").props('role=search aria-label="Filter missions"'):
-            self._text = ui.input("Search", value=chosen.text, on_change=self._choose)
+        with ui.element("div").classes("filters").props("role=search"):
+            self._text = ui.input("Search", value=text, on_change=self._search)
             self._text.props("outlined dense clearable debounce=300 dir=auto maxlength=200")
-            self._state = _select_box("State", chosen.state, self._choose)
-            self._robot = _select_box("Robot", chosen.robot, self._choose)
         self._count = PlainText("p", "", "quiet").props("role=status")
         self._error = PlainText("p", "", "trouble").props("role=alert")
         self._list = ui.element("ol").classes("rows")
@@ -92,21 +67,17 @@ class _MissionList:
             return
         self._seen = seen
         self._error.say("")
-        _set_options(self._state, "All states", {one.state for one in self._known}, self._chosen.state)
-        _set_options(self._robot, "All robots", {one.robot for one in self._known}, self._chosen.robot)
         self._show()
 
-    def _choose(self) -> None:
-        chosen = MissionFilter(
-            self._state.value or "", self._robot.value or "", (self._text.value or "").strip()
-        )
-        if chosen != self._chosen:
-            self._chosen = chosen
-            ui.navigate.history.replace(outside(_MISSIONS_PATH) + chosen.query)
-            self._show()
+    def _search(self) -> None:
+        text = (self._text.value or "").strip()
+        query = f"?{urlencode({'text': text})}" if text else ""
+        ui.navigate.history.replace(outside(_MISSIONS_PATH) + query)
+        self._show()
 
     def _show(self) -> None:
-        found = [summary for summary in reversed(self._known) if self._chosen.shows(summary)]
+        words = (self._text.value or "").casefold().split()
+        found = [summary for summary in reversed(self._known) if has_words(summary, words)]
         self._count.say(_count_text(len(found), len(self._known)))
         found = found[:MAX_LISTED_MISSIONS]
         for gone in self._rows.keys() - {summary.id for summary in found}:
@@ -128,16 +99,11 @@ def state_words(summary: MissionSummary, view: SessionView) -> str:
     return "waits for approval" if summary.state is MissionState.CHECKED else str(summary.state)
 
 
-def _select_box(label: str, value: str, chosen: Any) -> ui.select:  # noqa: ANN401 - any handler of NiceGUI's
-    box = ui.select({value: visible(value)}, value=value, label=label, on_change=chosen)
-    box.props("outlined dense")
-    return box
-
-
-def _set_options(box: ui.select, everything: str, values: set[str], chosen: str) -> None:
-    options = {"": everything, **{value: visible(value) for value in sorted(values | {chosen}) if value}}
-    if options != box.options:
-        box.set_options(options)
+def has_words(summary: MissionSummary, words: Sequence[str]) -> bool:
+    """Whether all words, in lower case, are in the state, robot, instruction, program or reason."""
+    texts = (summary.state, summary.robot, summary.instruction, summary.program, summary.reason)
+    everything = "\n".join(texts).casefold()
+    return all(word in everything for word in words)
 
 
 def _count_text(found: int, known: int) -> str:
