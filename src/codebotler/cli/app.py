@@ -46,9 +46,10 @@ def generate(
     from functools import partial
 
     from codebotler.checking.sampled import CheckSettings
-    from codebotler.cli.candidates import expect_no_retries, requests_to, write_candidate
+    from codebotler.cli.candidates import choose_candidate, line_reader, print_checked
     from codebotler.cli.generate import print_prompt, prompt_maker, write
     from codebotler.cli.rules import rules_for
+    from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
     from codebotler.core.world_file import read_world
     from codebotler.models.chosen import choose_model
@@ -66,17 +67,19 @@ def generate(
         print_prompt(make_prompt(instruction), chosen.name)
         return
     if candidates > 1:
-        expect_no_retries(retries, repair=repair)
+        if repair or retries is not None:
+            raise UserError("--candidates cannot be combined with --retries or --repair")
         opener = partial(open_model, chosen.name, settings)
-        request = requests_to(opener, make_prompt, candidates, room_map, record)
-        how = CheckSettings(skills=table, house_rules=house_rules)
-        accepted = write_candidate(request, instruction, how, room_map, asks=not yes, model=chosen.name)
+        how, ask = CheckSettings(skills=table, house_rules=house_rules), line_reader(is_allowed=not yes)
+        given = opener, make_prompt, instruction, how, room_map
+        program = choose_candidate(*given, count=candidates, ask=ask, record=record)
+        accepted = program is not None and print_checked(program, how, room_map)
     else:
         accepted = write(
             make_prompt(instruction),
             chosen.name,
             settings,
-            world=known,
+            room_map=room_map,
             house_rules=house_rules,
             skills=table,
             retries=int(repair) if retries is None else retries,

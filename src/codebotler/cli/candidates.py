@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from rich.console import Group, RenderableType
@@ -29,10 +30,7 @@ from codebotler.core.terminal import (
 )
 from codebotler.core.words import counted, listed, with_sentence
 from codebotler.generation.candidates import gather_candidates
-from codebotler.generation.generate import Attempt
-from codebotler.missions.preflight import with_closest_here
 from codebotler.models.base import Model
-from codebotler.models.recorded import UnknownInstructionError
 from codebotler.prompts import Prompt
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.room_map import RoomMap
@@ -45,68 +43,50 @@ def line_reader(*, is_allowed: bool) -> Callable[[str], str] | None:
     return read_line if is_allowed and is_interactive() else None
 
 
-def requests_to(
+def choose_candidate(
     open_model: Callable[[], Model],
     make_prompt: Callable[[str], Prompt],
-    count: int,
-    room_map: RoomMap | None,
-    record: Path | None = None,
-) -> Callable[[str], list[Attempt]]:
-    """Return a function that requests `count` candidates for an instruction, and records them in a file."""
-
-    def request(instruction: str) -> list[Attempt]:
-        opened = open_model()
-        with busy(f"asking {opened.name}"), open_recorder(record, opened.name) as add:
-            try:
-                return asyncio.run(gather_candidates(opened, make_prompt(instruction), count, add))
-            except UnknownInstructionError as error:
-                raise with_closest_here(error, room_map) from None
-
-    return request
-
-
-def expect_no_retries(retries: int | None, *, repair: bool) -> None:
-    """Raise UserError if a command with candidates also has options for retries."""
-    if repair or retries is not None:
-        raise UserError("--candidates cannot be combined with --retries or --repair")
-
-
-def choose_candidate(
-    request: Callable[[str], Sequence[Attempt]],
     instruction: str,
     settings: CheckSettings,
     room_map: RoomMap | None = None,
     *,
+    count: int,
     ask: Callable[[str], str] | None,
-    model: str = "",
+    record: Path | None = None,
 ) -> str | None:
     """Return the program that a person means, or None if they want none of them.
-
-    Raise UserError if all programs of the second round do what they did not mean.
 
     After the first "none of these", they may add a sentence to the instruction for a second round.
 
     Args:
-        request: requests candidates for an instruction.
+        open_model: opens the model.
+        make_prompt: makes the prompt for an instruction.
         instruction: the instruction.
         settings: the settings for runs in imagined worlds.
         room_map: the rooms; by default those that the programs name.
+        count: how many programs to request.
         ask: asks the person for a line, which is empty at the end; None if nobody can answer.
-        model: the name of the model.
+        record: a file to which all replies are appended, if any.
+
+    Raises:
+        UserError: all programs of the second round do what the person did not mean.
     """
-    refused: tuple[str, ...] = ()
-    for is_second in (False, True):
-        attempts = request(instruction)
+    rejected: ClarifyingQuestion | None = None
+    while True:
+        opened, prompt = open_model(), make_prompt(instruction)
+        if rejected is not None:
+            prompt = prompt.after(rejected.options[0].program, rejected.rejections)
+        with busy(f"asking {opened.name}"), open_recorder(record, opened.name) as add:
+            attempts = asyncio.run(gather_candidates(opened, prompt, count, add))
         programs = [one.reply.program for one in attempts if one.programless is None]
-        if not programs:
-            assert attempts[0].programless is not None
+        if not programs and attempts[0].programless is not None:
             note_programless(attempts[0].programless)
             return None
+        refused = () if rejected is None else rejected.programs
         with busy("comparing the programs"), WorkerPool(1) as pool:
-            groups = pool.call(
-                lambda: cluster_candidates(pool.here(), programs, settings, room_map, refused)  # noqa: B023 - called at once
-            )
-        question = question_about(groups, model=model, is_second=is_second)
+            grouping = partial(cluster_candidates, pool.here(), programs, settings, room_map, refused)
+            groups = pool.call(grouping)
+        question = question_about(groups, model=opened.name, is_second=rejected is not None)
         if question is None or ask is None:
             note(groups.summary)
             return groups.clusters[0].program
@@ -115,27 +95,13 @@ def choose_candidate(
             return chosen.program
         more = "" if question.why_last else ask(ADD_SENTENCE).strip()
         if not more:
-            break
-        refused = question.programs
-        instruction = with_sentence(instruction, more)
-    note("no program chosen")
-    return None
+            note("no program chosen")
+            return None
+        rejected, instruction = question, with_sentence(instruction, more)
 
 
-def write_candidate(
-    request: Callable[[str], Sequence[Attempt]],
-    instruction: str,
-    settings: CheckSettings,
-    room_map: RoomMap | None,
-    *,
-    asks: bool,
-    model: str,
-) -> bool:
-    """Print the program that a person means and its problems, and return whether the check accepts it."""
-    ask = line_reader(is_allowed=asks)
-    program = choose_candidate(request, instruction, settings, room_map, ask=ask, model=model)
-    if program is None:
-        return False
+def print_checked(program: str, settings: CheckSettings, room_map: RoomMap | None) -> bool:
+    """Print a program and its problems, and return whether the check accepts it."""
     print_source(program)
     rules, skills = settings.house_rules, settings.skills
     problems = check(program, room_map=room_map, skills=skills, house_rules=rules).problems

@@ -12,12 +12,10 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, note, print_source, shortened, visible
 from codebotler.core.words import brief
-from codebotler.core.world import World
 from codebotler.generation.generate import Attempt, ignore_attempt, write_checked_program
 from codebotler.generation.no_program import ProgramlessReply
-from codebotler.missions.preflight import with_closest_here
 from codebotler.models.open import kind_of, open_model
-from codebotler.models.recorded import RECORDED_NOTICE, UnknownInstructionError, is_recorded
+from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.simulator.house_rule import Rule
@@ -39,7 +37,7 @@ def write(
     model: str,
     settings: SamplingSettings,
     *,
-    world: World | None,
+    room_map: RoomMap | None,
     house_rules: tuple[Rule, ...] = (),
     skills: SkillTable = SKILLS,
     retries: int,
@@ -56,20 +54,16 @@ def write(
                 record_attempt(attempt)
                 _note_attempt(attempt, retries + 1)
 
-            room_map = None if world is None else RoomMap.of(world)
-            try:
-                generation = write_checked_program(
-                    opened,
-                    prompt,
-                    room_map=room_map,
-                    house_rules=house_rules,
-                    skills=skills,
-                    retries=retries,
-                    repair=repair,
-                    on_attempt=on_attempt,
-                )
-            except UnknownInstructionError as error:
-                raise with_closest_here(error, room_map) from None
+            generation = write_checked_program(
+                opened,
+                prompt,
+                room_map=room_map,
+                house_rules=house_rules,
+                skills=skills,
+                retries=retries,
+                repair=repair,
+                on_attempt=on_attempt,
+            )
         if generation.programless is None:
             print_source(generation.program)
     if is_recorded(opened.name):

@@ -9,13 +9,10 @@ import command_line
 from codebotler.checking.sampled import CheckSettings
 from codebotler.cli.candidates import choose_candidate, line_reader
 from codebotler.core.errors import UserError
-from codebotler.generation.generate import Attempt
-from codebotler.generation.no_program import describe_programless
-from codebotler.models.base import Reply, Usage
 from codebotler.models.recorded import open_recorded
-from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import prompt_for
 from command_line import Ended, Refusal, command
+from doubles import Several
 from roboeval.suites.load import Suite
 
 SAYS = 'def task_program():\n    say("{} mugs")\n'
@@ -23,34 +20,35 @@ ONE, TWO, THREE, FOUR = map(SAYS.format, range(1, 5))
 STAPLER = next(one for one in open_recorded("recorded").replies if one.startswith("Check every printer"))
 
 
-def attempt(program: str, number: int) -> Attempt:
-    reply = Reply(program, program, Usage(), None, "stop", no_program=None if program else "no-code")
-    none = describe_programless(reply, SamplingSettings())
-    return Attempt(number, prompt_for("Count the mugs."), reply, (), none)
-
-
 class Terminal:
     """A person who answers with the given lines, and a model that writes the given programs."""
 
     def __init__(
-        self, programs: Sequence[str], *lines: str, model: str = "", later: Sequence[str] = ()
+        self, programs: Sequence[str], *lines: str, model: str = "several", later: Sequence[str] = ()
     ) -> None:
-        self.programs, self.lines, self.model, self.later = programs, list(lines), model, later
-        self.instructions: list[str] = []
+        self.rounds, self.lines, self.model = [programs, *[later] * bool(later)], list(lines), model
+        self.asked_models: list[Several] = []
         self.asked: list[str] = []
 
-    def request(self, instruction: str) -> list[Attempt]:
-        programs = self.later if self.later and self.instructions else self.programs
-        self.instructions.append(instruction)
-        return [attempt(program, number) for number, program in enumerate(programs)]
+    def open(self) -> Several:
+        model = Several(self.rounds[min(len(self.asked_models), len(self.rounds) - 1)])
+        model.name = self.model
+        self.asked_models.append(model)
+        return model
+
+    @property
+    def instructions(self) -> list[str]:
+        return [model.prompts[0].instruction for model in self.asked_models]
 
     def read(self, question: str) -> str:
         self.asked.append(question)
         return self.lines.pop(0)
 
     def chosen(self, *, asks: bool = True) -> str | None:
-        ask = self.read if asks else None
-        return choose_candidate(self.request, "Count the mugs.", CheckSettings(), ask=ask, model=self.model)
+        ask, count = self.read if asks else None, len(self.rounds[0])
+        return choose_candidate(
+            self.open, prompt_for, "Count the mugs.", CheckSettings(), count=count, ask=ask
+        )
 
 
 def test_without_a_terminal_the_largest_cluster_is_taken(capsys: pytest.CaptureFixture[str]) -> None:
@@ -75,8 +73,9 @@ def test_the_person_chooses_an_option(capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_none_of_these_adds_a_sentence_for_a_second_round() -> None:
-    person = Terminal([ONE, TWO], "none\n", "Only clean ones.\n", "1\n", later=[THREE, FOUR, ONE])
+    person = Terminal([ONE, TWO], "none\n", "Only clean ones.\n", "1\n", later=[THREE, FOUR])
     assert person.chosen() == THREE
+    assert "did not mean a robot that" in person.asked_models[1].prompts[0].messages[-1].text
     assert person.instructions == ["Count the mugs.", "Count the mugs. Only clean ones."]
 
 
