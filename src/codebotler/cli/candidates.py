@@ -29,7 +29,7 @@ from codebotler.core.terminal import (
     visible,
 )
 from codebotler.core.words import counted, listed, with_sentence
-from codebotler.generation.candidates import gather_candidates
+from codebotler.generation.generate import gather_candidates
 from codebotler.models.base import Model
 from codebotler.prompts import Prompt
 from codebotler.simulator.pool import WorkerPool

@@ -23,6 +23,8 @@ from codebotler.simulator.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.room_map import RoomMap
 
+CONCURRENT_REQUESTS = 4  # for candidates
+
 Checker: TypeAlias = Callable[[str], Sequence[str]]
 """Returns the problems of a program, one sentence each; none if the program is accepted."""
 
@@ -122,6 +124,32 @@ async def make_attempt(
         return Attempt(number, prompt, reply, (none.sentence,), none)
     found = () if find_problems is None else await asyncio.to_thread(find_problems, reply.program)
     return Attempt(number, prompt, reply, tuple(found))
+
+
+async def gather_candidates(
+    model: Model,
+    prompt: Prompt,
+    count: int,
+    on_attempt: Callable[[Attempt], None] = ignore_attempt,
+    on_text: TextListener = ignore_text,
+) -> list[Attempt]:
+    """Ask a model `count` times for a program, check none of them, and close the model.
+
+    Raises:
+        ModelError: the model sent no complete reply to one of the requests.
+    """
+    limited = RateLimited(model, concurrency=CONCURRENT_REQUESTS)
+    try:
+        requests = (limited.reply(prompt, number=number, on_text=on_text) for number in range(count))
+        replies = await asyncio.gather(*requests)
+    finally:
+        await model.close()
+    attempts = [
+        await make_attempt(number, prompt, reply, model.settings) for number, reply in enumerate(replies)
+    ]
+    for attempt in attempts:
+        on_attempt(attempt)
+    return attempts
 
 
 def _repair(prompt: Prompt, attempt: Attempt) -> Prompt:

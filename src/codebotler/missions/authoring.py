@@ -6,17 +6,14 @@ import asyncio
 from collections.abc import Callable, Coroutine, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
-from codebotler.generation.candidates import gather_candidates
-from codebotler.generation.generate import Attempt, write_program
+from codebotler.generation.generate import Attempt, gather_candidates
 from codebotler.missions.view import SessionView
-from codebotler.models.base import Model, TextListener
+from codebotler.models.base import Model, TextListener, ignore_text
 from codebotler.models.open import open_model
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.robots.base import Robot
-
-Written = TypeVar("Written")
 
 
 class ModelAuthor:
@@ -38,10 +35,9 @@ class ModelAuthor:
             on_text: receives a single reply as it arrives.
         """
         model = self._open()
-        if count > 1:
-            return model.name, asyncio.run(self._await(gather_candidates(model, prompt, count)))
-        written = asyncio.run(self._await(write_program(model, prompt, on_text=on_text)))
-        return model.name, written.attempts
+        listener = on_text if count == 1 else ignore_text
+        writing = gather_candidates(model, prompt, count, on_text=listener)
+        return model.name, asyncio.run(self._await(writing))
 
     def _open(self) -> Model:
         if self.max_tokens is None or self._model is None:
@@ -58,7 +54,7 @@ class ModelAuthor:
             with suppress(RuntimeError):  # the event loop has already ended
                 request[0].call_soon_threadsafe(request[1].cancel)
 
-    async def _await(self, writing: Coroutine[None, None, Written]) -> Written:
+    async def _await(self, writing: Coroutine[None, None, list[Attempt]]) -> list[Attempt]:
         task = asyncio.create_task(writing)
         self._request = (asyncio.get_running_loop(), task)
         try:

@@ -4,8 +4,7 @@ import asyncio
 
 import pytest
 
-from codebotler.generation.candidates import CONCURRENT_REQUESTS, gather_candidates
-from codebotler.generation.generate import Attempt
+from codebotler.generation.generate import CONCURRENT_REQUESTS, Attempt, gather_candidates
 from codebotler.models.base import ModelError, Reply
 from codebotler.prompts import prompt_for
 from scripted_model import Scripted
