@@ -228,7 +228,7 @@ def test_what_a_page_has_written_into_the_root_is_left_alone(
     assert seen.stdout == "?? .gitignore\n"
 
 
-MADE = re.compile(r"(?:--out|--record|--mcap|(?<![<>=-])>|mkdir(?: -p)?|--new \S+ --suite) ?([\w./-]+)")
+MADE = re.compile(r"(?:--out|--mcap|(?<![<>=-])>|mkdir(?: -p)?|--new \S+ --suite) ?([\w./-]+)")
 """What a command makes: a file or a folder."""
 
 

@@ -32,7 +32,6 @@ def generate(
     repair: options.RepairOption = False,
     candidates: options.CandidatesOption = 1,
     yes: options.TakeLargestOption = False,
-    record: options.RecordOption = None,
     show_prompt: options.ShowPromptOption = False,
     base_url: options.BaseUrlOption = None,
     rules: options.RulesOption = None,
@@ -72,7 +71,7 @@ def generate(
         opener = partial(open_model, chosen.name, settings)
         how, ask = CheckSettings(skills=table, house_rules=house_rules), line_reader(is_allowed=not yes)
         given = opener, make_prompt, instruction, how, room_map
-        program = choose_candidate(*given, count=candidates, ask=ask, record=record)
+        program = choose_candidate(*given, count=candidates, ask=ask)
         accepted = program is not None and print_checked(program, how, room_map)
     else:
         accepted = write(
@@ -84,7 +83,6 @@ def generate(
             skills=table,
             retries=int(repair) if retries is None else retries,
             repair=repair,
-            record=record,
         )
     raise typer.Exit(0 if accepted else 1)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -16,7 +15,7 @@ from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion,
 from codebotler.checking.check import check
 from codebotler.checking.sampled import CheckSettings
 from codebotler.checking.storyboard import storyboard
-from codebotler.cli.generate import note_programless, open_recorder
+from codebotler.cli.generate import note_programless
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import (
     busy,
@@ -52,7 +51,6 @@ def choose_candidate(
     *,
     count: int,
     ask: Callable[[str], str] | None,
-    record: Path | None = None,
 ) -> str | None:
     """Return the program that a person means, or None if they want none of them.
 
@@ -66,7 +64,6 @@ def choose_candidate(
         room_map: the rooms; by default those that the programs name.
         count: how many programs to request.
         ask: asks the person for a line, which is empty at the end; None if nobody can answer.
-        record: a file to which all replies are appended, if any.
 
     Raises:
         UserError: all programs of the second round do what the person did not mean.
@@ -76,8 +73,8 @@ def choose_candidate(
         opened, prompt = open_model(), make_prompt(instruction)
         if rejected is not None:
             prompt = prompt.after(rejected.options[0].program, rejected.rejections)
-        with busy(f"asking {opened.name}"), open_recorder(record, opened.name) as add:
-            attempts = asyncio.run(gather_candidates(opened, prompt, count, add))
+        with busy(f"asking {opened.name}"):
+            attempts = asyncio.run(gather_candidates(opened, prompt, count))
         programs = [one.reply.program for one in attempts if one.programless is None]
         if not programs and attempts[0].programless is not None:
             note_programless(attempts[0].programless)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 
-from codebotler.core.files import Appender, expect_replaceable, to_line
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import busy, note, print_source, shortened, visible
 from codebotler.core.words import brief
-from codebotler.generation.generate import Attempt, ignore_attempt, write_checked_program
+from codebotler.generation.generate import Attempt, write_checked_program
 from codebotler.generation.no_program import ProgramlessReply
 from codebotler.models.open import kind_of, open_model
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
@@ -42,56 +39,25 @@ def write(
     skills: SkillTable = SKILLS,
     retries: int,
     repair: bool,
-    record: Path | None,
 ) -> bool:
     """Have a model write a program, print it, and return whether the check accepts it."""
-    with ExitStack() as recording:
-        with busy(f"asking {model}"):
-            opened = open_model(model, settings)
-            record_attempt = recording.enter_context(open_recorder(record, opened.name))
-
-            def on_attempt(attempt: Attempt) -> None:
-                record_attempt(attempt)
-                _note_attempt(attempt, retries + 1)
-
-            generation = write_checked_program(
-                opened,
-                prompt,
-                room_map=room_map,
-                house_rules=house_rules,
-                skills=skills,
-                retries=retries,
-                repair=repair,
-                on_attempt=on_attempt,
-            )
-        if generation.programless is None:
-            print_source(generation.program)
+    with busy(f"asking {model}"):
+        opened = open_model(model, settings)
+        generation = write_checked_program(
+            opened,
+            prompt,
+            room_map=room_map,
+            house_rules=house_rules,
+            skills=skills,
+            retries=retries,
+            repair=repair,
+            on_attempt=partial(_note_attempt, most=retries + 1),
+        )
+    if generation.programless is None:
+        print_source(generation.program)
     if is_recorded(opened.name):
         note(RECORDED_NOTICE)
     return not generation.problems
-
-
-@contextmanager
-def open_recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None]]:
-    """Yield a function that appends attempts to a file, if given. An OSError is raised only at the end."""
-    if path is None:
-        yield ignore_attempt
-        return
-    expect_replaceable(path, b"{")
-    failed: OSError | None = None
-    with closing(Appender(path)) as file:
-
-        def add(attempt: Attempt) -> None:
-            nonlocal failed
-            if failed is None:
-                try:
-                    file.append(to_line(attempt.data(model)))
-                except OSError as error:
-                    failed = error
-
-        yield add
-    if failed is not None:
-        raise failed
 
 
 def _note_attempt(attempt: Attempt, most: int) -> None:

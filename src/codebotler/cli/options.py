@@ -114,9 +114,6 @@ RetriesOption = Annotated[
 RepairOption = Annotated[
     bool, typer.Option("--repair", help="Ask again with the program and its problems; one retry by default.")
 ]
-RecordOption = Annotated[
-    Path | None, typer.Option(help="Append each attempt to this file, as a line of JSON.")
-]
 ShowPromptOption = Annotated[
     bool, typer.Option("--show-prompt", help="Print the prompt without asking a model.")
 ]

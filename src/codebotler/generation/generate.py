@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
-from typing import Any, TypeAlias
+from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from codebotler.checking.check import check
 from codebotler.core.errors import UserError
@@ -38,17 +38,6 @@ class Attempt:
     reply: Reply = field(repr=False)
     problems: tuple[str, ...]  # empty if the program was accepted or not checked
     programless: ProgramlessReply | None = None  # set if the reply has no program
-
-    def data(self, model: str) -> dict[str, Any]:
-        """Convert the attempt to plain data for a row of JSON."""
-        return {
-            "instruction": self.prompt.instruction,
-            "model": model,
-            "number": self.number,
-            "prompt": [asdict(message) for message in self.prompt.messages],
-            **self.reply.data(),
-            "problems": list(self.problems),
-        }
 
 
 @dataclass(frozen=True)
@@ -127,11 +116,7 @@ async def make_attempt(
 
 
 async def gather_candidates(
-    model: Model,
-    prompt: Prompt,
-    count: int,
-    on_attempt: Callable[[Attempt], None] = ignore_attempt,
-    on_text: TextListener = ignore_text,
+    model: Model, prompt: Prompt, count: int, on_text: TextListener = ignore_text
 ) -> list[Attempt]:
     """Ask a model `count` times for a program, check none of them, and close the model.
 
@@ -144,12 +129,7 @@ async def gather_candidates(
         replies = await asyncio.gather(*requests)
     finally:
         await model.close()
-    attempts = [
-        await make_attempt(number, prompt, reply, model.settings) for number, reply in enumerate(replies)
-    ]
-    for attempt in attempts:
-        on_attempt(attempt)
-    return attempts
+    return [await make_attempt(number, prompt, reply, model.settings) for number, reply in enumerate(replies)]
 
 
 def _repair(prompt: Prompt, attempt: Attempt) -> Prompt:

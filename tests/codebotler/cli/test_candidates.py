@@ -128,11 +128,10 @@ def refused(*words: str | Path) -> Refusal:
 @pytest.mark.slow
 def test_generate_prints_the_chosen_program(tmp_path: Path, paper: Suite) -> None:
     words = "generate", paper.tasks["FindBackpack"].prompts[0], "--model", "recorded:hasty"
-    ended = codebotler(*words, "--candidates", "6", "--record", "all.jsonl", cwd=tmp_path)
+    ended = codebotler(*words, "--candidates", "6", cwd=tmp_path)
     assert ended.status == 0
     assert ended.out.startswith("def task_program")
     assert "the check rejected 4" in ended.err
-    assert len((tmp_path / "all.jsonl").read_text().splitlines()) == 6
 
 
 @pytest.mark.slow

@@ -19,7 +19,6 @@ from server import Fault, Request, Server
 KEY = "sk-verysecret0123456789abcdefghijkl"
 LOST = "```python\ndef task_program():\n    go_to('the moon')\n```\n"
 FINE = "```python\ndef task_program():\n    go_to('kitchen')\n```\n"
-LIMIT = 1 << 30  # bytes of a file, of which most take no room
 CODEBOTLER = shlex.join([sys.executable, "-m", "codebotler"])
 WORLD = "robot: start_loc\nrooms: [start_loc, kitchen]\n"
 
@@ -98,9 +97,9 @@ def test_a_program_with_problems_is_printed_with_status_1(tmp_path: Path) -> Non
     assert len(server.requests) == 1
 
 
-def test_rejection_sampling_asks_again_and_records_both_attempts(tmp_path: Path) -> None:
+def test_rejection_sampling_asks_again_and_tells_of_both_attempts(tmp_path: Path) -> None:
     with Server(answer=lost_at_first) as server:
-        ended = written(server, "--retries", "3", "--record", "attempts.jsonl", cwd=tmp_path)
+        ended = written(server, "--retries", "3", cwd=tmp_path)
     assert ended.status == 0
     assert ended.out == "def task_program():\n    go_to('kitchen')\n"
     told = ended.err.splitlines()
@@ -111,11 +110,7 @@ def test_rejection_sampling_asks_again_and_records_both_attempts(tmp_path: Path)
     first, second = server.requests
     assert first.body["messages"] == second.body["messages"]
     assert "kitchen" in json.dumps(first.body["messages"][-1])
-    text = (tmp_path / "attempts.jsonl").read_text()
-    rows = [json.loads(line) for line in text.splitlines()]
-    assert [len(row["problems"]) for row in rows] == [1, 0]
-    assert [row["raw_reply"] for row in rows] == [LOST, FINE]
-    assert KEY not in text + ended.out + ended.err
+    assert KEY not in ended.out + ended.err
 
 
 def test_a_repair_carries_the_program_and_the_problem_in_words(tmp_path: Path) -> None:
@@ -137,7 +132,7 @@ def test_retries_end(tmp_path: Path) -> None:
 
 def test_a_refused_key_is_one_sentence(tmp_path: Path) -> None:
     with Server(fault=lambda _: Fault.UNAUTHORIZED) as server:
-        ended = written(server, "--record", "attempts.jsonl", cwd=tmp_path)
+        ended = written(server, cwd=tmp_path)
     assert (ended.status, ended.out, ended.err.count("\n")) == (2, "", 1)
     assert "401" in ended.err
     assert KEY not in ended.err
@@ -176,42 +171,6 @@ def test_no_prompt_is_shown_for_a_model_that_is_none(model: str, named: list[str
 def test_a_world_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text("rooms: 3\n")
     assert refused("Go.", "--world", "world.yaml", cwd=tmp_path).file == "world.yaml"
-
-
-def test_a_record_that_cannot_be_written(tmp_path: Path, paper: Suite) -> None:
-    refusal = refused(instruction(paper), "--record", "no/such/folder", cwd=tmp_path)
-    assert refusal.at == ("no/such/folder", None)
-    assert "No such file or directory" in refusal.sentence
-
-
-def test_a_record_is_added_to_no_file_of_other_things(tmp_path: Path, paper: Suite) -> None:
-    (tmp_path / "first.py").write_text("def task_program(): ...\n")
-    refusal = refused(instruction(paper), "--record", "first.py", cwd=tmp_path)
-    assert refusal.at == ("first.py", None)
-    assert "unexpected content" in refusal.sentence
-    assert (tmp_path / "first.py").read_text() == "def task_program(): ...\n"
-
-
-def test_a_full_disk_under_the_record_is_told_and_costs_no_program(tmp_path: Path) -> None:
-    with Server(answer=lost_at_first) as server:
-        ended = written(server, "--retries", "3", "--record", "/dev/full", cwd=tmp_path)
-    assert ended.status == 1
-    assert ended.out == "def task_program():\n    go_to('kitchen')\n"
-    accepted, full = ended.err.splitlines()[-2:]
-    assert re.match("attempt 2 of 4 .*accepted", accepted)
-    assert full.startswith("codebotler: /dev/full: No space left on device; ")
-
-
-@pytest.mark.slow
-def test_a_record_that_does_not_fit_keeps_only_whole_lines(tmp_path: Path, paper: Suite) -> None:
-    record = tmp_path / "attempts.jsonl"
-    record.write_text("{" + " " * (LIMIT - 102) + "\n")
-    words = ("generate", instruction(paper), "--record", record.name)
-    ended = codebotler(*words, cwd=tmp_path, before=f"trap '' XFSZ; ulimit -f {LIMIT // 1024};")
-    assert ended.status == 1
-    assert ended.out.startswith("def task_program():\n")
-    assert ended.err.startswith("codebotler: attempts.jsonl: File too large")
-    assert record.stat().st_size == LIMIT - 100
 
 
 @pytest.mark.parametrize(
