@@ -27,6 +27,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.words import counted
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.matching import contains, normalized
+from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.worker import Worker
 
@@ -129,6 +130,17 @@ def cluster_candidates(
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
     rejected = len(programs) - sum(counts[one] for one in accepted)
     return CandidateClusters(tuple(sorted(clusters, key=lambda one: -one.size)), rejected)
+
+
+def compare_candidates(
+    programs: Sequence[str],
+    settings: CheckSettings,
+    room_map: RoomMap | None = None,
+    refused: Sequence[str] = (),
+) -> CandidateClusters:
+    """Group candidates on a worker of this process's pool; see `cluster_candidates`."""
+    pool = shared_pool()
+    return pool.call(lambda: cluster_candidates(pool.here(), programs, settings, room_map, refused))
 
 
 def _cluster(

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from functools import partial
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from codebotler.candidates.clusters import cluster_candidates
+from codebotler.candidates.clusters import compare_candidates
 from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
 from codebotler.checking.check import check
 from codebotler.checking.sampled import CheckSettings
@@ -31,7 +30,6 @@ from codebotler.core.words import counted, listed, with_sentence
 from codebotler.generation.generate import gather_candidates
 from codebotler.models.base import Model
 from codebotler.prompts import Prompt
-from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.room_map import RoomMap
 
 ADD_SENTENCE = "What should be different? (Enter to give up) "
@@ -80,9 +78,8 @@ def choose_candidate(
             note_programless(attempts[0].programless)
             return None
         refused = () if rejected is None else rejected.programs
-        with busy("comparing the programs"), WorkerPool(1) as pool:
-            grouping = partial(cluster_candidates, pool.here(), programs, settings, room_map, refused)
-            groups = pool.call(grouping)
+        with busy("comparing the programs"):
+            groups = compare_candidates(programs, settings, room_map, refused)
         question = question_about(groups, model=opened.name, is_second=rejected is not None)
         if question is None or ask is None:
             note(groups.summary)

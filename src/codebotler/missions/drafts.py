@@ -1,21 +1,17 @@
-"""Examine the drafts of a mission's program: the check, and which of several programs a person means."""
+"""Examine a draft of a mission's program: the check, and what the robot and the past say of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from codebotler.candidates.clusters import CandidateClusters, cluster_candidates
 from codebotler.checking.check import check
 from codebotler.checking.proof import hold_within
 from codebotler.checking.remaining import remaining_outcomes
 from codebotler.checking.repetition import hold_to_past
-from codebotler.checking.sampled import CheckSettings
 from codebotler.missions.preflight import missing_skills, unknown_rooms
 from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.robots.base import Robot
-from codebotler.simulator.pool import shared_pool
 
 
 def examine_draft(program: str, view: SessionView, order: MissionOrder, robot: Robot) -> dict[str, Any]:
@@ -44,14 +40,3 @@ def examine_draft(program: str, view: SessionView, order: MissionOrder, robot: R
         "unknown_rooms": tuple(unknown_rooms(program, known, skills)) if known else (),
         "busy": "",
     }
-
-
-def compare_drafts(
-    programs: Sequence[str], view: SessionView, robot: Robot, refused: Sequence[str] = ()
-) -> CandidateClusters:
-    """Group several programs for one instruction by what they do in imagined worlds.
-
-    Raise UserError if all of them do the same as programs that were refused before.
-    """
-    settings, pool = CheckSettings(skills=robot.skills, house_rules=view.rules_in_force), shared_pool()
-    return pool.call(lambda: cluster_candidates(pool.here(), programs, settings, view.room_map, refused))

@@ -14,14 +14,16 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from codebotler.candidates.clusters import compare_candidates
 from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
 from codebotler.checking.evasions import find_evasions
 from codebotler.checking.rule_rooms import unknown_rooms_in
+from codebotler.checking.sampled import CheckSettings
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.core.world import World
 from codebotler.missions.authoring import ModelAuthor, prompt_of
-from codebotler.missions.drafts import compare_drafts, examine_draft
+from codebotler.missions.drafts import examine_draft
 from codebotler.missions.log import MissionState
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.past import expect_rest
@@ -319,7 +321,8 @@ class MissionSession(SharedView):
         """Take one of several programs, or ask the person which one is meant if they differ."""
         self._show(busy="comparing the programs")
         refused = () if self._rejected is None else self._rejected.programs
-        groups = compare_drafts(programs, self._view, self._robot, refused)
+        how = CheckSettings(skills=self._robot.skills, house_rules=self._view.rules_in_force)
+        groups = compare_candidates(programs, how, self._view.room_map, refused)
         is_second = self._rejected is not None
         question = question_about(groups, model=self._view.model, is_second=is_second)
         if question is not None and self._order.asks:
