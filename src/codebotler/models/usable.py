@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from http.client import HTTPConnection, HTTPException
 from threading import Thread
-from time import monotonic
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
@@ -52,18 +51,15 @@ class UsableModel:
 
 def find_usable_models(servers: Mapping[str, int] = MODEL_SERVERS) -> list[UsableModel]:
     """List the models of local servers, then an example for each key, then the recorded models."""
-    found: dict[str, list[UsableModel]] = {}
+    local: list[UsableModel] = []
 
-    def ask(server: str) -> None:
-        found[server] = _list_models(server, servers[server])
+    def ask() -> None:
+        for server, port in servers.items():
+            local.extend(_list_models(server, port))
 
-    threads = [Thread(target=ask, args=(server,), daemon=True) for server in servers]
-    for thread in threads:
-        thread.start()
-    deadline = monotonic() + 2 * SERVER_TIMEOUT  # a slow trickle of bytes resets a socket's own timeout
-    for thread in threads:
-        thread.join(max(0.0, deadline - monotonic()))
-    local = [model for server in servers for model in found.get(server, ())]
+    thread = Thread(target=ask, daemon=True)
+    thread.start()
+    thread.join(len(servers) * SERVER_TIMEOUT)  # a slow trickle of bytes resets a socket's own timeout
     by_key = [UsableModel(name, f"{key} is set") for key, name in KEY_VARIABLES.items() if _is_set(key)]
     recorded = [
         UsableModel(f"recorded:{name}", "written by hand, for known instructions") for name in RECORDED_NAMES
