@@ -15,7 +15,7 @@ from codebotler.core.terminal import console, shortened, visible
 from codebotler.missions.log import LogLine, MissionState, MissionSummary
 from codebotler.missions.store import last_rest, rest_text
 from codebotler.missions.view import SessionView
-from codebotler.missions.wording import event_text, title
+from codebotler.missions.wording import event_text, timeline, title
 from codebotler.models.chosen import ChosenModel
 from codebotler.models.usable import MODEL_HINT, UsableModel
 from codebotler.robots.base import Readiness
@@ -82,9 +82,7 @@ def _time_text(line: LogLine) -> str:
 def _event_line(line: LogLine) -> Text:
     """Return the styled text for an event, which may be empty."""
     text = Text(event_text(line), EVENT_STYLES.get(line["event"], ""))
-    if line["event"] == "state":
-        text.stylize("bold", 0, len(line["state"]))
-    elif line["event"] == "skill" and line["skill"] == "go_to":
+    if line["event"] == "skill" and line["skill"] == "go_to":
         text.stylize("bold")
     return text
 
@@ -146,13 +144,10 @@ def mission_view(
         author = f"written by {shortened(summary.model)}" if summary.model else "typed or changed by hand"
         head.append(f"\n{author}", "dim")
     table = grid("left", "right", "left")
-    before: Text | None = None
-    for line in events:
-        text = Text() if line["event"] == "feedback" else _event_line(line)
-        if text and text != before:  # each edit of a draft records the same state again
-            before = text if line["event"] == "state" else None
-            at = datetime.fromtimestamp(line["time"]).astimezone()
-            table.add_row(Text(f"{at:%H:%M:%S}", "dim"), Text(_time_text(line), "dim"), text)
+    for line, words in timeline(events):
+        at = datetime.fromtimestamp(line["time"]).astimezone()
+        text = Text(words, EVENT_STYLES.get(line["event"], ""))
+        table.add_row(Text(f"{at:%H:%M:%S}", "dim"), Text(_time_text(line), "dim"), text)
     state = summary.state
     problems = [Text(f"problem: {shortened(problem)}", "red") for problem in summary.problems]
     program = Group(Text(), source_view(summary.program))

@@ -12,7 +12,7 @@ from codebotler.core.skills.table import Recording
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Point, World, laid_out
 from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState
-from codebotler.missions.wording import activity, event_text, stop_text
+from codebotler.missions.wording import event_text
 from codebotler.simulator.room_map import RoomMap
 
 POSITION_FEEDBACK = re.compile(r"at \((-?\d{1,7}(?:\.\d{1,20})?), (-?\d{1,7}(?:\.\d{1,20})?)\)")
@@ -47,7 +47,6 @@ class Progress:
     doing: str = ""  # the current skill or pause in words; empty between them
     skill: str = ""  # the current skill
     subject: str = ""  # the first argument of the current skill
-    activity: str = ""  # the current activity, such as `driving to kitchen`; kept after a cancellation
     line: int | None = None  # the program's current line, if known
     clock: float = 0.0  # seconds on the robot's clock since the program began
     room: str = ""  # the destination or current room, as named in the program
@@ -75,14 +74,11 @@ class Progress:
         if event == "skill":
             now = now.with_skill(line)
         elif event == "sleep" and line["seconds"]:
-            now = replace(now, doing=event_text(line), activity=activity(line), line=line.get("line"))
+            now = replace(now, doing=event_text(line), line=line.get("line"))
         elif event in SKILL_END_EVENTS:
             now = now.with_result(line["result"]) if event == "result" else now.with_failure(event)
-            still = self.activity if event == "cancelled" else ""
-            now = replace(now, doing="", skill="", line=None, is_driving=False, activity=still)
+            now = replace(now, doing="", skill="", line=None, is_driving=False)
         text = "" if event == "cancelled" else event_text(line)
-        if event == "stop":
-            text = stop_text(line["by"], self.activity)
         if not text or (event == "sleep" and not line["seconds"]):
             return now
         return replace(now, moments=(*now.moments, _moment(line, text))[-_MAX_MOMENTS:])
@@ -105,7 +101,6 @@ class Progress:
             line=line.get("line"),
             is_driving=drives,
             subject=str(subject).strip(),
-            activity=activity(line),
         )
         return replace(now, room=now.subject, left=self.room) if drives else now
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from codebotler.core.phrases import phrase
 from codebotler.core.skills.declaration import by_name
@@ -11,8 +11,8 @@ from codebotler.core.skills.values import written_call
 from codebotler.core.skills.verbs import VerbForm
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import attempted_event, to_options, trace_from
-from codebotler.core.words import brief
-from codebotler.missions.log import LogLine, MissionSummary
+from codebotler.core.words import brief, counted
+from codebotler.missions.log import LogLine, MissionState, MissionSummary
 from codebotler.simulator.contract import CONTRACT
 
 BY_PAGE = "the page"  # the source of a stop from the page, as it appears in the log
@@ -22,7 +22,11 @@ _TITLE_TOKEN = re.compile(
     r"""#.*|(?P<quote>\'{3}|"{3}|['"])(?s:\\.|(?!(?P=quote)).)*+(?P=quote)?"""  # comments and strings
     r"""|(?:def +|\.)\w+|(?P<name>\w*+) ?\(|\w+|\)"""
 )
-_MAX_ACTIVITY_CHARACTERS = 100
+_STATE_TITLES: Mapping[str, str] = {MissionState.DRAFTING: "program written", MissionState.RUNNING: "started"}
+"""The titles of states in a timeline. Other states keep their own names."""
+
+_STATES_IMPLIED_BY_STOP = frozenset({MissionState.STOPPING, MissionState.STOPPED})
+"""The states that a timeline hides after a stop."""
 
 
 def event_text(line: LogLine) -> str:
@@ -31,14 +35,29 @@ def event_text(line: LogLine) -> str:
     return words(line) if words else ""
 
 
-def activity(line: LogLine) -> str:
-    """Describe the current skill or pause, as in `going to "supply room"`."""
-    if line["event"] == "sleep":
-        return f"waiting for {line['seconds']:g} s"
-    return skill_text(line, "ing", _MAX_ACTIVITY_CHARACTERS) or f"executing {visible(line['skill'])}"
+def timeline(events: Iterable[LogLine]) -> Iterator[tuple[LogLine, str]]:
+    """Yield events with their descriptions, without feedback, repeated states, and what a stop implies."""
+    before, is_stopped = "", False
+    for number, line in enumerate(events):
+        is_state = line["event"] == "state"
+        words = _step_text(line, is_first=number == 0) if is_state else event_text(line)
+        is_stopped = is_stopped or line["event"] == "stop"
+        is_implied = is_stopped and line.get("state") in _STATES_IMPLIED_BY_STOP
+        if words and words != before and not is_implied and line["event"] not in {"feedback", "cancelled"}:
+            yield line, words
+        before = words if is_state else ""  # each edit of a draft logs the same state again
 
 
-def skill_text(line: LogLine, form: VerbForm, most: int = 500) -> str:
+def _step_text(line: LogLine, *, is_first: bool) -> str:
+    state, reason = line["state"], shortened(line.get("reason", ""))
+    step = "mission created" if is_first else _STATE_TITLES.get(state, visible(state))
+    if state == MissionState.CHECKED:
+        problems = len(line.get("problems", ()))
+        step = f"checked: {counted(problems, 'problem') if problems else 'no problems'}"
+    return f"{step}: {reason.removeprefix(f'{state} ')}" if reason else step
+
+
+def skill_text(line: LogLine, form: VerbForm) -> str:
     """Describe the call of a skill. Return an empty string if the skill has no verb."""
     skill = by_name(line["skill"])
     if skill is None or skill.verb is None:
@@ -48,13 +67,12 @@ def skill_text(line: LogLine, form: VerbForm, most: int = 500) -> str:
     event = attempted_event(skill, arguments, place="", time=0.0)
     if event is None:
         return str(getattr(skill.verb, form))
-    return phrase(event, form, show=lambda text: shortened(text, most))
+    return phrase(event, form, show=shortened)
 
 
-def stop_text(by: str, doing: str = "") -> str:
-    """Describe a stop, including the activity that it interrupted, if any."""
-    during = f" while {doing}" if doing else ""
-    return f"stopped {'from' if by == BY_PAGE else 'by'} {visible(by)}{during}"
+def stop_text(by: str) -> str:
+    """Describe a stop."""
+    return f"stopped {'from' if by == BY_PAGE else 'by'} {visible(by)}"
 
 
 def state_text(state: str, reason: str) -> str:

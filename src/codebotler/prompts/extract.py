@@ -287,14 +287,21 @@ def _undefined(tree: ast.Module | None) -> set[str]:
 # --- lines
 
 
+def _code_of(lines: Sequence[str]) -> list[int]:
+    return [i for i, line in enumerate(lines) if line.strip()]
+
+
+def _indent(line: str) -> str:
+    return line[: len(line) - len(line.lstrip())]
+
+
 def _dedent(lines: Sequence[str]) -> list[str]:
-    first = next(filter(str.strip, lines), "")
-    margin = first[: len(first) - len(first.lstrip())]
+    margin = next((_indent(line) for line in lines if line.strip()), "")
     return [line.removeprefix(margin) for line in lines]
 
 
 def _strip_blank_lines(lines: Sequence[str]) -> Sequence[str]:
-    code = [i for i, line in enumerate(lines) if line.strip()]
+    code = _code_of(lines)
     return lines[code[0] : code[-1] + 1] if code else []
 
 

@@ -478,7 +478,7 @@ def test_mcap_that_cannot_be_written_is_named(folder: Path) -> None:
 def test_mission_tells_each_state_once(folder: Path) -> None:
     run(folder, "good.py", "--yes")
     _, out, _ = ended(folder, "missions", "last")
-    assert out.count("drafting") == 1
+    assert out.count("program written") == 1
 
 
 @pytest.mark.parametrize(

@@ -14,11 +14,10 @@ from codebotler.core.world_file import read_world
 from codebotler.missions.log import MissionState, MissionSummary
 from codebotler.missions.progress import _MAX_MOMENTS, _MAX_STEPS, Find, Moment, Progress
 from codebotler.missions.view import SessionView
-from codebotler.missions.wording import title
+from codebotler.missions.wording import timeline, title
 from codebotler.robots.simulated import OFFICE
 from codebotler.simulator.room_map import RoomMap
 from codebotler.web.floorplan import _HALO_RADIUS, MAX_DRAWN_ROOMS, MapState, floorplan
-from codebotler.web.panes.past_mission import timeline
 from codebotler.web.panes.robot import map_state
 from codebotler.web.storyboard import (
     _LEFT_OUT,
@@ -129,10 +128,6 @@ def test_a_program_that_sleeps_is_said_to_wait() -> None:
     sleep = line("sleep", seconds=30.0, line=3)
     now = Progress().after(sleep)
     assert (now.doing, now.line) == ("waits for 30 s", 3)
-    assert now.after(line("stop", by="x")).moments[-1].text == "stopped by x while waiting for 30 s"
-    assert [text for _, text in timeline([sleep, line("stop", by="x")])][-1].endswith(
-        "while waiting for 30 s"
-    )
 
 
 def test_the_clock_stands_when_the_robot_has_stopped() -> None:
@@ -148,7 +143,7 @@ def test_the_clock_stands_when_the_robot_has_stopped() -> None:
     ]
 
 
-def test_a_stop_is_one_event_with_what_it_interrupted() -> None:
+def test_a_stop_is_one_event() -> None:
     drive, cancelled = call("go_to", location="supply room"), line("cancelled", number=1, skill="go_to")
     for events in (
         [drive, cancelled, line("stop", by="the page")],
@@ -156,13 +151,11 @@ def test_a_stop_is_one_event_with_what_it_interrupted() -> None:
     ):
         assert [moment.text for moment in after(*events).moments] == [
             'drives to "supply room"',
-            'stopped from the page while going to "supply room"',
+            "stopped from the page",
         ]
-        words = [text for _, text in timeline(events)]
-        assert words == ['Drives to "supply room"', 'Stopped from the page while going to "supply room"']
-    assert after(line("stop", by="Ctrl-C")).moments[-1].text == "stopped by Ctrl-C"
-    asked = [call("ask", person="ann", question="Tea?", options=["no"]), line("stop", by="Ctrl-C")]
-    assert after(*asked).moments[-1].text == 'stopped by Ctrl-C while asking "Tea?"'
+        states = [line("state", state=state, reason="stopped by x") for state in ("stopping", "stopped")]
+        words = [text for _, text in timeline([*events, *states])]
+        assert words == ['drives to "supply room"', "stopped from the page"]
 
 
 def test_the_line_is_the_one_that_the_program_says() -> None:

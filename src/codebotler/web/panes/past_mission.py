@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
@@ -12,11 +12,10 @@ from typing import NamedTuple
 from nicegui import html, ui
 
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import shortened, visible
-from codebotler.core.words import counted
-from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState, MissionSummary, read_events
+from codebotler.core.terminal import shortened
+from codebotler.missions.log import LogLine, MissionSummary, read_events
 from codebotler.missions.store import find_continuations, find_mission, find_rest
-from codebotler.missions.wording import activity, capitalize, event_text, reason_text, stop_text, title
+from codebotler.missions.wording import capitalize, reason_text, timeline, title
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText, outside
 from codebotler.web.live import follow
@@ -24,11 +23,6 @@ from codebotler.web.panes.continuing import EARLY_ENDS, ContinueButton, can_be_c
 from codebotler.web.panes.mission_list import state_words
 
 MAX_LISTED_EVENTS, _MAX_CODE_CHARACTERS = 1_000, 200
-_STATE_TITLES: Mapping[str, str] = {MissionState.DRAFTING: "Program written", MissionState.RUNNING: "Started"}
-"""The titles of states in the timeline. Other states keep their own names."""
-
-_STATES_IMPLIED_BY_STOP = frozenset({MissionState.STOPPING, MissionState.STOPPED})
-"""The states that the timeline hides after a stop."""
 
 
 def add(console: Console, frame: Frame) -> None:
@@ -60,38 +54,6 @@ async def _update(console: Console, page: _MissionPage) -> None:
     """Refresh the page if it shows the current mission of this process."""
     if page.mission == console.view.id and not page.has_ended:
         page.show(*await asyncio.to_thread(_read, console, page.mission))
-
-
-def timeline(events: Sequence[LogLine]) -> Iterator[tuple[LogLine, str]]:
-    """Yield the visible events with their descriptions. A stop includes the activity that it interrupted."""
-    doing, is_stopped = "", False
-    for number, line in enumerate(events):
-        event = line["event"]
-        if event == "skill" or (event == "sleep" and line["seconds"]):
-            doing = activity(line)
-        elif event in SKILL_END_EVENTS and event != "cancelled":
-            doing = ""
-        if event == "stop":
-            is_stopped = True
-            yield line, capitalize(stop_text(line["by"], doing))
-            continue
-        is_hidden = event == "cancelled" or (is_stopped and line.get("state") in _STATES_IMPLIED_BY_STOP)
-        words = "" if is_hidden else timeline_text(line, is_first=number == 0)
-        if words:
-            yield line, words
-
-
-def timeline_text(line: LogLine, *, is_first: bool) -> str:
-    """Return the text of an event in the timeline, or an empty string if the event is hidden."""
-    event = line["event"]
-    if event == "state":
-        state, reason = line["state"], shortened(line.get("reason", ""))
-        step = "Mission created" if is_first else _STATE_TITLES.get(state, visible(state).capitalize())
-        if state == MissionState.CHECKED:
-            problems = len(line.get("problems", ()))
-            step = f"Checked: {counted(problems, 'problem') if problems else 'no problems'}"
-        return f"{step}: {reason.removeprefix(f'{state} ')}" if reason else step
-    return "" if event == "feedback" else capitalize(event_text(line))
 
 
 class _Chain(NamedTuple):
@@ -195,4 +157,4 @@ def _draw_event(line: LogLine, words: str) -> None:
     with ui.element("li").classes(f"event event-{line['event']}"):
         PlainText("time", f"{datetime.fromtimestamp(line['time']).astimezone():%H:%M:%S}")
         PlainText("small", f"{line['clock']:.1f} s" if line["clock"] else "")
-        PlainText("span", words, "text")
+        PlainText("span", capitalize(words), "text")
