@@ -74,7 +74,7 @@ class VirtualRobot:
 
     def start(self) -> bool:
         """Offer the skills and return whether a master was started. Raise NotReadyError if ROS is missing."""
-        worker = self._worker = self._ros1_servers() if self._ros == 1 else self._ros2_servers()
+        worker = self._worker = self._start_servers()
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)
         ]
@@ -96,24 +96,20 @@ class VirtualRobot:
         for thread in self._threads:
             thread.join(LISTEN_SECONDS)
 
-    def _ros1_servers(self) -> RosWorker:
-        where = urlsplit(self.address)
-        port = where.port if where.hostname in LOOPBACK_HOSTS else None
-        environment = {"ROS_MASTER_URI": self.address}
-        if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
-            environment["ROS_HOSTNAME"] = "localhost"
-        start = {
+    def _start_servers(self) -> RosWorker:
+        start: WorkerMessage = {
             "node": VIRTUAL_NODE,
             "actions": calls_data(default_connection(self._body.skills)),
-            "port": port,
         }
-        return RosWorker(self._python, "servers.py", start, environment)
-
-    def _ros2_servers(self) -> RosWorker:
-        environment = {"ROS_DOMAIN_ID": self.address}
-        if "ROS_AUTOMATIC_DISCOVERY_RANGE" not in os.environ:
-            environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-        start = {"node": VIRTUAL_NODE, "actions": calls_data(default_connection(self._body.skills))}
+        if self._ros == 1:
+            where = urlsplit(self.address)
+            port = start["port"] = where.port if where.hostname in LOOPBACK_HOSTS else None
+            environment = {"ROS_MASTER_URI": self.address}
+            if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
+                environment["ROS_HOSTNAME"] = "localhost"
+            return RosWorker(self._python, "servers.py", start, environment)
+        reach = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        environment = {"ROS_DOMAIN_ID": self.address, "ROS_AUTOMATIC_DISCOVERY_RANGE": reach}
         return RosWorker(self._python, "ros2_servers.py", start, environment)
 
     def _listen(self, worker: RosWorker) -> None:
