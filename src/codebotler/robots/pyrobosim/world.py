@@ -44,7 +44,7 @@ class DrivableWorld:
     def __init__(self, world: World, clock: Clock) -> None:
         plan = plan_floor(world)
         names = [room.name for room in world.rooms]
-        self._clock, self._motor = clock, Motor(clock)
+        self._motor = Motor(clock)
         self._world = Pyroworld(name="pyrobosim.world", inflation_radius=ROBOT_RADIUS, object_radius=0.0)
         self._floors = self._build(plan)
         self._rooms = dict(zip(names, self._floors, strict=False))  # leaves out a corridor, which has no name
