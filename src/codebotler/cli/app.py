@@ -51,6 +51,7 @@ def generate(
     from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
     from codebotler.core.world_file import read_world
+    from codebotler.missions.preflight import suggesting_here
     from codebotler.models.chosen import choose_model
     from codebotler.models.open import open_model
     from codebotler.simulator.room_map import RoomMap
@@ -65,25 +66,26 @@ def generate(
     if show_prompt:
         print_prompt(make_prompt(instruction), chosen.name)
         return
-    if candidates > 1:
-        if repair or retries is not None:
-            raise UserError("--candidates cannot be combined with --retries or --repair")
-        opener = partial(open_model, chosen.name, settings)
-        how, ask = CheckSettings(skills=table, house_rules=house_rules), line_reader(is_allowed=not yes)
-        given = opener, make_prompt, instruction, how, room_map
-        program = choose_candidate(*given, count=candidates, ask=ask)
-        accepted = program is not None and print_checked(program, how, room_map)
-    else:
-        accepted = write(
-            make_prompt(instruction),
-            chosen.name,
-            settings,
-            room_map=room_map,
-            house_rules=house_rules,
-            skills=table,
-            retries=int(repair) if retries is None else retries,
-            repair=repair,
-        )
+    if candidates > 1 and (repair or retries is not None):
+        raise UserError("--candidates cannot be combined with --retries or --repair")
+    with suggesting_here(room_map):
+        if candidates > 1:
+            opener = partial(open_model, chosen.name, settings)
+            how, ask = CheckSettings(skills=table, house_rules=house_rules), line_reader(is_allowed=not yes)
+            given = opener, make_prompt, instruction, how, room_map
+            program = choose_candidate(*given, count=candidates, ask=ask)
+            accepted = program is not None and print_checked(program, how, room_map)
+        else:
+            accepted = write(
+                make_prompt(instruction),
+                chosen.name,
+                settings,
+                room_map=room_map,
+                house_rules=house_rules,
+                skills=table,
+                retries=int(repair) if retries is None else retries,
+                repair=repair,
+            )
     raise typer.Exit(0 if accepted else 1)
 
 

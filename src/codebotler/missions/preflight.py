@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 
 from codebotler.checking.problems import no_room
@@ -142,6 +143,15 @@ def with_closest_here(error: UnknownInstructionError, room_map: RoomMap | None) 
     """Return the same error, but suggest only instructions whose rooms exist here."""
     closest = find_closest(error.instruction, known_instructions(room_map))
     return UnknownInstructionError(error.model, error.instruction, closest)
+
+
+@contextmanager
+def suggesting_here(room_map: RoomMap | None) -> Iterator[None]:
+    """Suggest only instructions whose rooms exist here if a recorded model does not know one."""
+    try:
+        yield
+    except UnknownInstructionError as error:
+        raise with_closest_here(error, room_map) from None
 
 
 def missing_skills(program: str, robot: Robot) -> list[str]:
