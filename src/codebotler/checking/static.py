@@ -25,6 +25,7 @@ from codebotler.core.skills.values import ValueType
 from codebotler.simulator.isolated_call import IsolatedCallError, isolated
 from codebotler.simulator.room_map import RoomMap
 
+EVERYTHING = frozenset({"Exception", "BaseException"})
 ENDING_NODES = (ast.Return, ast.Raise, ast.Continue, ast.Break)
 EXAMPLE_PROGRAM = "def task_program():\n    if is_in_rom('mug'):\n        say('a mug')\n"
 
@@ -95,8 +96,9 @@ def _definite_errors(
         never, caught = set(), []
     by_line: dict[int | None, list[Flaw]] = {}
     for flaw in flaws:
-        may_be_caught = not flaw.is_misuse and any(flaw.line in lines for lines in caught)
-        if flaw.line not in never and not may_be_caught:
+        kinds = frozenset().union(*(kinds for lines, kinds in caught if flaw.line in lines))
+        is_hidden = bool(kinds & EVERYTHING) and not flaw.is_misuse
+        if flaw.line not in never and flaw.kind not in kinds and not is_hidden:
             by_line.setdefault(flaw.line, []).append(flaw)
     return [
         (same[0].kind, "; ".join(dict.fromkeys(flaw.message for flaw in same)), line)
@@ -122,11 +124,19 @@ def _unreachable(tree: ast.Module) -> Iterator[ast.stmt]:
                 yield from statements[next(ends, len(statements)) + 1 :]
 
 
-def _guarded_lines(tree: ast.Module) -> Iterator[range]:
-    """Yield the lines of each block whose errors may be caught: by a `try`, or by a context manager."""
+def _guarded_lines(tree: ast.Module) -> Iterator[tuple[range, frozenset[str]]]:
+    """Yield the lines of each `try` or `with` block, and the kinds of errors that it may catch."""
     for node in nodes(tree):
-        if isinstance(node, ast.With) or (isinstance(node, ast.Try | ast.TryStar) and node.handlers):
-            yield _lines(node.body)
+        if isinstance(node, ast.Try | ast.TryStar) and node.handlers:
+            yield _lines(node.body), frozenset().union(*map(_caught_kinds, node.handlers))
+        elif isinstance(node, ast.With):  # a context manager may suppress any error
+            yield _lines(node.body), EVERYTHING
+
+
+def _caught_kinds(handler: ast.ExceptHandler) -> frozenset[str]:
+    if handler.type is None:
+        return EVERYTHING
+    return frozenset(node.id for node in ast.walk(handler.type) if isinstance(node, ast.Name))
 
 
 def _lines(statements: Sequence[ast.stmt]) -> range:
