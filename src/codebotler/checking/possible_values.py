@@ -150,6 +150,8 @@ def _bindings(node: ast.AST) -> Iterator[tuple[ast.expr, PossibleValue]]:
             yield target, None
         case ast.withitem(optional_vars=ast.expr() as target):
             yield target, None
+        case ast.Lambda(given):
+            yield from ((ast.Name(one.arg), None) for one in given.args)
         case ast.arguments(kwonlyargs=only):
             positional = [*node.posonlyargs, *node.args]
             defaults = [*zip(reversed(positional), reversed(node.defaults), strict=False)]
