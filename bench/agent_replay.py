@@ -29,15 +29,15 @@ from agent_server import INPUT_TOKENS, OUTPUT_TOKENS, Turn, instruction_of, serv
 from codebotler.core.trace import Option, Outcome, Status
 from codebotler.models.open import open_model
 from codebotler.models.sampling import SamplingSettings
-from codebotler.simulator.robot import Argument
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.robot import Argument
 from roboeval.evaluation.agents.conversation import TurnLimits
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.agents.plan import AgentPlan
 from roboeval.evaluation.evaluate import evaluate_run
-from roboeval.evaluation.failures import Verdict
-from roboeval.evaluation.generate import GenerationProgress, Pace, generate_run
-from roboeval.evaluation.judge import evaluate, judge
+from roboeval.evaluation.generating.generate import GenerationProgress, Pace, generate_run
+from roboeval.evaluation.judging.failures import Verdict
+from roboeval.evaluation.judging.judge import evaluate, judge
 from roboeval.evaluation.recording import SLEEP, RecordingRobot
 from roboeval.evaluation.runs.completions import Completion, CompletionKey
 from roboeval.evaluation.runs.endings import TIMEOUT

@@ -19,12 +19,12 @@ from pathlib import Path
 from codebotler.checking.check import check_on
 from codebotler.checking.sampled import DEFAULT_SAMPLES, CheckSettings
 from codebotler.simulator.engine import digest
-from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.worker import Worker
-from roboeval.evaluation.judge import evaluate
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite

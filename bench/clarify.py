@@ -21,8 +21,8 @@ from codebotler.candidates.question import DOMINANT_SHARE, question_about
 from codebotler.checking.sampled import CheckSettings
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool
-from roboeval.evaluation.engines import Local
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.engines.engine import Local
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.mutation.mutants import Original, mutants, sample_mutants
 from roboeval.mutation.operator import Context

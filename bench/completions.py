@@ -18,7 +18,7 @@ from pathlib import Path
 
 from codebotler.core.files import to_line
 from codebotler.simulator.pool import cores
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import read_completions
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite

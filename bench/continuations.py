@@ -31,23 +31,23 @@ from typing import Any
 import yaml
 
 from codebotler.core.errors import RobotError
-from codebotler.core.phrases import is_spoken
 from codebotler.core.skills.kinds import ASK, CHECK, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
+from codebotler.core.text.phrases import is_spoken
 from codebotler.core.trace import Event, Trace, held_after
 from codebotler.core.world import Person, Room, World
-from codebotler.missions.log import EVENTS_FILE, LogLine, MissionState, MissionSummary
 from codebotler.missions.mission import Mission
-from codebotler.missions.past import MissionPast, read_past
+from codebotler.missions.storage.log import EVENTS_FILE, LogLine, MissionState, MissionSummary
+from codebotler.missions.storage.past import MissionPast, read_past
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
-from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.matching import content_words, means_anybody
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.worker import Worker
-from roboeval.evaluation.judge import judge
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.matching import content_words, means_anybody
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
+from roboeval.evaluation.judging.judge import judge
 from roboeval.evaluation.recording import Call, RecordingRobot
 from roboeval.evaluation.recovery import check_rest
 from roboeval.evaluation.runs.completions import Completion

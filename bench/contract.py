@@ -22,18 +22,18 @@ from pathlib import Path
 from check import Source, real
 from codebotler.checking.check import check_on
 from codebotler.checking.exploration import ExploringGuard
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.proof import extend_check
-from codebotler.checking.rules import read_rules
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.world import World
 from codebotler.missions.rule_effects import LIMITED_SIMULATION
-from codebotler.simulator.contract import Contract, RequestedCall
 from codebotler.simulator.engine import digest
+from codebotler.simulator.guard.contract import Contract, RequestedCall
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from codebotler.simulator.worlds.room_map import RoomMap
 from roboeval.suites.load import load_suite
 
 WORKERS = int(os.environ.get("WORKERS", "2"))

@@ -24,11 +24,11 @@ from codebotler.core.trace import Status
 from codebotler.core.world import Room, World
 from codebotler.simulator.batches.replay import REPLAYED
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.robot import SimulatedRobot
 from in_process import Reused, compiled
-from roboeval.evaluation.engines import Local, Work
+from roboeval.evaluation.engines.engine import Local, Work
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 

@@ -23,20 +23,20 @@ from typing import TypeAlias
 
 from check import Source, real
 from codebotler.checking.check import check_on
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.checking.proof import extend_check
-from codebotler.checking.rules import read_rules
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, to_options
 from codebotler.missions.live import LiveRobot, StoppedError
 from codebotler.robots.base import Feedback, RobotArgument, RobotResult, ignore_feedback
 from codebotler.robots.clock import Clock
-from codebotler.simulator.contract import Contract
-from codebotler.simulator.house_rule import RuleViolationError
-from codebotler.simulator.robot import Argument
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.rule_guard import RuleGuard
+from codebotler.simulator.guard.contract import Contract
+from codebotler.simulator.guard.house_rule import RuleViolationError
+from codebotler.simulator.guard.rule_guard import RuleGuard
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.robot import Argument
+from codebotler.simulator.worlds.room_map import RoomMap
 from roboeval.suites.load import load_suite
 
 CALLS, MILLISECONDS = 3_000, 1.0

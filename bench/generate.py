@@ -25,10 +25,10 @@ from pydantic_ai.models.openai import OpenAIChatModel
 from pydantic_ai.providers.openai import OpenAIProvider
 from pydantic_ai.settings import ModelSettings
 
-from codebotler.models.chat_messages import to_messages
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.sampling import SamplingSettings
+from codebotler.models.servers.chat_messages import to_messages
 from codebotler.prompts import prompt_for
 
 SERVER = Path(__file__).parents[1] / "tests/codebotler/models/server.py"

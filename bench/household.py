@@ -22,7 +22,7 @@ from typing import TypeAlias
 
 import yaml
 
-from codebotler.checking.rules import read_rules
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.core.skills.files import skills_from
 from codebotler.core.world_file import read_world
 from codebotler.missions.rule_effects import RuleEffect, find_program_effects

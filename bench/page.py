@@ -19,7 +19,7 @@ from statistics import median
 
 from playwright.sync_api import Page, sync_playwright
 
-from codebotler.missions.log import EVENTS_FILE, read_events
+from codebotler.missions.storage.log import EVENTS_FILE, read_events
 
 STOPS = int(os.environ.get("STOPS", "20"))
 AIM, AIM_OF_CHECKS = 150.0, 1000.0

@@ -21,14 +21,14 @@ from pathlib import Path
 
 from check import Source, real
 from codebotler.checking.exploration import ExploringGuard, explore
-from codebotler.checking.rules import read_rules
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.checking.sampled import CheckSettings
-from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.fact_sampler import Draw, FactSampler
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
 from roboeval.suites.load import load_suite
 
 WORKERS = int(os.environ.get("WORKERS", "2"))

@@ -15,9 +15,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from codebotler.simulator.worker import Worker
-from roboeval.evaluation.engines import Engine, Local, Work
-from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.ray import RayCluster
+from roboeval.evaluation.engines.engine import Engine, Local, Work
+from roboeval.evaluation.engines.ray import RayCluster
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite

@@ -19,7 +19,7 @@ import polars as pl
 
 from codebotler.core.files import to_line, to_text
 from roboeval.evaluation.evaluate import evaluation_metadata
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import read_results

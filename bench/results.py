@@ -14,9 +14,9 @@ from pathlib import Path
 
 from codebotler.core.files import to_line, to_text
 from roboeval import evaluate, load_results, load_suite, recorded_completions
-from roboeval.analysis.counts import tally_of, task_scores
+from roboeval.analysis.counting.counts import tally_of, task_scores
+from roboeval.analysis.counting.summary import failures
 from roboeval.analysis.metrics import overall
-from roboeval.analysis.summary import failures
 from roboeval.evaluation.evaluate import evaluation_metadata
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.rows import Seal

@@ -21,7 +21,7 @@ from codebotler.core.world import Room, World
 from codebotler.robots.base import ROS_PYTHON, Options, Robot
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros.caller import calls_data
-from codebotler.robots.ros.connection import default_connection
+from codebotler.robots.ros.connections.connection import default_connection
 from codebotler.robots.ros.virtual import VirtualRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 

@@ -24,8 +24,8 @@ from pathlib import Path
 
 from check import Source, real
 from codebotler.checking.check import check_together
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.checking.problems import CheckResult, Sample
-from codebotler.checking.rules import read_rules
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.errors import VIOLATION
 from codebotler.core.trace import Event, Option, Outcome, Trace
@@ -34,15 +34,15 @@ from codebotler.rtl import EventPattern, Formula, Inconclusive, Last, Not, holds
 from codebotler.rtl.formulas import And, Or, Test
 from codebotler.rtl.semantics import is_match
 from codebotler.simulator.engine import digest
-from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.house_rule import Rule, RuleViolationError
-from codebotler.simulator.matching import meant_by
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import SampledRobot
+from codebotler.simulator.guard.house_rule import Rule, RuleViolationError
+from codebotler.simulator.guard.rule_guard import RuleGuard
 from codebotler.simulator.worker import NewRobot, Worker
-from roboeval.evaluation.judge import judge
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.matching import meant_by
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
+from roboeval.evaluation.judging.judge import judge
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.mutation.mutants import mutants, originals, sample_mutants
 from roboeval.mutation.operator import Context

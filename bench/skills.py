@@ -14,17 +14,17 @@ from functools import partial
 from pathlib import Path
 
 from codebotler.checking.check import check
-from codebotler.checking.rules import read_rules
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.core.trace import Status
 from codebotler.core.world import World
 from codebotler.core.world_file import read_world
-from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
+from codebotler.simulator.guard.rule_guard import RuleGuard
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import AS_WRITTEN, SampledRobot
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import AS_WRITTEN, SampledRobot
 from roboeval.mutation.mutants import Mutant, mutants, originals
 from roboeval.mutation.operator import Context, Operator, operators_in
 from roboeval.mutation.operators import control_flow, misuse

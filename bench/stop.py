@@ -22,8 +22,8 @@ from statistics import median
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
-from codebotler.missions.log import EVENTS_FILE, LogLine, read_events
 from codebotler.missions.mission import Mission
+from codebotler.missions.storage.log import EVENTS_FILE, LogLine, read_events
 from codebotler.robots.base import (
     CancelledError,
     Feedback,
@@ -36,7 +36,7 @@ from codebotler.robots.base import (
 from codebotler.robots.open import check_readiness, open_robot
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.ros.connection_file import read_connection
+from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.ros2 import ROS2_MODULES, choose_python
 from codebotler.robots.ros.virtual import VirtualRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER, find_missing

@@ -11,8 +11,8 @@ import time
 from functools import partial
 
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.robot import SimulatedRobot
-from roboeval.evaluation.judge import judge
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from roboeval.evaluation.judging.judge import judge
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, settings
 import messages
 import processor_time
 import shared_workers
-from codebotler.simulator.isolated_call import ClosedProcess
+from codebotler.simulator.process.isolated_call import ClosedProcess
 from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite, load_suite
 
@@ -138,7 +138,7 @@ def engine_of_its_own(request: pytest.FixtureRequest, monkeypatch: pytest.Monkey
     if request.path.parent.name == "simulator" and not request.node.get_closest_marker("shared_engine"):
         shared_workers.end_all()
         monkeypatch.setattr("codebotler.simulator.pool.Worker", Worker)
-        monkeypatch.setattr("codebotler.simulator.isolated_call.ClosedProcess", ClosedProcess)
+        monkeypatch.setattr("codebotler.simulator.process.isolated_call.ClosedProcess", ClosedProcess)
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ import pytest
 
 from codebotler.core.trace import Event, Option
 from codebotler.rtl import parse
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 
 SOURCES = Path(__file__).parent.parent / "src"
 ROOTS = {"Exception", "ValueError", "RuntimeError", "UserError", "RobotError"}
@@ -27,12 +27,12 @@ MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     "codebotler.rtl.semantics.Inconclusive": ((4, 1, Option("3", is_text=False)), {}),
     "codebotler.rtl.source.RtlSyntaxError": ((3, "a bracket is missing"), {}),
     "codebotler.core.errors.RobotError": (("PickInvalidObject", "there is no mug"), {}),
-    "codebotler.simulator.isolated_call.IsolatedCallError": (("MemoryError", "it is too large"), {}),
-    "codebotler.simulator.house_rule.RuleViolationError": (
+    "codebotler.simulator.process.isolated_call.IsolatedCallError": (("MemoryError", "it is too large"), {}),
+    "codebotler.simulator.guard.house_rule.RuleViolationError": (
         (Rule("quiet", "Be quiet.", parse('not tr.Exists(say(".*"))')), Event("say", "hello")),
         {"objection": "is broken by"},
     ),
-    "codebotler.web.guard.RefusedError": ((HTTPStatus.FORBIDDEN, "a sentence"), {}),
+    "codebotler.web.security.guard.RefusedError": ((HTTPStatus.FORBIDDEN, "a sentence"), {}),
 }
 """What each exception takes; one sentence by default."""
 

@@ -13,7 +13,7 @@ from forked import Forked, Server
 
 ROOT = Path(__file__).parent.parent
 PRELOADED = (
-    *("codebotler.cli.check", "codebotler.cli.run", "codebotler.generation.generate"),
+    *("codebotler.cli.programs.check", "codebotler.cli.operating.run", "codebotler.generation.generate"),
     *("codebotler.missions.session", "codebotler.robots.open", "codebotler.robots.simulated"),
     *("roboeval.cli.views.results", "roboeval.cli.views.tasks", "roboeval.evaluation.evaluate"),
     *("polars", "rich.table", "rich.live", "rich.syntax", "asyncio"),

@@ -113,7 +113,7 @@ def test_a_public_name_is_documented_and_is_no_module(package: str, name: str) -
 
 
 def test_names_stay_what_they_are_whatever_else_is_imported() -> None:
-    for module in ("evaluation.judge", "cli.app"):
+    for module in ("evaluation.judging.judge", "cli.app"):
         import_module(f"roboeval.{module}")
     for module in ("checking.check", "generation.generate", "cli.app"):
         import_module(f"codebotler.{module}")

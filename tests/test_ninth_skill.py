@@ -20,7 +20,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.prompts import prompt_for
 from codebotler.rtl import holds, parse
 from codebotler.simulator.engine import run
-from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.worlds.robot import SimulatedRobot
 from flaws import find_flaws
 from other_functions import with_functions
 from roboeval.suites.load import SUITES, load_suite

@@ -11,17 +11,17 @@ from mcap.reader import make_reader
 from typer.testing import CliRunner
 
 from codebotler.checking.check import check
-from codebotler.checking.rules import read_rules
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.cli.app import app
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.world_file import read_world
-from codebotler.missions.store import read_missions
-from codebotler.simulator.room_map import RoomMap
+from codebotler.missions.storage.store import read_missions
+from codebotler.simulator.worlds.room_map import RoomMap
 from roboeval.cli.app import app as roboeval
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite

@@ -19,7 +19,7 @@ __all__ = [
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from roboeval.evaluation.judge import evaluate
+    from roboeval.evaluation.judging.judge import evaluate
     from roboeval.evaluation.rewards import reward
     from roboeval.evaluation.runs.completions import Completion, read_completions
     from roboeval.evaluation.runs.results import load_results
@@ -32,7 +32,7 @@ else:  # each name is imported when it is first used
     __getattr__, __dir__ = facade(
         __name__,
         {
-            "evaluation.judge": ["evaluate"],
+            "evaluation.judging.judge": ["evaluate"],
             "evaluation.rewards": ["reward"],
             "evaluation.runs.completions": ["Completion", "read_completions"],
             "evaluation.runs.results": ["load_results"],

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from codebotler.core.world import Person, Room, World
-from codebotler.missions.log import MissionState
+from codebotler.missions.storage.log import MissionState
 from ended import cut, failed_mission, line_of
 from pageserver import PageServer
 from viewing import DESK, PHONE, SCREENS, OpenPage, Screen, Shoot, expect_no_grave_fault, write

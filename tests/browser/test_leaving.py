@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from codebotler.missions.store import read_missions
+from codebotler.missions.storage.store import read_missions
 from pageserver import PageServer
 from viewing import PHONE, OpenPage
 

@@ -20,8 +20,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from codebotler.missions.log import MissionState
-from codebotler.missions.wording import _EVENT_WORDERS
+from codebotler.missions.display.wording import _EVENT_WORDERS
+from codebotler.missions.storage.log import MissionState
 from server import Server
 
 ROOT = Path(__file__).parents[2]

@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 
 from codebotler.core.world import World
-from codebotler.missions.log import EVENTS_FILE, MissionState, MissionSummary
 from codebotler.missions.mission import Mission
+from codebotler.missions.storage.log import EVENTS_FILE, MissionState, MissionSummary
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 

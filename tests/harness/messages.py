@@ -16,8 +16,8 @@ ERRORS = {
     "MissionError": "codebotler.missions.mission",
     "ModelError": "codebotler.models.base",
     "NotReadyError": "codebotler.robots.base",
-    "RefusedError": "codebotler.web.guard",
-    "RobotError": "codebotler.simulator.robot",
+    "RefusedError": "codebotler.web.security.guard",
+    "RobotError": "codebotler.simulator.worlds.robot",
     "RobotLostError": "codebotler.robots.base",
     "RtlSyntaxError": "codebotler.rtl.source",
 }

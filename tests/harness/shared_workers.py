@@ -14,9 +14,9 @@ from typing import TypeVar
 import pytest
 
 from codebotler.core.trace import Outcome
-from codebotler.simulator.isolated_call import ClosedProcess
 from codebotler.simulator.ledger import SkillPerformer
 from codebotler.simulator.process.fork_server_client import ForkServer
+from codebotler.simulator.process.isolated_call import ClosedProcess
 from codebotler.simulator.worker import EngineError, Job, NewRobot, Worker
 
 Started = TypeVar("Started")
@@ -109,7 +109,7 @@ def shared() -> Iterator[None]:
         for user in ("codebotler.simulator.pool", "codebotler.missions.mission"):
             patch.setattr(f"{user}.Worker", worker)
         patch.setattr(
-            "codebotler.simulator.isolated_call.ClosedProcess",
+            "codebotler.simulator.process.isolated_call.ClosedProcess",
             lambda module: lasting(partial(ClosedProcess, module)),
         )
         yield

@@ -8,9 +8,9 @@ def task_program():
     for name in (
         "codebotler.core.world",
         "codebotler.core.trace",
-        "codebotler.simulator.robot",
+        "codebotler.simulator.worlds.robot",
         "codebotler.simulator.engine",
-        "roboeval.evaluation.judge",
+        "roboeval.evaluation.judging.judge",
         "roboeval.suites.load",
         "pydantic",
         "yaml",

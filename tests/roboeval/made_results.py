@@ -15,13 +15,13 @@ from codebotler.core.errors import RobotError
 from codebotler.core.files import to_line
 from codebotler.core.trace import Event, Trace
 from codebotler.core.world import World
-from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from roboeval.evaluation.judging.serialization import row_line
 from roboeval.evaluation.runs.completions import Completion, CompletionKey
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import Row, decode_row, key_of
 from roboeval.evaluation.runs.table import TableBuilder
-from roboeval.evaluation.serialization import row_line
 from roboeval.suites.load import Suite
 
 VERDICT = {

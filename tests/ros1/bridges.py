@@ -18,7 +18,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import ROS_PYTHON
 from codebotler.robots.ros.caller import calls_data
-from codebotler.robots.ros.connection import default_connection
+from codebotler.robots.ros.connections.connection import default_connection
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 
 ROS_SIDE = Path(__file__).parent / "bridge_to_ros.py"

@@ -17,7 +17,7 @@ from codebotler.core.skills.files import skills_from
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, Options, RobotLostError
 from codebotler.robots.ros import ros1, rosbridge
 from codebotler.robots.ros.caller import Timeouts
-from codebotler.robots.ros.connection_file import read_connection
+from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.robot import RosRobot
 from ros_graph import HERE, LONG, Graph, Process, started
 

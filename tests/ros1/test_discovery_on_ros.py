@@ -7,7 +7,7 @@ import yaml
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import ROS_PYTHON, NotReadyError
-from codebotler.robots.ros.discovery import discover_offers, draft_connection
+from codebotler.robots.ros.connections.discovery import discover_offers, draft_connection
 from ros_graph import HERE, Graph, Process
 
 

@@ -18,7 +18,7 @@ from codebotler.core.world import Room, World
 from codebotler.robots.base import ROS_PYTHON, Options
 from codebotler.robots.ros import rosbridge
 from codebotler.robots.ros.caller import Timeouts, calls_data
-from codebotler.robots.ros.connection import default_connection
+from codebotler.robots.ros.connections.connection import default_connection
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.virtual import VirtualRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER

@@ -23,11 +23,11 @@ from bridges import bridge, over_ros
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.missions.log import read_events
+from codebotler.missions.storage.log import read_events
 from codebotler.robots.base import CameraPicture, CancelledError, Options
 from codebotler.robots.ros import ros1, rosbridge
 from codebotler.robots.ros.caller import Timeouts
-from codebotler.robots.ros.connection_file import read_connection
+from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from halves import encoded, has_frame, rows, sees

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.checking.rules import read_rules
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
-from codebotler.missions.progress import POSITION_FEEDBACK
+from codebotler.missions.display.progress import POSITION_FEEDBACK
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, RobotLostError
 from codebotler.robots.ros.caller import Timeouts
-from codebotler.robots.ros.connection_file import read_connection
+from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros2_scene import ROS2_PYTHON, SHORT, Scene

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.checking.rules import read_rules
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import Room
 from codebotler.robots.base import CancelledError
-from codebotler.robots.ros.connection_file import read_connection
+from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.keepout import keepout_messages as keepout_mask
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from error_tables import errors_on, unsaid

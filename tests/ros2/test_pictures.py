@@ -17,7 +17,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import CameraPicture
-from codebotler.robots.ros.connection_file import read_connection
+from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from halves import encoded, has_frame, rows, sees
 from ros2_scene import ROS2_PYTHON, Scene

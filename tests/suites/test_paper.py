@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from codebotler.models.recorded import Solution, open_recorded
-from roboeval.evaluation.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES, NO_PROGRAM_CLASS
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.judging.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES, NO_PROGRAM_CLASS
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, Task, load_suite

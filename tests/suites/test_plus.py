@@ -14,8 +14,8 @@ import yaml
 from codebotler.core.world import World
 from codebotler.models.recorded import Solution
 from codebotler.simulator.engine import run
-from roboeval.evaluation.failures import Verdict
-from roboeval.evaluation.judge import judge
+from roboeval.evaluation.judging.failures import Verdict
+from roboeval.evaluation.judging.judge import judge
 from roboeval.linting.lint import lint
 from roboeval.linting.trials import Verdicts, judge_solutions
 from roboeval.suites.load import Suite, Task, load_suite

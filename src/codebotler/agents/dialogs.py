@@ -18,9 +18,9 @@ from codebotler.candidates.question import ClarifyingQuestion
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.missions.mission import MissionError
-from codebotler.missions.past import MissionPast
 from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.session import MissionSession
+from codebotler.missions.storage.past import MissionPast
 from codebotler.models.base import ModelError, ignore_text
 
 MAX_ARGUMENT = 10_000

@@ -15,21 +15,21 @@ from typing import Any, TypeVar
 
 from codebotler.agents.reports import CheckReport, MissionReport, RobotReport, report_check
 from codebotler.agents.steps import NOT_RUNNING, Steps
-from codebotler.checking.contract_file import contract_from
-from codebotler.checking.contract_text import contract_sentence
+from codebotler.checking.contracts.file import contract_from
+from codebotler.checking.contracts.text import contract_sentence
 from codebotler.core.errors import UserError
 from codebotler.core.program import MAX_PROGRAM_LENGTH
-from codebotler.core.words import brief, listed
+from codebotler.core.text.words import brief, listed
 from codebotler.missions.authoring import ModelAuthor
-from codebotler.missions.log import MissionState
+from codebotler.missions.display.view import MissionOrder, SessionView
+from codebotler.missions.display.wording import event_text
 from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import missing_skills
 from codebotler.missions.session import MissionSession
-from codebotler.missions.view import MissionOrder, SessionView
-from codebotler.missions.wording import event_text
+from codebotler.missions.storage.log import MissionState
 from codebotler.models.base import ignore_text
 from codebotler.prompts import Prompt, prompt_for
-from codebotler.simulator.contract import Contract
+from codebotler.simulator.guard.contract import Contract
 from codebotler.web.console import Console
 
 _Made = TypeVar("_Made")
@@ -65,8 +65,9 @@ class Gatekeeper:
     def propose(self, order: MissionOrder, steps: Steps | None = None) -> MissionSession:
         """Begin a mission that waits for approval. Raise MissionError if the console is busy with another."""
         before = self.console.session
-        is_own = before is self._session and not self.console.view.is_changed_by_person
-        if not (is_own or self.console.view.is_over):
+        view = SessionView() if before is None else before.view
+        is_own = before is self._session and not view.is_changed_by_person
+        if not (is_own or view.is_over):
             raise MissionError("a person is working on a mission of their own; wait until it is over")
         if len(order.program) > MAX_PROGRAM_LENGTH:  # it would have no contract
             raise UserError(f"the program has more than {MAX_PROGRAM_LENGTH:,} characters; shorten it")

@@ -10,8 +10,8 @@ from pydantic import BaseModel, Field, model_validator
 from codebotler.candidates.question import ClarifyingQuestion
 from codebotler.checking.problems import CheckResult
 from codebotler.core.terminal import shortened, visible_lines
-from codebotler.core.words import listed
-from codebotler.missions.view import SessionView
+from codebotler.core.text.words import listed
+from codebotler.missions.display.view import SessionView
 from codebotler.web.storyboard import Scene, Strip, strips
 
 

@@ -30,11 +30,11 @@ from codebotler.agents.tools import ACTING, READING
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
 from codebotler.core.terminal import shortened
-from codebotler.missions.log import EVENTS_FILE, SUMMARY_FILE
 from codebotler.missions.mission import BY_SHUTDOWN, MissionError
-from codebotler.missions.store import RECENT_MISSIONS, find_mission, read_missions
-from codebotler.web.access import AGENT_PATH
+from codebotler.missions.storage.log import EVENTS_FILE, SUMMARY_FILE
+from codebotler.missions.storage.store import RECENT_MISSIONS, find_mission, read_missions
 from codebotler.web.console import Console
+from codebotler.web.security.access import AGENT_PATH
 from codebotler.web.server import Companion
 
 MAX_MESSAGE_BYTES = 2_000_000

@@ -11,19 +11,19 @@ from threading import Lock
 from typing import TypeAlias
 
 from codebotler.agents.reports import SkillOutcome
-from codebotler.checking.contract_file import contract_yaml
+from codebotler.checking.contracts.file import contract_yaml
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.terminal import visible
+from codebotler.core.text.words import listed
 from codebotler.core.trace import Outcome
-from codebotler.core.words import listed
 from codebotler.missions.live import LiveRobot
 from codebotler.missions.mission import MissionError
-from codebotler.simulator.contract import TELLING_SKILLS, Contract
+from codebotler.simulator.guard.contract import TELLING_SKILLS, Contract
 from codebotler.simulator.ledger import Ledger
-from codebotler.simulator.robot import Argument
 from codebotler.simulator.skill_protocol import named_arguments, named_result
+from codebotler.simulator.worlds.robot import Argument
 
 IDLE_POLL_SECONDS = 0.1
 """How often an idle mission looks whether it was stopped."""

@@ -40,11 +40,11 @@ from codebotler.agents.reports import (
 )
 from codebotler.core.errors import UserError
 from codebotler.missions.authoring import ModelAuthor, prompt_of
+from codebotler.missions.display.view import MissionOrder, SessionView
+from codebotler.missions.display.wording import event_text
 from codebotler.missions.mission import MissionError
-from codebotler.missions.past import MissionPast
 from codebotler.missions.session import MissionSession
-from codebotler.missions.view import MissionOrder, SessionView
-from codebotler.missions.wording import event_text
+from codebotler.missions.storage.past import MissionPast
 from codebotler.prompts import clean_instruction
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS
 

@@ -15,8 +15,8 @@ from codebotler.rtl.text.clauses import clauses, complete_clauses, sentences
 from codebotler.rtl.text.numbers import numerals
 from codebotler.rtl.text.polarity import Polarity, polarity, without_harmless
 from codebotler.rtl.text.times import times_in
-from codebotler.simulator.matching import SOMEBODY, normalized, whole_words
-from codebotler.simulator.sampled_robot import AGREEING_TEXT
+from codebotler.simulator.worlds.matching import SOMEBODY, normalized, whole_words
+from codebotler.simulator.worlds.sampled_robot import AGREEING_TEXT
 
 PAPER_KINDS = frozenset({GOTO, SAY, CHECK, ASK, PICK, PLACE})
 ENDLESS_RUN = "waits"  # the ending of a run that reached a limit

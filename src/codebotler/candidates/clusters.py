@@ -22,14 +22,14 @@ from codebotler.checking.sampled import (
     run_together,
     unexplored_samplers,
 )
-from codebotler.checking.static import read_rooms
+from codebotler.checking.source.static import read_rooms
 from codebotler.core.errors import UserError
-from codebotler.core.words import counted
-from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.matching import contains, normalized
+from codebotler.core.text.words import counted
 from codebotler.simulator.pool import shared_pool
-from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.matching import contains, normalized
+from codebotler.simulator.worlds.room_map import RoomMap
 
 RANDOM_WORLDS, MAX_SHARED_WORLDS = 8, 24  # random worlds, and worlds with those that try further facts
 ROOM_NUMBER = re.compile(r"\s*\d+$")

@@ -12,12 +12,12 @@ from codebotler.candidates.clusters import CandidateCluster, CandidateClusters
 from codebotler.checking.problems import Sample
 from codebotler.checking.storyboard import steps_of
 from codebotler.core.errors import UserError
-from codebotler.core.phrases import phrase
 from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE
+from codebotler.core.text.phrases import phrase
+from codebotler.core.text.words import brief, counted, listed
 from codebotler.core.trace import Event
-from codebotler.core.words import brief, counted, listed
 from codebotler.models.recorded import is_recorded
-from codebotler.simulator.matching import normalized
+from codebotler.simulator.worlds.matching import normalized
 
 DOMINANT_SHARE = 0.75
 """The share of the candidates from which the largest cluster is taken without a question."""

@@ -17,15 +17,15 @@ from codebotler.checking.sampled import (
     run_in_sampled_worlds,
     run_together,
 )
-from codebotler.checking.static import read_program
+from codebotler.checking.source.static import read_program
 from codebotler.core.errors import expect_list
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_robot import AS_WRITTEN
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import AS_WRITTEN
 
 
 def check(

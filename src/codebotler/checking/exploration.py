@@ -13,13 +13,13 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Status
-from codebotler.simulator.contract import TELLING_SKILLS, RequestedCall
-from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.house_rule import Rule, RuleViolationError
-from codebotler.simulator.robot import Argument
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.rule_guard import RuleGuard
+from codebotler.simulator.guard.contract import TELLING_SKILLS, RequestedCall
+from codebotler.simulator.guard.house_rule import Rule, RuleViolationError
+from codebotler.simulator.guard.rule_guard import RuleGuard
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.fact_sampler import Draw, FactSampler
+from codebotler.simulator.worlds.robot import Argument
+from codebotler.simulator.worlds.room_map import RoomMap
 
 MAX_RUNS, MAX_LONE_RUNS, MAX_CALLS = 2_000, 100, 40_000
 """The budget for each kind of world: all runs, those that need a process of their own, and skill calls."""

@@ -7,17 +7,17 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, TypeAlias
 
-from codebotler.checking.contract_file import contract_data
+from codebotler.checking.contracts.file import contract_data
 from codebotler.core.errors import VIOLATION
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
+from codebotler.core.text.words import brief, counted, listed
 from codebotler.core.trace import Outcome, Trace, outcome_data
-from codebotler.core.words import brief, counted, listed
-from codebotler.simulator.contract import Contract
-from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_facts import SampledFact
-from codebotler.simulator.simulated_world import ambiguous
+from codebotler.simulator.guard.contract import Contract
+from codebotler.simulator.worlds.fact_sampler import Draw, FactSampler
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_facts import SampledFact
+from codebotler.simulator.worlds.simulated_world import ambiguous
 
 
 @dataclass(frozen=True)

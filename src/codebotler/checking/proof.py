@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from codebotler.checking.contract_of_program import derive_contract
-from codebotler.checking.contract_text import contract_clauses
+from codebotler.checking.contracts.of_program import derive_contract
+from codebotler.checking.contracts.text import contract_clauses
 from codebotler.checking.exploration import explore
 from codebotler.checking.problems import CheckResult, Problem, RuleProof, RuleVerdict
 from codebotler.checking.sampled import CheckSettings, SampledRuns, group_failures
-from codebotler.checking.written_arguments import read_arguments
+from codebotler.checking.source.written_arguments import read_arguments
 from codebotler.core.skills.table import SkillTable
-from codebotler.simulator.contract import Contract
+from codebotler.simulator.guard.contract import Contract
 from codebotler.simulator.worker import Worker
 
 

@@ -10,13 +10,13 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.calling import SKILL_FAILED
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, Status, attempted_event
-from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import shared_pool
-from codebotler.simulator.robot import Argument, Result
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.robot import Argument, Result
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
 
 def remaining_outcomes(

@@ -8,17 +8,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from codebotler.checking.problems import CheckResult, Problem, Sample
-from codebotler.core.phrases import is_spoken, phrase
 from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.kinds import PICK, PLACE
+from codebotler.core.text.phrases import is_spoken, phrase
+from codebotler.core.text.words import brief
 from codebotler.core.trace import Event, Outcome, Status, Trace, held_after
-from codebotler.core.words import brief
 from codebotler.rtl.text.numbers import numerals
 from codebotler.rtl.text.polarity import Polarity, polarity
-from codebotler.simulator.matching import content_words, normalized
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_robot import AGREEING_TEXT
+from codebotler.simulator.worlds.matching import content_words, normalized
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import AGREEING_TEXT
 
 UNBOUNDED_COUNT = 1_000_000
 """The number of steps that remain of a kind that a program repeats without end."""

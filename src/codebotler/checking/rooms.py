@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from codebotler.checking.static import read_rooms
+from codebotler.checking.source.static import read_rooms
 from codebotler.core.errors import UserError
-from codebotler.core.labels import check_label
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.simulator.room_map import RoomMap
+from codebotler.core.text.labels import check_label
+from codebotler.simulator.worlds.room_map import RoomMap
 
 DEFAULT_START = "start_loc"  # the name in the paper's prompt
 PLACEHOLDER_ROOMS = ("room 1", "room 2")  # for a program that visits all rooms but names none

@@ -11,16 +11,16 @@ from codebotler.checking.problems import Problem, Sample, no_room
 from codebotler.core.errors import VIOLATION, UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
+from codebotler.core.text.words import listed
 from codebotler.core.trace import Outcome, Status
-from codebotler.core.words import listed
-from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
+from codebotler.simulator.guard.rule_guard import RuleGuard
 from codebotler.simulator.process.exit_status import PROCESSOR_TIME
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import AS_WRITTEN, SampledRobot
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Job, Worker
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import AS_WRITTEN, SampledRobot
 
 DEFAULT_SAMPLES, MAX_SAMPLES = 5, 10_000
 EXPLORATION_FACTOR = 2  # worlds added per sample, at most, to try both values of each fact

@@ -10,9 +10,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from codebotler.core.phrases import is_question, phrase
 from codebotler.core.skills.kinds import GOTO
 from codebotler.core.terminal import shortened, visible
+from codebotler.core.text.phrases import is_question, phrase
 from codebotler.core.trace import Event, Trace, option_data, option_from
 
 MAX_SHOWN_STEPS, FIRST_STEPS, LAST_STEPS = 40, 12, 6

@@ -9,9 +9,8 @@ import typer
 
 from codebotler.cli import options
 from codebotler.cli.ending import obey
-from codebotler.cli.mcp import serve_agents
 from codebotler.cli.model_options import inherit_options, model_settings
-from codebotler.cli.operating import (
+from codebotler.cli.operating.commands import (
     connect,
     continue_mission,
     missions,
@@ -20,6 +19,7 @@ from codebotler.cli.operating import (
     serve_page,
     virtual_robot,
 )
+from codebotler.cli.operating.mcp import serve_agents
 from codebotler.core.terminal import note, report_problems
 
 
@@ -45,16 +45,16 @@ def generate(
     from functools import partial
 
     from codebotler.checking.sampled import CheckSettings
-    from codebotler.cli.candidates import choose_candidate, line_reader, print_checked
-    from codebotler.cli.generate import print_prompt, prompt_maker, write
-    from codebotler.cli.rules import rules_for
+    from codebotler.cli.programs.candidates import choose_candidate, line_reader, print_checked
+    from codebotler.cli.programs.generate import print_prompt, prompt_maker, write
+    from codebotler.cli.programs.rules import rules_for
     from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
     from codebotler.core.world_file import read_world
     from codebotler.missions.preflight import suggesting_here
     from codebotler.models.chosen import choose_model
     from codebotler.models.open import open_model
-    from codebotler.simulator.room_map import RoomMap
+    from codebotler.simulator.worlds.room_map import RoomMap
 
     chosen = choose_model(model, base_url)
     settings = chosen.add_server(model_settings(**sampling))
@@ -112,13 +112,13 @@ def check(
     """
     from codebotler.checking import check
     from codebotler.checking.proof import hold_within
-    from codebotler.cli.check import check_view, read_program
-    from codebotler.cli.contract import contract_view, write_contract
-    from codebotler.cli.rules import rules_for
+    from codebotler.cli.programs.check import check_view, read_program
+    from codebotler.cli.programs.contract import contract_view, write_contract
+    from codebotler.cli.programs.rules import rules_for
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
     from codebotler.simulator.pool import WorkerPool
-    from codebotler.simulator.room_map import RoomMap
+    from codebotler.simulator.worlds.room_map import RoomMap
 
     table = skills_from(*(skills or ()))
     _, connection = options.read_connect_option(connect, None, table)
@@ -161,10 +161,10 @@ def rules(
 
     For each rule, it shows a short example that keeps the rule and one that breaks it.
     """
-    from codebotler.checking.evasions import find_evasions
-    from codebotler.checking.rule_review import review_rules
-    from codebotler.checking.rules import read_rules
-    from codebotler.cli.rules import review_data, review_view, rooms_of
+    from codebotler.checking.house_rules.evasions import find_evasions
+    from codebotler.checking.house_rules.file import read_rules
+    from codebotler.checking.house_rules.review import review_rules
+    from codebotler.cli.programs.rules import review_data, review_view, rooms_of
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, note, print_json, print_rich
     from codebotler.core.world_file import read_world
@@ -198,11 +198,11 @@ def replay(
 
     Each program runs once in simulation, without --world in an imagined world. Logs are only read.
     """
-    from codebotler.cli.replay import find_replayed_files, replay, replay_data, replay_view
-    from codebotler.cli.rules import rules_for
+    from codebotler.cli.programs.replay import find_replayed_files, replay, replay_data, replay_view
+    from codebotler.cli.programs.rules import rules_for
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_json, print_rich
-    from codebotler.core.words import counted
+    from codebotler.core.text.words import counted
     from codebotler.core.world_file import read_world
 
     table = skills_from(*(skills or ()))
@@ -238,7 +238,7 @@ def skills(
 
     The example of each skill is called in 40 imagined worlds.
     """
-    from codebotler.cli.skills import SKILLS_TEMPLATE, skills_data, skills_view, write_new
+    from codebotler.cli.programs.skills import SKILLS_TEMPLATE, skills_data, skills_view, write_new
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.ros_package import write_ros_packages
     from codebotler.core.terminal import print_json, print_rich

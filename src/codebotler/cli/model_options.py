@@ -15,7 +15,7 @@ from codebotler.models.sampling import PAPER_MAX_TOKENS, SamplingSettings
 
 if TYPE_CHECKING:
     from codebotler.models.base import Model
-    from codebotler.models.batch import BatchModel
+    from codebotler.models.servers.batch import BatchModel
 
 CommandT = TypeVar("CommandT", bound=Callable[..., object])
 

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from codebotler.core.skills.table import SkillTable
     from codebotler.core.world import World
     from codebotler.robots.base import Options
-    from codebotler.robots.ros.connection import Connection
-    from codebotler.simulator.contract import Contract
-    from codebotler.simulator.house_rule import Rule
+    from codebotler.robots.ros.connections.connection import Connection
+    from codebotler.simulator.guard.contract import Contract
+    from codebotler.simulator.guard.house_rule import Rule
 
 
 def robot_names(incomplete: str) -> list[str]:
@@ -183,7 +183,7 @@ def robot_settings(
     skills: SkillsOption = None,
 ) -> RobotSettings:
     """Read the files that the options name, or raise UserError if a file is invalid."""
-    from codebotler.checking.rules import read_rules
+    from codebotler.checking.house_rules.file import read_rules
     from codebotler.core.skills.files import skills_from
     from codebotler.robots.base import Options
 
@@ -202,7 +202,7 @@ def read_connect_option(
     """Return the kind of robot, and the connection from a file or None if no file is given."""
     if file is None:
         return robot or "sim", None
-    from codebotler.robots.ros.connection_file import read_connection
+    from codebotler.robots.ros.connections.connection_file import read_connection
 
     connection = read_connection(file, skills)
     if robot not in {None, connection.robot}:
@@ -225,7 +225,7 @@ def read_world(
 
 def read_within(file: Path | None, skills: SkillTable) -> Contract | None:
     """Read the contract that programs must stay within, or return None without a file."""
-    from codebotler.checking.contract_file import read_contract
+    from codebotler.checking.contracts.file import read_contract
 
     return None if file is None else read_contract(file, skills)
 

@@ -12,10 +12,10 @@ from rich.text import Text
 
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import console, shortened, visible
-from codebotler.missions.log import LogLine, MissionState, MissionSummary
-from codebotler.missions.store import last_rest, rest_text
-from codebotler.missions.view import SessionView
-from codebotler.missions.wording import event_text, timeline, title
+from codebotler.missions.display.view import SessionView
+from codebotler.missions.display.wording import event_text, timeline, title
+from codebotler.missions.storage.log import LogLine, MissionState, MissionSummary
+from codebotler.missions.storage.store import last_rest, rest_text
 from codebotler.models.chosen import ChosenModel
 from codebotler.models.usable import MODEL_HINT, UsableModel
 from codebotler.robots.base import Readiness

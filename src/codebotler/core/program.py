@@ -2,7 +2,7 @@
 
 CPython 3.11 parses some texts in quadratic time, so the length of programs is limited. The compiler,
 `symtable` and pyflakes may still take any time, so apply them to untrusted text only in isolated processes
-(`codebotler.simulator.isolated_call`).
+(`codebotler.simulator.process.isolated_call`).
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from typing import Any
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Parameter, Skill, SkillTable
-from codebotler.core.unicode import MAX_ACCENTS, compose, long_rows
-from codebotler.core.words import counted, listed
+from codebotler.core.text.unicode import MAX_ACCENTS, compose, long_rows
+from codebotler.core.text.words import counted, listed
 
 TASK_FUNCTION = "task_program"
 MAX_PROGRAM_LENGTH = 20_000  # characters, which take at most a tenth of a second to parse

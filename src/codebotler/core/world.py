@@ -10,8 +10,8 @@ from itertools import chain, pairwise
 from typing import TypeAlias
 
 from codebotler.core.skills.values import Scalar
-from codebotler.core.unicode import compose_fields
-from codebotler.core.words import counted
+from codebotler.core.text.unicode import compose_fields
+from codebotler.core.text.words import counted
 
 warnings.filterwarnings("ignore", "Possible (nested )?set", FutureWarning)  # such regexes still work
 

@@ -25,12 +25,12 @@ from pydantic import (
     Tag,
 )
 
-from codebotler.core.labels import check_label
 from codebotler.core.program import literal, parse_expression
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import Scalar, plain, written_call
-from codebotler.core.words import listed
+from codebotler.core.text.labels import check_label
+from codebotler.core.text.words import listed
 from codebotler.core.world import Answer, Person, Room, Trait, World, is_within
 from codebotler.core.yaml_files import YamlFile, YamlPath
 

@@ -17,7 +17,7 @@ from pydantic_core import ErrorDetails
 
 from codebotler.core.errors import UserError, elide_middle
 from codebotler.core.files import read_text
-from codebotler.core.unicode import compose
+from codebotler.core.text.unicode import compose
 
 YamlPath: TypeAlias = tuple[str | int, ...]
 """The keys and positions that lead to a part of a file."""

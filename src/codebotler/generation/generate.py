@@ -12,16 +12,16 @@ from codebotler.checking.check import check
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.words import counted
+from codebotler.core.text.words import counted
 from codebotler.generation.no_program import ProgramlessReply, describe_programless
 from codebotler.models.base import Model, Reply, TextListener, ignore_text
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.worlds.room_map import RoomMap
 
 CONCURRENT_REQUESTS = 4  # for candidates
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from codebotler.core.words import brief
+from codebotler.core.text.words import brief
 from codebotler.models.base import Reply
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES, NoProgram
 from codebotler.models.sampling import CHAT_MAX_TOKENS, SamplingSettings

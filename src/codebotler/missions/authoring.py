@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from codebotler.generation.generate import Attempt, gather_candidates
-from codebotler.missions.view import SessionView
+from codebotler.missions.display.view import SessionView
 from codebotler.models.base import Model, TextListener, ignore_text
 from codebotler.models.open import open_model
 from codebotler.prompts import Prompt, prompt_for

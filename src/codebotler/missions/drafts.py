@@ -9,8 +9,8 @@ from codebotler.checking.check import check
 from codebotler.checking.proof import hold_within
 from codebotler.checking.remaining import remaining_outcomes
 from codebotler.checking.repetition import hold_to_past
+from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.preflight import missing_skills, unknown_rooms
-from codebotler.missions.view import MissionOrder, SessionView
 from codebotler.robots.base import Robot
 
 

@@ -10,23 +10,23 @@ from datetime import UTC, datetime
 from itertools import chain
 from typing import TypeAlias
 
-from codebotler.checking.room_names import ROOM_SKILL
+from codebotler.checking.source.room_names import ROOM_SKILL
 from codebotler.core.errors import RobotError
 from codebotler.core.skills import kinds
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.trace import Event, Option, Trace, attempted_event, held_after, trace_data
 from codebotler.core.world import Point
-from codebotler.missions.progress import POSITION_FEEDBACK
+from codebotler.missions.display.progress import POSITION_FEEDBACK
 from codebotler.missions.stop import StopButton
 from codebotler.robots import base
 from codebotler.robots.base import CameraPicture, CancelledError, RobotLostError
-from codebotler.simulator.contract import has_place, is_goal
-from codebotler.simulator.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, RuleViolationError
-from codebotler.simulator.robot import Argument, Result
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.rule_guard import RuleGuard, name_of
+from codebotler.simulator.guard.contract import has_place, is_goal
+from codebotler.simulator.guard.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, RuleViolationError
+from codebotler.simulator.guard.rule_guard import RuleGuard, name_of
 from codebotler.simulator.settings import ENDLESS, SimulationSettings
+from codebotler.simulator.worlds.robot import Argument, Result
+from codebotler.simulator.worlds.room_map import RoomMap
 
 MIN_LOGGED_SECONDS = 0.1
 """Shorter pauses are not logged, since a program may make thousands of them per second."""

@@ -12,26 +12,33 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeAlias
 
-from codebotler.checking.contract_file import contract_data
+from codebotler.checking.contracts.file import contract_data
 from codebotler.core.files import Appender, make_folder
 from codebotler.core.terminal import visible
+from codebotler.core.text.words import with_sentence
 from codebotler.core.trace import Outcome, RunError, Status, Trace
-from codebotler.core.words import with_sentence
 from codebotler.core.world import World
+from codebotler.missions.display.wording import stop_text
 from codebotler.missions.live import LiveRobot, StoppedError
-from codebotler.missions.log import NEXT_STATES, LogLine, MissionState, MissionSummary, add_event, open_log
-from codebotler.missions.map_event import map_data
-from codebotler.missions.past import MissionPast
-from codebotler.missions.pictures import PictureStore
 from codebotler.missions.stop import StopButton
-from codebotler.missions.wording import stop_text
+from codebotler.missions.storage.log import (
+    NEXT_STATES,
+    LogLine,
+    MissionState,
+    MissionSummary,
+    add_event,
+    open_log,
+)
+from codebotler.missions.storage.map_event import map_data
+from codebotler.missions.storage.past import MissionPast
+from codebotler.missions.storage.pictures import PictureStore
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.contract import Contract
-from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.room_map import NO_ROOMS, RoomMap
-from codebotler.simulator.rule_guard import RuleGuard
+from codebotler.simulator.guard.contract import Contract
+from codebotler.simulator.guard.house_rule import Rule
+from codebotler.simulator.guard.rule_guard import RuleGuard
 from codebotler.simulator.worker import EngineError, Worker
+from codebotler.simulator.worlds.room_map import NO_ROOMS, RoomMap
 
 STOP_GRACE_SECONDS = 10.0
 """The time that a robot has to confirm a stop, in real seconds."""

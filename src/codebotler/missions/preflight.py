@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from codebotler.checking.problems import no_room
-from codebotler.checking.room_names import named_rooms
+from codebotler.checking.source.room_names import named_rooms
 from codebotler.core.errors import RobotError
 from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.skills.paper import SKILLS
@@ -15,11 +15,11 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.live import check_answer
-from codebotler.missions.past import MissionPast
+from codebotler.missions.storage.past import MissionPast
 from codebotler.models.recorded import UnknownInstructionError, find_closest, open_recorded
 from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotLostError, RobotResult
-from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.guard.house_rule import Rule
+from codebotler.simulator.worlds.room_map import RoomMap
 
 MAX_CHECKED_ROOMS = 1_000
 """The limit for a check, which compares each drive with all rooms."""

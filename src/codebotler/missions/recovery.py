@@ -11,15 +11,15 @@ from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import shortened
 from codebotler.core.trace import Trace
-from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState
-from codebotler.missions.past import MissionPast, read_past
+from codebotler.missions.display.view import SessionView
 from codebotler.missions.preflight import ask_rooms, is_resumable
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import find_mission
-from codebotler.missions.view import SessionView
+from codebotler.missions.storage.log import SKILL_END_EVENTS, LogLine, MissionState
+from codebotler.missions.storage.past import MissionPast, read_past
+from codebotler.missions.storage.store import find_mission
 from codebotler.robots.base import NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.contract import Contract
+from codebotler.simulator.guard.contract import Contract
 
 
 @dataclass(frozen=True)

@@ -11,22 +11,22 @@ from pathlib import Path
 from codebotler.checking.rooms import room_map_for
 from codebotler.checking.sampled import CheckSettings, first_samplers
 from codebotler.core.errors import VIOLATION, RobotError, UserError
-from codebotler.core.phrases import phrase
 from codebotler.core.skills.table import SkillTable
+from codebotler.core.text.phrases import phrase
 from codebotler.core.trace import Outcome, trace_from
 from codebotler.core.world import World
-from codebotler.missions.log import SKILL_END_EVENTS, LogLine, MissionState, read_log
-from codebotler.missions.map_event import map_from
-from codebotler.missions.past import LoggedRobot, arguments_in
+from codebotler.missions.storage.log import SKILL_END_EVENTS, LogLine, MissionState, read_log
+from codebotler.missions.storage.map_event import map_from
+from codebotler.missions.storage.past import LoggedRobot, arguments_in
 from codebotler.robots.simulated import SIMULATION
 from codebotler.simulator.engine import digest
-from codebotler.simulator.house_rule import Rule, RuleViolationError
+from codebotler.simulator.guard.house_rule import Rule, RuleViolationError
+from codebotler.simulator.guard.rule_guard import RuleGuard
 from codebotler.simulator.pool import WorkerPool, cores
-from codebotler.simulator.robot import Argument, Result, SimulatedRobot
-from codebotler.simulator.room_map import NO_ROOMS, RoomMap
-from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.settings import Limits
+from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
+from codebotler.simulator.worlds.room_map import NO_ROOMS, RoomMap
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
 LIMITED_SIMULATION = replace(SIMULATION, limits=Limits())  # nobody waits to stop an endless program
 

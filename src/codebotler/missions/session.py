@@ -16,17 +16,18 @@ from pathlib import Path
 
 from codebotler.candidates.clusters import compare_candidates
 from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
-from codebotler.checking.evasions import find_evasions
-from codebotler.checking.rule_rooms import unknown_rooms_in
+from codebotler.checking.house_rules.evasions import find_evasions
+from codebotler.checking.house_rules.rooms import unknown_rooms_in
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.core.world import World
 from codebotler.missions.authoring import ModelAuthor, prompt_of
+from codebotler.missions.display.progress import Progress
+from codebotler.missions.display.shared_view import SharedView
+from codebotler.missions.display.view import CHECKING, UNCHECKED, MissionOrder, SessionView, program_digest
 from codebotler.missions.drafts import examine_draft
-from codebotler.missions.log import MissionState
 from codebotler.missions.mission import Mission, MissionError
-from codebotler.missions.past import expect_rest
 from codebotler.missions.preflight import (
     ask_rooms,
     expect_poses,
@@ -34,19 +35,18 @@ from codebotler.missions.preflight import (
     resume_robot,
     with_closest_here,
 )
-from codebotler.missions.progress import Progress
-from codebotler.missions.shared_view import SharedView
 from codebotler.missions.stop import StopButton
-from codebotler.missions.store import find_mission
-from codebotler.missions.view import CHECKING, UNCHECKED, MissionOrder, SessionView, program_digest
+from codebotler.missions.storage.log import MissionState
+from codebotler.missions.storage.past import expect_rest
+from codebotler.missions.storage.store import find_mission
 from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import UnknownInstructionError
 from codebotler.robots.base import CancelledError, NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.contract import Contract
-from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.guard.contract import Contract
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.worker import EngineError
+from codebotler.simulator.worlds.room_map import RoomMap
 
 _logger = logging.getLogger("codebotler.missions")
 _EXPECTED_ERRORS = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)

@@ -18,7 +18,7 @@ from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError, Reply, TextListener, Usage, ignore_text, make_reply
 from codebotler.models.keys import guard_logs
 from codebotler.models.sampling import CHAT_MAX_TOKENS, SamplingSettings
-from codebotler.models.server_errors import error_text, model_error
+from codebotler.models.servers.server_errors import error_text, model_error
 from codebotler.prompts import Prompt, PromptMessage
 from codebotler.prompts.rendering import task_end
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal, TypeAlias, get_args
 
-from codebotler.core.unicode import compose
+from codebotler.core.text.unicode import compose
 from codebotler.prompts.extract import defines_task
-from codebotler.simulator.isolated_call import IsolatedCallError
+from codebotler.simulator.process.isolated_call import IsolatedCallError
 
 NoProgram: TypeAlias = Literal["cut-off", "tool-call", "refusal", "filtered", "empty", "no-code"]
 """The kinds of replies without a program."""

@@ -36,7 +36,7 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
             return open_recorded(name)
         case "completions":
             with installed():
-                from codebotler.models.completions import CompletionsModel  # noqa: PLC0415 - see above
+                from codebotler.models.servers.completions import CompletionsModel  # noqa: PLC0415 - see above
             return CompletionsModel(rest, settings)
         case "hf":
             with installed():
@@ -44,7 +44,7 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
             return LocalModel(rest, settings)
         case _:
             with installed():
-                from codebotler.models.chat import ChatModel  # noqa: PLC0415 - see above
+                from codebotler.models.servers.chat import ChatModel  # noqa: PLC0415 - see above
             return ChatModel(name, settings)
 
 

@@ -14,7 +14,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.errors import UserError
-from codebotler.core.words import brief
+from codebotler.core.text.words import brief
 from codebotler.core.yaml_files import YamlFile
 from codebotler.models.base import ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.sampling import SamplingSettings

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from codebotler.models.base import Model, ModelError
 from codebotler.models.rate_limit import RateLimited
-from codebotler.models.server_errors import error_text
+from codebotler.models.servers.server_errors import error_text
 from codebotler.perception.base import PerceptionError, Sighting, check_label
 from codebotler.perception.image import jpeg_of
 from codebotler.prompts import PictureMessage, Prompt, PromptMessage

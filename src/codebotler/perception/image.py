@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw, ImageOps, UnidentifiedImageError
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_bytes
-from codebotler.models.server_errors import error_text
+from codebotler.models.servers.server_errors import error_text
 from codebotler.perception.base import Sighting
 
 IMAGE_FORMATS = ("JPEG", "PNG", "WEBP")

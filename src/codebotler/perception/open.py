@@ -32,7 +32,7 @@ def open_detector(
     # Each of these modules imports a large library, so import only the one needed.
     if kind != "hf":
         with installed():
-            from codebotler.models.chat import ChatModel  # noqa: PLC0415 - see above
+            from codebotler.models.servers.chat import ChatModel  # noqa: PLC0415 - see above
         from codebotler.perception.chat import ChatDetector  # noqa: PLC0415 - see above
 
         return ChatDetector(ChatModel(name, settings))

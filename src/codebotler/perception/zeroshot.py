@@ -12,7 +12,7 @@ from PIL.Image import Image
 from codebotler.core.errors import UserError
 from codebotler.models.keys import guard_logs
 from codebotler.models.local import find_source
-from codebotler.models.server_errors import error_text
+from codebotler.models.servers.server_errors import error_text
 from codebotler.perception.base import PerceptionError, Sighting, check_label
 
 PIPELINE_TASK = "zero-shot-object-detection"

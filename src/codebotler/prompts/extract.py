@@ -20,10 +20,10 @@ from codebotler.core.program import (
     undefined_names,
 )
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.unicode import compose
+from codebotler.core.text.unicode import compose
 from codebotler.prompts.lines import continues_prose, is_code, is_prose, parse_lines, trim, without_residue
 from codebotler.prompts.segments import Segment, answer_of
-from codebotler.simulator.isolated_call import IsolatedCallError, isolated
+from codebotler.simulator.process.isolated_call import IsolatedCallError, isolated
 
 MAX_HELPER_DEPTH = 20  # levels of helpers that call helpers; replies have two or three
 

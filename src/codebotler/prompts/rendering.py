@@ -17,8 +17,8 @@ from codebotler.core.errors import UserError, expect_list
 from codebotler.core.program import TASK_FUNCTION, Flaw, called_skills, parse_leniently, parse_program
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
-from codebotler.core.unicode import compose
-from codebotler.core.words import listed
+from codebotler.core.text.unicode import compose
+from codebotler.core.text.words import listed
 
 PROMPT_FOLDER = Path(__file__).parent
 OPENING = f"def {TASK_FUNCTION}():\n"

@@ -14,7 +14,7 @@ from codebotler.core.world import World
 from codebotler.robots.clock import Clock
 
 if TYPE_CHECKING:
-    from codebotler.robots.ros.connection import Connection
+    from codebotler.robots.ros.connections.connection import Connection
 
 RobotArgument: TypeAlias = Scalar | tuple[Scalar, ...]
 """An argument of a skill: a single value, several values, or the options of a question."""

@@ -13,7 +13,7 @@ from typing import Any
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Recording, Skill, SkillTable
-from codebotler.core.words import counted
+from codebotler.core.text.words import counted
 from codebotler.robots.base import (
     AnswerError,
     CancelledError,

@@ -17,7 +17,7 @@ from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.files import load_skill_module
 from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import plain
-from codebotler.core.words import listed
+from codebotler.core.text.words import listed
 from codebotler.robots.base import (
     STOP_BY_HAND,
     CancelledError,

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict
 
-from codebotler.core.words import brief
+from codebotler.core.text.words import brief
 from codebotler.core.world import Point, Room, World, is_within
 from codebotler.core.world_file import Corner, Metres, Name, YamlValue
 from codebotler.core.yaml_files import YamlFile

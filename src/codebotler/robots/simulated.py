@@ -24,9 +24,9 @@ from codebotler.robots.base import (
     ignore_feedback,
 )
 from codebotler.robots.clock import Clock
-from codebotler.simulator.matching import WORDS_FOR_PEOPLE
-from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.settings import ENDLESS, SimulationSettings
+from codebotler.simulator.worlds.matching import WORDS_FOR_PEOPLE
+from codebotler.simulator.worlds.robot import SimulatedRobot
 
 SIMULATION = SimulationSettings(
     literals="as-written",

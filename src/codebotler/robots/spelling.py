@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from codebotler.core.unicode import compose
+from codebotler.core.text.unicode import compose
 from codebotler.robots.base import Feedback, Robot, RobotArgument, RobotResult, ignore_feedback
 
 

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from codebotler.core.phrases import verb
 from codebotler.core.skills.kinds import GOTO
+from codebotler.core.text.phrases import verb
+from codebotler.core.text.words import brief, elide_list, listed, times
 from codebotler.core.trace import Trace
-from codebotler.core.words import brief, elide_list, listed, times
 from codebotler.rtl import formulas
 from codebotler.rtl.semantics import (
     Inconclusive,

@@ -6,7 +6,7 @@ from functools import lru_cache
 from itertools import product
 from typing import Any
 
-from codebotler.core.words import brief, listed
+from codebotler.core.text.words import brief, listed
 from codebotler.rtl.pattern import Tree, parse_tree
 
 MATCH_ALL_PATTERNS = frozenset({"", ".*", ".+", "^.*$"})

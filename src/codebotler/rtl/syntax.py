@@ -13,7 +13,7 @@ from codebotler.core.program import parse_expression
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import TRUTH_TYPE, ValueType, as_text
-from codebotler.core.unicode import compose
+from codebotler.core.text.unicode import compose
 from codebotler.rtl import formulas
 from codebotler.rtl.pattern import compile_regex, whole_word
 from codebotler.rtl.source import SKILL_KINDS, FormulaSource, RtlSyntaxError

@@ -6,11 +6,11 @@ import re
 from collections.abc import Iterator, Mapping
 from itertools import chain
 
-from codebotler.core.phrases import has_no_text, is_spoken, result_words, verb
 from codebotler.core.skills.kinds import CHECK, GOTO, INSIDE
 from codebotler.core.skills.verbs import VerbForm
+from codebotler.core.text.phrases import has_no_text, is_spoken, result_words, verb
+from codebotler.core.text.words import brief, elide_list, listed
 from codebotler.core.trace import Event
-from codebotler.core.words import brief, elide_list, listed
 from codebotler.rtl.formulas import EventPattern, Regex, TextPattern, Without, Words
 from codebotler.rtl.regex_words import MATCH_ALL_PATTERNS, choices, one_of
 from codebotler.rtl.text.claims import Claim, Number, Time

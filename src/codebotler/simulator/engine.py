@@ -13,8 +13,8 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.core.world import World
 from codebotler.simulator.pool import WorkerPool, cores
-from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings
+from codebotler.simulator.worlds.robot import SimulatedRobot
 
 
 def run(

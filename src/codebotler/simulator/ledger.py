@@ -10,8 +10,8 @@ from codebotler.core.errors import VIOLATION, RobotError
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.values import Scalar
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
-from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.settings import Limits, SimulationSettings
+from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
 
 UNREMEMBERED_CALLS = 50  # calls of a run before answers are cached
 OPTION_OVERHEAD = 10  # characters counted for each option, since even an empty one takes memory

@@ -9,7 +9,7 @@ from typing import Literal
 
 from codebotler.core.trace import Option
 from codebotler.core.world import Answer
-from codebotler.simulator.matching import Matching, finds
+from codebotler.simulator.worlds.matching import Matching, finds
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,14 @@ from typing import TypeAlias
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import Scalar
+from codebotler.core.text.unicode import compose
 from codebotler.core.trace import Option, Outcome, Status
-from codebotler.core.unicode import compose
 from codebotler.simulator.ledger import MAX_LINE, STOP, WAITS, Ledger, SkillAnswer, SkillPerformer, too_long
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.exit_status import cause_of_death
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
+from codebotler.simulator.worlds.robot import Argument, Result
 
 ParameterDescription: TypeAlias = tuple[str, str, tuple[Scalar, ...], str]  # name, kind, choices, words
 SkillDescriptions: TypeAlias = tuple[tuple[str, tuple[ParameterDescription, ...]], ...]

@@ -10,14 +10,14 @@ from typing import TypeAlias
 
 from codebotler.core.trace import Outcome
 from codebotler.simulator.batches.replay import outcomes
-from codebotler.simulator.compiler import CompiledProgram, compile_program, compile_programs
 from codebotler.simulator.ledger import SkillPerformer, judge_end
+from codebotler.simulator.process.compiler import CompiledProgram, compile_program, compile_programs
 from codebotler.simulator.process.errors import EngineError, LostProcessError, ProtocolError
 from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER
 from codebotler.simulator.skill_protocol import SkillProtocol
+from codebotler.simulator.worlds.robot import SimulatedRobot
 
 __all__ = ["EngineError", "Worker"]
 

@@ -17,12 +17,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.errors import UserError, installed
 from codebotler.core.terminal import shortened
-from codebotler.missions.log import EVENTS_FILE, LogLine, MissionSummary, read_events
+from codebotler.missions.display.view import MissionOrder, SessionView
+from codebotler.missions.display.wording import BY_PAGE
 from codebotler.missions.mission import MissionError
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import find_mission, read_missions
-from codebotler.missions.view import MissionOrder, SessionView
-from codebotler.missions.wording import BY_PAGE
+from codebotler.missions.storage.log import EVENTS_FILE, LogLine, MissionSummary, read_events
+from codebotler.missions.storage.store import find_mission, read_missions
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, MAX_WAIT_SECONDS, Console
 
 _CURRENT = "current"
@@ -166,7 +166,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
     ) -> Response:
         """Download the events as MCAP, for Foxglove."""
         with installed():
-            from codebotler.missions.mcap import write_mcap  # noqa: PLC0415 - part of an optional extra
+            from codebotler.missions.storage.mcap import write_mcap  # noqa: PLC0415 - part of an optional extra
 
         summary, events = _read_mission(console, mission)
         file = io.BytesIO()

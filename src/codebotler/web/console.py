@@ -15,20 +15,20 @@ from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.files import make_folder
 from codebotler.core.world import World
-from codebotler.missions.log import MissionState, MissionSummary
+from codebotler.missions.display.view import MissionOrder, SessionView
+from codebotler.missions.display.wording import BY_PAGE
 from codebotler.missions.mission import BY_SHUTDOWN, STOP_GRACE_SECONDS, MissionError
-from codebotler.missions.past import MissionPast, read_past
 from codebotler.missions.recovery import PriorApproval, past_to_recover
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import find_interrupted, find_mission
-from codebotler.missions.view import MissionOrder, SessionView
-from codebotler.missions.wording import BY_PAGE
+from codebotler.missions.storage.log import MissionState, MissionSummary
+from codebotler.missions.storage.past import MissionPast, read_past
+from codebotler.missions.storage.store import find_interrupted, find_mission
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
-from codebotler.simulator.contract import Contract
-from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.guard.contract import Contract
+from codebotler.simulator.guard.house_rule import Rule
+from codebotler.simulator.worlds.room_map import RoomMap
 
 MAX_PROGRAM_CHARACTERS = 200_000
 """The maximum length of a program or an instruction."""

@@ -17,9 +17,9 @@ from codebotler.core.terminal import shortened, visible_lines
 from codebotler.missions.mission import UNCONFIRMED_STOP
 from codebotler.robots.base import AnswerError
 from codebotler.robots.face import Face, FaceQuestion
-from codebotler.web.access import Role
 from codebotler.web.api import WhenToAnswer
 from codebotler.web.console import Console
+from codebotler.web.security.access import Role
 
 _FACE_PAGE = Path(__file__).with_name("static") / "face.html"
 _FACE_POLICY = (

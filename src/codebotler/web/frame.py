@@ -13,7 +13,7 @@ from nicegui import html, ui
 from nicegui.elements.mixins.text_element import TextElement
 
 from codebotler.core.terminal import note, visible_lines
-from codebotler.web.proxy import prefix_of
+from codebotler.web.security.proxy import prefix_of
 
 _STYLESHEET_HTML = '<link rel="stylesheet" href="{prefix}/static/page.css">'
 _STOP_BAR_HTML = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assertive"></span>

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from codebotler.missions.view import SessionView
+from codebotler.missions.display.view import SessionView
 from codebotler.web.console import Console
 from codebotler.web.frame import PAGE_BUILD_SECONDS, Frame, PlainText
 from codebotler.web.live import follow

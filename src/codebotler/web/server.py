@@ -30,14 +30,14 @@ from uvicorn.protocols.http.auto import AutoHTTPProtocol
 from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import note
-from codebotler.core.words import listed
+from codebotler.core.text.words import listed
 from codebotler.missions.mission import BY_SHUTDOWN
 from codebotler.web import api, face, page
-from codebotler.web.access import Access, PageAddress, Role
 from codebotler.web.console import Console
 from codebotler.web.frame import FACE_LINK, ROBOT_LINKS, Frame, Pages, Site
-from codebotler.web.guard import MAX_BODY_BYTES, NO_PAGE, Guard, refusal
-from codebotler.web.proxy import path_of
+from codebotler.web.security.access import Access, PageAddress, Role
+from codebotler.web.security.guard import MAX_BODY_BYTES, NO_PAGE, Guard, refusal
+from codebotler.web.security.proxy import path_of
 
 STATIC_FOLDER = Path(__file__).with_name("static")
 BY_LEAVING = "CodeBotler, because the last operator closed the page"

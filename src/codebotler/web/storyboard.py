@@ -10,9 +10,9 @@ from nicegui import ui
 
 from codebotler.checking.problems import CheckResult, Sample
 from codebotler.checking.storyboard import event_from_step, select_steps, steps_of
-from codebotler.core.phrases import NO_ANSWER, is_question, is_spoken, phrase
 from codebotler.core.skills.kinds import CHECK, GOTO
 from codebotler.core.terminal import shortened
+from codebotler.core.text.phrases import NO_ANSWER, is_question, is_spoken, phrase
 from codebotler.core.trace import Event
 from codebotler.web.frame import PlainText
 

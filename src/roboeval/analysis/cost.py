@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import polars as pl
 
-from roboeval.analysis.counts import completions_of
+from roboeval.analysis.counting.counts import completions_of
 from roboeval.analysis.resample import LIMITS, final_chances, mean_requests, rejected_share, trials_by_prompt
 from roboeval.evaluation.runs.table import MILLION, Price
 

@@ -13,8 +13,8 @@ from itertools import count
 from typing import Any, TypeAlias
 
 from codebotler.core.program import TASK_FUNCTION, all_bound_names, parse_program
-from roboeval.evaluation.explanation import error_sentence, reason
-from roboeval.evaluation.failures import NO_PROGRAM_CLASS
+from roboeval.evaluation.judging.explanation import error_sentence, reason
+from roboeval.evaluation.judging.failures import NO_PROGRAM_CLASS
 from roboeval.evaluation.runs.completions import CompletionKey, name_of
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import Row, failure_of, key_of

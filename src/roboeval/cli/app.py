@@ -5,16 +5,16 @@ from __future__ import annotations
 from codebotler.cli.ending import obey
 from codebotler.cli.options import command_line
 from codebotler.core.terminal import report_problems
-from roboeval.cli.clarify import clarify
-from roboeval.cli.compare import compare, resample
-from roboeval.cli.evaluate import evaluate, import_
-from roboeval.cli.find import find
-from roboeval.cli.generate import generate, run
-from roboeval.cli.mcp import mcp
 from roboeval.cli.mutate import mutate
-from roboeval.cli.recover import recover
-from roboeval.cli.report import report
-from roboeval.cli.show import export, serve, show
+from roboeval.cli.results.compare import compare, resample
+from roboeval.cli.results.find import find
+from roboeval.cli.results.report import report
+from roboeval.cli.results.show import export, serve, show
+from roboeval.cli.runs.clarify import clarify
+from roboeval.cli.runs.evaluate import evaluate, import_
+from roboeval.cli.runs.generate import generate, run
+from roboeval.cli.runs.mcp import mcp
+from roboeval.cli.runs.recover import recover
 from roboeval.cli.tasks import tasks
 
 app = command_line("roboeval", "Measure how well language models write programs for service robots.")

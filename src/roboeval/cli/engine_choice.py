@@ -7,7 +7,7 @@ from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from roboeval.evaluation.engines import OpenEngine
+    from roboeval.evaluation.engines.engine import OpenEngine
 
 MAX_WORKERS_OF_PROCESS = 2  # the most workers that one process can keep busy
 MIN_PROGRAMS_FOR_PROCESSES = 5_000  # with fewer programs, starting processes costs more than it saves
@@ -23,7 +23,7 @@ def engine_named(
     """
     if name == "local":
         from codebotler.simulator.pool import WorkerPool, cores
-        from roboeval.evaluation.engines import Local
+        from roboeval.evaluation.engines.engine import Local
 
         workers = workers or cores()
         with closing(WorkerPool(workers, **isolation)) as pool:
@@ -31,14 +31,14 @@ def engine_named(
             def local(programs: int) -> OpenEngine:
                 if programs < MIN_PROGRAMS_FOR_PROCESSES or min(workers, cores()) <= MAX_WORKERS_OF_PROCESS:
                     return Local(pool)
-                from roboeval.evaluation.processes import Processes
+                from roboeval.evaluation.engines.processes import Processes
 
                 pool.close()  # the pool has already warned about missing isolation
                 return Processes(workers, **isolation)
 
             yield local
         return
-    from roboeval.evaluation.ray import RayCluster
+    from roboeval.evaluation.engines.ray import RayCluster
 
     cluster = RayCluster(workers, **isolation)  # may fail, so create it before anything is written
     yield lambda _: cluster

@@ -19,9 +19,9 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import read_text, to_text, write_whole
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool
-from roboeval.evaluation.engines import Local
-from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.requests import add_usage
+from roboeval.evaluation.engines.engine import Local
+from roboeval.evaluation.generating.requests import add_usage
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion, CompletionKey
 from roboeval.evaluation.runs.folder import RunFolder, evaluation_key
 from roboeval.evaluation.runs.results import Results

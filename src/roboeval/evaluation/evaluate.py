@@ -14,13 +14,13 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, to_text, write_whole
 from codebotler.core.skills.files import files_of
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.words import brief
-from roboeval.evaluation.engines import PYTHON_VERSION, Local, OpenEngine
-from roboeval.evaluation.judge import judgements
+from codebotler.core.text.words import brief
+from roboeval.evaluation.engines.engine import PYTHON_VERSION, Local, OpenEngine
+from roboeval.evaluation.judging.judge import judgements
+from roboeval.evaluation.judging.serialization import row_line
 from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of
 from roboeval.evaluation.runs.folder import RunFolder, evaluation_key, load_json_object, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, Seal, decode_row, is_sealed, key_of, read_lines_of
-from roboeval.evaluation.serialization import row_line
 from roboeval.suites.load import Suite
 
 

@@ -25,9 +25,9 @@ from codebotler.simulator.pool import shared_pool
 from roboeval.evaluation.agents.conversation import AgentConversation, TurnLimits
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.agents.plan import DEFAULT_TURNS
-from roboeval.evaluation.engines import Local
-from roboeval.evaluation.explanation import completion_data
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.engines.engine import Local
+from roboeval.evaluation.judging.explanation import completion_data
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.endings import TIMEOUT
 from roboeval.suites.load import Suite, load_suite

@@ -16,11 +16,11 @@ from codebotler.core.skills.values import written_call
 from codebotler.core.terminal import shortened
 from codebotler.core.trace import Option
 from codebotler.core.world import World
-from codebotler.simulator.contract import CONTRACT, Contract
-from codebotler.simulator.house_rule import RuleViolationError
-from codebotler.simulator.robot import Argument, Result, SimulatedRobot
+from codebotler.simulator.guard.contract import CONTRACT, Contract
+from codebotler.simulator.guard.house_rule import RuleViolationError
 from codebotler.simulator.skill_protocol import named_result
-from roboeval.evaluation.judge import guard_of
+from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
+from roboeval.evaluation.judging.judge import guard_of
 from roboeval.evaluation.runs.endings import OUTSIDE_CONTRACT
 from roboeval.suites.load import Suite
 

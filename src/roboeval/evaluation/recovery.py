@@ -14,17 +14,17 @@ from codebotler.checking.problems import CheckResult
 from codebotler.checking.remaining import remaining_outcomes
 from codebotler.checking.repetition import hold_to_past
 from codebotler.checking.sampled import CheckSettings
-from codebotler.core.phrases import is_spoken
 from codebotler.core.skills.kinds import PICK, PLACE
+from codebotler.core.text.phrases import is_spoken
 from codebotler.core.trace import Status, Trace
-from codebotler.missions.past import MissionPast
+from codebotler.missions.storage.past import MissionPast
 from codebotler.models.base import Model, ModelError
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.recorded import is_recorded
 from codebotler.prompts import Prompt, prompt_for
-from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.worker import Worker
-from roboeval.evaluation.judge import judge
+from codebotler.simulator.worlds.room_map import RoomMap
+from roboeval.evaluation.judging.judge import judge
 from roboeval.evaluation.recording import Call, RecordingRobot
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.suites.load import Scenario, Suite

@@ -13,7 +13,7 @@ from codebotler.core.errors import VIOLATION, UserError, expect_list
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import shared_pool
-from roboeval.evaluation.judge import are_met, is_met, may_satisfy, robot_in
+from roboeval.evaluation.judging.judge import are_met, is_met, may_satisfy, robot_in
 from roboeval.evaluation.runs.completions import find_key_fault
 from roboeval.suites.load import Scenario, Suite, load_suite
 

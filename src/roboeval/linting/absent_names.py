@@ -6,7 +6,7 @@ import ast
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from codebotler.checking.rule_rooms import may_mean
+from codebotler.checking.house_rules.rooms import may_mean
 from codebotler.core.program import parse_expression
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS

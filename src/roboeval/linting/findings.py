@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from codebotler.core.words import counted
+from codebotler.core.text.words import counted
 
 FindingKind = Literal[
     "unsatisfiable",

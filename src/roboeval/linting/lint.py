@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import combinations
 
 from codebotler.core.yaml_files import YamlFile
-from codebotler.simulator.matching import Matching
+from codebotler.simulator.worlds.matching import Matching
 from roboeval.linting.findings import Finding
 from roboeval.linting.task_findings import task_findings
 from roboeval.linting.trials import Verdicts

@@ -6,14 +6,14 @@ import re
 from collections.abc import Iterator, Sequence
 from itertools import chain
 
-from codebotler.core.words import counted
+from codebotler.core.text.words import counted
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Claim, Number, Regex, TextPattern, Without, Words
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.regex_words import UNCLEAR
 from codebotler.rtl.wording import is_clear
-from roboeval.evaluation.failures import failure_of_verdicts
+from roboeval.evaluation.judging.failures import failure_of_verdicts
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.linting.clauses import clauses_of
 from roboeval.linting.findings import Finding

@@ -7,8 +7,8 @@ from typing import TypeAlias
 
 from codebotler.core.trace import Outcome
 from codebotler.simulator.pool import WorkerPool
-from roboeval.evaluation.failures import Verdict
-from roboeval.evaluation.judge import judge, run_in
+from roboeval.evaluation.judging.failures import Verdict
+from roboeval.evaluation.judging.judge import judge, run_in
 from roboeval.suites.load import Scenario, Suite, Task
 from roboeval.suites.solutions import solutions
 

@@ -10,14 +10,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.words import listed
+from codebotler.core.text.words import listed
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Regex, TextPattern
 from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.regex_samples import samples
 from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
-from codebotler.simulator.matching import Matching, resolve_room
+from codebotler.simulator.worlds.matching import Matching, resolve_room
 from roboeval.linting.absent_names import absent_names
 from roboeval.linting.findings import Finding, FindingKind
 from roboeval.suites.load import Requirement, Scenario, Task, TaskCheck

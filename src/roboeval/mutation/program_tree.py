@@ -10,7 +10,7 @@ from typing import Any, TypeAlias, TypeVar
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.program import Flaw, parse_program
 from codebotler.core.skills.declaration import by_name
-from codebotler.simulator.isolated_call import IsolatedCallError, isolated
+from codebotler.simulator.process.isolated_call import IsolatedCallError, isolated
 
 Node = TypeVar("Node", bound=ast.AST)
 Edit: TypeAlias = Mapping[Any, ast.AST | list[ast.stmt]]  # nodes and what replaces them

@@ -9,8 +9,8 @@ from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome, Status
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool
-from roboeval.evaluation.failures import Verdict
-from roboeval.evaluation.judge import judge, run_in
+from roboeval.evaluation.judging.failures import Verdict
+from roboeval.evaluation.judging.judge import judge, run_in
 from roboeval.mutation.mutants import Mutant, Original, mutants, originals, sample_mutants
 from roboeval.mutation.operator import Context
 from roboeval.mutation.score import MutantResult, MutantStatus, MutationScore, TriedMutant

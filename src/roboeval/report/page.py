@@ -10,9 +10,9 @@ from html import escape
 from pathlib import Path
 
 from codebotler.core.terminal import shortened
-from codebotler.core.words import counted
+from codebotler.core.text.words import counted
 from roboeval.analysis.failure_groups import FailureGroup
-from roboeval.evaluation.failures import label_of
+from roboeval.evaluation.judging.failures import label_of
 from roboeval.evaluation.runs.completions import name_of
 from roboeval.report.sheets import (
     Card,

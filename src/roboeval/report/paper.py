@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from roboeval.analysis.summary import Causes
+from roboeval.analysis.counting.summary import Causes
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import Cell, Sheet, note, sheet
 

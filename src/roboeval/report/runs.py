@@ -11,12 +11,12 @@ import polars as pl
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import UserError
-from codebotler.core.words import counted
-from roboeval.analysis.counts import completions_of, task_scores
+from codebotler.core.text.words import counted
+from roboeval.analysis.counting.counts import completions_of, task_scores
 from roboeval.analysis.metrics import TaskScore, overall, pass_at_1
 from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
 from roboeval.evaluation.runs.results import Results
-from roboeval.report.drawing import short_name
+from roboeval.report.figures.drawing import short_name
 from roboeval.suites.load import Suite
 
 MAX_RUN_NAME = 100

@@ -13,10 +13,10 @@ import yaml
 from matplotlib.figure import Figure
 
 from codebotler.core.yaml_files import Loader
-from roboeval.analysis.compare import MIN_SHOWN_P
+from roboeval.analysis.comparisons.compare import MIN_SHOWN_P
 from roboeval.analysis.failure_groups import FailureGroup
 from roboeval.analysis.metrics import Estimate
-from roboeval.evaluation.failures import label_of
+from roboeval.evaluation.judging.failures import label_of
 from roboeval.evaluation.runs.table import storable, write_table
 
 ColumnKind: TypeAlias = Literal["text", "class", "share", "difference", "count", "number", "p"]

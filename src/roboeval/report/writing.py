@@ -10,13 +10,13 @@ from pathlib import Path
 from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
 from roboeval.analysis.metrics import overall
-from roboeval.evaluation.requests import batches
+from roboeval.evaluation.generating.requests import batches
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.evaluation.runs.table import Price
-from roboeval.report import breakdown, cost, failures, house, modes, question, scores
-from roboeval.report.drawing import render, use_style
+from roboeval.report.figures.drawing import render, use_style
 from roboeval.report.page import GENERATOR, page
 from roboeval.report.runs import JudgedRun
+from roboeval.report.sections import breakdown, cost, failures, house, modes, question, scores
 from roboeval.report.sheets import (
     Card,
     Cards,

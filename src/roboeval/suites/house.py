@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from codebotler.checking.rules import read_rules
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from codebotler.core.labels import check_regex
+from codebotler.core.text.labels import check_regex
 from codebotler.core.world_file import AnswerFile, Name, NamePattern, PersonFile, WorldFile, YamlText
-from codebotler.simulator.matching import WORDS_FOR_PEOPLE, Matching
 from codebotler.simulator.settings import Limits, SimulationSettings
+from codebotler.simulator.worlds.matching import WORDS_FOR_PEOPLE, Matching
 
 MAX_WORLDS = 10_000  # per task; this many worlds already need a gigabyte of memory and minutes to sample
 

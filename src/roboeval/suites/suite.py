@@ -15,9 +15,9 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.words import counted
+from codebotler.core.text.words import counted
 from codebotler.core.yaml_files import YamlFile
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.settings import SimulationSettings
 from roboeval.suites.house import HouseRules
 from roboeval.suites.installed import installed_folder, installed_suites

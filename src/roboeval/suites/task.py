@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from codebotler.core.words import counted
+from codebotler.core.text.words import counted
 from codebotler.core.world import Answer, Person, Room, Trait, World
 from codebotler.rtl import Formula
 from codebotler.rtl.regex_words import first_choice

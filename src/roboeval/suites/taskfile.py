@@ -10,17 +10,17 @@ from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.core.program import parse_expression
-from codebotler.core.regex_flags import scope_flags
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.words import listed
+from codebotler.core.text.regex_flags import scope_flags
+from codebotler.core.text.words import listed
 from codebotler.core.yaml_files import YamlFile, YamlPath
 from codebotler.rtl import RtlSyntaxError, parse
 from codebotler.rtl.regex_words import first_choice
 from codebotler.rtl.syntax import ANSWERED
+from roboeval.suites.sampling.worlds import WorldSampler
 from roboeval.suites.schema import RequirementFile, SampledTaskFile, ScenarioFile, TaskFile
 from roboeval.suites.task import Requirement, Scenario, Task, TaskCheck
-from roboeval.suites.worlds import WorldSampler
 
 BORROWED_FIELDS = ("summary", "abilities", "prompts")
 PEOPLE_PLACEHOLDER = "people"  # in checks for sampled worlds: matches any person's name or word for people

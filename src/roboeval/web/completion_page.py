@@ -12,20 +12,20 @@ from nicegui import html, ui
 
 from codebotler.checking.storyboard import step_text
 from codebotler.core.terminal import shortened, visible_lines
-from codebotler.core.words import counted
+from codebotler.core.text.words import counted
 from codebotler.core.world import World
 from codebotler.web.floorplan import MapState, floorplan
 from codebotler.web.frame import PlainText, outside
 from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.failure_groups import Fix, nearest_fix
-from roboeval.evaluation.explanation import (
+from roboeval.evaluation.judging.explanation import (
     LOWERCASED_NOTE,
     cut_sentence,
     error_sentence,
     failing_first,
     instruction_shown,
 )
-from roboeval.evaluation.failures import label_of, no_program_sentence
+from roboeval.evaluation.judging.failures import label_of, no_program_sentence
 from roboeval.evaluation.runs.completions import CompletionKey, name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, describe_contents, world_title

@@ -12,14 +12,14 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
-from roboeval.analysis.compare import (
+from roboeval.analysis.comparisons.compare import (
     MISSIONS_COMPARED,
     compare_tables,
     comparison_sentence,
     pairs_to_compare,
 )
+from roboeval.analysis.comparisons.missions import has_missions
 from roboeval.analysis.metrics import Estimate
-from roboeval.analysis.missions import has_missions
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of
 from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.snapshot import Snapshot

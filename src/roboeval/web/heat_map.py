@@ -8,9 +8,9 @@ from typing import Any
 from urllib.parse import quote
 
 from codebotler.core.terminal import shortened
+from roboeval.analysis.counting.summary import Failures
 from roboeval.analysis.metrics import mean_of, percent
-from roboeval.analysis.summary import Failures
-from roboeval.evaluation.failures import NO_PROGRAM_CLASS, label_of, plural_of
+from roboeval.evaluation.judging.failures import NO_PROGRAM_CLASS, label_of, plural_of
 from roboeval.evaluation.runs.completions import recorded_suffix
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 

@@ -12,7 +12,7 @@ from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
 from codebotler.web.frame import PAGE_BUILD_SECONDS, Pages, Site
-from codebotler.web.proxy import prefix_of
+from codebotler.web.security.proxy import prefix_of
 from roboeval.suites.load import Suite
 from roboeval.web.api import EvaluationQuery, FilterQuery, router
 from roboeval.web.comparison_page import draw_comparison

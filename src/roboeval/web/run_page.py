@@ -12,7 +12,7 @@ from nicegui import html, ui
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Button, PlainText, outside
 from roboeval.analysis.metrics import percent
-from roboeval.evaluation.failures import plural_of
+from roboeval.evaluation.judging.failures import plural_of
 from roboeval.web.heat_map import MAX_NAME, MISSING, TaskCells, models_of, run_address, verb_of
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.serializers import run_data

@@ -14,8 +14,8 @@ from typing import Any
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from roboeval.analysis.metrics import pass_at_1
-from roboeval.evaluation.explanation import PROGRAM_GONE, completion_data, suite_instruction
-from roboeval.evaluation.requests import batches
+from roboeval.evaluation.generating.requests import batches
+from roboeval.evaluation.judging.explanation import PROGRAM_GONE, completion_data, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, how_many, name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_data
 from roboeval.suites.load import Suite

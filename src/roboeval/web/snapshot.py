@@ -12,10 +12,10 @@ from fastapi import Query
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
-from roboeval.analysis.counts import tally_of, task_scores
+from roboeval.analysis.counting.counts import tally_of, task_scores
+from roboeval.analysis.counting.summary import Failures, failures
 from roboeval.analysis.metrics import Estimate, TaskScore, overall
-from roboeval.analysis.summary import Failures, failures
-from roboeval.evaluation.failures import NO_PROGRAM_CLASS
+from roboeval.evaluation.judging.failures import NO_PROGRAM_CLASS
 from roboeval.evaluation.runs.completions import KEY, CompletionKey
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.table import storable

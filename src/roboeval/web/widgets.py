@@ -16,7 +16,7 @@ from codebotler.core.skills.declaration import all_names
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Frame, PlainText, outside
 from roboeval.analysis.metrics import Estimate
-from roboeval.evaluation.explanation import first_lines
+from roboeval.evaluation.judging.explanation import first_lines
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.web.heat_map import MISSING
 from roboeval.web.run_store import MissingError

@@ -21,22 +21,22 @@ from codebotler.agents.gatekeeper import Gatekeeper
 from codebotler.agents.reports import SkillOutcome
 from codebotler.agents.server import make_server
 from codebotler.agents.steps import Steps
-from codebotler.checking.contract_file import contract_from
-from codebotler.checking.rules import read_rules
+from codebotler.checking.contracts.file import contract_from
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
-from codebotler.missions.log import MissionState, MissionSummary
+from codebotler.missions.display.view import MissionOrder, SessionView, program_digest
+from codebotler.missions.display.wording import event_text
 from codebotler.missions.preflight import known_instructions
-from codebotler.missions.store import RECENT_MISSIONS
-from codebotler.missions.view import MissionOrder, SessionView, program_digest
-from codebotler.missions.wording import event_text
+from codebotler.missions.storage.log import MissionState, MissionSummary
+from codebotler.missions.storage.store import RECENT_MISSIONS
 from codebotler.models.base import Reply, TextListener, ignore_text
 from codebotler.models.recorded import open_recorded
 from codebotler.prompts import Prompt
 from codebotler.robots.base import RobotLostError, RobotResult
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.web.console import Console
 from doubles import Answering, Several, raising
 from ended import cut, failed_mission, line_of
@@ -497,7 +497,7 @@ def test_past_missions_are_read_by_one_call_at_a_time_and_never_all(
         go_on.wait(SOON)
         return []
 
-    for module in ("agents.server", "missions.store"):
+    for module in ("agents.server", "missions.storage.store"):
         monkeypatch.setattr(f"codebotler.{module}.read_missions", slowly)
 
     async def act(agent: Agent) -> None:

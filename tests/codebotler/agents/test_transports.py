@@ -26,14 +26,14 @@ from mcp.client.streamable_http import streamable_http_client
 from mcp_types import ElicitRequestParams, ElicitResult
 
 from codebotler.agents.server import serve_without_page
-from codebotler.cli.mcp import serve_agents
+from codebotler.cli.operating.mcp import serve_agents
 from codebotler.core.errors import UserError
 from codebotler.core.world import Room, World
-from codebotler.missions.store import read_missions
+from codebotler.missions.storage.store import read_missions
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.simulated import Simulated
-from codebotler.web.access import Access, Role
 from codebotler.web.console import Console
+from codebotler.web.security.access import Access, Role
 from codebotler.web.server import Companion
 from pageserver import WORLD, PageServer
 

@@ -7,9 +7,9 @@ import pytest
 from codebotler.candidates.clusters import CandidateClusters, cluster_candidates, shared_rooms
 from codebotler.checking.sampled import CheckSettings
 from codebotler.rtl import parse
-from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.room_map import RoomMap
 
 ROOMS = RoomMap(("hall", "kitchen", "lab"), "hall")
 NO_LAB = Rule("no-lab", "Never go to the lab.", parse('not tr.Exists(goto("lab"))'))

@@ -8,7 +8,7 @@ from codebotler.candidates.question import ClarifyingQuestion, describe_differen
 from codebotler.checking.problems import Sample
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Event, Outcome, Status, Trace
-from codebotler.simulator.sampled_facts import whereabouts
+from codebotler.simulator.worlds.sampled_facts import whereabouts
 
 MUG, NO_MUG = (whereabouts("mug", "lab", is_there=there) for there in (True, False))
 CUP = whereabouts("cup", "lab", is_there=True)

@@ -12,10 +12,10 @@ from codebotler.checking.problems import CheckResult
 from codebotler.checking.sampled import MAX_EXTRA_WORLDS, CheckSettings
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Status
-from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.room_map import RoomMap
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.room_map import RoomMap
 
 ROOMS = ("start_loc", "kitchen", "alice's office", "bob's office")
 START = "def task_program():\n    "

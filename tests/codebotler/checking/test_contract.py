@@ -8,20 +8,20 @@ from pathlib import Path
 import pytest
 
 from codebotler.checking.check import check
-from codebotler.checking.contract_file import contract_yaml, read_contract
-from codebotler.checking.contract_text import contract_rows, contract_sentence
+from codebotler.checking.contracts.file import contract_yaml, read_contract
+from codebotler.checking.contracts.text import contract_rows, contract_sentence
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.proof import hold_within
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import ValueType
-from codebotler.core.text_template import ANY_TEXT, TextTemplate
+from codebotler.core.text.text_template import ANY_TEXT, TextTemplate
 from codebotler.rtl import parse
-from codebotler.simulator.contract import Contract, RequestedCall, SkillBound
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.contract import Contract, RequestedCall, SkillBound
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.worlds.room_map import RoomMap
 
 ROOMS = RoomMap(("start_loc", "printer room 1", "printer room 2", "café", "lab"), "start_loc", plain=True)
 PRINTERS = """

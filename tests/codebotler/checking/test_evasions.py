@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.checking.evasions import find_evasions
+from codebotler.checking.house_rules.evasions import find_evasions
 from codebotler.core.errors import UserError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.rtl import parse
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 
 BOTH = "bob's office|accounting"
 

@@ -10,10 +10,10 @@ from codebotler.checking.exploration import Exploration, explore
 from codebotler.checking.sampled import CheckSettings, SampledRuns
 from codebotler.core.trace import Outcome
 from codebotler.rtl import parse
-from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.house_rule import Rule
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.fact_sampler import Draw, FactSampler
+from codebotler.simulator.worlds.room_map import RoomMap
 
 ROOMS = RoomMap(("start", "kitchen", "lab"), "start")
 NO_LAB = Rule("no-lab", "Never go to the lab.", parse('not tr.Exists(goto("lab"))'))

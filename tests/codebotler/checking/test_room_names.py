@@ -1,6 +1,6 @@
 import pytest
 
-from codebotler.checking.room_names import fixed_drives, lists_rooms, named_rooms
+from codebotler.checking.source.room_names import fixed_drives, lists_rooms, named_rooms
 from codebotler.core.program import parse_leniently
 
 START = "def task_program():\n    "

@@ -5,18 +5,18 @@ from __future__ import annotations
 import pytest
 from rich.console import Console
 
-from codebotler.checking.rule_review import (
+from codebotler.checking.house_rules.review import (
     ALWAYS_BROKEN,
     DETECTED,
     IMPOSSIBLE,
     NEVER_BROKEN,
     review_rules,
 )
-from codebotler.cli.rules import step_sentence, steps_view
+from codebotler.cli.programs.rules import step_sentence, steps_view
 from codebotler.core.trace import Event, Option, Trace
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import Monitor, holds, parse
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 
 WORLD = World(
     (Room("hall"), Room("kitchen", ("glass",)), Room("office", (), (Person("carol"),))),

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.checking.check import check
-from codebotler.checking.rules import read_rules
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.core.errors import UserError
 
 RULES = r"""

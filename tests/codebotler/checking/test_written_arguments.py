@@ -2,9 +2,9 @@
 
 import pytest
 
-from codebotler.checking.written_arguments import WrittenArguments, read_arguments
+from codebotler.checking.source.written_arguments import WrittenArguments, read_arguments
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.text_template import ANY_TEXT
+from codebotler.core.text.text_template import ANY_TEXT
 
 
 def read(*lines: str) -> WrittenArguments:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from codebotler.core.world_file import read_world
-from codebotler.missions.log import EVENTS_FILE, SUMMARY_FILE
+from codebotler.missions.storage.log import EVENTS_FILE, SUMMARY_FILE
 from command_line import Ended, command
 from ended import cut, failed_mission, line_of
 from server import Request, Server

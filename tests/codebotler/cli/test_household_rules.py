@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.checking.rule_review import review_rules
-from codebotler.checking.rules import read_rules
+from codebotler.checking.house_rules.file import read_rules
+from codebotler.checking.house_rules.review import review_rules
 from codebotler.core.skills.files import skills_from
 from codebotler.core.world_file import read_world
 from codebotler.missions.rule_effects import find_program_effects

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from codebotler.core.files import to_line
-from codebotler.missions.log import LogLine
+from codebotler.missions.storage.log import LogLine
 from command_line import Ended, command, refused
 from forked import Forked
 

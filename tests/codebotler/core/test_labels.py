@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from codebotler.core.labels import SlowRegexError, check_label, expect_quick
+from codebotler.core.text.labels import SlowRegexError, check_label, expect_quick
 
 
 @pytest.mark.parametrize(

@@ -11,24 +11,24 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.core.errors import RobotError, UserError
-from codebotler.core.phrases import phrase
 from codebotler.core.skills.declaration import RTL_WORDS, by_name
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.skills.verbs import Verb, verb_of
+from codebotler.core.text.phrases import phrase
 from codebotler.core.trace import Event, Outcome, Status, trace_data, trace_from
 from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import read_world
 from codebotler.prompts import prompt_for
 from codebotler.rtl import RtlSyntaxError, holds, parse
 from codebotler.rtl.syntax import LAST_LOOKS, LOOK_RESULTS, QUESTIONS, TEXT_WORDS, WRAPPED_FIELDS
-from codebotler.simulator.house_rule import Rule, RuleViolationError
+from codebotler.simulator.guard.house_rule import Rule, RuleViolationError
+from codebotler.simulator.guard.rule_guard import RuleGuard
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rule_guard import RuleGuard
 from codebotler.simulator.settings import PAPER_SETTINGS
+from codebotler.simulator.worlds.robot import SimulatedRobot
 
 HEAD = "from enum import Enum\nfrom typing import Literal\nfrom codebotler import Simulation, skill\n"
 EVERY = (

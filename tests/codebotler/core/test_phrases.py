@@ -1,7 +1,7 @@
 import pytest
 
-from codebotler.core.phrases import NO_ANSWER, phrase
 from codebotler.core.skills.verbs import VerbForm
+from codebotler.core.text.phrases import NO_ANSWER, phrase
 from codebotler.core.trace import Event, Option
 
 TEA = Event("ask", "Tea?", (Option("yes"), Option("2", is_text=False)), answer="yes")

@@ -9,8 +9,8 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.simulation import Simulation
 from codebotler.core.skills.table import Parameter, Recording, Skill, SkillTable
 from codebotler.core.skills.values import NO_VALUE, TEXT_TYPE
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.sampled_robot import SampledRobot
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
 
 def test_eight_skills_stand_as_the_paper_writes_them() -> None:

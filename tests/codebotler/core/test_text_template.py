@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from codebotler.core.text_template import TextTemplate
+from codebotler.core.text.text_template import TextTemplate
 
 ANY = TextTemplate(("", ""))
 

@@ -7,7 +7,7 @@ from unicodedata import combining, normalize
 import pytest
 
 from codebotler.core.program import Flaw, parse_expression, parse_program
-from codebotler.core.unicode import MAX_ACCENTS, SHORT_TEXT, compose, long_rows, normalize_text
+from codebotler.core.text.unicode import MAX_ACCENTS, SHORT_TEXT, compose, long_rows, normalize_text
 
 LONG = "e\u0301" * SHORT_TEXT
 ROW = "a" + "\u0315\u0300" * 50

@@ -2,7 +2,7 @@
 
 import pytest
 
-from codebotler.core.words import with_sentence
+from codebotler.core.text.words import with_sentence
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.core.errors import UserError
-from codebotler.core.labels import check_label
+from codebotler.core.text.labels import check_label
 from codebotler.core.world import HALLWAY, Person, Room, World, laid_out
 from codebotler.core.world_file import WorldFile, read_world
 from codebotler.core.yaml_files import YamlFile

@@ -8,21 +8,21 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.checking.contract_file import contract_data
+from codebotler.checking.contracts.file import contract_data
 from codebotler.core.errors import RobotError
-from codebotler.core.text_template import TextTemplate
+from codebotler.core.text.text_template import TextTemplate
 from codebotler.core.world import Room, World
-from codebotler.missions.log import EVENTS_FILE, LogLine, MissionState
+from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.session import MissionSession
-from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.missions.storage.log import EVENTS_FILE, LogLine, MissionState
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import Robot, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
-from codebotler.simulator.contract import Contract, SkillBound
-from codebotler.simulator.house_rule import UNKNOWN_ROOM
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.guard.contract import Contract, SkillBound
+from codebotler.simulator.guard.house_rule import UNKNOWN_ROOM
+from codebotler.simulator.worlds.room_map import RoomMap
 from doubles import Answering
 
 ROOMS = RoomMap(("hall", "kitchen", "the vault", "café"), "hall", plain=True)

@@ -17,11 +17,11 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event
 from codebotler.core.world import Point, Room, World, laid_out, rooms_along
 from codebotler.core.world_file import read_world
-from codebotler.missions.log import EVENTS_FILE, LogLine, MissionState
+from codebotler.missions.display.view import MissionOrder
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import ask_rooms, expect_poses
 from codebotler.missions.session import MissionSession
-from codebotler.missions.view import MissionOrder
+from codebotler.missions.storage.log import EVENTS_FILE, LogLine, MissionState
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import NotReadyError, Robot
 from codebotler.robots.face import Face, RobotWithFace
@@ -30,12 +30,12 @@ from codebotler.robots.ros.keepout import MASK_RESOLUTION, keepout_messages
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.robots.spelling import SpellingRobot
 from codebotler.rtl import parse
-from codebotler.simulator.house_rule import Rule, RuleViolationError
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.rule_guard import RuleGuard
+from codebotler.simulator.guard.house_rule import Rule, RuleViolationError
+from codebotler.simulator.guard.rule_guard import RuleGuard
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from codebotler.simulator.worlds.room_map import RoomMap
 from doubles import Answering
 
 WORLD = read_world(OFFICE)

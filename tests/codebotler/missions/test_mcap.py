@@ -16,9 +16,9 @@ import pytest
 from mcap.reader import make_reader
 
 from codebotler.core.world import Person, Room, World
-from codebotler.missions.log import LogLine, MissionSummary, read_events
-from codebotler.missions.mcap import TimeSource, export_mcap, write_mcap
 from codebotler.missions.mission import Mission
+from codebotler.missions.storage.log import LogLine, MissionSummary, read_events
+from codebotler.missions.storage.mcap import TimeSource, export_mcap, write_mcap
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 

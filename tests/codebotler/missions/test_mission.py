@@ -18,7 +18,8 @@ from codebotler.core.errors import RobotError, UserError
 from codebotler.core.trace import Outcome
 from codebotler.core.world import Room, World
 from codebotler.missions import mission as module
-from codebotler.missions.log import (
+from codebotler.missions.mission import UNCONFIRMED_STOP, Mission, MissionError
+from codebotler.missions.storage.log import (
     EVENTS_FILE,
     NEXT_STATES,
     SUMMARY_FILE,
@@ -27,8 +28,7 @@ from codebotler.missions.log import (
     MissionSummary,
     read_events,
 )
-from codebotler.missions.mission import UNCONFIRMED_STOP, Mission, MissionError
-from codebotler.missions.store import find_mission, read_missions, recover_missions
+from codebotler.missions.storage.store import find_mission, read_missions, recover_missions
 from codebotler.robots.base import NotReadyError, Robot, RobotLostError, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated

@@ -16,22 +16,22 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.text_template import ANY_TEXT
+from codebotler.core.text.text_template import ANY_TEXT
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
-from codebotler.missions.log import MissionState, MissionSummary, add_event, open_log, read_events
-from codebotler.missions.map_event import map_data
+from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.mission import Mission
-from codebotler.missions.past import MissionPast, read_past
 from codebotler.missions.recovery import PriorApproval
 from codebotler.missions.session import MissionSession
-from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.missions.storage.log import MissionState, MissionSummary, add_event, open_log, read_events
+from codebotler.missions.storage.map_event import map_data
+from codebotler.missions.storage.past import MissionPast, read_past
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
-from codebotler.simulator.contract import Contract, SkillBound
+from codebotler.simulator.guard.contract import Contract, SkillBound
 from codebotler.simulator.pool import shared_pool
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.worlds.room_map import RoomMap
 from ended import cut, failed_mission, line_of
 
 WORLD = World(

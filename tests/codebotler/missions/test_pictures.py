@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from codebotler.missions import pictures as module
+from codebotler.missions.display.wording import event_text
 from codebotler.missions.live import LiveRobot
-from codebotler.missions.log import LogLine, MissionState, read_events
-from codebotler.missions.mcap import write_mcap
 from codebotler.missions.mission import Mission
-from codebotler.missions.pictures import PictureStore, read_picture
-from codebotler.missions.wording import event_text
+from codebotler.missions.storage import pictures as module
+from codebotler.missions.storage.log import LogLine, MissionState, read_events
+from codebotler.missions.storage.mcap import write_mcap
+from codebotler.missions.storage.pictures import PictureStore, read_picture
 from codebotler.robots.base import CameraPicture, Feedback, RobotArgument, RobotResult, ignore_feedback
 from codebotler.robots.reservation import Reservation
 from doubles import Answering

@@ -15,13 +15,13 @@ import pytest
 import rich.progress  # noqa: F401 - by now, since an interrupt in the middle of an import leaves a file open
 
 from codebotler.checking.check import check
-from codebotler.cli.run import Request, run
+from codebotler.cli.operating.run import Request, run
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.world import Room, World
-from codebotler.missions.log import MissionState, read_events
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import ask_rooms, limit_rooms, unknown_rooms
-from codebotler.missions.store import read_missions
+from codebotler.missions.storage.log import MissionState, read_events
+from codebotler.missions.storage.store import read_missions
 from codebotler.models.base import Reply, TextListener, Usage, ignore_text
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
@@ -29,7 +29,7 @@ from codebotler.robots.base import CancelledError, NotReadyError, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.web.console import Console
 from doubles import Answering, raising
 

@@ -10,10 +10,10 @@ import pytest
 
 from codebotler.candidates.question import ClarifyingAnswer
 from codebotler.core.world import Room, World
-from codebotler.missions.log import MissionState, MissionSummary, read_events
+from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.mission import MissionError
 from codebotler.missions.session import MissionSession
-from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.missions.storage.log import MissionState, MissionSummary, read_events
 from codebotler.robots.simulated import Simulated
 from doubles import Several
 

@@ -11,19 +11,19 @@ import pytest
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.world import Room, World
-from codebotler.missions.log import EVENTS_FILE, LogLine, MissionState
+from codebotler.missions.display.view import MissionOrder
+from codebotler.missions.display.wording import event_text
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.session import MissionSession
-from codebotler.missions.view import MissionOrder
-from codebotler.missions.wording import event_text
+from codebotler.missions.storage.log import EVENTS_FILE, LogLine, MissionState
 from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import open_recorded as recorded
 from codebotler.robots.base import Robot, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
-from codebotler.simulator.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, Rule
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.guard.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, Rule
+from codebotler.simulator.worlds.room_map import RoomMap
 from doubles import Answering
 
 VAULT = Rule("vault", "Never go into the vault.", parse('not tr.Exists(goto("vault"))'))

@@ -12,7 +12,8 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender
-from codebotler.missions.log import (
+from codebotler.missions.mission import Mission
+from codebotler.missions.storage.log import (
     EVENTS_FILE,
     SUMMARY_FILE,
     MissionState,
@@ -20,8 +21,7 @@ from codebotler.missions.log import (
     open_log,
     read_events,
 )
-from codebotler.missions.mission import Mission
-from codebotler.missions.store import find_mission, last_rest, read_missions, recover_missions
+from codebotler.missions.storage.store import find_mission, last_rest, read_missions, recover_missions
 
 IF_TOOL_DIES = "its worker cancelled the goal"
 
@@ -115,7 +115,7 @@ def test_mission_that_cannot_be_closed_is_told_and_others_are(
             raise OSError(number, os.strerror(number), str(folder / EVENTS_FILE))
         return open_log(folder)
 
-    monkeypatch.setattr("codebotler.missions.store.open_log", open_second)
+    monkeypatch.setattr("codebotler.missions.storage.store.open_log", open_second)
     (summary,) = recover_missions(tmp_path)
     assert summary.state == "interrupted"
     unclosed, closed = capsys.readouterr().err.splitlines()
@@ -144,7 +144,7 @@ def test_the_last_mission_is_found_without_reading_all(
     (first / SUMMARY_FILE).write_text("damaged")
     with pytest.raises(UserError):
         read_missions(tmp_path)
-    monkeypatch.setattr("codebotler.missions.store.RECENT_MISSIONS", 1)
+    monkeypatch.setattr("codebotler.missions.storage.store.RECENT_MISSIONS", 1)
     assert find_mission(tmp_path, "last").name.endswith("-10")
     assert [one.id[-2:] for one in read_missions(tmp_path, 2)] == ["10", "-9"]  # in the order of their times
 

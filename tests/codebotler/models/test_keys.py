@@ -23,7 +23,6 @@ from pathlib import Path
 
 logging.basicConfig(level=logging.DEBUG, stream=sys.stderr)
 logging.getLogger().addHandler(logging.FileHandler("log.txt"))
-
 from codebotler.models.base import ModelError
 from codebotler.models.sampling import SamplingSettings
 from codebotler.models.open import open_model

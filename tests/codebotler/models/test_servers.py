@@ -10,10 +10,10 @@ from typing import Any, TypeVar
 import openai
 import pytest
 
-from codebotler.models import http_client
 from codebotler.models.base import Model, ModelError, Reply, Usage
 from codebotler.models.open import open_model
 from codebotler.models.sampling import SamplingSettings
+from codebotler.models.servers import http_client
 from codebotler.prompts import Prompt, PromptMessage, prompt_for
 from server import CHUNK, HUGE, TASK, Fault, Server
 

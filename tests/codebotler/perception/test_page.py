@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from codebotler.missions import pictures as missionpictures
+from codebotler.missions.storage import pictures as missionpictures
 from codebotler.perception import Sighting, read_image
 from codebotler.perception.base import MAX_LABEL_CHARACTERS
 from codebotler.perception.image import ENCODINGS, LONGEST_SIDE, MAX_IMAGE_BYTES, MAX_PIXELS, MIN_SIDE

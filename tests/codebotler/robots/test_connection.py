@@ -10,8 +10,8 @@ import pytest
 
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.paper import SKILLS
-from codebotler.robots.ros.connection import Connection, SkillCall, default_connection
-from codebotler.robots.ros.connection_file import read_connection
+from codebotler.robots.ros.connections.connection import Connection, SkillCall, default_connection
+from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.motion import Motion
 
 GO_TO = "go_to: {action: /drive, type: nav2_msgs/action/NavigateToPose, goal: {pose: $place}}"

@@ -12,9 +12,9 @@ import yaml
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import ROS_PYTHON
-from codebotler.robots.ros.connection import MotionTopic
-from codebotler.robots.ros.connection_file import read_connection
-from codebotler.robots.ros.discovery import discover_offers, draft_connection
+from codebotler.robots.ros.connections.connection import MotionTopic
+from codebotler.robots.ros.connections.connection_file import read_connection
+from codebotler.robots.ros.connections.discovery import discover_offers, draft_connection
 
 NAV2 = "action /navigate_to_pose nav2_msgs/action/NavigateToPose"
 

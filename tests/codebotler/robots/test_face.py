@@ -17,10 +17,10 @@ from codebotler.core.skills.table import Parameter, Recording, Skill
 from codebotler.core.skills.values import NO_VALUE, TEXT_TYPE, ValueType
 from codebotler.core.trace import Event
 from codebotler.core.world import Room, World
-from codebotler.missions.log import MissionState, read_events
 from codebotler.missions.mission import Mission
-from codebotler.missions.past import MissionPast
 from codebotler.missions.preflight import missing_skills, resume_robot
+from codebotler.missions.storage.log import MissionState, read_events
+from codebotler.missions.storage.past import MissionPast
 from codebotler.robots.base import AnswerError, CancelledError, Options, RobotArgument
 from codebotler.robots.face import (
     ASK_TIMEOUT,

@@ -9,7 +9,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.yaml_files import YamlFile
-from codebotler.missions.map_event import map_data
+from codebotler.missions.storage.map_event import map_data
 from codebotler.robots.places import Places, read_places
 
 PLAIN = """\

@@ -25,9 +25,9 @@ from codebotler.core.trace import Event
 from codebotler.core.world import Person, Point, Room, World
 from codebotler.core.world_file import read_world
 from codebotler.missions.live import LiveRobot
-from codebotler.missions.log import MissionState
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import ask_rooms
+from codebotler.missions.storage.log import MissionState
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError
 from codebotler.robots.open import check_readiness
@@ -36,7 +36,7 @@ from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import FEEDBACK_SECONDS, METRES_PER_SECOND, OFFICE, SIMULATION
 from codebotler.rtl import parse
 from codebotler.simulator.engine import run
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite
 

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from codebotler import rtl
+from codebotler.core.text.unicode import compose
 from codebotler.core.trace import Event, Option, Trace
-from codebotler.core.unicode import compose
 from codebotler.rtl.formulas import ScopeName
 
 NAMES = st.sampled_from(["a", "b", "ab", "a b", "No"])

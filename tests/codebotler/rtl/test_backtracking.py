@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import codebotler.rtl
-import codebotler.simulator.robot
+import codebotler.simulator.worlds.robot
 from codebotler.rtl import Claim, Number, Time
 from codebotler.rtl.reasoning.backtracking import (
     UNITS,
@@ -35,7 +35,7 @@ MODULES = [
         importlib.import_module(one.name)
         for one in pkgutil.walk_packages(codebotler.rtl.__path__, "codebotler.rtl.")
     ),
-    codebotler.simulator.robot,
+    codebotler.simulator.worlds.robot,
 ]
 
 

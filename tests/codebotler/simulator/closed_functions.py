@@ -5,7 +5,7 @@ import socket
 from contextlib import suppress
 from pathlib import Path
 
-from codebotler.simulator.isolated_call import isolated
+from codebotler.simulator.process.isolated_call import isolated
 
 
 @isolated("hello")

@@ -28,10 +28,10 @@ from codebotler.simulator.ledger import Ledger, RememberingLedger, SkillAnswer
 from codebotler.simulator.pool import MAX_BATCH_KEYS, MAX_KEYS_AHEAD, MIN_BATCH_KEYS, DistinctKeys, WorkerPool
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.worker import EngineError, Job, Worker
+from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
 from in_process import all_of
 from other_functions import with_functions
 from processes import are_gone, children_of

@@ -9,15 +9,15 @@ from codebotler.core.errors import RobotError, UserError
 from codebotler.core.trace import Option
 from codebotler.core.world import Room, World, is_within, laid_out
 from codebotler.core.world_file import read_world
-from codebotler.missions.map_event import map_data, map_from
+from codebotler.missions.storage.map_event import map_data, map_from
 from codebotler.robots.simulated import SIMULATION
 from codebotler.rtl import parse
-from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.house_rule import Rule, RuleViolationError
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import SampledRobot
+from codebotler.simulator.guard.house_rule import Rule, RuleViolationError
+from codebotler.simulator.guard.rule_guard import RuleGuard
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
 FLAT = """
 robot: hall

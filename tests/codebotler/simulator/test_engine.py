@@ -24,17 +24,17 @@ from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.core.world import Room, World
 from codebotler.simulator import pool
 from codebotler.simulator.engine import digest, run
-from codebotler.simulator.isolated_call import IDLE_PROCESSES, end_all
 from codebotler.simulator.ledger import SkillAnswer
 from codebotler.simulator.pool import MIN_BATCH_KEYS, WorkerPool
 from codebotler.simulator.process import bytecode, spawn
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.fork_server_client import BatchServer
+from codebotler.simulator.process.isolated_call import IDLE_PROCESSES, end_all
 from codebotler.simulator.process.spawn import compiled_file
-from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.skill_protocol import OVERRUN, SkillProtocol
 from codebotler.simulator.worker import EngineError, Worker
+from codebotler.simulator.worlds.robot import SimulatedRobot
 from other_functions import with_functions
 from processes import are_gone, children_of, engine_processes, fork_servers
 
@@ -712,7 +712,7 @@ def test_a_compiler_that_is_killed_from_outside_is_no_verdict() -> None:
         return SimulatedRobot(WORLD)
 
     assert said(worker.run(saying("a"), robot)) == ["a"]
-    os.kill(IDLE_PROCESSES["codebotler.simulator.compiler"][-1]._process.pid, signal.SIGKILL)
+    os.kill(IDLE_PROCESSES["codebotler.simulator.process.compiler"][-1]._process.pid, signal.SIGKILL)
     assert said(worker.run(saying("b"), robot)) == ["b"]
     worker.close()
 

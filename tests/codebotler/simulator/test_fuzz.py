@@ -27,9 +27,9 @@ from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.settings import PAPER_SETTINGS, Limits, SimulationSettings
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.robot import SimulatedRobot
 from flaws import find_flaws
 from in_process import OrdinaryProcess, all_of, without_addresses
 from random_programs import broken_programs, programs, tame_programs

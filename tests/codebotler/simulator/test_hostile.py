@@ -36,11 +36,11 @@ from codebotler.rtl import parse
 from codebotler.simulator.process.exit_status import PROCESSOR_TIME
 from codebotler.simulator.process.fork_server_client import BatchServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
-from roboeval.evaluation.judge import judge
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from roboeval.evaluation.judging.judge import judge
 from roboeval.suites.load import Requirement, Scenario
 
 ONE_A_LAYER = {  # the others are slow

@@ -19,11 +19,11 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Event, Option, Outcome, Status, Trace
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import Formula, holds, parse
-from codebotler.simulator.house_rule import Rule, RuleViolationError
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rule_guard import RuleGuard, name_of
+from codebotler.simulator.guard.house_rule import Rule, RuleViolationError
+from codebotler.simulator.guard.rule_guard import RuleGuard, name_of
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.robot import SimulatedRobot
 
 WORLD = World(
     (

@@ -17,7 +17,7 @@ from codebotler.checking.check import check
 from codebotler.core import program as programs
 from codebotler.core.program import MAX_PROGRAM_LENGTH, SOURCE_NAME
 from codebotler.prompts.extract import program_in, program_of
-from codebotler.simulator.isolated_call import IsolatedCallError, end_all
+from codebotler.simulator.process.isolated_call import IsolatedCallError, end_all
 from codebotler.simulator.worker import EngineError
 from roboeval.mutation.program_tree import apply_edit, parse_tree
 from roboeval.training.rollouts import Rollout, judge
@@ -84,7 +84,7 @@ def test_answer_to_an_interrupted_call_reaches_no_other() -> None:
 
 def test_process_that_cannot_start_is_no_fault_of_the_text(monkeypatch: pytest.MonkeyPatch) -> None:
     end_all()
-    monkeypatch.setattr("codebotler.simulator.isolated_call.SERVE_CODE", "raise SystemExit(1)")
+    monkeypatch.setattr("codebotler.simulator.process.isolated_call.SERVE_CODE", "raise SystemExit(1)")
     with pytest.raises(EngineError):
         closed.echo("a")
 

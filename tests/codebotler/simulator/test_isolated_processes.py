@@ -13,10 +13,10 @@ import pytest
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
-from codebotler.simulator.isolated_call import IDLE_PROCESSES
-from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.process.isolated_call import IDLE_PROCESSES
 from codebotler.simulator.sandbox.isolation import NOBODY
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.robot import SimulatedRobot
 from other_functions import with_functions
 from processes import children_of, lives
 
@@ -70,7 +70,9 @@ def enclosed() -> Iterator[dict[str, Enclosed]]:
     worker = Worker()
 
     def say(_robot: SimulatedRobot, message: str) -> None:
-        found["compiler"] = Enclosed.of(IDLE_PROCESSES["codebotler.simulator.compiler"][-1]._process.pid)
+        found["compiler"] = Enclosed.of(
+            IDLE_PROCESSES["codebotler.simulator.process.compiler"][-1]._process.pid
+        )
         for role, fork_server in worker._fork_servers.items():
             found[role] = Enclosed.of(fork_server.pid)
             for pid in filter(lives, children_of(fork_server.pid)):

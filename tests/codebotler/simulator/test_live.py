@@ -14,10 +14,10 @@ import pytest
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Outcome, Status, Trace
-from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.sandbox import LIVE_SERVER, PROGRAM
 from codebotler.simulator.settings import ENDLESS, PAPER_SETTINGS
 from codebotler.simulator.worker import EngineError, Worker
+from codebotler.simulator.worlds.robot import Argument, Result
 from processes import are_gone, children_of, engine_processes, fork_servers
 
 LIVE = replace(PAPER_SETTINGS, literals="as-written", limits=ENDLESS)

@@ -5,11 +5,11 @@ import pytest
 from codebotler.core.errors import RobotError
 from codebotler.core.world import Person, Room, World
 from codebotler.robots.simulated import SIMULATION
-from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.matching import meant_by
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_robot import SampledRobot
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.matching import meant_by
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
 ROOMS = ("kitchen", "kitchen table", "shelf", "bookshelf", "lab 1", "lab 10", "alice's office")
 

@@ -10,12 +10,12 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
-from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.house_rule import Rule, RuleViolationError
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import SampledRobot
+from codebotler.simulator.guard.house_rule import Rule, RuleViolationError
+from codebotler.simulator.guard.rule_guard import RuleGuard
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
 
 @skill(fails={"NotFound": "it is not there"})

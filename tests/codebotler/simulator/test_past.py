@@ -14,11 +14,11 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Room
 from codebotler.rtl import parse
-from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.house_rule import Rule, RuleViolationError
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.rule_guard import RuleGuard
-from codebotler.simulator.sampled_robot import SampledRobot
+from codebotler.simulator.guard.house_rule import Rule, RuleViolationError
+from codebotler.simulator.guard.rule_guard import RuleGuard
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
 ROOMS = RoomMap(("hall", "kitchen", "lab"), "kitchen")
 YES_NO = (Option("yes"), Option("no"))

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.entities import Thing
-from codebotler.simulator.matching import Matching, _pattern, resolve_room
-from codebotler.simulator.robot import Result, SimulatedRobot
 from codebotler.simulator.settings import SimulationSettings, choose
+from codebotler.simulator.worlds.entities import Thing
+from codebotler.simulator.worlds.matching import Matching, _pattern, resolve_room
+from codebotler.simulator.worlds.robot import Result, SimulatedRobot
 
 Texts: TypeAlias = tuple[str, ...]
 

@@ -13,12 +13,12 @@ import pytest
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Option
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.fact_sampler import FactSampler
-from codebotler.simulator.matching import normalized
-from codebotler.simulator.robot import Argument, Result
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_facts import whereabouts
-from codebotler.simulator.sampled_robot import SampledRobot
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.matching import normalized
+from codebotler.simulator.worlds.robot import Argument, Result
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_facts import whereabouts
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
 ROOMS = RoomMap(("start_loc", "kitchen", "lab"), "start_loc")
 YES_NO = (Option("Yes"), Option("No"))
@@ -401,7 +401,7 @@ def test_draws_depend_on_seed_sample_and_fact_alone() -> None:
 
 def test_draws_are_the_same_whatever_hashing_does() -> None:
     told = (
-        "from codebotler.simulator.fact_sampler import FactSampler\n"
+        "from codebotler.simulator.worlds.fact_sampler import FactSampler\n"
         "print([FactSampler(5).draw(99, 'x', str(n)) for n in range(9)])\n"
     )
     printed = {

@@ -3,8 +3,8 @@ from datetime import UTC, datetime
 import pytest
 
 from codebotler.core.trace import Option
-from codebotler.simulator.matching import Matching, finds
 from codebotler.simulator.settings import PAPER_SETTINGS, Limits, SimulationSettings, choose
+from codebotler.simulator.worlds.matching import Matching, finds
 
 
 def test_rules_of_the_paper_are_those_that_the_published_verdicts_rest_on() -> None:

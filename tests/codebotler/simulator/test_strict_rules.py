@@ -9,9 +9,9 @@ from codebotler.core.trace import Option, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import read_world
 from codebotler.simulator.engine import run
-from codebotler.simulator.matching import WORDS_FOR_PEOPLE, resolve_room
-from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings, choose
+from codebotler.simulator.worlds.matching import WORDS_FOR_PEOPLE, resolve_room
+from codebotler.simulator.worlds.robot import SimulatedRobot
 from roboeval.suites.schema import SimulationFile
 
 pytestmark = pytest.mark.shared_engine

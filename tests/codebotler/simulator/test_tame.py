@@ -13,14 +13,19 @@ import pytest
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Room, World
-from codebotler.simulator.compiler import LONG_SOURCE, CompiledProgram, compile_program, compile_programs
-from codebotler.simulator.isolated_call import IDLE_PROCESSES
-from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.process.compiler import (
+    LONG_SOURCE,
+    CompiledProgram,
+    compile_program,
+    compile_programs,
+)
+from codebotler.simulator.process.isolated_call import IDLE_PROCESSES
 from codebotler.simulator.sandbox import tame
 from codebotler.simulator.sandbox.fuel import nodes_of
 from codebotler.simulator.sandbox.tame_expressions import GIVEN
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.robot import SimulatedRobot
 from in_process import all_of
 
 NAMES = frozenset(SKILLS)
@@ -559,7 +564,7 @@ def test_a_program_that_exhausts_the_compiler_costs_those_beside_it_nothing() ->
 @pytest.mark.parametrize("number", [signal.SIGXCPU, signal.SIGSYS, signal.SIGSEGV])
 def test_a_compiler_that_dies_at_several_programs_is_replaced(number: int) -> None:
     compile_programs(["say(0)", "say(1)"], "lowercase", ("say",))
-    os.kill(IDLE_PROCESSES["codebotler.simulator.compiler"][-1]._process.pid, number)
+    os.kill(IDLE_PROCESSES["codebotler.simulator.process.compiler"][-1]._process.pid, number)
     together = compile_programs(["say(1)", "say(2)"], "lowercase", ("say",))
     assert [type(one) for one in together] == [CompiledProgram, CompiledProgram]
 

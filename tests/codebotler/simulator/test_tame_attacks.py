@@ -26,16 +26,16 @@ from codebotler.core.skills.values import NO_VALUE
 from codebotler.core.trace import Outcome, Status, trace_data
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import outcomes
-from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.room_map import RoomMap
-from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.skill_protocol import arguments_of
 from codebotler.simulator.worker import NewRobot, Worker
+from codebotler.simulator.worlds.fact_sampler import FactSampler
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
 FOLDER = Path(__file__).parents[2] / "hostile_tame"
 PROGRAMS = {path.stem: path.read_text(encoding="utf-8") for path in sorted(FOLDER.glob("*.py"))}

@@ -6,7 +6,7 @@ from unicodedata import normalize
 import pytest
 
 from codebotler.checking.check import check
-from codebotler.checking.rules import read_rules
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.core.program import parse_leniently
 from codebotler.core.world import Person, Room, World
 from codebotler.core.world_file import read_world

@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 
 from codebotler.core.world import Room, World
-from codebotler.missions.store import read_missions
+from codebotler.missions.storage.store import read_missions
 from codebotler.robots.simulated import OFFICE
 from ended import cut, failed_mission, line_of
 from pageserver import SERVE, WORLD, PageServer
@@ -378,6 +378,6 @@ def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(t
 
 def test_nothing_of_the_page_is_loaded_for_other_commands() -> None:
     loaded = "print('nicegui' in sys.modules, 'fastapi' in sys.modules)"
-    code = f"import sys, codebotler.cli.app, codebotler.cli.run, codebotler.web.console; {loaded}"
+    code = f"import sys, codebotler.cli.app, codebotler.cli.operating.run, codebotler.web.console; {loaded}"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout.split() == ["False", "False"]

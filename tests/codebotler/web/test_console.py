@@ -18,12 +18,12 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import Appender
 from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
-from codebotler.missions import log as mission_log
-from codebotler.missions.log import LogLine, MissionState, MissionSummary
+from codebotler.missions.display.view import MissionOrder, SessionView, program_digest
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import known_instructions
-from codebotler.missions.store import read_missions
-from codebotler.missions.view import MissionOrder, SessionView, program_digest
+from codebotler.missions.storage import log as mission_log
+from codebotler.missions.storage.log import LogLine, MissionState, MissionSummary
+from codebotler.missions.storage.store import read_missions
 from codebotler.models.base import Model, ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.open import open_model
 from codebotler.models.recorded import open_recorded
@@ -31,7 +31,7 @@ from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, Robot, RobotResult
 from codebotler.robots.simulated import OFFICE, Simulated
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.panes.instruction import examples
 from doubles import Answering

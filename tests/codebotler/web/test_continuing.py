@@ -16,12 +16,12 @@ from codebotler.core.skills.values import ValueType
 from codebotler.core.trace import Event
 from codebotler.core.world import Room, World
 from codebotler.missions import recovery
-from codebotler.missions.log import MissionState, MissionSummary, add_event, open_log
-from codebotler.missions.map_event import map_data
-from codebotler.missions.past import MissionPast
+from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.recovery import ask_evidence, is_recoverable
 from codebotler.missions.session import MissionSession
-from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.missions.storage.log import MissionState, MissionSummary, add_event, open_log
+from codebotler.missions.storage.map_event import map_data
+from codebotler.missions.storage.past import MissionPast
 from codebotler.models.base import Model, ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt

@@ -11,12 +11,12 @@ import pytest
 from codebotler.checking.check import check
 from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
-from codebotler.missions.log import MissionState, MissionSummary
-from codebotler.missions.progress import _MAX_MOMENTS, _MAX_STEPS, Find, Moment, Progress
-from codebotler.missions.view import SessionView
-from codebotler.missions.wording import timeline, title
+from codebotler.missions.display.progress import _MAX_MOMENTS, _MAX_STEPS, Find, Moment, Progress
+from codebotler.missions.display.view import SessionView
+from codebotler.missions.display.wording import timeline, title
+from codebotler.missions.storage.log import MissionState, MissionSummary
 from codebotler.robots.simulated import OFFICE
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.web.floorplan import _HALO_RADIUS, MAX_DRAWN_ROOMS, MapState, floorplan
 from codebotler.web.panes.robot import map_state
 from codebotler.web.storyboard import (

@@ -16,16 +16,16 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from codebotler.core.world import Room, World
-from codebotler.missions.log import MissionState, read_events
+from codebotler.missions.display.view import SessionView
 from codebotler.missions.mission import UNCONFIRMED_STOP
-from codebotler.missions.store import read_missions
-from codebotler.missions.view import SessionView
+from codebotler.missions.storage.log import MissionState, read_events
+from codebotler.missions.storage.store import read_missions
 from codebotler.robots.face import Face, FaceQuestion
 from codebotler.robots.simulated import Simulated
-from codebotler.web.access import MIN_TOKEN_LENGTH
 from codebotler.web.console import Console
 from codebotler.web.face import MAX_FACE_OPTIONS, MAX_FACE_TEXT, face_data, question_data, screen_text
-from codebotler.web.guard import MAX_BODY_BYTES
+from codebotler.web.security.access import MIN_TOKEN_LENGTH
+from codebotler.web.security.guard import MAX_BODY_BYTES
 from command_line import ENVIRONMENT
 from forked import PAGE, Forked
 from pageserver import PageServer

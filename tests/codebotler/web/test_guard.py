@@ -17,7 +17,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from codebotler.core.errors import UserError
-from codebotler.web.access import (
+from codebotler.web.security.access import (
     MAX_WRONG_TOKENS,
     WRONG_TOKEN_SECONDS,
     Access,
@@ -25,8 +25,8 @@ from codebotler.web.access import (
     Role,
     TooManyTriesError,
 )
-from codebotler.web.guard import MAX_AGENT_BODY_BYTES, MAX_BODY_BYTES, Guard, _is_same
-from codebotler.web.proxy import OuterAddress, proxies_in_front
+from codebotler.web.security.guard import MAX_AGENT_BODY_BYTES, MAX_BODY_BYTES, Guard, _is_same
+from codebotler.web.security.proxy import OuterAddress, proxies_in_front
 from command_line import ENVIRONMENT
 from forked import PAGE, Forked
 from pageserver import PageServer
@@ -188,7 +188,7 @@ def test_a_token_that_was_made_here_opens_whatever_was_tried_before() -> None:
 
 
 def test_addresses_that_tried_are_not_kept_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("codebotler.web.access.MAX_ADDRESSES", 3)
+    monkeypatch.setattr("codebotler.web.security.access.MAX_ADDRESSES", 3)
     access = Access("a token", "a face")
     for number in range(9):
         access.of_token("wrong", f"address {number}")
@@ -460,7 +460,7 @@ def test_what_is_sent_without_its_length_has_the_same_limit(server: PageServer) 
 
 
 def test_agents_leave_room_for_people(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("codebotler.web.guard.MAX_AGENT_REQUESTS", 2)
+    monkeypatch.setattr("codebotler.web.security.guard.MAX_AGENT_REQUESTS", 2)
     statuses: list[int] = []
 
     async def main() -> None:
@@ -552,7 +552,7 @@ def test_the_default_port_moves_on_and_a_port_that_was_named_does_not(
     with PageAddress(port=0).listen() as first, PageAddress(port=0).listen() as other:
         taken, free = first.getsockname()[1], other.getsockname()[1]
         other.close()
-        monkeypatch.setattr("codebotler.web.access.PAGE_PORTS", (taken, free))
+        monkeypatch.setattr("codebotler.web.security.access.PAGE_PORTS", (taken, free))
         with PageAddress().listen() as found:
             assert found.getsockname()[1] == free
         with pytest.raises(UserError, match=f"port {taken} is already in use"):

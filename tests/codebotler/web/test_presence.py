@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
-from codebotler.web.access import Role
+from codebotler.web.security.access import Role
 from codebotler.web.server import _PAGE_SOCKETS, Presence
 
 PAGE = f"{_PAGE_SOCKETS}socket.io/"

@@ -28,8 +28,8 @@ from codebotler.models.sampling import SamplingSettings
 from roboeval.evaluation.agents.conversation import TurnLimits
 from roboeval.evaluation.agents.plan import AgentMode, AgentPlan
 from roboeval.evaluation.evaluate import evaluate_run
-from roboeval.evaluation.generate import GenerationProgress, Pace, generate_run
-from roboeval.evaluation.requests import GenerationPlan
+from roboeval.evaluation.generating.generate import GenerationProgress, Pace, generate_run
+from roboeval.evaluation.generating.requests import GenerationPlan
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.rows import Row
@@ -300,7 +300,7 @@ from codebotler.models.open import open_model
 from codebotler.models.sampling import SamplingSettings
 from roboeval.evaluation.agents.conversation import TurnLimits
 from roboeval.evaluation.agents.plan import AgentPlan
-from roboeval.evaluation.generate import Pace, generate_run
+from roboeval.evaluation.generating.generate import Pace, generate_run
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.load import load_suite
 model = open_model("openai-chat:agent", SamplingSettings(base_url={url!r}, seed=0))

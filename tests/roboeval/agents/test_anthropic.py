@@ -10,7 +10,7 @@ from codebotler.models.open import open_model
 from codebotler.models.sampling import SamplingSettings
 from roboeval.evaluation.agents.conversation import TurnLimits
 from roboeval.evaluation.agents.plan import AgentPlan
-from roboeval.evaluation.generate import Pace, generate_run
+from roboeval.evaluation.generating.generate import Pace, generate_run
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.load import load_suite
 from server import Request, Server

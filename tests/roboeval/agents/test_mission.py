@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from codebotler.checking.contract_file import contract_from
+from codebotler.checking.contracts.file import contract_from
 from codebotler.core.errors import VIOLATION, RobotError, UserError
 from codebotler.core.trace import Option, Status, outcome_data
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.agents.mission import MAX_MISTAKES, MAX_REPEATS, AgentMission
 from roboeval.evaluation.agents.plan import DEFAULT_TURNS
-from roboeval.evaluation.judge import evaluate, judge
+from roboeval.evaluation.judging.judge import evaluate, judge
 from roboeval.evaluation.recording import SLEEP, RecordingRobot
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Row

@@ -9,8 +9,8 @@ import pytest
 
 from codebotler.core.files import to_line
 from command_line import refused, roboeval
-from roboeval.analysis.compare import compare_tables
-from roboeval.analysis.missions import has_missions, mission_costs
+from roboeval.analysis.comparisons.compare import compare_tables
+from roboeval.analysis.comparisons.missions import has_missions, mission_costs
 from roboeval.evaluation.runs.results import load_results
 from small_suite import a_suite
 

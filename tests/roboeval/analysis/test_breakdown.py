@@ -11,14 +11,14 @@ from codebotler.core.trace import Event, trace_data
 from codebotler.core.world import Room, World
 from made_results import VERDICT, as_driven, results_of
 from made_up_runs import SUITE, made_up
-from roboeval.analysis.breakdown import (
+from roboeval.analysis.counting.breakdown import (
     by_ability,
     compare_phrasings,
     compare_report_back,
     never_returned,
     spread_by_task,
 )
-from roboeval.analysis.counts import prompt_scores
+from roboeval.analysis.counting.counts import prompt_scores
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.traces import circumstances
 from roboeval.suites.load import Scenario

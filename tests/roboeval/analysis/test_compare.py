@@ -12,7 +12,7 @@ import pytest
 from codebotler.core.errors import UserError
 from command_line import refused, roboeval
 from made_results import results_of
-from roboeval.analysis.compare import (
+from roboeval.analysis.comparisons.compare import (
     ComparedRun,
     compare_scores,
     comparison_data,

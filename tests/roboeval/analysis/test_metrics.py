@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from made_results import table_of
-from roboeval.analysis.counts import task_scores
+from roboeval.analysis.counting.counts import task_scores
 from roboeval.analysis.metrics import (
     Estimate,
     PromptScore,

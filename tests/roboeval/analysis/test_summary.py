@@ -13,11 +13,11 @@ import pytest
 
 from codebotler.core.errors import UserError
 from made_results import table_of
-from roboeval.analysis.counts import tally_of
-from roboeval.analysis.summary import ALL, EvaluationSummary, kinds_in_order, summarise, summary_data
-from roboeval.analysis.summary import causes as causes_of
+from roboeval.analysis.counting.counts import tally_of
+from roboeval.analysis.counting.summary import ALL, EvaluationSummary, kinds_in_order, summarise, summary_data
+from roboeval.analysis.counting.summary import causes as causes_of
 from roboeval.cli.views.results import summary_view
-from roboeval.evaluation.failures import FAILURE_CLASSES
+from roboeval.evaluation.judging.failures import FAILURE_CLASSES
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.scope import JudgingScope
 from roboeval.suites.load import Suite

@@ -11,12 +11,12 @@ import pytest
 from codebotler.core.terminal import visible
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from made_results import results_of, table_of
-from roboeval.analysis.counts import tally_of
-from roboeval.analysis.summary import summarise
-from roboeval.analysis.tasks import prompt_data, task_data
+from roboeval.analysis.counting.counts import tally_of
+from roboeval.analysis.counting.summary import summarise
+from roboeval.analysis.counting.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import prompt_view
 from roboeval.cli.views.results import summary_view, task_view
-from roboeval.evaluation.explanation import INSTRUCTION_NOT_RECORDED, OF_SUITE
+from roboeval.evaluation.judging.explanation import INSTRUCTION_NOT_RECORDED, OF_SUITE
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.scope import JudgingScope

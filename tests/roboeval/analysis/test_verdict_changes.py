@@ -13,7 +13,7 @@ import pytest
 from codebotler.core.errors import UserError
 from command_line import Ended, refused, roboeval
 from made_results import results_of
-from roboeval.analysis.verdict_changes import (
+from roboeval.analysis.comparisons.verdict_changes import (
     VerdictChanges,
     changes_data,
     describe_ranking,

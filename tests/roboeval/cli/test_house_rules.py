@@ -11,9 +11,9 @@ import pytest
 
 from command_line import refused, roboeval
 from roboeval.cli.inputs import open_current
-from roboeval.cli.report import judged_run
-from roboeval.report.house import house
+from roboeval.cli.results.report import judged_run
 from roboeval.report.page import page
+from roboeval.report.sections.house import house
 
 RULES = """
 rules:

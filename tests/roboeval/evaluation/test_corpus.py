@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion, read_completions
 from roboeval.suites.load import Suite, load_suite
 

@@ -17,20 +17,20 @@ from codebotler.core.world import Person, Room, World
 from codebotler.rtl import Explanation, Formula, explain, parse
 from codebotler.simulator.settings import SimulationSettings
 from made_results import as_driven, results_of, row_of
-from roboeval.analysis.tasks import prompt_data, task_data
+from roboeval.analysis.counting.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import completion_view as view_of_completion
 from roboeval.cli.views.completions import prompt_view
 from roboeval.cli.views.results import task_view
-from roboeval.evaluation.explanation import (
+from roboeval.evaluation.judging.explanation import (
     INSTRUCTION_NOT_RECORDED,
     LOWERCASED_NOTE,
     OF_SUITE,
     completion_data,
 )
-from roboeval.evaluation.judge import judge
+from roboeval.evaluation.judging.judge import judge
+from roboeval.evaluation.judging.serialization import judgement
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.serialization import judgement
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
 
 HOSTILE = "[red]x[/red]\x1b[2J\x07\u202e\ud800"
@@ -382,7 +382,7 @@ def test_of_very_long_traces_only_the_first_are_explained(monkeypatch: pytest.Mo
         compared.append(sum(len(event.text) for event in trace))
         return explain(formula, trace)
 
-    monkeypatch.setattr("roboeval.evaluation.explanation.explain", noting)
+    monkeypatch.setattr("roboeval.evaluation.judging.explanation.explain", noting)
     worlds = completion_data(one, None, suite)["worlds"]
     why = [check["explanation"] for world in worlds for check in world["failed_checks"]]
     assert len(why) == 30

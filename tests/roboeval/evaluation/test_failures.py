@@ -2,7 +2,7 @@ import pytest
 
 from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.rtl import parse
-from roboeval.evaluation.failures import FAILURE_CLASSES, Verdict, failure_of_verdicts
+from roboeval.evaluation.judging.failures import FAILURE_CLASSES, Verdict, failure_of_verdicts
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.suites.load import Requirement
 from roboeval.suites.schema import Category

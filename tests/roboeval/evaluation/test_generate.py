@@ -21,8 +21,8 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line
 from codebotler.models.base import ModelError
 from codebotler.models.sampling import SamplingSettings
-from roboeval.evaluation.generate import GenerationProgress, Pace, generate_run
-from roboeval.evaluation.requests import GenerationPlan, RequestLog
+from roboeval.evaluation.generating.generate import GenerationProgress, Pace, generate_run
+from roboeval.evaluation.generating.requests import GenerationPlan, RequestLog
 from roboeval.evaluation.runs.completions import read_completions
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.load import Suite
@@ -384,8 +384,8 @@ SCRIPT = """
 import pathlib, sys
 sys.path.insert(0, {tests!r})
 from codebotler.models.sampling import SamplingSettings
-from roboeval.evaluation.generate import Pace, generate_run
-from roboeval.evaluation.requests import GenerationPlan
+from roboeval.evaluation.generating.generate import Pace, generate_run
+from roboeval.evaluation.generating.requests import GenerationPlan
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.load import load_suite
 from scripted_model import Scripted

@@ -9,7 +9,7 @@ import pytest
 import rules
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Event
-from codebotler.simulator.rule_guard import RuleGuard
+from codebotler.simulator.guard.rule_guard import RuleGuard
 from roboeval.suites.house import HouseRules
 from rules import ALL, Effect, Measuring, errand_of, houses
 

@@ -31,7 +31,7 @@ from playwright.sync_api import expect, sync_playwright
 from codebotler.core.errors import UserError
 from codebotler.prompts import prompt_for
 from roboeval.evaluation import inspect as inspecting
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import recorded_completions

@@ -33,7 +33,7 @@ from codebotler.core.errors import UserError
 from codebotler.prompts.tools import agent_prompt, tools_for
 from roboeval.evaluation import inspect as inspecting
 from roboeval.evaluation.agents.mission import AgentMission
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Row
 from roboeval.suites.load import Suite, load_suite

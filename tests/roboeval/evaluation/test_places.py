@@ -20,16 +20,16 @@ from codebotler.core.trace import Outcome
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
 from codebotler.rtl.semantics import visible
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from roboeval.analysis.search import TraceMatch, TraceQuery, match_row
-from roboeval.evaluation.explanation import SUITE_CHANGED, completion_data
-from roboeval.evaluation.judge import is_met, judge_outcomes, run_in_worlds
+from roboeval.evaluation.judging.explanation import SUITE_CHANGED, completion_data
+from roboeval.evaluation.judging.judge import is_met, judge_outcomes, run_in_worlds
+from roboeval.evaluation.judging.serialization import row_line
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import decode_row, key_of
 from roboeval.evaluation.runs.traces import circumstances, trace_of
-from roboeval.evaluation.serialization import row_line
 from roboeval.suites.house import HouseRules
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
 

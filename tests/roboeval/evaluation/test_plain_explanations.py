@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
+from codebotler.core.text.words import brief
 from codebotler.core.trace import Trace
-from codebotler.core.words import brief
 from codebotler.rtl import explain
 from roboeval.linting.trials import judge_solutions
 from roboeval.suites.load import Suite, Task, load_suite

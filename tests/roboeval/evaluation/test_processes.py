@@ -20,10 +20,10 @@ from codebotler.simulator.pool import NO_SECCOMP
 from codebotler.simulator.worker import EngineError, Worker
 from command_line import ENVIRONMENT, roboeval
 from roboeval.cli import engine_choice
-from roboeval.evaluation import engines
-from roboeval.evaluation.engines import Local, Work, own_worker
-from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.processes import Processes
+from roboeval.evaluation.engines import engine as engines
+from roboeval.evaluation.engines.engine import Local, Work, own_worker
+from roboeval.evaluation.engines.processes import Processes
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import load_suite
 
@@ -157,7 +157,7 @@ def test_processes_end_with_the_one_that_started_them(tmp_path: Path) -> None:
     (tmp_path / "killed.py").write_text(
         dedent("""
         from test_processes import numbered, sleeps
-        from roboeval.evaluation.processes import Processes
+        from roboeval.evaluation.engines.processes import Processes
 
         if __name__ == "__main__":
             results = Processes(2).map_distinct(sleeps, numbered(100), abs)

@@ -21,11 +21,11 @@ import pytest
 from codebotler.simulator.pool import MAX_KEYS_AHEAD, NO_SECCOMP
 from codebotler.simulator.worker import EngineError
 from command_line import ENVIRONMENT, roboeval
-from roboeval.evaluation import engines
-from roboeval.evaluation import ray as rayengine
-from roboeval.evaluation.engines import Local, RunPrograms, Work
-from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.ray import VERSIONS, RayCluster, run_shard
+from roboeval.evaluation.engines import engine as engines
+from roboeval.evaluation.engines import ray as rayengine
+from roboeval.evaluation.engines.engine import Local, RunPrograms, Work
+from roboeval.evaluation.engines.ray import VERSIONS, RayCluster, run_shard
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite
@@ -87,7 +87,7 @@ def test_missing_isolation_is_warned_of_once_or_refused(
 
 
 ALONE = """
-from roboeval.evaluation.ray import RayCluster
+from roboeval.evaluation.engines.ray import RayCluster
 with RayCluster() as cluster:
     import ray
     import psutil  # which comes with it

@@ -24,7 +24,7 @@ from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.process.spawn import START_LOCK
 from codebotler.simulator.worker import Worker, run_log
 from processes import are_gone, children_of
-from roboeval.evaluation.judge import evaluate, is_met
+from roboeval.evaluation.judging.judge import evaluate, is_met
 from roboeval.evaluation.rewards import Share, reward, total
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.house import HouseRules

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.linting.findings import Finding, render
 from roboeval.linting.lint import lint

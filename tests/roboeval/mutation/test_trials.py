@@ -13,7 +13,7 @@ import pytest
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome
 from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.worlds.robot import SimulatedRobot
 from roboeval.mutation.mutants import Mutant, Original
 from roboeval.mutation.report import to_yaml
 from roboeval.mutation.score import MutantResult, MutantStatus, MutationScore, TriedMutant

@@ -18,10 +18,16 @@ from PIL import Image
 from made_up_runs import cases, made_up
 from roboeval.analysis.metrics import overall
 from roboeval.analysis.resample import LIMITS, accepted_after
-from roboeval.evaluation.failures import FAILURE_CLASSES, FailureClass
-from roboeval.report.cost import retry_curves
-from roboeval.report.curves import draw_accepted, draw_limits, draw_thresholds, most_completions
-from roboeval.report.drawing import (
+from roboeval.evaluation.judging.failures import FAILURE_CLASSES, FailureClass
+from roboeval.report.figures.bars import (
+    WORST_AND_BEST,
+    draw_causes,
+    draw_heat_map,
+    draw_overall,
+    draw_task_scores,
+)
+from roboeval.report.figures.curves import draw_accepted, draw_limits, draw_thresholds, most_completions
+from roboeval.report.figures.drawing import (
     COLOURS,
     PAGE_WIDTH,
     new_figure,
@@ -29,15 +35,9 @@ from roboeval.report.drawing import (
     shades,
     use_style,
 )
-from roboeval.report.failures import all_causes
-from roboeval.report.figures import (
-    WORST_AND_BEST,
-    draw_causes,
-    draw_heat_map,
-    draw_overall,
-    draw_task_scores,
-)
 from roboeval.report.runs import JudgedRun, runs_to_draw
+from roboeval.report.sections.cost import retry_curves
+from roboeval.report.sections.failures import all_causes
 
 PICTURES = Path(__file__).with_name("pictures")
 DRAWINGS: dict[str, Callable[[list[JudgedRun]], Figure]] = {

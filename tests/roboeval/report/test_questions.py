@@ -17,18 +17,18 @@ from roboeval.evaluation.clarify import (
     store_measurement,
 )
 from roboeval.evaluation.runs.table import Price
-from roboeval.report.breakdown import (
+from roboeval.report.runs import JudgedRun
+from roboeval.report.sections.breakdown import (
     ability_sheet,
     distinct_words,
     phrasing_sheet,
     report_back_sheet,
     spread_sheet,
 )
-from roboeval.report.cost import budget_sheet, cost_sheet, expect_known, price_of, read_prices
-from roboeval.report.failures import failures_section
-from roboeval.report.question import question
-from roboeval.report.runs import JudgedRun
-from roboeval.report.scores import differences
+from roboeval.report.sections.cost import budget_sheet, cost_sheet, expect_known, price_of, read_prices
+from roboeval.report.sections.failures import failures_section
+from roboeval.report.sections.question import question
+from roboeval.report.sections.scores import differences
 from roboeval.report.sheets import Groups, Prose, Sheet
 from roboeval.report.writing import about_suite, origin_sheet
 
@@ -176,8 +176,8 @@ def test_groups_of_failures_and_what_is_left_out(monkeypatch: pytest.MonkeyPatch
     assert isinstance(table, Sheet)
     rows = as_dicts(table)
     assert (rows[0]["passes"], rows[0]["lines apart"]) == ("Visit/0/0", 0)
-    monkeypatch.setattr("roboeval.report.failures.MAX_GROUPS_PER_RUN", 2)
-    monkeypatch.setattr("roboeval.report.failures.MIN_GROUPS_PER_RUN", 2)
+    monkeypatch.setattr("roboeval.report.sections.failures.MAX_GROUPS_PER_RUN", 2)
+    monkeypatch.setattr("roboeval.report.sections.failures.MIN_GROUPS_PER_RUN", 2)
     about, groups, table = failures_section([run]).parts
     assert isinstance(about, Prose)
     assert re.search(r"^a: 2 of 7 groups are shown", about.paragraphs[-1])

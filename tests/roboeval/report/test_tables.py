@@ -12,15 +12,15 @@ from codebotler.core.files import to_line
 from made_up_runs import HOSTILE, UNCHECKED, made_up, unfinished, usual
 from roboeval.analysis.resample import accepted_after
 from roboeval.evaluation.evaluate import evaluate_run
-from roboeval.evaluation.failures import FAILURE_CLASSES
+from roboeval.evaluation.judging.failures import FAILURE_CLASSES
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import read_results
 from roboeval.evaluation.runs.source import open_source
 from roboeval.report import paper
-from roboeval.report.cost import rejection_sampling
-from roboeval.report.failures import all_causes, causes_sheet, published_notes
 from roboeval.report.runs import JudgedRun, name_runs, read_labels
-from roboeval.report.scores import curve_sheet, overall_sheet, prompt_sheet, task_sheet
+from roboeval.report.sections.cost import rejection_sampling
+from roboeval.report.sections.failures import all_causes, causes_sheet, published_notes
+from roboeval.report.sections.scores import curve_sheet, overall_sheet, prompt_sheet, task_sheet
 from roboeval.report.sheets import Column, Sheet, format_cell, note, page_text, page_words, write_csv
 from roboeval.report.writing import sections
 from roboeval.suites.load import Suite

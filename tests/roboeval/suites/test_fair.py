@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import yaml
 
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.suites.load import load_suite
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from codebotler.models.recorded import Solution, open_recorded
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.linting.lint import lint
 from roboeval.linting.trials import judge_solutions

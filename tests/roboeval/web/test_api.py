@@ -18,13 +18,13 @@ import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from codebotler.core.files import to_line
-from codebotler.web.access import Access, PageAddress
-from codebotler.web.guard import Guard
+from codebotler.web.security.access import Access, PageAddress
+from codebotler.web.security.guard import Guard
 from command_line import refused, roboeval
 from made_up_runs import made_up
 from pageserver import PageServer
 from roboeval.evaluation.runs.folder import RunFolder
-from roboeval.report.scores import results
+from roboeval.report.sections.scores import results
 from roboeval.report.sheets import Section, Sheet
 from roboeval.report.writing import write_report
 from runs_server import serving

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from roboeval.analysis.metrics import percent
-from roboeval.evaluation.failures import plural_of
+from roboeval.evaluation.judging.failures import plural_of
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.web.heat_map import TaskCells, failure_rows, failure_text, shade
 from roboeval.web.run_store import RunStore

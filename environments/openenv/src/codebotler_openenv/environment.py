@@ -9,7 +9,7 @@ from openenv.core.env_server.types import EnvironmentMetadata
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
-from codebotler.core.words import listed
+from codebotler.core.text.words import listed
 from codebotler.simulator.worker import EngineError
 from codebotler_openenv.models import (
     CodebotlerAction,

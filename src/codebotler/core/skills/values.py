@@ -9,7 +9,7 @@ from enum import Enum
 from math import isfinite
 from typing import Any, Literal, NewType, TypeAlias, get_args, get_origin
 
-from codebotler.core.words import listed
+from codebotler.core.text.words import listed
 
 Scalar: TypeAlias = str | int | float | bool
 Base: TypeAlias = Literal["str", "int", "float", "bool"]

@@ -24,7 +24,7 @@ from codebotler.robots.base import (
 )
 from codebotler.robots.clock import Clock
 from codebotler.robots.reservation import robot_file
-from codebotler.robots.ros.connection import Connection, SkillCall, Values, default_connection
+from codebotler.robots.ros.connections.connection import Connection, SkillCall, Values, default_connection
 from codebotler.robots.ros.worker import RosWorker, WorkerMessage, find_missing
 
 USE_OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"

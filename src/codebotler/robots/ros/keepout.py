@@ -9,7 +9,7 @@ from typing import Any
 from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.world import Room, crossings
 from codebotler.rtl import And, EventPattern, Exists, Formula, Not
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 
 MASK_RESOLUTION = 0.05  # the side of a mask cell in metres
 EMPTY_MASK = ((0.0, 0.0), (MASK_RESOLUTION, MASK_RESOLUTION))  # one free cell, to replace an earlier mask

@@ -24,10 +24,10 @@ from codebotler.robots.base import (
 )
 from codebotler.robots.places import NamedPlace, Places
 from codebotler.robots.ros.caller import RosCaller
-from codebotler.robots.ros.connection import SkillCall, Values
+from codebotler.robots.ros.connections.connection import SkillCall, Values
 from codebotler.robots.ros.keepout import keepout_messages
 from codebotler.robots.ros.motion import Pose
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 
 if TYPE_CHECKING:
     from codebotler.perception import Detector

@@ -18,8 +18,6 @@ from typing import Any, NoReturn
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Option
 from codebotler.simulator.ledger import RememberingLedger
-from codebotler.simulator.robot import Argument, SimulatedRobot
-from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, BATCH_MEMORY, HEADER, MAX_FRAME
 from codebotler.simulator.sandbox.channel import receive, send_frames
 from codebotler.simulator.sandbox.environment import simulate_environment
@@ -28,6 +26,8 @@ from codebotler.simulator.sandbox.fork_server import RUN_DOOR, serve
 from codebotler.simulator.sandbox.isolation import give_up_rights, usable_filter
 from codebotler.simulator.sandbox.start import arrange, forget_the_shell
 from codebotler.simulator.sandbox.tame_expressions import GIVEN
+from codebotler.simulator.worlds.robot import Argument, SimulatedRobot
+from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

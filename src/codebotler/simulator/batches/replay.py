@@ -14,9 +14,9 @@ from codebotler.core.trace import Option, Outcome, Status
 from codebotler.simulator.ledger import RememberingLedger, SkillAnswer, judge_end
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.robot import Argument, Setup, SimulatedRobot
 from codebotler.simulator.sandbox import MAX_FRAME
 from codebotler.simulator.skill_protocol import SkillDescriptions, describe_skills
+from codebotler.simulator.worlds.robot import Argument, Setup, SimulatedRobot
 
 Programs: TypeAlias = Sequence[tuple[bytes, Sequence[SimulatedRobot]]]
 """Each program's code, with one robot for each run."""

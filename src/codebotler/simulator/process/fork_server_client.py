@@ -15,10 +15,10 @@ from codebotler.simulator.batches.replay import message
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.isolated_process import IsolatedProcess, channel_pair
 from codebotler.simulator.process.spawn import start_fork_server, start_module
-from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.skill_protocol import SkillProtocol, describe_skills
+from codebotler.simulator.worlds.robot import SimulatedRobot
 
 REPORT_BYTES = 8  # size of a reported number
 EMPTY_PROGRAM = marshal.dumps(compile("task_program = int", "<program>", "exec"), WITHOUT_REFERENCES)

@@ -8,10 +8,10 @@ from nicegui import ui
 
 from codebotler.candidates.question import CandidateOption, ClarifyingAnswer, ClarifyingQuestion
 from codebotler.core.terminal import shortened
-from codebotler.core.words import counted, listed
+from codebotler.core.text.words import counted, listed
+from codebotler.missions.display.view import SessionView
+from codebotler.missions.display.wording import capitalize
 from codebotler.missions.mission import MissionError
-from codebotler.missions.view import SessionView
-from codebotler.missions.wording import capitalize
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, scroll_up, warn
 from codebotler.web.storyboard import draw_scene, scenes

@@ -10,14 +10,14 @@ from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import note, shortened
+from codebotler.core.text.words import counted
 from codebotler.core.trace import Event
-from codebotler.core.words import counted
-from codebotler.missions.log import MissionState, MissionSummary
+from codebotler.missions.display.view import SessionView
+from codebotler.missions.display.wording import capitalize
 from codebotler.missions.mission import MissionError
-from codebotler.missions.past import MissionPast
 from codebotler.missions.recovery import ask_evidence
-from codebotler.missions.view import SessionView
-from codebotler.missions.wording import capitalize
+from codebotler.missions.storage.log import MissionState, MissionSummary
+from codebotler.missions.storage.past import MissionPast
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, outside, scroll_up, warn
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from codebotler.checking.contract_text import contract_rows, contract_sentence
+from codebotler.checking.contracts.text import contract_rows, contract_sentence
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import shortened, visible
-from codebotler.missions.view import SessionView
-from codebotler.simulator.contract import Contract
+from codebotler.missions.display.view import SessionView
+from codebotler.simulator.guard.contract import Contract
 from codebotler.web.frame import PlainText
 
 

@@ -9,14 +9,14 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.terminal import shortened, visible, visible_lines
-from codebotler.missions.log import MissionSummary
+from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import known_instructions
-from codebotler.missions.store import read_missions
-from codebotler.missions.view import MissionOrder, SessionView
+from codebotler.missions.storage.log import MissionSummary
+from codebotler.missions.storage.store import read_missions
 from codebotler.models.recorded import is_recorded
 from codebotler.models.usable import MODEL_HINT
-from codebotler.simulator.room_map import RoomMap
+from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, scroll_to, scroll_up, warn
 

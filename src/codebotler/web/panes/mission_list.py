@@ -11,11 +11,11 @@ from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from codebotler.core.words import counted
-from codebotler.missions.log import MissionState, MissionSummary
-from codebotler.missions.store import last_rest, read_missions, rest_text
-from codebotler.missions.view import SessionView
-from codebotler.missions.wording import reason_text, title
+from codebotler.core.text.words import counted
+from codebotler.missions.display.view import SessionView
+from codebotler.missions.display.wording import reason_text, title
+from codebotler.missions.storage.log import MissionState, MissionSummary
+from codebotler.missions.storage.store import last_rest, read_missions, rest_text
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText, outside
 from codebotler.web.live import follow

@@ -13,9 +13,9 @@ from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from codebotler.missions.log import LogLine, MissionSummary, read_events
-from codebotler.missions.store import find_continuations, find_mission, find_rest
-from codebotler.missions.wording import capitalize, reason_text, timeline, title
+from codebotler.missions.display.wording import capitalize, reason_text, timeline, title
+from codebotler.missions.storage.log import LogLine, MissionSummary, read_events
+from codebotler.missions.storage.store import find_continuations, find_mission, find_rest
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText, outside
 from codebotler.web.live import follow

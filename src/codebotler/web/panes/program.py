@@ -17,9 +17,9 @@ from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.terminal import shortened, visible
-from codebotler.missions.log import MissionState
+from codebotler.missions.display.view import SessionView
 from codebotler.missions.mission import MissionError
-from codebotler.missions.view import SessionView
+from codebotler.missions.storage.log import MissionState
 from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.frame import Button, PlainText, script, scroll_up, warn

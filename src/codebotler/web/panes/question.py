@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from codebotler.core.terminal import shortened
-from codebotler.core.words import counted
+from codebotler.core.text.words import counted
 from codebotler.robots.base import AnswerError
 from codebotler.robots.face import Face, FaceQuestion
 from codebotler.web.frame import Button, PlainText, warn

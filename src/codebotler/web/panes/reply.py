@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nicegui import html
 
-from codebotler.missions.view import SessionView
+from codebotler.missions.display.view import SessionView
 from codebotler.web.frame import PlainText
 
 _MAX_CHARACTERS = 6_000

@@ -10,11 +10,11 @@ from nicegui import ui
 from codebotler.core.skills.declaration import verb_for
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Room, World, laid_out
-from codebotler.missions.log import MissionState, MissionSummary
-from codebotler.missions.progress import ANSWER, Moment, position_on_map
-from codebotler.missions.view import Phase, SessionView
-from codebotler.missions.wording import reason_text, title
-from codebotler.simulator.room_map import RoomMap
+from codebotler.missions.display.progress import ANSWER, Moment, position_on_map
+from codebotler.missions.display.view import Phase, SessionView
+from codebotler.missions.display.wording import reason_text, title
+from codebotler.missions.storage.log import MissionState, MissionSummary
+from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.floorplan import MapState, floorplan, room_at
 from codebotler.web.frame import Button, PlainText, script

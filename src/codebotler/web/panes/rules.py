@@ -7,9 +7,9 @@ import asyncio
 from nicegui import ui
 
 from codebotler.core.terminal import shortened
+from codebotler.missions.display.view import SessionView
 from codebotler.missions.mission import MissionError
-from codebotler.missions.view import SessionView
-from codebotler.simulator.house_rule import Rule
+from codebotler.simulator.guard.house_rule import Rule
 from codebotler.web.console import Console
 from codebotler.web.frame import Button, PlainText, warn
 

@@ -10,20 +10,20 @@ from rich.text import Text
 
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
-from codebotler.core.words import counted
-from roboeval.analysis.compare import (
+from codebotler.core.text.words import counted
+from roboeval.analysis.comparisons.compare import (
     ComparedRun,
     Comparison,
     comparison_sentence,
     p_text,
     sample_size_sentences,
 )
+from roboeval.analysis.comparisons.verdict_changes import VerdictChanges, ranks, sentences
 from roboeval.analysis.failure_groups import FailureGroup
 from roboeval.analysis.statistics import MIN_CLUSTERS
-from roboeval.analysis.verdict_changes import VerdictChanges, ranks, sentences
 from roboeval.cli.views.groups import failure_group_view
 from roboeval.cli.views.results import ruled
-from roboeval.evaluation.failures import classes_to_show, plural_of
+from roboeval.evaluation.judging.failures import classes_to_show, plural_of
 
 
 def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun]) -> RenderableType:

@@ -12,8 +12,8 @@ from rich.text import Text
 
 from codebotler.checking.storyboard import grid, storyboard
 from codebotler.core.terminal import shortened, visible, visible_lines
-from codebotler.core.words import counted
-from roboeval.evaluation.explanation import (
+from codebotler.core.text.words import counted
+from roboeval.evaluation.judging.explanation import (
     LOWERCASED_NOTE,
     PROGRAM_GONE,
     cut_sentence,
@@ -22,7 +22,7 @@ from roboeval.evaluation.explanation import (
     first_lines,
     instruction_shown,
 )
-from roboeval.evaluation.failures import label_of, no_program_sentence
+from roboeval.evaluation.judging.failures import label_of, no_program_sentence
 from roboeval.evaluation.runs.completions import name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, world_title

@@ -10,13 +10,13 @@ from rich.table import Table
 from rich.text import Text
 
 from codebotler.core.terminal import shortened, visible
-from codebotler.core.words import counted
+from codebotler.core.text.words import counted
 from roboeval.analysis.failure_groups import FailureGroup
 from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resample
 from roboeval.analysis.search import TraceMatch
 from roboeval.cli.views.completions import kind_view
 from roboeval.cli.views.results import ruled
-from roboeval.evaluation.explanation import PROGRAM_GONE
+from roboeval.evaluation.judging.explanation import PROGRAM_GONE
 from roboeval.evaluation.runs.completions import CompletionKey, how_many, name_of
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.suites.task import check_label

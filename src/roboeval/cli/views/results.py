@@ -14,14 +14,14 @@ from rich.text import Text
 
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
-from codebotler.core.words import counted
-from roboeval.analysis.summary import EvaluationSummary, Failures
+from codebotler.core.text.words import counted
+from roboeval.analysis.counting.summary import EvaluationSummary, Failures
 from roboeval.cli.views.completions import kind_view, prompt_lines
-from roboeval.evaluation.failures import classes_to_show, plural_of
+from roboeval.evaluation.judging.failures import classes_to_show, plural_of
 from roboeval.evaluation.runs.completions import how_many, recorded_suffix
 
 if TYPE_CHECKING:
-    from roboeval.analysis.broken_rules import BrokenRules
+    from roboeval.analysis.counting.broken_rules import BrokenRules
 
 MAX_TASKS_NAMED = 3  # for more tasks, only their number is shown
 

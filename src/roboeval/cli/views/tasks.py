@@ -9,7 +9,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from codebotler.core.words import listed
+from codebotler.core.text.words import listed
 from roboeval.suites.load import Scenario, Suite, Task, TaskCheck
 from roboeval.suites.task import describe_contents, world_title
 

@@ -20,7 +20,7 @@ from codebotler.prompts.tools import GIVE_UP, agent_prompt, object_schema, tools
 from roboeval.evaluation.agents.conversation import mission_data
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.agents.plan import AgentPlan
-from roboeval.evaluation.requests import run_metadata, with_batch
+from roboeval.evaluation.generating.requests import run_metadata, with_batch
 from roboeval.evaluation.runs.completions import CompletionKey, row_for
 from roboeval.evaluation.runs.endings import TURN_LIMIT
 from roboeval.evaluation.runs.folder import RunFolder

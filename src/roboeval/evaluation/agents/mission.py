@@ -14,10 +14,10 @@ from codebotler.core.skills.table import Skill
 from codebotler.core.terminal import shortened
 from codebotler.core.trace import Outcome
 from codebotler.prompts.tools import GIVE_UP, WAIT
-from codebotler.simulator.contract import Contract
+from codebotler.simulator.guard.contract import Contract
 from codebotler.simulator.ledger import Ledger, judge_end
-from codebotler.simulator.robot import Argument
 from codebotler.simulator.skill_protocol import named_arguments
+from codebotler.simulator.worlds.robot import Argument
 from roboeval.evaluation.recording import RecordingRobot
 from roboeval.evaluation.runs.endings import (
     ERROR,

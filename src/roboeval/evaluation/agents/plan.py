@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeAlias
 
-from codebotler.checking.contract_file import contract_yaml
+from codebotler.checking.contracts.file import contract_yaml
 from codebotler.models.base import ModelError, Reply
 from codebotler.prompts import Prompt, template_hash
 from codebotler.prompts.tools import agent_prompt, agent_template_hash
-from codebotler.simulator.contract import Contract
+from codebotler.simulator.guard.contract import Contract
 from roboeval.evaluation.agents.conversation import AgentConversation, Conversation, TurnLimits
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.agents.replan import ReplanConversation
-from roboeval.evaluation.requests import Ask, GenerationPlan
+from roboeval.evaluation.generating.requests import Ask, GenerationPlan
 from roboeval.evaluation.runs.completions import CompletionKey, row_for
 from roboeval.evaluation.runs.endings import SERVER_REJECTED
 

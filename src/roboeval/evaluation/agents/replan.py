@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from codebotler.core.errors import VIOLATION
 from codebotler.core.trace import Outcome, RunError, Status
-from codebotler.missions.past import MissionPast
+from codebotler.missions.storage.past import MissionPast
 from codebotler.models.base import Reply
 from codebotler.prompts import Prompt
 from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.worker import EngineError
 from roboeval.evaluation.agents.conversation import Conversation, TurnLimits
 from roboeval.evaluation.agents.mission import AgentMission
-from roboeval.evaluation.failures import FAILURE_CLASSES, PYTHON_ERROR_CLASS
+from roboeval.evaluation.judging.failures import FAILURE_CLASSES, PYTHON_ERROR_CLASS
 from roboeval.evaluation.recording import RecordingRobot
 from roboeval.evaluation.recovery import rest_prompt
 from roboeval.evaluation.runs.endings import ERROR, OUTSIDE_CONTRACT, TIMEOUT

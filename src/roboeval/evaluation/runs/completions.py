@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parse_row, read_lines, to_line
-from codebotler.core.words import counted
+from codebotler.core.text.words import counted
 from codebotler.models.no_program import NO_PROGRAM_KINDS, NoProgram, classify_reply, is_cut_off
 from codebotler.prompts.extract import read_reply
 from roboeval.evaluation.runs.endings import ENDINGS

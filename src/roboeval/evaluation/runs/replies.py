@@ -7,7 +7,7 @@ from types import UnionType
 from typing import Any
 
 from codebotler.core.terminal import shortened
-from codebotler.core.words import counted
+from codebotler.core.text.words import counted
 from roboeval.evaluation.runs.completions import Completion
 
 TOKENS = ("input_tokens", "output_tokens", "reasoning_tokens")

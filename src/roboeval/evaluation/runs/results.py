@@ -14,7 +14,7 @@ import polars as pl
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import UserError
-from roboeval.evaluation.requests import requested_tasks
+from roboeval.evaluation.generating.requests import requested_tasks
 from roboeval.evaluation.runs.completions import Completion, CompletionKey, read_completions
 from roboeval.evaluation.runs.folder import RunFolder, evaluation_of, load_json_object, selected_tasks
 from roboeval.evaluation.runs.rows import LocatedRow, Row, add_or_raise, key_of, read_checks, read_lines_of

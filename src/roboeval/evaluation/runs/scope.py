@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from roboeval.evaluation.requests import batches
+from roboeval.evaluation.generating.requests import batches
 from roboeval.evaluation.runs.completions import Completion, how_many
 from roboeval.suites.load import Suite
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.words import counted, listed
+from codebotler.core.text.words import counted, listed
 from codebotler.models.recorded import InstructionSolutions, Solution
 from roboeval.suites.families.tasks import TrainedTask, family_names, suite_file, trained_task
 from roboeval.suites.suite import Suite

@@ -18,7 +18,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
 from codebotler.core.program import Flaw, parse_program
 from codebotler.core.skills.paper import SKILLS
-from codebotler.core.words import listed
+from codebotler.core.text.words import listed
 from codebotler.core.world_file import Name, YamlText
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl.formulas import And

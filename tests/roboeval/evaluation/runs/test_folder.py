@@ -19,11 +19,11 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import read_rows, to_line
 from roboeval.cli.app import app
 from roboeval.evaluation.evaluate import evaluate_run
+from roboeval.evaluation.judging.time_limit import TimeLimitExceeded, time_limit
 from roboeval.evaluation.runs.completions import Completion, read_completions
 from roboeval.evaluation.runs.folder import RunFolder, tasks_to_judge
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import open_source, recorded_completions
-from roboeval.evaluation.time_limit import TimeLimitExceeded, time_limit
 from roboeval.suites.load import Suite, load_suite
 from seals import unseal
 
@@ -416,12 +416,12 @@ def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(
     slow, quick = (f"def task_program(): say({'a' * n!r})\n" for n in (22, 3))
     run = a_run(tmp_path / "run", [slow, quick, slow, quick], "Slow")
 
-    monkeypatch.setattr("roboeval.evaluation.judge.BUDGET", 0.001)
+    monkeypatch.setattr("roboeval.evaluation.judging.judge.BUDGET", 0.001)
     assert [row["index"] for row in judged(run, suite)] == [1, 3]
     assert [
         record.getMessage().split()[0]
         for record in caplog.records
-        if record.name == "roboeval.evaluation.judge"
+        if record.name == "roboeval.evaluation.judging.judge"
     ] == ["Slow/0/0", "Slow/0/2"]
     result = CliRunner().invoke(app, ["evaluate", str(run.path), "--suite", str(tmp_path / "suite")])
     assert result.exit_code == 1

@@ -9,7 +9,7 @@ import pytest
 
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from roboeval.cli.views.completions import SHOWN_REPLY_CHARACTERS, completion_view
-from roboeval.evaluation.explanation import completion_data
+from roboeval.evaluation.judging.explanation import completion_data
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.replies import reply_data, reply_facts
 from small_run import HOSTILE, SHOWN, SUITE, printed, row

@@ -17,12 +17,12 @@ from codebotler.rtl import parse
 from made_results import row_of, table_of
 from roboeval.analysis.search import TraceQuery, match_row
 from roboeval.cli.views.completions import completion_view
-from roboeval.evaluation.explanation import completion_data
-from roboeval.evaluation.failures import Verdict
+from roboeval.evaluation.judging.explanation import completion_data
+from roboeval.evaluation.judging.failures import Verdict
+from roboeval.evaluation.judging.serialization import ROW_BYTES, WORLD_BYTES, judgement
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.traces import CIRCUMSTANCES, trace_of
-from roboeval.evaluation.serialization import ROW_BYTES, WORLD_BYTES, judgement
 from roboeval.suites.load import Suite, load_suite
 
 WORLD = World(rooms=(Room("start"),), robot="start", about="nobody is in")

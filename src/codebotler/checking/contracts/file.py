@@ -1,0 +1,115 @@
+"""Read and write contracts as YAML."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict
+
+from codebotler.core.skills.paper import SKILLS
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.text.text_template import ANY_TEXT, TextTemplate
+from codebotler.core.yaml_files import YamlFile
+from codebotler.simulator.guard.contract import Contract, SkillBound, Templates, has_place
+
+ANY, AT_MOST, IN = "any", "at most", "in"
+WIDTH = 110  # characters of a line
+
+
+class ContractFile(BaseModel):
+    """A file with a contract."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    version: Literal[1]
+    skills: Mapping[str, Mapping[str, Any]]
+
+
+def read_contract(path: Path, skills: SkillTable = SKILLS) -> Contract:
+    """Read a contract.
+
+    Args:
+        path: the file.
+        skills: the skills that it may name.
+
+    Raises:
+        UserError: the file is not valid; the message gives the line and the fix.
+    """
+    return _contract_in(YamlFile.read(path), skills)
+
+
+def contract_from(data: Mapping[str, Any], skills: SkillTable) -> Contract:
+    """Convert the bounds of skills, as in a file, to a contract. Raise UserError if they are not valid."""
+    return _contract_in(
+        YamlFile(json.dumps({"version": 1, "skills": data}, ensure_ascii=False), "the contract"), skills
+    )
+
+
+def _contract_in(file: YamlFile, skills: SkillTable) -> Contract:
+    content = file.validate(ContractFile)
+    bounds = {}
+    for name, given in content.skills.items():
+        if name not in skills:
+            raise file.wrong(
+                f'there is no skill "{name}"; the skills are: {", ".join(skills)}', "skills", name
+            )
+        bounds[name] = _read_bound(file, skills[name], given)
+    return Contract(bounds)
+
+
+def _read_bound(file: YamlFile, row: Skill, given: Mapping[str, Any]) -> SkillBound:
+    names = [parameter.name for parameter in row.parameters]
+    known = [*names, AT_MOST, *([IN] if has_place(row) else [])]
+    for key, value in given.items():
+        where = "skills", row.name, key
+        if key not in known:
+            raise file.wrong(f'{row.name} has no "{key}"; write {", ".join(known)}', *where)
+        if key == AT_MOST and not (type(value) is int and value > 0):
+            raise file.wrong(f'"{key}" must be a whole number above 0', *where)
+        is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
+        if key != AT_MOST and value != ANY and not is_list:
+            raise file.wrong(f'"{key}" must be any, or a list of texts in quotes', *where)
+        if key == IN and is_list and not all(map(str.strip, value)):
+            raise file.wrong(f'"{key}" has an empty text; name a room', *where)
+    missing = [name for name in names if name not in given]
+    if missing:
+        sentence = f'{row.name} lacks "{missing[0]}"; write a list of texts, or any'
+        raise file.wrong(sentence, "skills", row.name)
+    texts = tuple((name, _templates(file, row, name, given[name])) for name in names)
+    places = None if IN not in given or given[IN] == ANY else tuple(given[IN])
+    return SkillBound(texts, places, given.get(AT_MOST))
+
+
+def _templates(file: YamlFile, row: Skill, name: str, given: str | list[str]) -> Templates:
+    if isinstance(given, str):
+        return (ANY_TEXT,)
+    found = []
+    for number, text in enumerate(given):
+        try:
+            found.append(TextTemplate.parse(text))
+        except ValueError as error:
+            raise file.wrong(str(error), "skills", row.name, name, number) from None
+    return tuple(found)
+
+
+def contract_data(contract: Contract) -> dict[str, Any]:
+    """Return a contract as plain data, for YAML and JSON."""
+    return {"version": 1, "skills": {name: _bound_data(bound) for name, bound in contract.skills.items()}}
+
+
+def _bound_data(bound: SkillBound) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        name: ANY if ANY_TEXT in templates else [*map(str, templates)] for name, templates in bound.texts
+    }
+    if bound.places is not None:
+        data[IN] = [*bound.places]
+    return data if bound.at_most is None else data | {AT_MOST: bound.at_most}
+
+
+def contract_yaml(contract: Contract) -> str:
+    """Write a contract as YAML."""
+    return yaml.safe_dump(contract_data(contract), sort_keys=False, allow_unicode=True, width=WIDTH)

@@ -1,0 +1,84 @@
+"""Derive the contract of a program from its text, and from its runs in all worlds that it can tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from codebotler.checking.exploration import Exploration
+from codebotler.checking.source.written_arguments import WrittenArguments
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.text.text_template import ANY_TEXT, TextTemplate
+from codebotler.simulator.guard.contract import (
+    TELLING_SKILLS,
+    Contract,
+    RequestedCall,
+    SkillBound,
+    Templates,
+    has_place,
+    is_goal,
+)
+from codebotler.simulator.guard.rule_guard import name_of
+from codebotler.simulator.worlds.room_map import RoomMap
+
+
+def derive_contract(
+    found: Exploration, written: WrittenArguments, room_map: RoomMap, skills: SkillTable
+) -> Contract:
+    """Return the upper bound of what a program may do.
+
+    What the text of a program gives to a skill is allowed, also in worlds that change, which no exploration
+    visits. If the text leaves open what that is, the calls of a complete exploration are allowed, or else
+    anything.
+
+    Args:
+        found: the runs of the program.
+        written: the arguments of its calls, as far as its text gives them.
+        room_map: the rooms.
+        skills: the skills that the program may call.
+    """
+    bounds = {}
+    for row in skills.without(TELLING_SKILLS).rows:
+        calls = [call for call in found.calls if call.skill == row.name]
+        bound = _bound(row, calls, found, written, room_map)
+        is_named = row.name in written.skills and all(texts != () for _, texts in bound.texts)
+        if calls or is_named:
+            bounds[row.name] = bound
+    return Contract(bounds)
+
+
+def _bound(
+    row: Skill,
+    calls: Sequence[RequestedCall],
+    found: Exploration,
+    written: WrittenArguments,
+    room_map: RoomMap,
+) -> SkillBound:
+    knows_all = found.is_complete and found.is_steady and not written.reads_clock
+    texts: list[tuple[str, Templates]] = []
+    for number, parameter in enumerate(row.parameters):
+        given = written.skills.get(row.name, {}).get(parameter.name, ())
+        if ANY_TEXT in given and not knows_all:
+            texts.append((parameter.name, (ANY_TEXT,)))
+            continue
+        allowed = tuple(one for one in given if one != ANY_TEXT)
+        if is_goal(row, parameter.name):
+            allowed = tuple(dict.fromkeys(room for one in allowed for room in _rooms(one, room_map)))
+        met = sorted({text for call in calls for text in call.texts[number]})
+        met = [text for text in met if not any(one.matches(text) for one in allowed)]
+        texts.append((parameter.name, (*allowed, *(TextTemplate((text,)) for text in met))))
+    places = {call.place for call in calls} if has_place(row) and knows_all else None
+    return SkillBound(
+        tuple(texts),
+        tuple(sorted(places)) if places else None,
+        found.most_calls.get(row.name) if knows_all else None,
+    )
+
+
+def _rooms(template: TextTemplate, room_map: RoomMap) -> list[TextTemplate]:
+    """Return the rooms that a goal may mean, or the goal itself if it means none."""
+    if len(template.parts) == 1:
+        goals = room_map.possible_rooms(template.parts[0])
+    else:
+        goals = [room for room in room_map.goals if template.matches(room)]
+    names = [name_of(room_map.full_name(room), template.parts[0]) for room in goals]
+    return [TextTemplate((name,)) for name in names] or [template]

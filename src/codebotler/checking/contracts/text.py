@@ -1,0 +1,97 @@
+"""Describe contracts in words: a sentence or two for people, and a row per skill for tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE, SAY
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.text.phrases import verb
+from codebotler.core.text.words import brief, counted, elide_list, listed
+from codebotler.simulator.guard.contract import TELLING_SKILLS, Contract, SkillBound, is_goal
+
+NEVER = {
+    GOTO: "drives nowhere",
+    PICK: "picks up nothing",
+    PLACE: "puts down nothing",
+    ASK: "asks nobody",
+    SAY: "says nothing",
+}
+"""Phrases for a contract that lacks the skill which records such events."""
+
+ANYBODY = "anybody"  # a question to "" may be answered by any person in the room
+GAP = "[...]"
+MAX_VALUES, MAX_LONG_TEXTS = 6, 3  # shown texts in a short sentence
+LONG_TEXT = 30  # characters
+
+
+@dataclass(frozen=True)
+class ContractRow:
+    """The bound of one skill, in words.
+
+    Args:
+        what: the verb of the skill, such as `pick up`.
+        texts: the allowed texts of its arguments.
+        places: the rooms in which it may happen, or an empty string for all.
+        at_most: how often it may succeed, such as `at most 3 times`, or an empty string.
+    """
+
+    what: str
+    texts: str
+    places: str
+    at_most: str
+
+
+def contract_rows(
+    contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief, *, is_short: bool = False
+) -> Iterator[ContractRow]:
+    """Yield a row for each skill of a contract, with all that it allows or, if it is short, with a part."""
+    named = contract.skills.keys() - TELLING_SKILLS
+    for row in sorted((row for row in skills.rows if row.name in named), key=lambda row: not row.is_drive):
+        bound = contract.skills[row.name]
+        what = row.name if row.recording is None else verb(row.recording.kind).base
+        places = _any_of(map(show, bound.places or ()), is_short=is_short)
+        often = "" if not bound.at_most else f"at most {counted(bound.at_most, 'time')}"
+        texts = _texts_of(row, bound, show, is_short=is_short)
+        yield ContractRow(what, texts, f"in {places}" if places else "", often)
+
+
+def contract_sentence(
+    contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief, *, is_short: bool = True
+) -> str:
+    """Say in a sentence or two what a program may do at most, and what it never does.
+
+    A short sentence only counts some of the texts. Show it together with a table that has them all.
+    """
+    rows = contract_rows(contract, skills, show, is_short=is_short)
+    may = [" ".join(filter(None, (row.what, row.texts, row.places))) for row in rows]
+    known = {row.recording.kind: row.name for row in skills.rows if row.recording is not None}
+    never = [what for kind, what in NEVER.items() if known.get(kind, "") not in {"", *contract.skills}]
+    parts = [f"It may {'; '.join(may)}" if may else "", f"It {listed(never)}" if never else ""]
+    return " ".join(f"{part}." for part in parts if part)
+
+
+def contract_clauses(contract: Contract, skills: SkillTable) -> list[str]:
+    """Say of each skill what a program may do with it, such as `go to "kitchen" or "lab" at most 3 times`."""
+    rows = contract_rows(contract, skills)
+    return [" ".join(filter(None, (row.what, row.texts, row.places, row.at_most))) for row in rows]
+
+
+def _texts_of(row: Skill, bound: SkillBound, show: Callable[[str], str], *, is_short: bool) -> str:
+    words = []
+    for (name, templates), parameter in zip(bound.texts, row.parameters, strict=True):
+        if any(one.is_any for one in templates):
+            words.append("any room" if is_goal(row, name) else f"any {name.replace('_', ' ')}")
+        elif templates:
+            first = sorted(templates, key=lambda one: len(one.parts) == 1)  # those with gaps
+            empty = ANYBODY if row.recording is not None and row.recording.to == name else '""'
+            any_of = _any_of((GAP.join(map(show, one.parts)) for one in first), empty, is_short=is_short)
+            words.append(f"with {any_of}" if parameter.is_options else any_of)
+    return " ".join(words)
+
+
+def _any_of(texts: Iterable[str], empty: str = '""', *, is_short: bool) -> str:
+    shown = ['"{}"'.format(text.replace('"', "'")) if text else empty for text in texts]
+    few = MAX_LONG_TEXTS if any(len(text) > LONG_TEXT for text in shown) else MAX_VALUES
+    return listed(elide_list(shown, few) if is_short else shown, "or")

@@ -1,0 +1,1 @@
+"""Files of house rules: read, reviewed by examples, and searched for loopholes."""

@@ -1,0 +1,1 @@
+"""The source of programs, read without running it."""

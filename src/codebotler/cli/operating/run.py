@@ -1,0 +1,230 @@
+"""`codebotler run`: get a program, check it, ask for approval, and run it on the robot."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from codebotler.cli.operating.continuing import past_view
+from codebotler.cli.programs.candidates import ADD_SENTENCE, ask_which, line_reader
+from codebotler.cli.programs.check import check_view, read_program
+from codebotler.cli.programs.contract import contract_view
+from codebotler.cli.programs.generate import note_programless
+from codebotler.cli.views import EventPrinter, continue_view, ending_view, source_view
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import busy, confirm, note, print_rich, read_line, shortened
+from codebotler.missions.display.view import MissionOrder, SessionView
+from codebotler.missions.mission import STOP_GRACE_SECONDS, MissionError
+from codebotler.missions.recovery import PriorApproval, past_to_recover
+from codebotler.missions.session import MissionSession
+from codebotler.missions.storage.log import MissionState
+from codebotler.missions.storage.past import MissionPast
+from codebotler.models.base import ModelError
+from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
+from codebotler.robots.base import Robot
+from codebotler.web.console import Console
+
+SIGNALS = {
+    signal.SIGINT: "Ctrl-C",
+    signal.SIGTERM: "SIGTERM",
+    signal.SIGHUP: "SIGHUP, since its terminal was closed",
+}
+SIGNAL_EXIT_BASE = 128
+"""By the convention of shells, the exit status after a signal is this plus the signal's number."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """A user's request on the command line to run a program or an instruction.
+
+    Raises:
+        UserError: the request is empty, its file does not exist, or standard input is needed twice.
+    """
+
+    what: str  # a file, `-` for standard input, or an instruction
+    yes: bool = False  # whether to run the program without asking
+    despite_problems: bool = False  # whether to run the program even if the check finds problems
+    shows_all: bool = False  # whether to show all different outcomes in imagined worlds, not just one
+    past: MissionPast | None = None  # of the mission whose rest is requested
+    recoveries: int = 0  # how many times a model may write the rest if a skill fails
+    candidates: int = 1  # how many programs to get from the model, of which the user chooses one
+
+    def __post_init__(self) -> None:
+        if not self.what.strip() and self.past is not None:
+            raise UserError(f"mission {self.past.mission} has no instruction; name a program for the rest")
+        if not self.what.strip():
+            raise UserError("the argument is empty; name a program, or say what the robot should do")
+        if self.what.endswith(".py") and not self.is_program:
+            raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
+        if self.recoveries and self.is_program and self.past is None:
+            raise UserError("--recover needs an instruction, since a model writes the rest; leave it out")
+        if self.candidates > 1 and self.is_program:
+            raise UserError("--candidates needs an instruction, but this is a program")
+        if self.what == "-" and not self.yes:
+            raise UserError("the program uses standard input, so approval cannot be read; add --yes")
+
+    def order_on(self, console: Console) -> MissionOrder:
+        """Return the order for a mission."""
+        program = read_program(self.what) if self.is_program else ""
+        if self.past is not None:
+            return console.rest_of(self.past, program)
+        asks = line_reader(is_allowed=not self.yes) is not None
+        return MissionOrder("" if program else self.what, program=program, asks=asks)
+
+    @property
+    def is_program(self) -> bool:
+        """Whether the request names a program rather than an instruction."""
+        try:
+            return self.what == "-" or Path(self.what).exists()
+        except (OSError, ValueError):  # an instruction may be too long for a path or contain a null character
+            return False
+
+
+def run(console: Console, request: Request) -> int:
+    """Carry out a user's request from the program to the end of the mission, and show each step.
+
+    If a skill fails, a model may write the rest, which is run in the same way.
+
+    Returns:
+        the exit status: 0 if the mission is done, 128 plus the number of a signal that stopped it, or else 1.
+    """
+    order, approval = request.order_on(console), None
+    with console:
+        for left in range(request.recoveries, -1, -1):
+            session = console.begin(order)
+            try:
+                status = _carry_out(session, console.robot, request, approval)
+            except KeyboardInterrupt:
+                session.stop(SIGNALS[signal.SIGINT])
+                raise
+            except ModelError as error:  # without a rest, the status of the first mission counts
+                if left == request.recoveries:
+                    raise
+                note(error.sentence)
+                return 1
+            past = past_to_recover(session, console.robot, console.home) if left and status == 1 else None
+            if past is None:
+                if status and session.view.progress.has_begun:
+                    print_rich(continue_view(session.view))
+                return status
+            approval = approval or PriorApproval.of(session.view)
+            order = console.rest_of(past)
+            print_rich(past_view(past))
+            note(f"recovering: asking {order.model} for the rest")
+            request = replace(request, despite_problems=False)  # accepted for the first program only
+        raise AssertionError("the last mission has no rest")
+
+
+def _carry_out(
+    session: MissionSession, robot: Robot, request: Request, approval: PriorApproval | None
+) -> int:
+    """Show a mission's program, run it if the user approves it, and return the exit status."""
+    view = _prepared(session)
+    if view.programless is not None:
+        note_programless(view.programless)
+        session.reject(view.programless.sentence)
+    elif view.check is None:
+        note(f"not run: {shortened(view.reason)}")
+    elif _is_approved(session, view, robot, request, approval):
+        return _watched(session, view, robot, request)
+    session.join(STOP_GRACE_SECONDS)
+    return 1
+
+
+def _prepared(session: MissionSession) -> SessionView:
+    """Wait until the session has a checked program or ends, and show the progress."""
+    view = session.view
+    while not (view.is_over or view.may_be_approved or view.waits_for_program):
+        if view.question is not None and view.waits_for_answer:
+            answer = ask_which(view.question, read_line)
+            adds = answer == "none" and not view.question.why_last
+            session.answer(view.question, answer, read_line(ADD_SENTENCE) if adds else "")
+            view = session.view
+        before = view.busy
+        with busy(before or "finishing"):
+            view = session.wait_until(lambda now, before=before: now.busy != before)  # type: ignore[misc]  # mypy does not infer such lambdas
+    for remark in view.remarks:
+        note(remark)
+    if session.error is not None:
+        raise session.error
+    return view
+
+
+def _show_check(view: SessionView, request: Request) -> None:
+    assert view.check is not None, "the program is checked"
+    is_named = request.is_program and not view.author
+    if not is_named:
+        if is_recorded(view.author):
+            note(RECORDED_NOTICE)
+        print_rich(source_view(view.program))
+    name = request.what if is_named and request.what != "-" else "the program"
+    print_rich(check_view(view.check, view.program, name, shows_all=request.shows_all))
+    for sentence in (*view.missing_skills, *view.unknown_rooms):
+        note(shortened(f"before the robot moves: {sentence}"))
+
+
+def _is_approved(
+    session: MissionSession,
+    view: SessionView,
+    robot: Robot,
+    request: Request,
+    approval: PriorApproval | None,
+) -> bool:
+    """Show the result of the check, and return whether the user approves the program."""
+    _show_check(view, request)
+    if view.contract is not None:
+        print_rich(contract_view(view.contract, robot.skills))
+    if view.problems and not (request.despite_problems and view.can_run):
+        session.reject(f"the check found {'a problem' if len(view.problems) == 1 else 'problems'}")
+        anyway = "; --despite-problems runs it anyway" if view.can_run else ""
+        note(f"not run because of problems{anyway}")
+        return False
+    if approval is not None and view.past is not None and approval.allows(view, view.past):
+        note("the rest stays within what was approved before")
+    elif not request.yes and not confirm(f"run the program on the robot {robot.name}?"):
+        session.stop("the person at the terminal")
+        note("not run; the robot has not moved")
+        return False
+    return True
+
+
+def _watched(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> int:
+    """Run the program, print its events, and return the exit status."""
+    with _stopped_by_signals(session) as got, EventPrinter(robot.name) as watcher:
+        session.on_event = watcher
+        with suppress(MissionError):  # the mission was stopped before it could start
+            session.approve(view.digest, despite_problems=request.despite_problems)
+        view = session.wait_until(lambda _: False)
+    if session.error is not None:
+        raise session.error
+    print_rich(ending_view(view))
+    if view.state is MissionState.STOPPED and got:
+        return SIGNAL_EXIT_BASE + got[0]
+    return 0 if view.state is MissionState.DONE else 1
+
+
+@contextmanager
+def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
+    """Stop the session when a signal arrives, and yield the list of signals received so far.
+
+    SIGHUP stays ignored if it already was, as with `nohup`, so that the mission outlives its terminal.
+    """
+    got: list[int] = []
+
+    def obey(number: int, _frame: object) -> None:
+        session.stop_soon(SIGNALS[signal.Signals(number)])
+        got.append(number)
+        if len(got) > 1:
+            note(f"\nasked the robot to stop; it has {STOP_GRACE_SECONDS:g} s to confirm")
+
+    outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    obeyed = [number for number in SIGNALS if not (outlives and number is signal.SIGHUP)]
+    before = {number: signal.signal(number, obey) for number in obeyed}
+    try:
+        yield got
+    finally:
+        for number, handler in before.items():  # further signals must not interrupt the cleanup
+            signal.signal(number, signal.SIG_IGN if got else handler)

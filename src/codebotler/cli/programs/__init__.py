@@ -1,0 +1,1 @@
+"""The commands that work with programs, rules and skills, without a robot."""

@@ -1,0 +1,122 @@
+"""`codebotler check`: read a program and show the result of the check."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.text import Text
+
+from codebotler.checking.problems import CheckResult, Problem, Sample
+from codebotler.checking.storyboard import steps_of, storyboard
+from codebotler.cli.programs.contract import proof_lines
+from codebotler.core.errors import UserError
+from codebotler.core.files import MAX_FILE_BYTES, decode_text, read_text
+from codebotler.core.terminal import shortened, visible
+from codebotler.core.text.words import counted
+from codebotler.core.trace import RunError
+from codebotler.prompts.extract import program_in
+
+STANDARD_INPUT = "standard input"
+CONTEXT_LINES = 1
+"""The number of lines to show before and after a line with a problem."""
+MAX_ROOMS_SHOWN = 12
+
+
+def read_program(name: str) -> str:
+    """Read a program from a file or standard input (`-`), where it may be part of a model's reply."""
+    if name != "-":
+        if not name:
+            raise UserError("the file name is empty; name a file, or - for standard input")
+        text = read_text(Path(name))
+        if not text.strip():
+            raise UserError("the file contains no program", file=name)
+        return text
+    text = decode_text(sys.stdin.buffer.read(MAX_FILE_BYTES + 1), STANDARD_INPUT)
+    if not text.strip():
+        raise UserError("is empty; pipe a program or a model's reply into it", file=STANDARD_INPUT)
+    return program_in(text)
+
+
+def check_view(found: CheckResult, program: str, name: str, *, shows_all: bool = False) -> RenderableType:
+    """Show the verdict, the problems, and a run in one sampled world, or all different runs."""
+    parts: list[RenderableType] = [_verdict(found, name)]
+    lines = program.rstrip("\n").split("\n")
+    for problem in found.problems:
+        parts += [Text(), *_problem(problem, lines)]
+    parts += [Text(), _rooms(found), *_vain_searches(found), *proof_lines(found)]
+    kinds = _distinct_samples(found)
+    for sample in kinds if shows_all else kinds[:1]:
+        parts += [Text(), *_sample(sample)]
+    if len(kinds) > 1 and not shows_all:
+        parts += [Text(), Text(f"this is 1 of {len(kinds)} different outcomes; --all shows them", "dim")]
+    return Group(*parts)
+
+
+def _verdict(found: CheckResult, name: str) -> Text:
+    count = len(found.problems)
+    if not count:
+        verdict = Text.assemble(("accepted", "bold green"), f": no problem in {visible(name)}")
+    else:
+        verdict = Text.assemble(("rejected", "bold red"), f": {counted(count, 'problem')} in {visible(name)}")
+    if not found.samples:
+        run = "the program was not run"
+    elif not any(sample.draws for sample in found.samples):
+        run = "the program behaves the same in every world"
+    else:
+        run = f"run in {counted(len(found.samples), 'imagined world')} with random people and objects"
+    return verdict.append(f"\n{run}", "dim")
+
+
+def _problem(problem: Problem, lines: list[str]) -> Iterator[RenderableType]:
+    yield Text(shortened(problem.sentence), "red")
+    if problem.line is None:
+        return
+    first, last = max(1, problem.line - CONTEXT_LINES), min(len(lines), problem.line + CONTEXT_LINES)
+    width = len(str(last))
+    for number in range(first, last + 1):
+        mark, style = (">", "bold") if number == problem.line else (" ", "dim")
+        text = shortened(lines[number - 1].expandtabs(4))
+        yield Text(f"{mark} {number:{width}} | {text}", style)
+
+
+def _rooms(found: CheckResult) -> Text:
+    shown = [f'"{shortened(room, 60)}"' for room in found.rooms[:MAX_ROOMS_SHOWN]]
+    left = len(found.rooms) - len(shown)
+    rooms = ", ".join([*shown, *([f"and {left} more"] if left > 0 else [])])
+    if not found.rooms_are_guessed:
+        return Text(f"rooms: {rooms}", "dim")
+    return Text(f"rooms named by the program: {rooms}\nto find misspelled rooms, add --world FILE", "yellow")
+
+
+def _vain_searches(found: CheckResult) -> Iterator[Text]:
+    count = sum(sample.in_vain for sample in found.samples)
+    if 0 < count < len(found.samples):
+        where = f"in {count} of {len(found.samples)} worlds"
+        yield Text(f"{where}, the robot waits or searches without success; this is not a problem", "dim")
+
+
+def _distinct_samples(found: CheckResult) -> list[Sample]:
+    """Return one sample of each different behaviour: first those with problems, then long successful runs."""
+
+    def rank(sample: Sample) -> tuple[bool, bool, bool, int]:
+        error, trace = sample.outcome.error, sample.outcome.trace
+        return sample.number not in found.evidence, error is not None, sample.in_vain, -len(trace)
+
+    different: dict[tuple[str, RunError | None], Sample] = {}
+    for sample in found.samples:
+        different.setdefault((str(steps_of(sample.outcome.trace)), sample.outcome.error), sample)
+    return sorted(different.values(), key=rank)
+
+
+def _sample(sample: Sample) -> Iterator[RenderableType]:
+    where = f", where {shortened(sample.world, 1_000)}" if sample.world else ""
+    yield Text.assemble(("what the robot would do", "bold"), where)
+    steps = steps_of(sample.outcome.trace, has_places=True)
+    yield storyboard(steps, set())
+    if sample.outcome.error is not None:
+        error = f"{sample.outcome.error.kind}: {shortened(sample.outcome.error.message)}"
+        yield Padding(Text(error, "red"), (0, 0, 0, 4))

@@ -1,0 +1,1 @@
+"""Texts: labels, phrases, templates, and how texts are compared."""

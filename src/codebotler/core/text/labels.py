@@ -1,0 +1,110 @@
+"""Validate the labels of a world, and reject regexes that may take exponential time.
+
+Python tries every way to match a regex and cannot be interrupted. In a label, a repetition may therefore
+contain only single characters, at most one may be unlimited, and the ways to match a string are limited. This
+simple rule also rejects some fast regexes that labels do not need. `.*` at either end is always allowed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from functools import lru_cache
+from importlib import import_module
+from math import prod
+from typing import Any
+
+from codebotler.core.text.regex_flags import scope_flags
+
+PLAIN_LABEL = re.compile(r"[\w ',;:!%@&/-]*")  # matches texts without special characters, such as most names
+ENDLESS_REPEATS = 100  # repetitions with a higher limit count as unlimited
+MAX_WAYS = 1_000  # ways in which a regex may match a string
+MAX_WAYS_BESIDE_ENDLESS = 40  # ways if a repetition is unlimited
+ANY_LABEL = ".*"
+SINGLE = frozenset({"LITERAL", "NOT_LITERAL", "ANY", "IN"})
+REPEAT_OPCODES = frozenset({"MAX_REPEAT", "MIN_REPEAT", "POSSESSIVE_REPEAT"})
+LOOK_OPCODES = frozenset({"ASSERT", "ASSERT_NOT"})
+GROUPS = LOOK_OPCODES | {"SUBPATTERN"}
+UNSUPPORTED_OPCODES = frozenset({"GROUPREF", "GROUPREF_EXISTS"})
+
+
+def plain_names(labels: Iterable[str]) -> tuple[str, ...]:
+    """Return the labels that are names and not regexes, each once."""
+    return tuple(dict.fromkeys(filter(PLAIN_LABEL.fullmatch, labels)))
+
+
+class SlowRegexError(Exception):
+    """Raised for a regex that may be slow, with a message that says why and what to write instead."""
+
+
+def check_label(text: str) -> str:
+    """Return a label unchanged if it is valid.
+
+    Raises:
+        ValueError: it is not a regular expression, or it may be slow to search.
+    """
+    if PLAIN_LABEL.fullmatch(text):
+        return text
+    check_regex(text)
+    try:
+        expect_quick(text)
+    except SlowRegexError as error:
+        raise ValueError(f"searching for it may take too long: {error}") from None
+    return text
+
+
+def check_regex(text: str) -> str:
+    """Return a regular expression unchanged, or raise ValueError if it is not valid."""
+    try:
+        re.compile(text)
+        re.compile(f"(?:{scope_flags(text)})")  # patterns for whole words wrap it like this
+    except (re.error, RecursionError, OverflowError) as error:
+        raise ValueError(f"it is not a valid regular expression: {error}") from None
+    return text
+
+
+@lru_cache(maxsize=1024)
+def expect_quick(pattern: str) -> None:
+    """Raise SlowRegexError if a regex breaks the rule described at the top of this module."""
+    if pattern != ANY_LABEL:
+        pattern = pattern.removeprefix(ANY_LABEL)
+        pattern = pattern if pattern.endswith("\\.*") else pattern.removesuffix(ANY_LABEL)
+    ways, endless = _cost(import_module("re._parser").parse(pattern))
+    if endless > 1:
+        raise SlowRegexError("two repetitions are unlimited; limit them, as in .{0,50}")
+    if ways > (MAX_WAYS_BESIDE_ENDLESS if endless else MAX_WAYS):
+        raise SlowRegexError("it can match a string in too many ways; use fewer repetitions and alternatives")
+
+
+def _cost(tree: Any) -> tuple[int, int]:  # noqa: ANN401 - private classes of `re`
+    """Count the ways in which part of a regex can match a string, and its unlimited repetitions."""
+    costs = [(str(op), *_cost_of(str(op), value)) for op, value in tree]
+    # Python never backtracks into a lookaround, so its cost is added to that of the rest.
+    looks = [(ways, endless) for op, ways, endless in costs if op in LOOK_OPCODES]
+    rest = [(ways, endless) for op, ways, endless in costs if op not in LOOK_OPCODES]
+    return (
+        prod(ways for ways, _ in rest) + sum(ways for ways, _ in looks),
+        max(sum(endless for _, endless in rest), *(endless for _, endless in looks), 0),
+    )
+
+
+def _cost_of(op: str, value: Any) -> tuple[int, int]:  # noqa: ANN401 - private classes of `re`
+    if op in UNSUPPORTED_OPCODES:
+        raise SlowRegexError("it refers back to a group; write out the text instead")
+    if op in REPEAT_OPCODES:
+        return _cost_of_repeat(*value)
+    if op == "BRANCH":
+        costs = [_cost(choice) for choice in value[1]]
+        return sum(ways for ways, _ in costs), max(endless for _, endless in costs)
+    if op == "ATOMIC_GROUP":
+        return _cost(value)
+    return _cost(value[-1]) if op in GROUPS else (1, 0)
+
+
+def _cost_of_repeat(least: int, most: int, repeated: Any) -> tuple[int, int]:  # noqa: ANN401 - private classes of `re`
+    if most <= 1:
+        ways, endless = _cost(repeated)
+        return 1 + ways, endless
+    if [str(op) for op, _ in repeated][1:] or str(repeated[0][0]) not in SINGLE:
+        raise SlowRegexError("a repetition contains more than one character; write it out")
+    return (1, 1) if most > ENDLESS_REPEATS else (most - least + 1, 0)

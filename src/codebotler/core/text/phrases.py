@@ -1,0 +1,88 @@
+"""Describe events in English, with objects and results."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from codebotler.core.skills.declaration import by_event, verb_for
+from codebotler.core.skills.table import Recording
+from codebotler.core.skills.verbs import Verb, VerbForm
+from codebotler.core.terminal import visible
+from codebotler.core.text.words import brief, elide_list
+from codebotler.core.trace import Event, Option
+
+NO_ANSWER = "no answer"
+MAX_BRACKETED_OPTIONS = 20
+
+
+def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, quote: str = '"') -> str:
+    """Describe an event, such as `looked for "mug": found` or `asked "Tea?" [yes | no] → yes`.
+
+    The result, if any, comes last. The forms `base` and `ing` put it in parentheses.
+
+    Args:
+        event: the event.
+        form: the form of the verb.
+        show: shortens and escapes texts for the output.
+        quote: the quotation mark around texts.
+    """
+    answer = None if event.answer is None else show(event.answer)
+    if form == "ing" and answer is not None:
+        return f"the answer {quote}{answer}{quote} to {quote}{show(event.text)}{quote}"
+    words = verb_phrase(event.kind, form, [*map(show, (event.text, *event.more))], quote)
+    if form in {"base", "ing"}:
+        result = f"answer {quote}{answer}{quote}" if answer is not None else result_words(event)
+        return f"{words} ({result})" if result else words
+    if event.options:
+        words += f" {bracket_options(event.options, show)}"
+    if form == "past" and (answer is not None or is_question(event.kind)):
+        return f"{words} → {NO_ANSWER if answer is None else answer}"
+    return f"{words}: {result}" if (result := result_words(event)) else words
+
+
+def verb_phrase(kind: str, form: VerbForm, given: Sequence[str], quote: str = '"') -> str:
+    """Return the verb for a kind of event in the given form, followed by the arguments of the skill."""
+    is_bare = not given or (not given[0] and by_event(kind) is None) or has_no_text(kind)
+    return verb(kind).with_object(getattr(verb(kind), form), [] if is_bare else given, quote)
+
+
+def result_words(event: Event) -> str:
+    """Return the result of an event in words, such as `not found`, or an empty string if it has none."""
+    return "" if event.found is None else verb(event.kind).results[event.found]
+
+
+def bracket_options(options: Sequence[Option], show: Callable[[str], str] = brief) -> str:
+    """Write the options of a question in brackets, such as `[yes | no]`."""
+    shown = [f"{show(one.text)}{'' if one.is_text else ' (no text)'}" for one in options]
+    return f"[{' | '.join(elide_list(shown, MAX_BRACKETED_OPTIONS))}]"
+
+
+def verb(kind: str) -> Verb:
+    """Return the verb for a kind of event, or a generic verb if no loaded skill records this kind."""
+    if (known := verb_for(kind)) is not None:
+        return known
+    shown = visible(kind)
+    return Verb(f"do {shown}", f"does {shown}", f"did {shown}", f"doing {shown}", f"did {shown}")
+
+
+def has_no_text(kind: str) -> bool:
+    """Whether events of a kind have no text because their skill has no parameters."""
+    recording = _recording(kind)
+    return recording is not None and not recording.text
+
+
+def is_spoken(kind: str) -> bool:
+    """Whether events of a kind are spoken."""
+    recording = _recording(kind)
+    return recording is not None and recording.is_spoken
+
+
+def is_question(kind: str) -> bool:
+    """Whether events of a kind offer options."""
+    recording = _recording(kind)
+    return recording is not None and recording.options is not None
+
+
+def _recording(kind: str) -> Recording | None:
+    row = by_event(kind)
+    return None if row is None else row.recording

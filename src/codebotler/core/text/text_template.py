@@ -1,0 +1,109 @@
+"""Texts with holes, in which any text may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from string import Formatter
+
+from codebotler.core.cachedproperty import cached_property
+from codebotler.core.text.unicode import normalize_text
+
+MAX_PIECES, MAX_TEMPLATE_LENGTH = 20, 2_000
+_HOLE = "\ud800"  # a lone surrogate, which no text of a program contains
+
+
+@dataclass(frozen=True)
+class TextTemplate:
+    """A text with holes, in which any text may be, even none.
+
+    Texts are compared without regard to case, Unicode composition and the amount of whitespace.
+
+    Args:
+        parts: the pieces around the holes; a single piece is one exact text, and two empty ones are any text.
+            Adjacent holes become one. More than 20 pieces or 2,000 characters become any text.
+
+    Raises:
+        ValueError: there are no parts.
+    """
+
+    parts: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if not self.parts:
+            raise ValueError("a text template has at least one part")
+        first, *rest = self.parts
+        parts = (first, *filter(None, rest[:-1]), *rest[-1:])
+        if len(parts) > MAX_PIECES or sum(map(len, parts)) > MAX_TEMPLATE_LENGTH:
+            parts = ("", "")
+        object.__setattr__(self, "parts", parts)
+
+    @property
+    def is_any(self) -> bool:
+        """Whether every text matches."""
+        return len(self.parts) > 1 and not any(map(str.strip, self._pieces))
+
+    @cached_property
+    def _pieces(self) -> list[str]:
+        return _comparable(_HOLE.join(self.parts)).split(_HOLE)
+
+    def matches(self, text: str) -> bool:
+        """Whether a text is one of this template's texts."""
+        return _are_in_order(self._pieces, _comparable(text))
+
+    def covers(self, other: TextTemplate) -> bool:
+        """Whether each text of another template is one of this template's texts.
+
+        The answer may be False although it is so, but not True although it is not.
+        """
+        return _are_in_order(self._pieces, _comparable(_HOLE.join(other.parts)))
+
+    def __str__(self) -> str:
+        return "{}".join(part.replace("{", "{{").replace("}", "}}") for part in self.parts)
+
+    @classmethod
+    def parse(cls, text: str) -> TextTemplate:
+        """Read a template in which {} is a hole, and {{ and }} are braces.
+
+        Raises:
+            ValueError: a brace is neither part of a hole nor doubled.
+        """
+        parts = [""]
+        for piece, field, form, conversion in Formatter().parse(text):
+            parts[-1] += piece
+            if field or form or conversion:
+                raise ValueError("a hole is written {}, and a brace is doubled")
+            if field is not None:
+                parts.append("")
+        return cls(tuple(parts))
+
+
+ANY_TEXT = TextTemplate(("", ""))
+
+
+@lru_cache(maxsize=256)  # a text is compared with many templates
+def _comparable(text: str) -> str:
+    """Return a text between two spaces, in which equal texts are spelled alike."""
+    folded = normalize_text("NFD", normalize_text("NFD", text).casefold())
+    return f" {' '.join(folded.split())} "
+
+
+def _are_in_order(pieces: list[str], text: str) -> bool:
+    """Whether a text begins with the first piece, ends with the last one, and has the others in between."""
+    first, *others = pieces
+    if not others:
+        return text == first
+    if not text.startswith(first):
+        return False
+    end = len(first)
+    for piece in others[:-1]:
+        start = text.find(piece, _start(piece, text, end))
+        if start < 0:
+            return False
+        end = start + len(piece)
+    return text.endswith(others[-1]) and len(text) - len(others[-1]) >= _start(others[-1], text, end)
+
+
+def _start(piece: str, text: str, end: int) -> int:
+    """Return where a piece may begin: around an empty hole, two spaces have become one."""
+    return end - 1 if piece.startswith(" ") and text[end - 1] == " " else end

@@ -1,0 +1,1 @@
+"""What people and agents see of a mission while it runs."""

@@ -1,0 +1,1 @@
+"""Missions on disk: logs, summaries, pictures, and exports for robotics tools."""

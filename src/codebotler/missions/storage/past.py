@@ -1,0 +1,307 @@
+"""Find out from the log of a mission what it did and saw, so that another mission can do the rest."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from codebotler.core.errors import RobotError, UserError
+from codebotler.core.skills.kinds import PICK, PLACE
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.terminal import shortened
+from codebotler.core.text.phrases import NO_ANSWER, phrase
+from codebotler.core.trace import (
+    Event,
+    Trace,
+    attempted_event,
+    held_after,
+    placed_trace_data,
+    placed_trace_from,
+    to_options,
+)
+from codebotler.core.world import World
+from codebotler.missions.display.progress import Progress
+from codebotler.missions.storage.log import (
+    SKILL_END_EVENTS,
+    LogLine,
+    MissionState,
+    MissionSummary,
+    read_events,
+)
+from codebotler.missions.storage.store import find_continuations, find_mission
+from codebotler.robots.simulated import SIMULATION
+from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
+from codebotler.simulator.worlds.room_map import RoomMap
+
+DONE_EVENTS = frozenset({"result", "late"})
+"""The kinds of log events that end a skill which the robot has executed."""
+
+
+@dataclass(frozen=True)
+class MissionPast:
+    """The steps of a mission, and of those that it continued, until it ended.
+
+    Args:
+        mission: its ID.
+        instruction: the instruction; empty if there was only a program.
+        model: the model that wrote its program; empty if a person did.
+        program: its program.
+        why: why it ended, in a sentence.
+        trace: what the robot did and saw, with the names that programs used.
+        place: where the robot was last; empty if unknown.
+        unsure: a step that may have happened or not; None if there is none.
+        before: the number of steps that missions did before this program.
+        has_failed: whether it failed, rather than that somebody stopped it or it was interrupted.
+        testimony: what a person said of the unsure step, in a sentence.
+    """
+
+    mission: str
+    instruction: str
+    model: str
+    program: str
+    why: str
+    trace: Trace
+    place: str = ""
+    unsure: Event | None = None
+    before: int = 0
+    has_failed: bool = False
+    testimony: str = ""
+
+    @property
+    def is_untouched(self) -> bool:
+        """Whether nothing was done or tried, so that its program is still the whole rest."""
+        return bool(self.program) and not (self.trace or self.unsure or self.has_failed)
+
+    @property
+    def held(self) -> str:
+        """The thing in the robot's hand; empty for nothing."""
+        return held_after(self.trace)
+
+    @property
+    def progress(self) -> Progress:
+        """The progress of a mission that begins with this past."""
+        return Progress(room=self.place, held=self.held)
+
+    @property
+    def steps(self) -> list[str]:
+        """The robot's steps, in words."""
+        return [*map(_step_words, self.trace)]
+
+    @property
+    def done(self) -> list[str]:
+        """The robot's steps that did not fail, in words."""
+        return [_step_words(event) for event in self.trace if not event.failed]
+
+    def here(self, place: str) -> str:
+        """Say that the robot is at a place, and what it holds."""
+        return f'The robot is in "{shortened(place)}" and holds {self._held_words}.'
+
+    @property
+    def was(self) -> str:
+        """Say where the robot was last and what it held, according to the log; empty if unknown."""
+        where = f'the robot was in "{shortened(self.place)}" and held {self._held_words}'
+        return f"Just before that, {where}, says the log." if self.place else ""
+
+    @property
+    def _held_words(self) -> str:
+        return f'"{shortened(self.held)}"' if self.held else "nothing"
+
+    @property
+    def question(self) -> str:
+        """The question to a person whether the unsure step happened; empty if there is none."""
+        if self.unsure is None:
+            return ""
+        return f"the log does not say whether the robot {self._unsure_words}"
+
+    @property
+    def _unsure_words(self) -> str:
+        assert self.unsure is not None
+        where = f' in "{shortened(self.unsure.place)}"' if self.unsure.place else ""
+        return phrase(self.unsure, "past", show=shortened).removesuffix(f" → {NO_ANSWER}") + where
+
+    @property
+    def answers(self) -> tuple[str, ...]:
+        """The answers that the unsure step may have had, if it is a question."""
+        return () if self.unsure is None else tuple(option.text for option in self.unsure.options)
+
+    def resolve(self, *, happened: bool, answer: str = "") -> MissionPast:
+        """Return the past with a person's word on the unsure step.
+
+        Args:
+            happened: whether it happened.
+            answer: its answer, if it is a question; empty if nobody knows it.
+
+        Raises:
+            UserError: the answer is none of the options.
+        """
+        if self.unsure is None:
+            return self
+        if answer and answer not in self.answers:
+            raise UserError(f'"{shortened(answer)}" is not one of the options: {", ".join(self.answers)}')
+        done = replace(self.unsure, answer=answer or None)
+        trace = (*self.trace, done) if happened else self.trace
+        did = "happened" if happened else "did not happen"
+        testimony = f"a person said that this {did}: {self._unsure_words}"
+        return replace(self, trace=trace, unsure=None, testimony=testimony)
+
+    def add_to(self, room_map: RoomMap | None, place: str) -> tuple[RoomMap, str]:
+        """Return the rooms with this past, and the robot's place, which is the last one if it is unknown."""
+        place = place or self.place
+        known = RoomMap((place,), place, guessed=True) if room_map is None else room_map
+        return replace(known, start=known.room(place) or known.start, past=self.trace), place
+
+    def data(self) -> dict[str, object]:
+        """Convert the past to the data of a log event."""
+        return {
+            "continues": self.mission,
+            "why": self.why,
+            "trace": placed_trace_data(self.trace),
+        }
+
+
+def read_past(
+    folder: Path, skills: SkillTable, robot_kind: str = "", world: World | None = None
+) -> MissionPast:
+    """Read what a mission did and saw.
+
+    Args:
+        folder: the folder of the mission.
+        skills: the robot's skills.
+        robot_kind: the kind of robot that is to do the rest; by default that of the mission.
+        world: the map of that robot, or None if it has none.
+
+    Raises:
+        UserError: the mission cannot be continued, ran on another kind of robot or another map, or its log is
+            invalid.
+    """
+    summary = MissionSummary.read(folder)
+    if robot_kind not in {"", summary.robot}:
+        raise UserError(f"mission {summary.id} ran on the robot {summary.robot}, not {robot_kind}")
+    expect_rest(folder)
+    events = read_events(folder)
+    before: LogLine = next((line for line in events if line["event"] == "past"), {})
+    has_run = any(line["event"] == "state" and line["state"] == MissionState.RUNNING for line in events)
+    if before and not has_run:  # the rest is still that of the mission before it
+        return read_past(find_mission(folder.parent.parent, summary.continues), skills, robot_kind, world)
+    if not summary.program:
+        raise UserError(f"mission {summary.id} ended before it had a program; give the instruction again")
+    try:
+        if world is not None:
+            _expect_same_map(summary.id, events, world)
+        robot, unsure = _repeat(events, skills, summary.place)
+    except UserError:
+        raise
+    except (AttributeError, LookupError, TypeError, ValueError, re.error):
+        sentence = "the log does not fit the skills; name the files of own skills with --skills"
+        raise UserError(sentence, file=folder) from None
+    return MissionPast(
+        summary.id,
+        summary.instruction,
+        summary.model,
+        summary.program,
+        summary.reason,
+        robot.trace,
+        robot.place,
+        unsure,
+        len(before.get("trace", ())),
+        summary.state is MissionState.FAILED,
+    )
+
+
+def expect_rest(folder: Path) -> None:
+    """Raise UserError if the mission in a folder goes on, is done, or has been continued."""
+    summary = MissionSummary.read(folder)
+    if not summary.has_ended:
+        raise UserError(f"mission {summary.id} has not ended; stop it first")
+    if summary.state is MissionState.DONE:
+        raise UserError(f"mission {summary.id} is done; there is nothing to continue")
+    for later in find_continuations(folder):
+        if later.if_tool_dies:  # it has done a part of the rest
+            raise UserError(f"mission {summary.id} was continued by mission {later.id}; continue that one")
+
+
+def _expect_same_map(mission: str, events: Sequence[LogLine], world: World) -> None:
+    """Raise UserError if a mission had a map with a room that a world lacks."""
+    here = {room.name for room in world.rooms}
+    had = (room["name"] for line in events if line["event"] == "map" for room in line["rooms"])
+    lacks = next((name for name in had if name not in here), None)
+    if lacks is not None:
+        where = f'ran on another map, with the room "{shortened(lacks)}"'
+        raise UserError(f"mission {mission} {where}; give the same --world as then, or none if it had none")
+
+
+def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[LoggedRobot, Event | None]:
+    """Return a robot that did what a log contains, and a step at the end that may have happened or not."""
+    past = next((placed_trace_from(line["trace"]) for line in events if line["event"] == "past"), ())
+    robot = LoggedRobot(World((), place), skills)
+    robot.events, robot.held = [*past], held_after(past) or None
+    unsure: Event | None = None
+    for number, line in enumerate(events, 1):
+        if line["event"] != "skill":
+            continue
+        ends = (later for later in events[number:] if later["event"] in SKILL_END_EVENTS)
+        robot.end = next(ends, {"event": "unknown"})
+        row, arguments = skills[line["skill"]], arguments_in(line, skills)
+        if robot.end["event"] in {"unknown", "cancelled"} and _has_effect(row):
+            holding = robot.held or ""
+            unsure = attempted_event(row, arguments, place=robot.place, time=0.0, holding=holding)
+            unsure = unsure or Event(row.name, "", place=robot.place, holding=holding)
+        try:
+            robot.execute(row.name, arguments)
+        except RobotError:
+            tried = attempted_event(row, arguments, place=robot.place, time=0.0, holding=robot.held or "")
+            if tried is not None and robot.end["event"] == "error":
+                robot.events.append(replace(tried, failed=str(robot.end["kind"])))
+    return robot, unsure
+
+
+def _step_words(event: Event) -> str:
+    words = phrase(event, "past", show=shortened)
+    if not event.failed and words.endswith(NO_ANSWER):  # a question that nobody answers fails
+        words = f"{words.removesuffix(NO_ANSWER)}answer unknown"
+    if event.failed:
+        words = f"failed to {phrase(event, 'base', show=shortened)} ({shortened(event.failed)})"
+    return f'in "{shortened(event.place)}": {words}' if event.place else words
+
+
+def _has_effect(row: Skill) -> bool:
+    """Return whether a person would notice if a skill were executed twice. A drive may be repeated."""
+    is_spoken = row.recording is not None and row.recording.is_spoken
+    return is_spoken or not (row.is_idle or row.is_drive)
+
+
+class LoggedRobot(SimulatedRobot):
+    """A robot whose skills end as in the log of a mission."""
+
+    def __init__(self, world: World | None, skills: SkillTable) -> None:
+        super().__init__(world or World((), ""), SIMULATION, skills)
+        self.end: LogLine = {}  # the event that ends the current skill
+
+    def thing_meant(self, request: str) -> None:
+        """Return None, since a log does not list the things in a room."""
+
+    def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Repeat the end of a skill, and record its event."""
+        if self.end["event"] not in DONE_EVENTS:
+            raise RobotError(self.end["event"], "the skill failed or was cancelled")
+        row, result = self.skills[skill], self.end.get("result")
+        event = attempted_event(row, arguments, place=self.place, time=self.now, holding=self.held or "")
+        if event is None:
+            return result
+        if row.is_drive:
+            self.room = self.room_for(event.text) or event.text
+            event = replace(event, destination=self.place)
+        elif event.kind in {PICK, PLACE}:
+            self.held = event.text if event.kind == PICK else None
+        found = result if isinstance(result, bool) else None
+        self.events.append(replace(event, answer=str(result) if event.options else None, found=found))
+        return result
+
+
+def arguments_in(line: LogLine, skills: SkillTable) -> list[Argument]:
+    """Return the arguments of a skill call in a log."""
+    given = zip(skills[line["skill"]].parameters, line["arguments"].values(), strict=True)
+    listed = [to_options(value) if parameter.is_options else value for parameter, value in given]
+    return [tuple(value) if isinstance(value, list) else value for value in listed]

@@ -1,0 +1,159 @@
+"""List and find past missions on disk, and close interrupted missions."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections.abc import Sequence
+from contextlib import closing, suppress
+from pathlib import Path
+
+from codebotler.core.errors import UserError
+from codebotler.core.skills.values import written_call
+from codebotler.core.terminal import note, system_sentence, visible
+from codebotler.missions.storage.log import (
+    SUMMARY_FILE,
+    LogLine,
+    MissionState,
+    MissionSummary,
+    add_event,
+    find_unfinished_skill,
+    open_log,
+    read_events,
+)
+
+RECENT_MISSIONS = 200
+"""The number of missions that agents see, and among which the last one is looked for."""
+
+_MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d{1,6})?", re.ASCII)
+
+
+def read_missions(home: Path, most: int | None = None) -> list[MissionSummary]:
+    """Read the summaries of all missions, or of the last ones, oldest first.
+
+    Raises:
+        UserError: a summary is damaged.
+    """
+    folders = _mission_folders(home)[-most if most else 0 :]
+    return sorted(map(MissionSummary.read, folders), key=lambda summary: (summary.created, summary.id))
+
+
+def find_mission(home: Path, name: str) -> Path:
+    """Return the folder of a mission, given its ID or `last`. Raise UserError if there is no such mission."""
+    if name == "last" and (known := read_missions(home, RECENT_MISSIONS)):
+        return home / "missions" / known[-1].id
+    folder = home / "missions" / name
+    if not _MISSION_ID.fullmatch(name) or not (folder / SUMMARY_FILE).is_file():
+        raise UserError(f'there is no mission "{name}"; `codebotler missions` lists them')
+    return folder
+
+
+def find_continuations(folder: Path) -> list[MissionSummary]:
+    """Return the missions that continue the mission in a folder, oldest first, without damaged ones."""
+    return [one for one in _read_undamaged(folder.parent) if one.continues == folder.name]
+
+
+def find_rest(folder: Path) -> MissionSummary | None:
+    """Return the `last_rest` of the mission in a folder."""
+    return last_rest(folder.name, _read_undamaged(folder.parent))
+
+
+def _read_undamaged(missions: Path) -> list[MissionSummary]:
+    found: list[MissionSummary] = []
+    for path in sorted(missions.glob(f"*/{SUMMARY_FILE}")):
+        with suppress(UserError, OSError):
+            found.append(MissionSummary.read(path.parent))
+    return found
+
+
+def last_rest(mission: str, known: Sequence[MissionSummary]) -> MissionSummary | None:
+    """Return the last mission that ran and did the rest of another one, directly or after others."""
+    rests = {one.continues: one for one in known if one.if_tool_dies and one.continues < one.id}
+    rest = rests.get(mission)
+    while rest is not None and rest.id in rests:
+        rest = rests[rest.id]
+    return rest
+
+
+def rest_text(rest: MissionSummary | None) -> str:
+    """Say which mission did the rest of another one, and its state; empty if none did."""
+    return "" if rest is None else f"continued by mission {rest.id} ({rest.state})"
+
+
+def recover_missions(home: Path) -> list[MissionSummary]:
+    """Close and report missions whose process died, but skip damaged missions."""
+    found: list[MissionSummary] = []
+    for folder in _mission_folders(home):
+        try:
+            found += _close_interrupted(folder)
+        except UserError:
+            continue
+        except OSError as error:  # such as a full disk, which must not keep CodeBotler from starting
+            why = system_sentence(error)
+            note(f"mission {folder.name} may have been interrupted, but cannot be closed: {why}")
+    for summary in found:
+        note(f"mission {summary.id} was interrupted: {visible(summary.reason)}")
+    return found
+
+
+def find_interrupted(home: Path) -> list[MissionSummary]:
+    """Close missions whose process died. Return them, with the last mission if it was interrupted before."""
+    found = recover_missions(home)
+    with suppress(UserError):
+        last = read_missions(home, 1)
+        found += [one for one in last if one.state is MissionState.INTERRUPTED and one not in found]
+    return found
+
+
+def _mission_folders(home: Path) -> list[Path]:
+    folder = home / "missions"
+    try:
+        found = sorted(folder.iterdir(), key=_numbers)
+    except FileNotFoundError:
+        return []
+    except NotADirectoryError:
+        raise UserError(
+            "this is a file, not a folder of missions; set CODEBOTLER_HOME to another folder", file=folder
+        ) from None
+    return [path for path in found if os.path.exists(path / SUMMARY_FILE)]  # noqa: PTH110 - raises nothing
+
+
+def _numbers(folder: Path) -> tuple[list[int], str]:
+    """Return a key that sorts the tenth mission of a second after the second one."""
+    return [int(number) for number in re.findall(r"\d+", folder.name)], folder.name
+
+
+def _close_interrupted(folder: Path) -> list[MissionSummary]:
+    if MissionSummary.read(folder).has_ended:
+        return []
+    try:
+        log = open_log(folder)
+    except BlockingIOError:
+        return []  # another process runs the mission
+    with closing(log):
+        summary, events = MissionSummary.read(folder), read_events(folder)
+        if summary.has_ended:
+            return []
+        last = next((line for line in reversed(events) if line["event"] == "state"), None)
+        if last is not None and MissionState(last["state"]).is_final:
+            summary.state, summary.reason = MissionState(last["state"]), last.get("reason", "")
+            summary.ended = last["time"]
+            summary.write(folder)
+            return []
+        summary.reason, clock = _interruption_reason(summary, events), events[-1]["clock"] if events else 0.0
+        summary.state, summary.ended = MissionState.INTERRUPTED, time.time()
+        add_event(log, "state", clock, state=summary.state, reason=summary.reason)
+        summary.write(folder)
+        return [summary]
+
+
+def _interruption_reason(summary: MissionSummary, events: list[LogLine]) -> str:
+    if not summary.state.is_moving:
+        return "CodeBotler ended unexpectedly before the robot moved"
+    skill = find_unfinished_skill(events)
+    if skill is None:
+        return "CodeBotler ended unexpectedly while the robot was idle"
+    going = written_call(skill["skill"], list(skill["arguments"].values()))
+    where = next((f", {e['text']}" for e in reversed(events) if e["event"] == "feedback"), "")
+    return f"CodeBotler ended unexpectedly during {going}{where}; {summary.if_tool_dies}"

@@ -1,0 +1,1 @@
+"""Models on servers: the protocols of providers, and the errors of networks."""

@@ -1,0 +1,119 @@
+"""Build request files and parse answer files for batch endpoints that use OpenAI's protocol."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import httpx2
+
+from codebotler.core.errors import UserError
+from codebotler.models.base import Reply
+from codebotler.models.sampling import SamplingSettings
+from codebotler.models.servers.chat import OWN_SERVER, ChatModel
+from codebotler.models.servers.completions import CompletionsModel
+from codebotler.models.servers.server_errors import FIRST_ERROR, error_in_reply
+from codebotler.prompts import Prompt
+
+OPENAI_URL = "https://api.openai.com/v1"
+STREAM_FIELDS = ("stream", "stream_options")  # not allowed in batches
+EMPTY_ANSWER = {
+    "choices": [{"index": 0, "finish_reason": "stop", "text": "pass", "message": {"content": "pass"}}]
+}
+STREAM_HEADERS = {"content-type": "text/event-stream"}
+
+
+@dataclass(frozen=True)
+class BatchRequest:
+    """A request for a batch endpoint."""
+
+    url: str  # the path of the endpoint, such as `/v1/chat/completions`
+    body: Mapping[str, Any]  # as JSON
+
+
+class BatchModel:
+    """A model whose requests and answers are stored in files. It sends nothing and needs no key.
+
+    It reuses the model's code for single requests, and takes the place of the server.
+    """
+
+    def __init__(self, name: str, settings: SamplingSettings) -> None:
+        kind, _, rest = name.partition(":")
+        client = httpx2.AsyncClient(transport=httpx2.MockTransport(self._answer_request))
+        usable = replace(settings, base_url=settings.base_url or OPENAI_URL, timeout=SamplingSettings.timeout)
+        self._model: ChatModel | CompletionsModel
+        if kind == "completions":
+            self._model = CompletionsModel(rest, usable, client)
+        elif kind == OWN_SERVER or (kind == "openai" and settings.base_url is not None):
+            self._model = ChatModel(name, usable, client)
+        else:
+            raise UserError(f"{name} does not support batch files; use {OWN_SERVER}:NAME or completions:NAME")
+        self.name = self._model.name
+        self.settings = replace(self._model.settings, base_url=settings.base_url, timeout=settings.timeout)
+        self._runner = asyncio.Runner()
+        self._bodies: dict[Prompt, Mapping[str, Any]] = {}
+        self._sent: httpx2.Request | None = None
+        self._answer = _response(200, EMPTY_ANSWER)
+
+    def request(self, prompt: Prompt, *, number: int) -> BatchRequest:
+        """Return the request for reply `number` to a prompt, counted from 0."""
+        if prompt not in self._bodies:
+            self._reply(prompt, number, _response(200, EMPTY_ANSWER))
+            assert self._sent is not None, "the model sends its request to this object"
+            sent = json.loads(self._sent.content)
+            self._bodies[prompt] = {name: value for name, value in sent.items() if name not in STREAM_FIELDS}
+        seed = self.settings.seed_of(number)  # requests for the same prompt differ only in their seed
+        body = {**self._bodies[prompt], **({} if seed is None else {"seed": seed})}
+        is_chat = isinstance(self._model, ChatModel)
+        return BatchRequest("/v1/chat/completions" if is_chat else "/v1/completions", body)
+
+    def reply(self, prompt: Prompt, *, number: int, status: int, body: object) -> Reply:
+        """Parse the HTTP status and JSON of an answer, or raise ModelError if the answer is an error."""
+        if status < FIRST_ERROR and not _has_choice(body):
+            raise error_in_reply(self.name, body)
+        short = replace(prompt, messages=prompt.messages[-1:])  # encoding a long prompt would only cost time
+        return replace(self._reply(short, number, _response(status, body)), latency_s=None)
+
+    def close(self) -> None:
+        """Close the client."""
+        self._runner.run(self._model.close())
+        self._runner.close()
+
+    def _reply(self, prompt: Prompt, number: int, answer: httpx2.Response) -> Reply:
+        self._answer = answer
+        return self._runner.run(self._model.reply(prompt, number=number))
+
+    def _answer_request(self, request: httpx2.Request) -> httpx2.Response:
+        self._sent = request
+        return self._answer
+
+
+def _has_choice(body: object) -> bool:
+    choices = body.get("choices") if isinstance(body, Mapping) else None
+    return isinstance(choices, list) and bool(choices) and isinstance(choices[0], Mapping)
+
+
+def _response(status: int, body: Any) -> httpx2.Response:  # noqa: ANN401 - any JSON
+    """Build the response that a server would have sent as a stream."""
+    if status >= FIRST_ERROR:
+        return httpx2.Response(status, json=body)
+    head = {name: value for name, value in body.items() if name not in {"choices", "usage"}}
+    *earlier, last = _split_choice(body["choices"][0])
+    chunks = [{"choices": [choice]} for choice in earlier] + [{"choices": [last], "usage": body.get("usage")}]
+    events = [json.dumps({**head, "object": "chat.completion.chunk", **chunk}) for chunk in chunks]
+    text = "".join(f"data: {event}\n\n" for event in [*events, "[DONE]"])
+    return httpx2.Response(200, headers=STREAM_HEADERS, text=text)
+
+
+def _split_choice(choice: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Split a choice into the choices of a stream, with the reasoning first."""
+    message = choice.get("message")
+    if not isinstance(message, Mapping):
+        return [dict(choice)]
+    said = {name: value for name, value in message.items() if value is not None}
+    thought = {name: said.pop(name) for name in (*said,) if name.startswith("reasoning")}
+    last = {**{name: value for name, value in choice.items() if name != "message"}, "delta": said}
+    return [*([{"index": 0, "delta": thought, "finish_reason": None}] if thought else []), last]

@@ -1,0 +1,1 @@
+"""How skills and places are connected to a robot on ROS."""

@@ -1,0 +1,188 @@
+"""Read a connection file (`--connect`), which maps skills to ROS calls and names the robot's places."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.yaml_files import YamlFile
+from codebotler.robots.places import Places, read_places
+from codebotler.robots.ros.connections.connection import (
+    PLACE_VARIABLES,
+    Connection,
+    MotionTopic,
+    SkillCall,
+    find_variables,
+)
+
+
+def _check_topic(text: str) -> str:
+    if not re.fullmatch(r"~?/?\w+(/\w+)*", text):
+        raise ValueError("must be a ROS name, such as /navigate_to_pose")
+    return text
+
+
+def _check_type(text: str) -> str:
+    if not re.fullmatch(r"\w+/((action|srv|msg)/)?\w+", text):
+        raise ValueError("must be a type with its package, such as std_msgs/msg/String")
+    return text
+
+
+Topic = Annotated[str, Field(strict=True), AfterValidator(_check_topic)]
+Type = Annotated[str, Field(strict=True), AfterValidator(_check_type)]
+
+
+class _ConnectionPart(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class FramesForm(_ConnectionPart):
+    """The coordinate frames for poses from tf."""
+
+    from_: Annotated[str, Field(alias="from")] = "map"
+    to: str = "base_link"
+
+
+class PoseForm(_ConnectionPart):
+    """The topic or the transforms that give the robot's pose."""
+
+    topic: Topic | None = None
+    tf: FramesForm | None = None
+
+    def motion_topic(self) -> MotionTopic:
+        """Return the topic with the poses, /amcl_pose by default."""
+        if self.tf is not None:
+            return MotionTopic(self.topic or "/tf", (self.tf.from_, self.tf.to))
+        return MotionTopic(self.topic or "/amcl_pose")
+
+
+class VelocityForm(_ConnectionPart):
+    """The topic with the robot's velocities."""
+
+    topic: Topic
+
+
+class KeepoutForm(_ConnectionPart):
+    """The topics for Nav2's keepout filter."""
+
+    mask: Topic
+    info: Topic
+
+
+class SkillForm(_ConnectionPart):
+    """The ROS call for a skill, or the camera and detector."""
+
+    action: Topic | None = None
+    service: Topic | None = None
+    topic: Topic | None = None
+    type: Type | None = None
+    goal: dict[str, Any] = {}
+    request: dict[str, Any] = {}
+    message: dict[str, Any] = {}
+    result: str = ""
+    success: str = ""
+    reason: str = ""
+    detector: str | None = None
+    image: Topic | None = None
+
+
+class ConnectionForm(_ConnectionPart):
+    """The structure of a connection file."""
+
+    robot: Literal["ros1", "rosbridge", "ros2"] = "ros2"
+    places: Any = None
+    pose: PoseForm | None = None
+    velocity: VelocityForm | None = None
+    packages: list[str] = []
+    keepout: KeepoutForm | None = None
+    skills: Annotated[dict[str, SkillForm], Field(min_length=1)]
+
+
+MESSAGE_KEYS = {"action": "goal", "service": "request", "topic": "message"}
+"""The key in a connection file that contains the fields to send, for each kind of call."""
+TYPE_FOLDERS = {"action": "action", "service": "srv", "topic": "msg"}
+"""The middle part of a full ROS 2 type name, for each kind of call."""
+
+
+def read_connection(path: Path, skills: SkillTable) -> Connection:
+    """Read a connection file with calls for some of the given skills, or raise UserError if it is invalid."""
+    file = YamlFile.read(path)
+    form = file.validate(ConnectionForm)
+    places = None if form.places is None else read_places(form.places, file)
+    calls, cameras = {}, {}
+    for name, skill in form.skills.items():
+        if name not in skills:
+            raise file.wrong(f"unknown skill {name}; declare it in a file for --skills", "skills", name)
+        if skill.detector is not None:
+            cameras[name] = _camera(file, name, skill, skills[name])
+        else:
+            calls[name] = _call(file, skills[name], skill, places)
+    folders = tuple(str((path.parent / folder).resolve()) for folder in form.packages)
+    for number, folder in enumerate(folders):
+        if not Path(folder).is_dir():
+            raise file.wrong(f"there is no folder {folder}", "packages", number)
+    if form.keepout is not None and (form.robot != "ros2" or places is None):
+        raise file.wrong("keepout needs places and Nav2; add places, and use robot: ros2", "keepout")
+    return Connection(
+        calls,
+        form.robot,
+        places,
+        None if form.pose is None else form.pose.motion_topic(),
+        None if form.velocity is None else MotionTopic(form.velocity.topic),
+        folders,
+        cameras,
+        None if form.keepout is None else (form.keepout.mask, form.keepout.info),
+    )
+
+
+def _camera(file: YamlFile, name: str, form: SkillForm, skill: Skill) -> tuple[str, str]:
+    if form.image is None or form.detector is None:
+        raise file.wrong('a detector also needs "image", a camera topic; add it', "skills", name)
+    if skill.returns.annotation != "bool" or len(skill.parameters) != 1:
+        raise file.wrong(f"a detector cannot perform {skill.signature}", "skills", name, "detector")
+    return form.image, form.detector
+
+
+def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) -> SkillCall:
+    at = ("skills", skill.name)
+    named = [(kind, name) for kind in MESSAGE_KEYS if (name := getattr(form, kind)) is not None]
+    if len(named) != 1 or form.type is None:
+        raise file.wrong('give one of "action", "service" and "topic", and its "type"', *at)
+    kind, name = named[0]
+    for other in {*MESSAGE_KEYS.values()} - {MESSAGE_KEYS[kind]}:
+        if getattr(form, other):
+            raise file.wrong(f'for {kind}s, use "{MESSAGE_KEYS[kind]}" instead', *at, other)
+    if skill.returns.annotation != "None" and not form.result:
+        raise file.wrong(f'add "result", the field of the answer that {skill.signature} returns', *at)
+    request = getattr(form, MESSAGE_KEYS[kind])
+    known = {parameter.name for parameter in skill.parameters}
+    known |= {*PLACE_VARIABLES} if places and skill.is_drive else set()
+    if known and not request:
+        raise file.wrong(f'write the message in "{MESSAGE_KEYS[kind]}", such as {{data: ${min(known)}}}', *at)
+    for variable in find_variables(request):
+        if variable not in known:
+            lacks = "; name a file under places" if variable in PLACE_VARIABLES and skill.is_drive else ""
+            given = ", ".join(f"${one}" for one in sorted(known)) or "none"
+            sentence = f"unknown variable ${variable}{lacks}; the known variables are: {given}"
+            raise file.wrong(sentence, *at, MESSAGE_KEYS[kind])
+    try:
+        SkillCall("topic", "", "", request).fields(dict.fromkeys(known, ""))
+    except (AttributeError, TypeError):
+        raise file.wrong("a path gives both a value and subfields", *at, MESSAGE_KEYS[kind]) from None
+    failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
+    whole, ros = _full_type(kind, form.type), skill.ros
+    is_ours = ros is not None and whole == f"{ros.package}/action/{ros.type}"
+    definition = ros.definition if ros is not None and is_ours else ""
+    return SkillCall(kind, name, whole, request, definition, form.result, form.success, form.reason, failure)  # type: ignore[arg-type]  # kind is a str here
+
+
+def _full_type(kind: str, text: str) -> str:
+    """Return the full ROS 2 name of a type, such as std_srvs/srv/Trigger for std_srvs/Trigger."""
+    package, *middle, name = text.split("/")
+    if kind == "action" and middle != ["action"]:
+        name = name.removesuffix("Action")
+    return f"{package}/{TYPE_FOLDERS[kind]}/{name}"

@@ -1,0 +1,161 @@
+"""`Contract`: an upper bound of what a program may do, by which a person approves it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from codebotler.core.skills.kinds import PICK, PLACE
+from codebotler.core.skills.table import Skill
+from codebotler.core.skills.values import as_text
+from codebotler.core.text.text_template import TextTemplate
+from codebotler.core.text.words import brief, counted, elide_list, listed
+from codebotler.core.trace import Event, Option, attempted_event
+from codebotler.rtl import And
+from codebotler.simulator.guard.house_rule import UNKNOWN_ROOM, Rule, RuleViolationError
+from codebotler.simulator.worlds.robot import Argument
+
+CONTRACT = Rule("approved contract", "Do only what the contract allows", And(()))
+"""The rule that names the contract in messages and logs. The name of a house rule has no spaces."""
+
+TELLING_SKILLS = frozenset({"get_all_rooms", "get_current_location"})
+"""Skills that only tell rooms, which every contract allows."""
+
+KINDS_WITH_PLACE = {PICK, PLACE}
+
+Templates: TypeAlias = tuple[TextTemplate, ...]
+
+
+@dataclass(frozen=True)
+class RequestedCall:
+    """A call of a skill, whatever comes of it.
+
+    Args:
+        skill: its name.
+        texts: the texts of each argument; for the goal of a drive, the names of the rooms that it may mean.
+        place: the robot's room; "" if it is unknown.
+    """
+
+    skill: str
+    texts: tuple[tuple[str, ...], ...]
+    place: str = ""
+
+    @classmethod
+    def of(cls, row: Skill, arguments: Sequence[Argument], rooms: Sequence[str], place: str) -> RequestedCall:
+        """Make the call of a skill. `rooms` are the rooms that the goal of a drive may mean."""
+        texts = []
+        for parameter, value in zip(row.parameters, arguments, strict=True):
+            if is_goal(row, parameter.name) and rooms:
+                texts.append(tuple(rooms))
+            elif isinstance(value, tuple):
+                texts.append(
+                    tuple(each.text if isinstance(each, Option) else as_text(each) for each in value)
+                )
+            else:
+                texts.append((as_text(value),))
+        return cls(row.name, tuple(texts), place)
+
+
+def is_goal(row: Skill, parameter: str) -> bool:
+    """Return whether a parameter names the room that the robot drives to."""
+    return row.is_drive and row.recording is not None and row.recording.text == parameter
+
+
+def has_place(row: Skill) -> bool:
+    """Return whether a contract says in which rooms a skill may be called."""
+    return row.recording is not None and row.recording.kind in KINDS_WITH_PLACE
+
+
+@dataclass(frozen=True)
+class SkillBound:
+    """The upper bound of a program's calls of one skill.
+
+    Args:
+        texts: the allowed texts of each argument, by the parameter's name.
+        places: the rooms in which it may be called; None for any.
+        at_most: how many successful calls one run may make; None for any number.
+    """
+
+    texts: tuple[tuple[str, Templates], ...] = ()
+    places: tuple[str, ...] | None = None
+    at_most: int | None = None
+
+    def objection(self, call: RequestedCall) -> str:
+        """Return why a call is not allowed, as the end of a sentence, or an empty string if it is."""
+        for (name, allowed), texts in zip(self.texts, call.texts, strict=True):
+            for text in texts:
+                if not any(template.matches(text) for template in allowed):
+                    return f'since its {name} may be {_some(allowed)}, and not "{brief(text)}"'
+        if self.places is not None and not call.place:
+            return UNKNOWN_ROOM
+        if self.places is None or call.place.casefold() in map(str.casefold, self.places):
+            return ""
+        return f'since it may happen in {_some(self.places)}, and not in "{brief(call.place)}"'
+
+    def beyond(self, other: SkillBound) -> SkillBound | None:
+        """Return the part of this bound that another one does not allow, or None if it allows all.
+
+        If several of its limits are wider, the part is the whole bound.
+        """
+        added: list[tuple[str, Templates]] = []
+        for (name, templates), (_, allowed) in zip(self.texts, other.texts, strict=True):
+            new = (one for one in templates if not any(each.covers(one) for each in allowed))
+            added.append((name, tuple(new)))
+        places: tuple[str, ...] | None = ()
+        if other.places is not None:
+            known = {place.casefold() for place in other.places}
+            places = self.places and tuple(place for place in self.places if place.casefold() not in known)
+        is_more = other.at_most is not None and (self.at_most is None or self.at_most > other.at_most)
+        wider = [*(new != () for _, new in added), places != (), is_more]
+        if sum(wider) != 1:
+            return self if any(wider) else None
+        texts = (new if new[1] != () else old for new, old in zip(added, self.texts, strict=True))
+        return SkillBound(tuple(texts), self.places if places == () else places, self.at_most)
+
+
+@dataclass(frozen=True)
+class Contract:
+    """An upper bound of what a program may do.
+
+    Args:
+        skills: the bound of each skill that may be called; no other skill may be called.
+    """
+
+    skills: Mapping[str, SkillBound]
+
+    def objection(self, call: RequestedCall, earlier: int = 0) -> str:
+        """Return why a call is not allowed, as the end of a sentence, or an empty string if it is.
+
+        Args:
+            call: the call.
+            earlier: how many calls of this skill the run has made before.
+        """
+        bound = self.skills.get(call.skill)
+        if call.skill in TELLING_SKILLS:
+            return ""
+        if bound is None:
+            return f"since {call.skill} may not be called"
+        if bound.at_most is not None and earlier >= bound.at_most:
+            return f"since {call.skill} may succeed at most {counted(bound.at_most, 'time')}"
+        return bound.objection(call)
+
+    def beyond(self, other: Contract) -> Contract:
+        """Return the part of this contract that another one does not allow."""
+        new = {
+            name: bound if name not in other.skills else bound.beyond(other.skills[name])
+            for name, bound in self.skills.items()
+            if name not in TELLING_SKILLS
+        }
+        return Contract({name: bound for name, bound in new.items() if bound is not None})
+
+
+def contract_violation(row: Skill, arguments: Sequence[Argument], place: str, why: str) -> RuleViolationError:
+    """Return the error for a call that a contract does not allow."""
+    event = attempted_event(row, arguments, place=place, time=0.0)
+    return RuleViolationError(CONTRACT, event or Event(row.name, ""), "forbids", why)
+
+
+def _some(values: Iterable[object]) -> str:
+    shown = [f'"{brief(str(value))}"' for value in values]
+    return listed(elide_list(shown), "or") or "nothing"

@@ -1,0 +1,1 @@
+"""Simulated worlds and the robots in them."""

@@ -1,0 +1,88 @@
+"""The map of a world's rooms, which is known before any facts are drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from codebotler.core.text.labels import plain_names
+from codebotler.core.text.unicode import compose_fields
+from codebotler.core.text.words import listed
+from codebotler.core.trace import Trace
+from codebotler.core.world import Room, Trait, World, laid_out
+from codebotler.simulator.worlds.matching import goals_meant
+
+
+@dataclass(frozen=True)
+class RoomMap:
+    """The part of a world that is known before any facts are drawn."""
+
+    rooms: tuple[str, ...]  # in the order in which the robot lists them
+    start: str
+    guessed: bool = False  # the rooms are a guess: any other place a program drives to exists as well
+    plain: bool = False  # names are plain text and not regexes, as always on real robots and guessed maps
+    plan: tuple[Room, ...] = ()  # footprints, and stopping points if the robot drives straight between rooms
+    things: tuple[str, ...] = ()  # the names of known things, which may be anywhere
+    people: tuple[str, ...] = ()  # the names of known people, who may be anywhere
+    traits: tuple[tuple[str, tuple[Trait, ...]], ...] = ()  # their properties
+    places: tuple[tuple[str, str], ...] = ()  # the places, each with the room that contains it
+    past: Trace = ()  # what the robot did and saw before the program begins
+
+    def __post_init__(self) -> None:
+        compose_fields(self)
+
+    @classmethod
+    def of(cls, world: World) -> RoomMap:
+        """Make the map of a world from a suite or file."""
+        plan = [replace(room, objects=(), people=()) for room in laid_out(world).rooms]
+        return cls(
+            tuple(room.name for room in world.rooms if not room.within),
+            world.robot,
+            plan=tuple(plan),
+            places=tuple((room.name, room.within) for room in world.rooms if room.within),
+            traits=world.traits,
+            things=plain_names(label for room in world.rooms for label in room.objects),
+            people=plain_names(person.name for room in world.rooms for person in room.people),
+        )
+
+    @classmethod
+    def of_places(cls, world: World) -> RoomMap:
+        """Make the map of a robot that plans its own routes, and starts at the first place."""
+        names = tuple(room.name for room in world.rooms)
+        plan = tuple(Room(room.name, (), (), room.footprint) for room in world.rooms)
+        return cls(names, names[0], plain=True, plan=plan)
+
+    def room(self, request: str) -> str | None:
+        """Return the room that a request refers to, or None if there is none or there may be several."""
+        meant = self._meant(request)
+        if not meant and self.guessed:
+            return request.strip() or None
+        return meant[0] if len(meant) == 1 else None
+
+    def possible_rooms(self, request: str) -> list[str]:
+        """Return all known rooms that a request may refer to, however a real robot understands it."""
+        meant, wanted = self._meant(request), request.strip().casefold()
+        if not self.plain or any(room.strip().casefold() == wanted for room in meant):
+            return meant
+        return [room for room in self.rooms if room.strip().casefold() in wanted]
+
+    def _meant(self, request: str) -> list[str]:
+        return goals_meant(request, self.goals, dict(self.places), plain=self.guessed or self.plain)
+
+    def full_name(self, room: str) -> str:
+        """Return a room's name as rules know it, with the room around it if it is a place."""
+        within = dict(self.places).get(room)
+        return f"{room} in {within}" if within else room
+
+    @property
+    def goals(self) -> tuple[str, ...]:
+        """The rooms and the places in them, to all of which the robot can drive."""
+        return (*self.rooms, *(place for place, _ in self.places))
+
+    @property
+    def described(self) -> list[str]:
+        """The rooms for a model, each with its places."""
+        places = {room: [place for place, within in self.places if within == room] for room in self.rooms}
+        return [f"{room} (with {listed(within)})" if within else room for room, within in places.items()]
+
+
+NO_ROOMS = RoomMap((), "")

@@ -1,0 +1,65 @@
+"""The facts of a sampled world, and what a program has found out about its rooms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from codebotler.core.text.words import brief
+from codebotler.simulator.worlds.matching import SOMEBODY, contains
+
+
+@dataclass(frozen=True)
+class SampledFact:
+    """A fact of a sampled world.
+
+    Args:
+        form: the fact in words, with `{}` in place of each name or text.
+        names: these names and texts.
+        is_random: False if it holds because the program assumed it.
+    """
+
+    form: str
+    names: tuple[str, ...]
+    is_random: bool = True
+
+    @property
+    def sentence(self) -> str:
+        """The fact in words."""
+        return self.form.format(*map(brief, self.names))
+
+
+def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True) -> SampledFact:
+    """Return the fact that a person or thing is, or is not, in a room. The name is canonical."""
+    if name == SOMEBODY:
+        return SampledFact(f'{SOMEBODY if is_there else "nobody"} is in "{{}}"', (room,), is_random)
+    return SampledFact(f'"{{}}" {"is" if is_there else "is not"} in "{{}}"', (name, room), is_random)
+
+
+# --- the program's knowledge, by canonical names
+
+
+@dataclass
+class ExploredRoom:
+    """What a program knows about one room."""
+
+    missed: set[str] = field(default_factory=set)  # looked for and not found
+    gone: set[str] = field(default_factory=set)  # picked up here
+    people: set[str] = field(default_factory=set)
+
+    def lacks(self, name: str) -> bool:
+        """Return whether a name, or a longer name that contains it, is known to be absent."""
+        missed = self.missed
+        return name in missed or (name != SOMEBODY and any(contains(longer, name) for longer in missed))
+
+
+@dataclass
+class RoomSearch:
+    """The rooms in which a program looked for a person or thing."""
+
+    vain: set[str] = field(default_factory=set)
+    found: set[str] = field(default_factory=set)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the program searched several rooms without success."""
+        return len(self.vain) > 1 and not self.found

@@ -1,0 +1,1 @@
+"""Compares models, ways to act, and suites."""

@@ -1,0 +1,240 @@
+"""Compares models on the same prompts: how much and how significantly they differ, and in which tasks."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import combinations
+from typing import Any, TypeVar
+
+import polars as pl
+
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import visible
+from codebotler.core.text.words import counted
+from roboeval.analysis.comparisons.missions import comparable_tables
+from roboeval.analysis.counting.counts import tally_of, task_scores
+from roboeval.analysis.counting.summary import failures
+from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of, pass_at_1
+from roboeval.analysis.statistics import SampleSizes, by_bootstrap, p_by_signs, sample_sizes
+from roboeval.evaluation.runs.completions import how_many
+from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.scope import Coverage, JudgingScope
+
+SIGNIFICANCE = 0.05
+MIN_SHOWN_P = 0.001  # smaller values are shown as "p < 0.001"
+MAX_PAIRS = 10  # if there are more pairs, each run is compared only with the best
+PromptScores = Mapping[tuple[str, int], float]  # pass@1 by task and prompt
+RunLike = TypeVar("RunLike")
+
+
+@dataclass(frozen=True)
+class TaskDifference:
+    """The difference in pass@1 between two models on one task."""
+
+    task: str
+    first: float  # mean pass@1 over common prompts
+    second: float
+    share: float  # contribution to the difference over all prompts
+    prompts: int  # common prompts
+    difference: Estimate  # second minus first, with its interval over prompts
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The difference in pass@1 between two models, second minus first, over their common prompts."""
+
+    first: float  # mean pass@1
+    second: float
+    prompts: int  # common prompts
+    left_out: int  # number of prompts that only one model has
+    over_prompts: Estimate  # the difference, with its interval over prompts
+    over_tasks: Estimate  # the difference, with its interval over tasks
+    bootstrap: Estimate  # the difference, with an interval from a cluster bootstrap over tasks
+    p_prompts: float  # p-value of the sign-flip permutation test over prompts
+    p_tasks: float  # p-value of the same test over tasks
+    sample_sizes: SampleSizes
+    tasks: tuple[TaskDifference, ...]  # sorted by contribution, largest first
+
+
+def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
+    """Compare two models on their common prompts. Raise UserError if there are none."""
+    keys = [key for key in first if key in second]
+    if not keys:
+        raise UserError("the runs have no prompt in common, so they cannot be compared")
+    by_task: dict[str, list[tuple[float, float]]] = defaultdict(list)
+    for key in keys:
+        by_task[key[0]].append((first[key], second[key]))
+    pairs = [pair for pairs in by_task.values() for pair in pairs]
+    tasks = [[b - a for a, b in pairs] for pairs in by_task.values()]
+    prompts = [[b - a] for a, b in pairs]
+    return Comparison(
+        first=mean_of([[a for a, _ in pairs]]),
+        second=mean_of([[b for _, b in pairs]]),
+        prompts=len(pairs),
+        left_out=len({*first, *second}) - len(keys),
+        over_prompts=by_formula(prompts, within=DIFFERENCE),
+        over_tasks=by_formula(tasks, within=DIFFERENCE, over="tasks"),
+        bootstrap=by_bootstrap(tasks, within=DIFFERENCE, over="tasks"),
+        p_prompts=p_by_signs(prompts),
+        p_tasks=p_by_signs(tasks),
+        sample_sizes=sample_sizes(pairs),
+        tasks=tuple(sorted(_by_task(by_task), key=lambda one: (-abs(one.share), one.task))),
+    )
+
+
+def compare_tables(first: pl.DataFrame, second: pl.DataFrame) -> Comparison:
+    """Compare two runs with `compare_scores`, by missions if an agent carried out those of any run."""
+    return compare_scores(*(pass_at_1(task_scores(table)) for table in comparable_tables(first, second)))
+
+
+def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[TaskDifference]:
+    total = sum(map(len, by_task.values()))
+    for task, pairs in by_task.items():
+        n = len(pairs)
+        first, second = mean_of([[a for a, _ in pairs]]), mean_of([[b for _, b in pairs]])
+        difference = by_formula([[b - a] for a, b in pairs], within=DIFFERENCE)
+        yield TaskDifference(task, first, second, (second - first) * n / total, n, difference)
+
+
+def pairs_to_compare(
+    runs: Sequence[RunLike], pass_at_1: Callable[[RunLike], float]
+) -> list[tuple[RunLike, RunLike]]:
+    """Return all pairs of runs. If there are too many, pair each run only with the best one."""
+    pairs = list(combinations(runs, 2))
+    if len(pairs) <= MAX_PAIRS:
+        return pairs
+    best = max(runs, key=pass_at_1)
+    return [(run, best) for run in runs if run is not best]
+
+
+def p_text(p: float) -> str:
+    """Format a p-value, such as "p = 0.042"."""
+    return f"p = {p:.3f}" if p >= MIN_SHOWN_P else f"p < {MIN_SHOWN_P}"
+
+
+def comparison_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
+    """Describe which run is better, how significant this is, and how many prompts were left out."""
+    sentence = _better_sentence(comparison, names)
+    if not comparison.left_out:
+        return sentence
+    left = counted(comparison.left_out, "prompt")
+    both = counted(comparison.prompts, "prompt")
+    return f"{sentence} Based on {both} in common, without {left} that only one run has."
+
+
+def _better_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
+    difference = comparison.over_tasks.mean
+    if abs(difference) < ROUNDING_ERROR:
+        return f"{names[0]} and {names[1]} pass equally often."
+    better, other = (names[1], names[0]) if difference > 0 else names
+    by = f"{100 * abs(difference):.1f} points"
+    if comparison.p_tasks <= SIGNIFICANCE:
+        return f"{better} is better than {other} by {by} ({p_text(comparison.p_tasks)} over tasks)."
+    if comparison.p_prompts <= SIGNIFICANCE:
+        tasks = counted(len(comparison.tasks), "task")
+        p = f"{p_text(comparison.p_prompts)} over prompts"
+        return (
+            f"{better} is better than {other} by {by} on prompts like these ({p}); "
+            f"{tasks} are too few to generalise to others."
+        )
+    p = f"{p_text(comparison.p_tasks)} over tasks"
+    return f"{better} passes more often than {other} by {by}, but the difference is not significant ({p})."
+
+
+def other_differences(first: Results, second: Results) -> list[str]:
+    """Describe differences other than the model that may explain why the results of two runs differ."""
+    judged_with = ("python", "codebotler")  # in run.json, these are the versions used for generation
+    runs = [
+        {**one.about, **{name: one.manifest.get(name) for name in judged_with}} for one in (first, second)
+    ]
+    found = []
+    modes = [run.get("mode", "program") for run in runs]
+    if modes[0] != modes[1]:
+        found.append(f"the modes differ: {modes[0]} and {modes[1]}; {MISSIONS_COMPARED}")
+    for name, words in COMPARED_SETTINGS.items():
+        a, b = (run.get(name) for run in runs)
+        if a is not None and b is not None and a != b and (name != "template" or modes[0] == modes[1]):
+            found.append(f"{words} differ: {_short(a)} and {_short(b)}")
+    settings = [value if isinstance(value := run.get("settings"), dict) else {} for run in runs]
+    if bool(settings[0]) != bool(settings[1]):
+        found.append("the settings of one run were not recorded")
+    for name in sorted({*settings[0], *settings[1]} if all(settings) else ()):
+        a, b = (one.get(name) for one in settings)
+        if a != b:
+            found.append(f"{name.replace('_', '-')} differs: {_short(a)} and {_short(b)}")
+    return found
+
+
+MISSIONS_COMPARED = "each program or agent in each world counts as one mission"
+
+COMPARED_SETTINGS = {
+    "python": "the Python versions used for judging",
+    "codebotler": "the versions of codebotler used for judging",
+    "template": "the prompt templates",
+}
+
+
+def _short(value: object) -> str:
+    return "none" if value is None else visible(str(value))[:12]
+
+
+@dataclass(frozen=True)
+class ComparedRun:
+    """The results of a compared run other than its pass@1."""
+
+    name: str
+    coverage: Coverage
+    scope: JudgingScope
+    classes: Mapping[str, float]  # shares of judged completions, by class of failure
+
+    @classmethod
+    def of(cls, name: str, results: Results, table: pl.DataFrame | None = None) -> ComparedRun:
+        """Collect the coverage, the scope and the failure classes of a run, by default of its own table."""
+        found = failures(tally_of(results.table if table is None else table))
+        shares = {one.name: one.share for one in found}
+        return cls(name, results.coverage, results.scope, shares)
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """Convert the run to plain data, without its name."""
+        return {**asdict(self.coverage), "cut_off": self.scope.cut_off, "failures": dict(self.classes)}
+
+
+def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:
+    """Convert a comparison to plain data."""
+    return {
+        "first": {"name": names[0], "pass@1": comparison.first},
+        "second": {"name": names[1], "pass@1": comparison.second},
+        "prompts": comparison.prompts,
+        "prompts_left_out": comparison.left_out,
+        "difference": comparison.over_tasks.mean,
+        "interval": {
+            "prompts": _ends(comparison.over_prompts),
+            "tasks": _ends(comparison.over_tasks),
+            "bootstrap": _ends(comparison.bootstrap),
+        },
+        "p": {"prompts": comparison.p_prompts, "tasks": comparison.p_tasks},
+        "needed": asdict(comparison.sample_sizes),
+        "tasks": [{**asdict(task), "difference": task.second - task.first} for task in comparison.tasks],
+    }
+
+
+def _ends(estimate: Estimate) -> dict[str, float]:
+    return {"low": estimate.low, "high": estimate.high}
+
+
+def sample_size_sentences(comparison: Comparison) -> list[str]:
+    """Describe how many completions or prompts are needed to detect the difference."""
+    sizes = comparison.sample_sizes
+    if sizes.completions is None:
+        return ["There is no difference, so no sample size can be computed."]
+    each = how_many(sizes.completions)
+    total = sizes.completions * comparison.prompts
+    needed = [
+        f"For 80% power on these prompts, use {each} per prompt and model ({total:,} in all for each model)."
+    ]
+    if sizes.prompts is not None:
+        needed.append(f"For 80% power on prompts like these, use {sizes.prompts:,} prompts.")
+    return needed

@@ -1,0 +1,1 @@
+"""Counts verdicts by task, prompt, ability and broken rule."""

@@ -1,0 +1,176 @@
+"""Summarises an evaluation: pass rates, and counts of failures by class and kind."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import visible
+from roboeval.analysis.counting.tally import Tally
+from roboeval.analysis.metrics import Estimate, PromptScore, TaskScore, overall, prompts_of
+from roboeval.evaluation.judging.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES
+from roboeval.evaluation.runs.completions import how_many
+from roboeval.evaluation.runs.scope import Coverage, JudgingScope
+from roboeval.suites.load import Suite
+
+
+@dataclass(frozen=True)
+class Failures:
+    """Counts the failures of a class, or of a kind within a class."""
+
+    name: str
+    count: int
+    share: float  # of all judged completions
+    kinds: tuple[Failures, ...] = ()  # kinds of a class; known kinds come first, even if they did not occur
+
+
+@dataclass(frozen=True)
+class EvaluationSummary:
+    """The results of an evaluation: scores, failures and coverage."""
+
+    k: tuple[int, ...]
+    tasks: tuple[TaskScore, ...]  # tasks with completions, in the order of the suite
+    overall: tuple[Estimate, ...]  # pass@k for each value of k
+    failures: tuple[Failures, ...]
+    scope: JudgingScope
+    missing: Mapping[str, Sequence[str]]  # tasks of the suite without a score, by reason
+    ablated: bool = False  # judged by common-sense requirements only
+
+    @property
+    def prompts(self) -> list[PromptScore]:
+        """The scores of all prompts, across tasks."""
+        return prompts_of(self.tasks)
+
+    @property
+    def judged(self) -> int:
+        """The number of judged completions."""
+        return sum(task.n for task in self.tasks)
+
+    @property
+    def coverage(self) -> Coverage:
+        """The numbers of judged, existing and requested completions."""
+        return self.scope.coverage(self.judged)
+
+
+def summarise(
+    tally: Tally, suite: Suite, scope: JudgingScope, *, k: Sequence[int] = (1,), ablated: bool = False
+) -> EvaluationSummary:
+    """Summarise an evaluation. Raise UserError if nothing was judged or if k is too large for a prompt."""
+    tasks = tally.scores(suite.tasks)
+    if not tasks:
+        raise UserError(f"0 of {how_many(scope.total)} judged; there are no results yet")
+    try:
+        estimates = tuple(overall(tasks, tries) for tries in k)
+    except ValueError as error:
+        fewest = min(prompt.n for prompt in prompts_of(tasks))
+        raise UserError(f"{visible(str(error))}; choose k from 1 to {fewest}") from None
+    scored = {score.task for score in tasks}
+    expected = [n for n, task in suite.tasks.items() if task.ablation is not None or not ablated]
+    missing = _missing([name for name in expected if name not in scored], scope)
+    return EvaluationSummary(tuple(k), tasks, estimates, failures(tally), scope, missing, ablated)
+
+
+def _missing(tasks: Sequence[str], scope: JudgingScope) -> dict[str, list[str]]:
+    selected = [task for task in tasks if scope.selects(task)]
+    return {
+        "no_completions": [task for task in selected if not scope.completions.get(task)],
+        "not_judged": [task for task in selected if scope.completions.get(task)],
+        "not_selected": [task for task in tasks if not scope.selects(task)],
+    }
+
+
+def failures(tally: Tally) -> tuple[Failures, ...]:
+    """Count failures by class and kind (paper, section V.B). At least one completion must be judged."""
+    failed: dict[str, Counter[str]] = defaultdict(Counter)
+    for (name, kind), count in tally.failed.items():
+        failed[name][kind] = count
+    n = tally.judged.total()
+
+    def of_class(name: str) -> Failures:
+        counts = failed.get(name, Counter())
+        known = FAILURE_CLASSES[name].kinds if name in FAILURE_CLASSES else ()
+        others = sorted(counts.keys() - set(known), key=lambda kind: (-counts[kind], kind))
+        kinds = tuple(Failures(kind, counts[kind], counts[kind] / n) for kind in [*known, *others])
+        return Failures(name, counts.total(), counts.total() / n, kinds)
+
+    usual = [name for name in FAILURE_CLASSES if name != AGENT_ERROR_CLASS or name in failed]
+    return tuple(of_class(name) for name in [*usual, *sorted(failed.keys() - set(FAILURE_CLASSES))])
+
+
+PASSED, ALL = "passed", "all"
+
+
+@dataclass(frozen=True)
+class Causes:
+    """The shares of completions in each class of outcome, and of failures of each kind within a class."""
+
+    classes: Mapping[str, float]  # shares of all completions, including PASSED
+    kinds: Mapping[str, Mapping[str, float]]  # shares of the failures in a class
+    counts: Mapping[tuple[str, str], int]  # by class and kind (ALL: the whole class); empty if unknown
+
+
+def causes(tally: Tally) -> Causes:
+    """Compute the shares of outcomes (paper, section V.B). At least one completion must be judged."""
+    found = failures(tally)
+    kinds = {one.name: sorted((k.name, k.count) for k in one.kinds if k.count) for one in found}
+    return Causes(
+        {PASSED: tally.passed.total() / tally.judged.total(), **{one.name: one.share for one in found}},
+        {one.name: {kind: count / one.count for kind, count in kinds[one.name]} for one in found},
+        {(PASSED, ALL): tally.passed.total()}
+        | {(one.name, kind): n for one in found for kind, n in [(ALL, one.count), *kinds[one.name]]},
+    )
+
+
+def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
+    """Return the kinds of failure that occur in a class, with known kinds first."""
+    occurring = {kind for one in found for kind in one.kinds.get(name, {})}
+    known = [kind for kind in FAILURE_CLASSES[name].kinds if kind in occurring]
+    return [*known, *sorted(occurring - {*known})]
+
+
+def summary_data(summary: EvaluationSummary) -> dict[str, Any]:
+    """Convert a summary to plain data."""
+    estimates = zip(summary.k, summary.overall, strict=True)
+    return {
+        "models": sorted(model for model in summary.scope.models if model is not None),
+        "judged": summary.judged,
+        "to_judge": summary.scope.total,
+        "requested": summary.coverage.requested,
+        "cut_off": summary.scope.cut_off,
+        "max_tokens": summary.scope.limit,
+        **({"endings": dict(ends), "turns": summary.scope.turns} if (ends := summary.scope.endings) else {}),
+        "completions": summary.judged,
+        "passed": sum(task.c for task in summary.tasks),
+        **{f"pass@{k}": asdict(estimate) for k, estimate in estimates},
+        "tasks": [_task_score_data(task, summary) for task in summary.tasks],
+        "failures": [
+            {**_failure_data(each, "class"), "kinds": [_failure_data(kind, "kind") for kind in each.kinds]}
+            for each in summary.failures
+        ],
+        "missing": summary.missing,
+    }
+
+
+def _task_score_data(task: TaskScore, summary: EvaluationSummary) -> dict[str, Any]:
+    ks = summary.k
+    spreads = {
+        f"pass@{k}": {"mean": task.pass_at(k).mean, "lowest": task.lowest(k), "highest": task.highest(k)}
+        for k in ks
+    }
+    prompts = [
+        {"prompt": prompt.prompt, **_counts(prompt), **{f"pass@{k}": prompt.pass_at(k) for k in ks}}
+        for prompt in task.prompts
+    ]
+    requested = summary.scope.coverage(task.n, task.task).requested
+    return {"task": task.task, **_counts(task), "requested": requested, **spreads, "prompts": prompts}
+
+
+def _counts(score: TaskScore | PromptScore) -> dict[str, int]:
+    return {"completions": score.n, "passed": score.c}
+
+
+def _failure_data(failures: Failures, what: str) -> dict[str, Any]:
+    return {what: failures.name, "count": failures.count, "share": failures.share}

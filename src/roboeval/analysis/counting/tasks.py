@@ -1,0 +1,94 @@
+"""Summarises the results of a task by prompt, and of a prompt by program."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import Any
+
+import polars as pl
+
+from roboeval.analysis.counting.counts import completions_of, prompt_scores
+from roboeval.evaluation.judging.explanation import reason, suite_instruction
+from roboeval.evaluation.runs.completions import KEY, Completion, CompletionKey
+from roboeval.evaluation.runs.results import Results
+
+
+def task_data(results: Results, task: str) -> dict[str, Any]:
+    """Summarise a task as plain data: the pass rate and kinds of failure of each prompt."""
+    suite = results.suite
+    of_task = completions_of(results.table).filter(pl.col("task") == task).sort("prompt", maintain_order=True)
+    return {
+        "task": task,
+        "summary": suite.tasks[task].summary if suite is not None and task in suite.tasks else None,
+        "prompts": [
+            {**_prompt_head(results, of_prompt), "failures": _failure_kinds(of_prompt)}
+            for of_prompt in of_task.partition_by("prompt", maintain_order=True)
+        ],
+    }
+
+
+def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
+    """Summarise a judged prompt as plain data: its distinct programs, and why each of them fails."""
+    of_prompt = completions_of(results.table).filter(pl.col("task") == task, pl.col("prompt") == prompt)
+    programs = results.programs
+    groups: dict[object, list[CompletionKey]] = defaultdict(list)
+    for index in of_prompt["index"]:
+        key = task, prompt, index
+        groups[programs.get(key, index)].append(key)
+    return {
+        "task": task,
+        **_prompt_head(results, of_prompt),
+        "programs": [
+            {
+                "indices": [index for _, _, index in same],
+                "gone": same[0] not in programs,
+                **_reason(results, same[0]),
+            }
+            for same in groups.values()
+        ],
+    }
+
+
+def _reason(results: Results, key: CompletionKey) -> dict[str, Any]:
+    row = results.row(key)
+    if row["passed"]:
+        return {"passed": True, "failure": None}
+    return reason(row, results.suite, ablated=results.is_ablated)
+
+
+def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
+    keys = [*of_prompt.filter(~pl.col("stale")).select(KEY).iter_rows()]
+    written = [results.completions[key] for key in keys]
+    ((task, prompt, n, c, share),) = prompt_scores(of_prompt).iter_rows()
+    requested = results.scope.requested
+    prompts = () if results.suite is None else results.suite.task(task).prompts
+    return {
+        "prompt": prompt,
+        "instructions": _distinct(written, "instruction"),
+        "suite_instruction": suite_instruction(results.suite, task, prompt),
+        "models": _distinct(written, "model"),
+        "completions": n,
+        "requested": None if requested is None else requested.get(task, 0) // len(prompts),
+        "gone": n - len(written),
+        "passed": c,
+        "pass@1": share,
+    }
+
+
+def _distinct(written: Sequence[Completion], name: str) -> list[str]:
+    values = dict.fromkeys(getattr(completion, name) for completion in written)
+    return [value for value in values if value is not None]
+
+
+def _failure_kinds(of_prompt: pl.DataFrame) -> list[dict[str, Any]]:
+    counted = (
+        of_prompt.drop_nulls("failure_class")
+        .group_by("failure_class", "failure_kind", maintain_order=True)
+        .agg(count=pl.len(), example=pl.col("index").first())
+        .sort("count", descending=True, maintain_order=True)
+    )
+    return [
+        {"class": name, "kind": kind, "count": count, "example": example}
+        for name, kind, count, example in counted.iter_rows()
+    ]

@@ -1,0 +1,168 @@
+"""Defines the commands compare, for two runs or suites, and resample, for rejection sampling."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboeval.cli.engine_choice import engine_named
+from roboeval.cli.inputs import expect_same_suite, open_current
+from roboeval.cli.options import (
+    AblationOption,
+    EngineOption,
+    HouseRulesOption,
+    JsonOption,
+    ProcessOption,
+    RunArgument,
+    SuiteOption,
+    WorkersOption,
+    path_to,
+)
+from roboeval.cli.output import fail, note, print_json, print_rich, show_progress
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from roboeval.evaluation.engines.engine import OpenEngine
+    from roboeval.evaluation.runs.results import Results
+
+
+def compare(
+    runs: Annotated[
+        list[Path],
+        typer.Argument(help="Two judged runs; with --suites, one or more.", parser=path_to("a run")),
+    ],
+    suite: SuiteOption = "paper",
+    suites: Annotated[
+        str | None,
+        typer.Option(help="Two suites, such as paper,plus; shows which verdicts the second changes."),
+    ] = None,
+    most: Annotated[
+        int, typer.Option("--groups", min=0, help="With --suites: how many groups of programs to show.")
+    ] = 10,
+    ablation: AblationOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Show how much better one run is, and how certain that is.
+
+    The difference is the second run's pass rate minus the first's.
+    """
+    if suites is not None:
+        compare_suites(runs, suites, most=most, ablated=ablation, as_json=json)
+    elif len(runs) == _PAIR:
+        compare_runs(runs, suite, ablated=ablation, as_json=json)
+    else:
+        fail(f"name two runs, not {len(runs)}; only --suites accepts another number")
+
+
+_PAIR = 2
+
+
+def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
+    """Print how much better the second of two runs is."""
+    from roboeval.analysis.comparisons.compare import (
+        ComparedRun,
+        compare_tables,
+        comparison_data,
+        other_differences,
+    )
+    from roboeval.analysis.comparisons.missions import comparable_tables
+    from roboeval.cli.views.comparison import comparison_view
+
+    opened = [open_current(path, suite, ablated=ablated) for path in paths]
+    expect_same_suite(opened, suite)
+    tables = comparable_tables(*(one.table for one in opened))
+    result = compare_tables(*(one.table for one in opened))
+    warnings = other_differences(*opened)
+    for warning in warnings:
+        note(f"warning: {warning}")
+    first, second = (
+        ComparedRun.of(str(path), one, table) for path, one, table in zip(paths, opened, tables, strict=True)
+    )
+    if as_json:
+        data = comparison_data(result, (first.name, second.name))
+        both = {side: data[side] | run.data for side, run in (("first", first), ("second", second))}
+        print_json({**data, **both, "warnings": warnings})
+    else:
+        print_rich(comparison_view(result, (first, second)))
+
+
+def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bool, as_json: bool) -> None:
+    """Print which verdicts the second of two suites changes."""
+    from roboeval.analysis.comparisons.verdict_changes import changes_data, verdict_changes
+    from roboeval.cli.views.comparison import changes_view
+    from roboeval.evaluation.runs.completions import how_many
+
+    if len({path.resolve() for path in paths}) < len(paths):
+        fail("a run is listed twice; list each run once")
+    names = [name.strip() for name in suites.split(",")]
+    if len(names) != _PAIR or len({*names}) != _PAIR or not all(names):
+        fail(f'--suites takes two suites separated by a comma, such as paper,plus, not "{suites}"')
+    found = []
+    for path in paths:
+        first = open_current(path, names[0], ablated=ablated)
+        second = open_current(path, names[1], ablated=ablated, reuse_from=first)
+        found.append(verdict_changes(str(path), first, second))
+    for one in found:
+        if one.left_out:
+            note(f"{one.name}: left out because only one suite has judged them: {how_many(one.left_out)}")
+    if as_json:
+        print_json(changes_data(found))
+    else:
+        print_rich(changes_view(found, most=most))
+
+
+def resample(
+    run: RunArgument,
+    retries: Annotated[
+        list[int] | None, typer.Option(min=0, help="Maximum number of retries; may be given several times.")
+    ] = None,
+    samples: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Number of imagined worlds for each check.")
+    ] = 5,
+    seed: Annotated[int, typer.Option(help="The random seed of the imagined worlds.")] = 0,
+    suite: SuiteOption = "paper",
+    workers: WorkersOption = None,
+    engine: EngineOption = "local",
+    one_process_per_run: ProcessOption = False,
+    rules: HouseRulesOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Compute how often programs would pass with rejection sampling.
+
+    The programs of a judged run are checked, also against its house rules. The result is computed for each
+    maximum number of retries, without querying a model.
+    """
+    from roboeval.analysis.comparisons.missions import has_missions
+    from roboeval.analysis.resample import LIMITS, curve_data, trials_by_prompt
+    from roboeval.cli.views.groups import resample_view
+
+    with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
+        results = open_current(run, suite, ablated=False, rules=rules)
+        if has_missions(results.table):
+            fail(f"{run}: holds missions of an agent, which cannot be checked; name a run of programs")
+        checker = engine_for(len(results.places))
+        prompts = trials_by_prompt(check_run(results, samples=samples, seed=seed, engine=checker))
+    coverage = results.coverage
+    limits = sorted(set(retries)) if retries else LIMITS
+    if json:
+        of = {"suite": results.manifest["suite"], "samples": samples, "seed": seed, **asdict(coverage)}
+        print_json({**of, **curve_data(prompts, limits)})
+    else:
+        print_rich(resample_view(prompts, limits, title=str(run), coverage=coverage))
+
+
+def check_run(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
+    """Check the programs of a run, save the results, and return the run's table with these results."""
+    from roboeval.evaluation.generating.checks import check_programs
+    from roboeval.evaluation.runs.table import with_answers
+
+    completions = [results.completions[key] for key in results.places]
+    judged = [one for one in completions if one.acted is None]  # an agent's mission holds in one world only
+    different = {(completion.task, completion.program) for completion in judged}
+    checking = check_programs(results.run, results.known_suite, judged, engine, samples=samples, seed=seed)
+    return with_answers(results.table, dict(show_progress(checking, "checking", len(different))))

@@ -1,0 +1,110 @@
+"""Defines the command report, which writes figures and a web page about runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboeval.cli.inputs import command, expect_same_suite, open_current
+from roboeval.cli.options import (
+    BesideOption,
+    CheckOption,
+    HouseRulesOption,
+    LabelsOption,
+    PricesOption,
+    PublishedOption,
+    SuiteOption,
+    WorkersOption,
+    path_to,
+)
+from roboeval.cli.output import fail, note, show_progress
+from roboeval.cli.results.compare import check_run
+
+if TYPE_CHECKING:
+    from roboeval.evaluation.engines.engine import OpenEngine
+    from roboeval.evaluation.runs.results import Results
+    from roboeval.report.runs import JudgedRun
+
+
+def report(
+    runs: Annotated[list[Path], typer.Argument(help="Judged runs.", parser=path_to("a run"))],
+    out: Annotated[Path, typer.Option(help="The folder to write to.", parser=path_to("a folder"))],
+    suite: SuiteOption = "paper",
+    published: PublishedOption = False,
+    price: PricesOption = None,
+    label: LabelsOption = None,
+    beside: BesideOption = None,
+    check: CheckOption = True,
+    workers: WorkersOption = None,
+    rules: HouseRulesOption = None,
+) -> None:
+    """Write a report with figures, tables and a web page.
+
+    The report has the paper's figures. Its page also shows why programs fail and how certain the numbers are.
+    """
+    import atexit
+    import gc
+
+    gc.disable()  # garbage collection would take a fifth of the time
+    atexit.register(gc.freeze)  # skip the collection at exit, too
+    from codebotler.core.terminal import busy
+    from codebotler.simulator.pool import cores
+    from roboeval.evaluation.engines.engine import Local
+    from roboeval.report.runs import name_runs, read_labels
+    from roboeval.report.sections.cost import expect_known, read_prices
+    from roboeval.report.writing import expect_no_others, headline, pieces, sections, write_report
+
+    expect_no_others(out)
+    prices, labels = read_prices(price or ()), read_labels(label or (), runs)
+    if beside == suite:
+        fail(f'--beside names "{suite}", which the report itself uses; name a different suite')
+    opened = [open_current(run, suite, ablated=False) for run in runs]
+    expect_same_suite(opened, suite)
+    engine = Local(workers or cores()) if check else None
+    read = name_runs(
+        [judged_run(one, suite, beside=beside, rules=rules, engine=engine) for one in opened],
+        labels,
+    )
+    expect_known(prices, read)
+    options: list[object] = ["--out", out, *["--published"] * published]
+    options += [] if beside is None else ["--beside", beside]
+    options += [] if rules is None else ["--rules", rules]
+    options += ["--no-check"] * (not check)
+    options += [word for text in price or () for word in ("--price", text)]
+    options += [word for text in label or () for word in ("--label", text)]
+    again = command("report", *runs, *options, suite=suite)
+    with busy("assembling the report"):
+        parts = sections(read, with_published=published, prices=prices, command=again)
+    written = write_report(*headline(read), parts, out)
+    for _ in show_progress(written, "writing", pieces(parts)):
+        pass
+    note(f"the report is in {out / 'index.html'}")
+
+
+def judged_run(
+    results: Results, suite: str, *, beside: str | None, rules: Path | None, engine: OpenEngine | None
+) -> JudgedRun:
+    """Read a run with any verdicts of its ablation, of another suite and with house rules.
+
+    The engine checks the programs. Without an engine, earlier results of the check are left out, too.
+    """
+    import polars as pl
+
+    from roboeval.evaluation.runs.folder import evaluation_key
+    from roboeval.report.runs import JudgedRun
+
+    run = results.run
+    ablated = other = house = None
+    if run.rows(evaluation_key(results.known_suite, ablated=True)).is_file():
+        ablated = open_current(run.path, suite, ablated=True, reuse_from=results)
+    if engine is None:
+        table = results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))
+    else:
+        table = check_run(results, engine=engine)
+    if beside is not None:
+        other = open_current(run.path, beside, ablated=False, reuse_from=results)
+    if rules is not None:
+        house = open_current(run.path, suite, ablated=False, rules=rules, reuse_from=results)
+    return JudgedRun(results, table, ablated=ablated, other_suite=other, house=house)

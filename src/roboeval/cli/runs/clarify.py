@@ -1,0 +1,64 @@
+"""Defines the command clarify, which measures what one question about candidate programs gains."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from codebotler.core.text.words import counted
+from roboeval.cli.inputs import load
+from roboeval.cli.options import (
+    HouseRulesOption,
+    JsonOption,
+    SourceArgument,
+    SuiteOption,
+    WorkersOption,
+)
+from roboeval.cli.output import note, print_json, print_rich, show_progress
+
+
+def clarify(
+    source: SourceArgument,
+    suite: SuiteOption = "paper",
+    candidates: Annotated[
+        int, typer.Option(min=2, max=20, help="Number of candidates that a model writes for a prompt.")
+    ] = 10,
+    noise: Annotated[
+        float,
+        typer.Option(min=0, max=1, help="Share of questions that the simulated person answers wrongly."),
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(help="Random seed for candidates and answers.")] = 0,
+    rules: HouseRulesOption = None,
+    workers: WorkersOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Measure how much one question about candidate programs helps.
+
+    A simulated person chooses among the behaviours of several programs for the same prompt. A run keeps the
+    result for `roboeval report`, unless there are --rules.
+    """
+    from codebotler.simulator.pool import WorkerPool, cores
+    from roboeval.cli.views.clarify import clarify_view
+    from roboeval.evaluation.clarify import ClarifySettings, clarify, measurement_data, store_measurement
+    from roboeval.evaluation.runs.folder import with_judged_worlds
+    from roboeval.evaluation.runs.source import open_source
+
+    known = load(suite, rules)
+    opened = open_source(source, known)
+    completions = opened.of(None)
+    if opened.run is not None:
+        known = with_judged_worlds(opened.run, known, ablated=False)
+    settings = ClarifySettings(candidates, noise, seed)
+    count = len({(one.task, one.prompt) for one in completions})
+    with WorkerPool(workers or cores()) as pool:
+        prompts = [*show_progress(clarify(completions, known, pool, settings), "asking", count)]
+    data = measurement_data(completions, known, settings, prompts)
+    if json:
+        print_json(data)
+    else:
+        print_rich(clarify_view(data, source, candidates))
+    if left_out := count - len(prompts):
+        note(f"left out, with fewer than {candidates} completions: {counted(left_out, 'prompt')} of {count}")
+    if opened.run is not None and rules is None:
+        note(f"the result is in {store_measurement(opened.run, known, data)}")

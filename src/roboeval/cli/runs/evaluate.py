@@ -1,0 +1,200 @@
+"""Defines the commands evaluate, which judges completions, and import, which creates a run from them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from codebotler.cli.options import SkillsOption
+from codebotler.core.errors import installed
+from codebotler.core.text.words import counted
+from roboeval.cli.engine_choice import engine_named
+from roboeval.cli.inputs import command, load
+from roboeval.cli.options import (
+    AblationOption,
+    EngineOption,
+    HouseRulesOption,
+    IsolationOption,
+    JsonOption,
+    KeepOption,
+    ProcessOption,
+    RedoOption,
+    SourceArgument,
+    SuiteOption,
+    TasksOption,
+    WorkersOption,
+    WorldSeedOption,
+    WorldsOption,
+    path_to,
+)
+from roboeval.cli.output import fail, note, progress_meter, show_progress, stoppable
+from roboeval.cli.results.show import house_of, print_summary
+
+if TYPE_CHECKING:
+    from roboeval.analysis.counting.summary import EvaluationSummary
+    from roboeval.evaluation.engines.engine import OpenEngine
+    from roboeval.evaluation.runs.completions import CompletionKey
+    from roboeval.evaluation.runs.folder import RunFolder
+    from roboeval.evaluation.runs.rows import Row
+    from roboeval.evaluation.runs.source import Source
+    from roboeval.suites.load import Suite
+
+
+def evaluate(
+    source: SourceArgument,
+    out: KeepOption = None,
+    suite: SuiteOption = "paper",
+    tasks: TasksOption = None,
+    ablation: AblationOption = False,
+    redo: RedoOption = False,
+    workers: WorkersOption = None,
+    worlds: WorldsOption = None,
+    seed: WorldSeedOption = None,
+    engine: EngineOption = "local",
+    require_isolation: IsolationOption = False,
+    one_process_per_run: ProcessOption = False,
+    rules: HouseRulesOption = None,
+    skills: SkillsOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Judge whether each completion does what its prompt asks."""
+    isolation = {"require_isolation": require_isolation, "one_process_per_run": one_process_per_run}
+    with engine_named(engine, workers, **isolation) as engine_for:
+        from roboeval.analysis.counting.summary import summarise
+        from roboeval.analysis.counting.tally import Tally
+        from roboeval.evaluation.runs.folder import RunFolder, about_of, tasks_to_judge
+        from roboeval.evaluation.runs.scope import JudgingScope
+        from roboeval.evaluation.runs.source import open_source
+
+        judged_by = load(suite, rules, skills)
+        if worlds is not None or seed is not None:
+            judged_by = judged_by.with_worlds(worlds, seed)
+        wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
+        if left:
+            note(f"not judged because they have no ablation: {', '.join(left)}")
+        tally, table = Tally(), None
+        if rules is not None:
+            from roboeval.evaluation.runs.table import TableBuilder  # imports polars, which loads slowly
+
+            table = TableBuilder()
+        opened = open_source(source, judged_by)
+        run = opened.run if out is None else RunFolder(out)
+        again = f"the same command {'without --redo ' * redo}continues where it stopped"
+        with stoppable("nothing was saved (add --out RUN to save verdicts)" if run is None else again):
+            about = {} if opened.run is None else about_of(opened.run)
+            scope = JudgingScope.of(opened.completions, wanted, about, judged_by)
+            if scope.total == 0:
+                fail(f"{source}: contains no completion for {tasks or 'a task with an ablation'}")
+            if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
+                run.keep(opened.completions)
+            running = engine_for(scope.total)
+            rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
+            for row in show_progress(rows, "judging", scope.total):
+                tally.add(row)
+                if table is not None:
+                    table.add(row)
+            counted = summarise(tally, judged_by, scope, ablated=ablation)
+            house = None if table is None else house_of(run, judged_by, table.table(), ablated=ablation)
+            print_summary(counted, title=source, as_json=json, house=house)
+        _name_next_command(run, tally.first_failed, suite=suite, ablated=ablation, rules=rules)
+        _expect_all_judged(counted, scope.total)
+
+
+def _expect_all_judged(summary: EvaluationSummary, total: int) -> None:
+    """Exit with status 1 if some completions could not be judged."""
+    from roboeval.evaluation.runs.completions import how_many
+
+    if (left_out := total - summary.judged) > 0:
+        note(f"roboeval: not judged: {how_many(left_out)} of {total:,}; the same command tries again")
+        raise SystemExit(1)
+
+
+def _name_next_command(
+    run: RunFolder | None, failed: CompletionKey | None, *, suite: str, ablated: bool, rules: Path | None
+) -> None:
+    from roboeval.evaluation.runs.completions import name_of
+
+    if run is None:
+        return
+    shown = [] if failed is None else [name_of(failed)]
+    again = command("show", run.path, *shown, suite=suite, ablated=ablated, rules=rules)
+    does = "explains the first failure" if shown else "prints these tables again"
+    note(f"the verdicts are in {run.path}; `{again}` {does}")
+
+
+def _judged(
+    source: Source,
+    run: RunFolder | None,
+    suite: Suite,
+    tasks: frozenset[str] | None,
+    *,
+    ablated: bool,
+    redo: bool,
+    engine: OpenEngine,
+) -> Iterator[Row]:
+    from roboeval.evaluation.evaluate import evaluate_run
+    from roboeval.evaluation.judging.judge import evaluate
+
+    if run is not None:
+        completions = source.completions
+        return evaluate_run(
+            run, suite, ablated=ablated, tasks=tasks, redo=redo, engine=engine, completions=completions
+        )
+    return evaluate(source.of(tasks), suite, ablated=ablated, engine=engine)
+
+
+def import_(
+    path: Annotated[
+        str, typer.Argument(help="A .jsonl file, a folder or zip of .py files, or the answers to a batch.")
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="The run folder to create; for answers, the run with the requests.", parser=path_to("a run")
+        ),
+    ],
+    suite: SuiteOption = "paper",
+) -> None:
+    """Create a run from completions generated elsewhere.
+
+    Answers to requests of `generate --requests` are added to the run they belong to.
+    """
+    from roboeval.evaluation.runs.completions import how_many
+    from roboeval.evaluation.runs.folder import RunFolder
+    from roboeval.evaluation.runs.source import is_answers, open_source
+
+    if is_answers(Path(path)):
+        import_batch(Path(path), out, suite)
+        return
+    completions = open_source(path, load(suite)).completions
+    RunFolder(out).keep(completions)
+    again = command("evaluate", out, suite=suite)
+    note(f"{out} has {how_many(len(completions))}; `{again}` judges them")
+
+
+def import_batch(path: Path, out: Path, suite: str) -> None:
+    """Add the answers from a batch endpoint to their run. Exit with status 1 if completions are missing."""
+    with installed():
+        from roboeval.evaluation.generating.batches import import_answers
+    from roboeval.evaluation.runs.completions import how_many, name_of
+    from roboeval.evaluation.runs.folder import RunFolder
+
+    with path.open("rb") as file:
+        count = sum(1 for _ in file)
+    with progress_meter("reading", count) as update:
+        found = import_answers(RunFolder(out), load(suite), path, progress=lambda done: update(done, ""))
+    there, again = found.total - len(found.missing), command("evaluate", out, suite=suite)
+    note(
+        f"{there:,} of {how_many(found.total)} are in {out}, {found.new:,} of them new; `{again}` judges them"
+    )
+    examples = {why: key for key, why in reversed([*found.missing.items()])}
+    for why, count in Counter(found.missing.values()).items():
+        note(f"{counted(count, 'request')} failed, such as {name_of(examples[why])}: {why}")
+    if found.missing:
+        lacks = how_many(len(found.missing))
+        note(f"roboeval: {lacks} missing; `roboeval generate --requests` requests them again")
+        raise SystemExit(1)

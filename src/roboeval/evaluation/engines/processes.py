@@ -1,0 +1,127 @@
+"""Runs and judges programs in several processes on this machine."""
+
+from __future__ import annotations
+
+import gc
+import os
+import pickle
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from contextlib import ExitStack, contextmanager
+from functools import lru_cache, partial
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from typing import Any, Self, TypeVar
+
+from codebotler.simulator.engine import digest
+from codebotler.simulator.pool import map_batches
+from codebotler.simulator.worker import EngineError
+from roboeval.evaluation.engines.engine import (
+    GC_THRESHOLD,
+    RawResult,
+    RunPrograms,
+    Work,
+    WorkResult,
+    own_worker,
+)
+
+JobKey = TypeVar("JobKey")
+
+
+class Processes:
+    """Runs programs in several processes, each of which replays and judges the programs of its own worker.
+
+    With threads instead of processes, a single core would replay and judge for all workers. A process starts
+    when there is work for it. The caller must warn if programs are not fully isolated.
+    """
+
+    def __init__(self, workers: int, **isolation: bool) -> None:
+        self._workers, self._isolation = workers, isolation
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Do nothing: the processes end when the results are exhausted."""
+
+    def map_distinct(
+        self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
+    ) -> Iterator[WorkResult]:
+        """See `Engine`."""
+        functions = pickle.dumps((function, then))
+        batch = partial(run_batch, functions, self._isolation)
+        return map_in_processes(batch, works, workers=self._workers, name=lambda work: digest(*work))
+
+
+def map_in_processes(
+    function: Callable[[Sequence[JobKey]], Sequence[WorkResult]],
+    keys: Iterable[JobKey],
+    *,
+    workers: int,
+    name: Callable[[JobKey], bytes],
+) -> Iterator[WorkResult]:
+    """Call a function in worker processes on a few keys at a time, and yield the results in order.
+
+    `name` returns a short, unique name for a key. Duplicate keys are passed to the function only once.
+    """
+    with process_pool(workers) as processes:
+
+        def submit(keys: Sequence[JobKey]) -> Future[Sequence[WorkResult]]:
+            with starting_processes():
+                return processes.submit(function, keys)
+
+        try:
+            yield from map_batches(submit, keys, workers=workers, name=name)
+        except BrokenExecutor:
+            raise EngineError("a worker process died; it may have run out of memory") from None
+
+
+@contextmanager
+def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Start a process pool that ends with the block, or with this process if that ends first."""
+    context = get_context("spawn")
+    with ExitStack() as held:
+        with starting_processes():
+            pipe, ours = context.Pipe(duplex=False)
+            held.enter_context(pipe)
+            processes = ProcessPoolExecutor(workers, context, exit_with_parent, (pipe,))
+        held.callback(processes.shutdown, cancel_futures=True)
+        held.enter_context(ours)  # closed before the pool shuts down, so that workers exit with us
+        yield processes
+
+
+@contextmanager
+def starting_processes() -> Iterator[None]:
+    """Make processes started in the block ignore Ctrl-C. Raise EngineError if they cannot start."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # child processes inherit the mask
+    try:
+        yield
+    except OSError as error:
+        raise EngineError(f"cannot start a worker process: {error.strerror}") from None
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def exit_with_parent(pipe: Connection) -> None:
+    """Exit this process as soon as the other end of a pipe is closed."""
+    gc.set_threshold(GC_THRESHOLD, *gc.get_threshold()[1:])
+
+    def end() -> None:
+        pipe.poll(None)
+        os._exit(1)
+
+    threading.Thread(target=end, daemon=True).start()
+
+
+def run_batch(functions: bytes, isolation: Mapping[str, bool], works: Sequence[Work]) -> list[Any]:
+    """Run programs on the worker of this process."""
+    function, then = load_functions(functions)
+    return [then(ran) for ran in function(own_worker(**isolation), works)]
+
+
+@lru_cache(maxsize=1)
+def load_functions(functions: bytes) -> tuple[RunPrograms[Any], Callable[[Any], Any]]:
+    """Unpickle functions. They are cached because they refer to a whole suite."""
+    return pickle.loads(functions)  # type: ignore[no-any-return] # noqa: S301 - pickled by our own parent process

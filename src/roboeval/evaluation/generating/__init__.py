@@ -1,0 +1,1 @@
+"""Generates the completions of a run, in rounds or through batch endpoints, and checks them."""

@@ -1,0 +1,208 @@
+"""Generates the completions of a run, and continues a run that was interrupted."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from typing import Any
+
+from codebotler.core.files import MAX_ROW, Appender, to_line, to_text, write_whole
+from codebotler.models.base import BudgetSpentError, Model, ModelError, Reply, Usage, make_reply
+from codebotler.models.rate_limit import RateLimited
+from codebotler.prompts import Prompt
+from roboeval.evaluation.generating.requests import (
+    GenerationPlan,
+    RequestLog,
+    add_usage,
+    no_usage,
+    run_metadata,
+    with_batch,
+)
+from roboeval.evaluation.runs.completions import CompletionKey, how_many
+from roboeval.evaluation.runs.folder import RunFolder
+from roboeval.evaluation.runs.turns import TurnLog
+
+FAILURES_IN_A_ROW = 3  # stop after this many, or the number of concurrent requests if larger
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Limits on concurrent requests, requests per minute, and total tokens."""
+
+    concurrency: int = 8
+    requests_per_minute: float | None = None
+    token_budget: int | None = None
+
+
+@dataclass
+class GenerationProgress:
+    """Progress towards the completions that a run should have."""
+
+    total: int
+    found: int  # completions present at the start
+    interrupted: int  # requests pending at the last interruption, which may be billed twice
+    usage: Counter[str] = field(default_factory=no_usage)  # token counts of the new completions
+    failures: dict[CompletionKey, str] = field(default_factory=dict)  # error messages of failed requests
+    stopped: str | None = None  # why generation stopped early
+
+    def __post_init__(self) -> None:
+        self.done = self.found
+
+    @property
+    def missing(self) -> str | None:
+        """Return a sentence that says how many completions are missing and why, or None if none are."""
+        left = self.total - self.done
+        reason = self.stopped or next(iter(self.failures.values()), "they were not requested")
+        return f"{how_many(left)} {'is' if left == 1 else 'are'} missing: {reason}" if left else None
+
+
+def generate_run(
+    run: RunFolder,
+    plan: GenerationPlan,
+    model: Model,
+    pace: Pace,
+    *,
+    on_progress: Callable[[GenerationProgress], None] = lambda _: None,
+) -> GenerationProgress:
+    """Request the missing completions of a run, save each as it arrives, and close the model."""
+    with run.writing():
+        metadata = run_metadata(run, plan, model.name, model.settings)
+        with contextlib.closing(Appender(run.completions)) as file:
+            done = {completion.key for completion in plan.completed(run)}
+            given = [one for one in plan.given() if one.key not in done]
+            done |= {one.key for one in given}
+            keys = plan.keys()
+            todo = [key for key in keys if key not in done]
+            log = RequestLog(run.in_flight, done)
+            metadata["possibly_paid_twice"] += log.interrupted
+            if todo:
+                metadata["batches"] = with_batch(metadata["batches"], plan, model.settings)
+            write_whole(run.about, to_text(metadata))
+            for completion in given:
+                file.append(to_line(completion.row))
+            progress = GenerationProgress(len(keys), len(keys) - len(todo), log.interrupted)
+            turns = TurnLog(run.turns, done) if plan.has_turns else None
+            with log, contextlib.closing(turns) if turns else contextlib.nullcontext():
+                on_progress(progress)
+                generation = _Generation(plan, model, pace, file, log, turns, progress, on_progress)
+                asyncio.run(generation.generate(todo))
+        is_empty = not run.completions.stat().st_size and not run.turns.exists()
+        if generation.error is not None and is_empty:
+            run.completions.unlink()
+            run.about.unlink()
+            raise generation.error
+    return progress
+
+
+def reply_of_refusal(error: ModelError) -> Reply:
+    """Return the reply to record for a request that the server refused permanently."""
+    return make_reply(error.sentence, Usage(), None, None, known_kind="refusal", has_answer=False)
+
+
+@dataclass
+class _Generation:
+    """Requests completions concurrently and saves each as it arrives."""
+
+    plan: GenerationPlan
+    model: Model
+    pace: Pace
+    file: Appender
+    log: RequestLog
+    turns: TurnLog | None  # None if each completion is one reply
+    progress: GenerationProgress
+    on_progress: Callable[[GenerationProgress], None]
+    error: ModelError | None = None
+    _failures_in_a_row: int = 0
+    _budget: int | None = None  # tokens used when the budget ran out
+    _refused: dict[CompletionKey, ModelError] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._paced = RateLimited(self.model, **asdict(self.pace))
+
+    async def generate(self, keys: list[CompletionKey]) -> None:
+        waiting = iter(keys)
+        try:
+            async with asyncio.TaskGroup() as group:
+                for _ in range(min(self.pace.concurrency, len(keys))):
+                    group.create_task(self._request_each(waiting))
+            if self.progress.stopped is None and self.progress.done:
+                await self._keep_refused()
+            if self._budget is not None:  # pending requests have used more tokens in the meantime
+                self.progress.stopped = BudgetSpentError(self._budget, self._paced.tokens_used).sentence
+        except BaseExceptionGroup as errors:
+            raise errors.exceptions[0] from None
+        finally:
+            await self.model.close()
+
+    async def _request_each(self, waiting: Iterator[CompletionKey]) -> None:
+        for key in waiting:
+            if self.progress.stopped is None:
+                await self._request(key)
+
+    async def _request(self, key: CompletionKey) -> None:
+        try:
+            row = await self.plan.complete(key, self.model.name, partial(self._ask, key), self._earlier(key))
+            await self._keep(key, row)
+        except BudgetSpentError as error:
+            self._budget, self.progress.stopped = error.budget, error.sentence
+        except ModelError as error:
+            self.log.ended(key)
+            self.error = error
+            self.progress.failures[key] = error.sentence
+            if error.is_refusal:
+                self._refused[key] = error
+            self._failures_in_a_row += 1
+            if self._failures_in_a_row >= max(FAILURES_IN_A_ROW, self.pace.concurrency):
+                self.progress.stopped = error.sentence
+
+    async def _ask(self, key: CompletionKey, prompt: Prompt) -> Reply:
+        logged = partial(self._logged, key)
+        reply = await self._paced.reply(prompt, number=self.plan.sample(key), around=logged)
+        if self.turns is not None:
+            await self.turns.keep(key, reply)
+            self.log.ended(key)
+        return reply
+
+    @contextlib.contextmanager
+    def _logged(self, key: CompletionKey) -> Iterator[None]:
+        """Log a request, including each retry, before it is sent."""
+        self.log.sent(key)
+        try:
+            yield
+        except ModelError:
+            self.log.ended(key)
+            raise
+
+    def _earlier(self, key: CompletionKey) -> list[Reply]:
+        return [] if self.turns is None else self.turns.replies(key)
+
+    async def _keep(self, key: CompletionKey, row: dict[str, Any]) -> None:
+        line = to_line(row)
+        if len(line) > MAX_ROW:
+            raise ModelError(f"the reply is too long to save: {len(line):,} bytes", may_pass=True)
+        self.file.append(line)
+        if self.turns is None:
+            self.log.kept(key)
+        else:
+            self.turns.forget(key)
+        try:
+            await asyncio.to_thread(self.file.sync)
+        finally:  # also after an interrupt, because closing the file syncs it to disk
+            add_usage(self.progress.usage, row["usage"])
+            self.progress.done += 1
+        self._failures_in_a_row = 0
+        self.on_progress(self.progress)
+
+    async def _keep_refused(self) -> None:
+        # The server accepted other requests, so these were refused because of their content.
+        for key, error in self._refused.items():
+            replies = [*self._earlier(key), reply_of_refusal(error)]
+            row = await self.plan.complete(key, self.model.name, partial(self._ask, key), replies)
+            self.file.append(to_line(row))
+            del self.progress.failures[key]
+            self.progress.done += 1
+        self._refused.clear()

@@ -1,0 +1,241 @@
+"""Plans the requests of a run, describes them in run.json, and logs pending requests."""
+
+from __future__ import annotations
+
+import contextlib
+import platform
+from collections import Counter
+from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, ClassVar, Self, TypeAlias
+
+from codebotler import __version__
+from codebotler.core.errors import UserError
+from codebotler.core.files import Appender, read_rows, to_line, write_whole
+from codebotler.core.text.words import brief
+from codebotler.models.base import Reply
+from codebotler.models.sampling import SamplingSettings
+from codebotler.prompts import Prompt, prompt_for, template_hash
+from roboeval.evaluation.runs.completions import (
+    Completion,
+    CompletionKey,
+    name_of,
+    read_completions,
+    row_for,
+)
+from roboeval.evaluation.runs.folder import RunFolder, load_json_object
+from roboeval.suites.load import Suite
+
+Ask: TypeAlias = Callable[[Prompt], Awaitable[Reply]]
+"""Requests a reply."""
+
+WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change a model's replies
+OPTIONAL_SETTINGS = ("reasoning_effort", "extra_body")  # left out of run.json if unset
+
+
+@dataclass(frozen=True)
+class GenerationPlan:
+    """The completions that a run should have: a fixed number for each prompt of the selected tasks."""
+
+    suite: Suite
+    tasks: frozenset[str] | None = None
+    num_completions: int = 50
+
+    has_turns: ClassVar[bool] = False  # whether a completion takes several replies
+
+    def keys(self) -> list[CompletionKey]:
+        """Return all keys: first the first completion of every prompt, then the second one, and so on."""
+        tasks = [task for name, task in self.suite.tasks.items() if self.tasks is None or name in self.tasks]
+        prompts = [(task.name, prompt) for task in tasks for prompt in range(len(task.prompts))]
+        return [(*prompt, index) for index in range(self.num_completions) for prompt in prompts]
+
+    def instruction(self, key: CompletionKey) -> str:
+        """Return the instruction of a completion."""
+        return self.suite.tasks[key[0]].prompts[key[1]]
+
+    def prompt(self, key: CompletionKey) -> Prompt:
+        """Return the prompt that requests a completion."""
+        rules, skills = self.suite.house_sentences, self.suite.skills
+        return prompt_for(self.instruction(key), rules=rules, skills=skills)
+
+    def sample(self, key: CompletionKey) -> int:
+        """Return the number of the sample, which determines its seed."""
+        return key[2]
+
+    def given(self) -> Iterable[Completion]:
+        """Return the completions to copy from another run."""
+        return ()
+
+    def describe(self) -> dict[str, Any]:
+        """Return entries of run.json that all completions of the run share."""
+        return {"template": template_hash(self.suite.skills)}
+
+    async def complete(
+        self, key: CompletionKey, model: str, ask: Ask, earlier: Sequence[Reply] = ()
+    ) -> dict[str, Any]:
+        """Request a completion from the model of this name, unless it replied earlier, and return its row."""
+        reply = earlier[-1] if earlier else await ask(self.prompt(key))
+        return row_for(key, self.instruction(key), model, reply.data())
+
+    def completed(self, run: RunFolder) -> Iterator[Completion]:
+        """Read the completions of a run. Raise UserError if an instruction differs from the suite's."""
+        if not run.completions.is_file() or not run.completions.stat().st_size:
+            return
+        for completion in read_completions(run.completions, self.suite):
+            if completion.instruction != self.instruction(completion.key):
+                which = f"{name_of(completion.key)} was generated from a different instruction"
+                raise UserError(
+                    f"{which} than the suite's current one; name another folder", file=run.completions
+                )
+            yield completion
+
+
+def no_usage() -> Counter[str]:
+    """Return token counts of zero."""
+    return Counter(input_tokens=0, output_tokens=0)
+
+
+def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> None:
+    """Add the token counts of a row to the total. They are null if the model does not count tokens."""
+    for name in total:
+        total[name] += (usage or {}).get(name) or 0
+
+
+def run_metadata(
+    run: RunFolder, plan: GenerationPlan, model: str, settings: SamplingSettings
+) -> dict[str, Any]:
+    """Return the content of run.json. Raise UserError if existing completions have other settings."""
+    suite = plan.suite
+    fixed = {"model": model, "settings": _recorded(settings), **plan.describe(), "suite": suite.name}
+    earlier: dict[str, Any] = {}
+    if run.about.exists():
+        earlier = load_json_object(run.about)
+        if not isinstance(earlier.get("settings"), dict):
+            raise UserError("holds imported completions; name another folder", file=run.path)
+        _expect_same(earlier, fixed, run.about)
+    elif run.completions.exists() and run.completions.stat().st_size:
+        why = "is missing, so the settings of the completions are unknown"
+        raise UserError(f"{why}; name another folder", file=run.about)
+    return {
+        **fixed,
+        "batches": batches(earlier),
+        "possibly_paid_twice": earlier.get("possibly_paid_twice", 0),
+    }
+
+
+def _recorded(settings: SamplingSettings) -> dict[str, Any]:
+    return {
+        name: value
+        for name, value in asdict(settings).items()
+        if name not in WITHOUT_EFFECT and (value is not None or name not in OPTIONAL_SETTINGS)
+    }
+
+
+def with_batch(
+    earlier: list[dict[str, Any]], plan: GenerationPlan, settings: SamplingSettings
+) -> list[dict[str, Any]]:
+    """Append the batch of a plan, unless the last batch is the same one."""
+    batch = {
+        "tasks": None if plan.tasks is None else sorted(plan.tasks),
+        "num_completions": plan.num_completions,
+        "settings": asdict(settings),
+        "codebotler": __version__,
+        "python": platform.python_version(),
+    }
+    if earlier and earlier[-1].items() >= batch.items():
+        return earlier
+    return [*earlier, {**batch, "started": timestamp()}]
+
+
+def batches(metadata: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the request batches recorded in run.json, in order."""
+    found = metadata.get("batches")
+    return [dict(one) for one in found if isinstance(one, dict)] if isinstance(found, list) else []
+
+
+def requested_tasks(metadata: Mapping[str, Any]) -> frozenset[str] | None:
+    """Return the tasks that run.json says were requested, or None for all."""
+    requested: set[str] = set()
+    for batch in batches(metadata):
+        if not isinstance(batch.get("tasks"), list):
+            return None
+        requested |= {*batch["tasks"]}
+    return frozenset(requested)
+
+
+OPTIONAL_ENTRIES = ("mode", "contract", "max_mission_tokens")  # left out of run.json if unset
+
+
+def _expect_same(earlier: dict[str, Any], fixed: dict[str, Any], file: Path) -> None:
+    before, now = ({**values, **values["settings"], "settings": None} for values in (earlier, fixed))
+    for name, value in {**dict.fromkeys(OPTIONAL_ENTRIES), **now}.items():
+        if before.get(name) != value:
+            what = "prompt template" if name == "template" else name.replace("_", "-")
+            which = f"a different {what} ({_brief(before.get(name))}, now {_brief(value)})"
+            sentence = f"the completions were generated with {which}; name another folder to start over"
+            raise UserError(sentence, file=file)
+
+
+def _brief(value: object) -> str:
+    return brief("none" if value is None else str(value), 24)
+
+
+def timestamp() -> str:
+    """Return the current time, to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+class RequestLog:
+    """Logs each request before it is sent, and each end of a request without a completion.
+
+    A request with neither an end nor a completion was pending when the run was interrupted, and may be billed
+    twice. The file starts anew with each command, and is deleted when a run ends normally.
+    """
+
+    def __init__(self, path: Path, done: set[CompletionKey]) -> None:
+        self.path = path
+        self.interrupted = len(self._read() - done)  # requests pending at the last interruption
+        self.under_way: set[CompletionKey] = set()
+
+    def __enter__(self) -> Self:
+        """Start a new file, because run.json now counts the pending requests."""
+        write_whole(self.path, b"")
+        self._file = Appender(self.path)
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        with contextlib.suppress(OSError):  # a full disk has already been reported
+            self._file.close()
+        if kind is None and not self.under_way:
+            self.path.unlink()
+
+    def sent(self, key: CompletionKey) -> None:
+        """Log a request before it is sent. If the disk is full, the OSError prevents the request."""
+        self._file.append(to_line({"sent": key}))
+        self.under_way.add(key)
+
+    def ended(self, key: CompletionKey) -> None:
+        """Log that a pending request has failed, or that its reply, a turn of a mission, has been saved."""
+        if key in self.under_way:
+            self.kept(key)
+            self._file.append(to_line({"ended": key}))
+
+    def kept(self, key: CompletionKey) -> None:
+        """Forget a request whose completion has been saved."""
+        self.under_way.remove(key)
+
+    def _read(self) -> set[CompletionKey]:
+        pending: set[CompletionKey] = set()
+        for number, row in read_rows(self.path, growing=True) if self.path.exists() else ():
+            match row:
+                case {"sent": [str(task), int(prompt), int(index)]}:
+                    pending.add((task, prompt, index))
+                case {"ended": [str(task), int(prompt), int(index)]}:
+                    pending.discard((task, prompt, index))
+                case _:
+                    raise UserError(
+                        "this line is not a request; delete the file", file=self.path, line=number
+                    )
+        return pending

@@ -1,0 +1,1 @@
+"""Judges traces, and explains and stores the verdicts."""

@@ -1,0 +1,149 @@
+"""Explains verdicts: what a program did in each world, and which step broke a requirement."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from codebotler.checking.storyboard import steps_of
+from codebotler.core.terminal import shortened
+from codebotler.core.text.words import counted
+from codebotler.core.trace import Trace
+from codebotler.rtl import explain
+from roboeval.evaluation.judging.failures import no_program_sentence
+from roboeval.evaluation.runs.completions import KEY, Completion
+from roboeval.evaluation.runs.replies import reply_data
+from roboeval.evaluation.runs.traces import trace_of
+from roboeval.suites.load import Scenario, Suite
+
+INSTRUCTION_NOT_RECORDED = "instruction not recorded"
+OF_SUITE = "the suite's current prompt is:"
+PROGRAM_GONE = "the judged program is no longer in this run"
+SUITE_CHANGED = "the suite has changed since this was judged"
+TRACE_CUT = "the trace was too long to save, so this cannot be explained"
+TRACES_TOO_LONG = "the traces of this program are too long to explain this check"
+
+LOWERCASED_NOTE = "This suite lower-cases strings before running; shown as judged."
+MAX_PROGRAM_LINES = 1_000
+MAX_EXPLAINED_SIZE = 100_000  # characters of all traces of a completion
+EVENT_SIZE = 10  # characters that each event counts for in addition to its texts
+
+
+def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dict[str, Any]:
+    """Explain why a completion fails: the first failing world, and the error or failed check there."""
+    why = row["failure"]
+    verdict = row["verdicts"][why["world"]]
+    ending = {key: verdict[key] for key in ("world", "error", "line")}
+    if why["check"] is None:
+        explanation = no_program_sentence(why)
+        return {"passed": False, "failure": why, **ending, "explanation": explanation, "step": None}
+    scenario = _scenario(suite, row, why["world"], ablated=ablated)
+    explained = _explained(why["check"], scenario, verdict, trace_of(verdict), ExplanationBudget())
+    return {"passed": False, "failure": why, **ending, **explained}
+
+
+def completion_data(
+    row: Mapping[str, Any], completion: Completion | None, suite: Suite | None, *, ablated: bool = False
+) -> dict[str, Any]:
+    """Describe a completion: its instruction, its program, and the steps and failed checks in each world."""
+    budget = ExplanationBudget()
+    return {
+        **{key: row[key] for key in (*KEY, "passed", "failure")},
+        **{key: getattr(completion, key, None) for key in ("model", "instruction", "program")},
+        "suite_instruction": suite_instruction(suite, row["task"], row["prompt"]),
+        "reply": reply_data(completion),
+        "lowered": suite is not None and suite.settings.literals == "lowercase",
+        "worlds": [
+            _world_data(verdict, _scenario(suite, row, number, ablated=ablated), budget)
+            for number, verdict in enumerate(row["verdicts"])
+        ],
+    }
+
+
+def suite_instruction(suite: Suite | None, task: str, prompt: int) -> str | None:
+    """Return the suite's own text of a prompt, or None if the suite lacks the prompt."""
+    prompts = () if suite is None or task not in suite.tasks else suite.tasks[task].prompts
+    return prompts[prompt] if prompt < len(prompts) else None
+
+
+def instruction_shown(recorded: str | None, of_suite: str | None) -> tuple[str | None, str | None]:
+    """Return a note on the origin of an instruction, and the instruction. Each is None if there is none."""
+    if recorded is not None or of_suite is None:
+        return INSTRUCTION_NOT_RECORDED if recorded is None else None, recorded
+    return f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}", of_suite
+
+
+def failing_first(worlds: Iterable[Mapping[str, Any]]) -> list[tuple[int, Mapping[str, Any]]]:
+    """Number the worlds from 1, and put the failing ones first."""
+    return sorted(enumerate(worlds, 1), key=lambda one: bool(one[1]["satisfied"]))
+
+
+class ExplanationBudget:
+    """Limits how much of a completion's traces is analysed to explain failed checks."""
+
+    def __init__(self) -> None:
+        self._left = MAX_EXPLAINED_SIZE
+
+    def covers(self, trace: Trace) -> bool:
+        """Subtract a trace from the budget, and return whether enough was left to explain a check on it."""
+        texts = [text for event in trace for text in (event.text, *(option.text for option in event.options))]
+        self._left -= EVENT_SIZE * len(trace) + sum(map(len, texts))
+        return self._left >= 0
+
+
+def _scenario(suite: Suite | None, row: Mapping[str, Any], number: int, *, ablated: bool) -> Scenario | None:
+    task = None if suite is None else suite.tasks.get(row["task"])
+    scenarios = () if task is None else task.judged_in(ablated=ablated)
+    about = row["verdicts"][number]["world"]
+    return next((s for s in (*scenarios[number : number + 1], *scenarios) if s.world.about == about), None)
+
+
+def _world_data(
+    verdict: Mapping[str, Any], scenario: Scenario | None, budget: ExplanationBudget
+) -> dict[str, Any]:
+    trace, cut = trace_of(verdict), verdict.get("cut")
+    return {
+        **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
+        "steps": steps_of(trace, has_places=True),
+        **({} if cut is None else {"cut": cut}),
+        "failed_checks": [
+            {"check": check, **_explained(check, scenario, verdict, trace, budget)}
+            for check in verdict["failed_checks"]
+        ],
+    }
+
+
+def _explained(
+    check: str, scenario: Scenario | None, verdict: Mapping[str, Any], trace: Trace, budget: ExplanationBudget
+) -> dict[str, Any]:
+    if "cut" in verdict:
+        return {"explanation": TRACE_CUT, "step": None}
+    require = () if scenario is None else scenario.require
+    requirement = next((r for r in require if r.text == check), None)
+    if requirement is None:
+        return {"explanation": f"{SUITE_CHANGED} and no longer has this requirement here", "step": None}
+    if not budget.covers(trace):
+        return {"explanation": TRACES_TOO_LONG, "step": None}
+    why = explain(requirement.formula, trace)
+    if why is None:
+        return {"explanation": f"{SUITE_CHANGED}; this requirement is now satisfied", "step": None}
+    return {"explanation": why.sentence, "step": None if why.event is None else why.event + 1}
+
+
+def error_sentence(verdict: Mapping[str, Any]) -> str:
+    """Return the message of the error that ended a run, preceded by its line if the line is known."""
+    where = "" if verdict["line"] is None else f"line {verdict['line']}"
+    return ": ".join(filter(None, (where, verdict["error"]["message"])))
+
+
+def first_lines(program: str) -> tuple[str, int]:
+    """Shorten a program for display, and return it with the number of omitted lines."""
+    lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
+    shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MAX_PROGRAM_LINES])
+    return shown, max(0, len(lines) - MAX_PROGRAM_LINES)
+
+
+def cut_sentence(cut: Mapping[str, Any]) -> str:
+    """Return a sentence that says how many steps were not saved."""
+    were = "was" if cut["events"] == 1 else "were"
+    return f"{counted(cut['events'], 'more step')} {were} not saved, because the trace is too long"

@@ -1,0 +1,221 @@
+"""Runs programs in worlds and judges their traces. No other module decides whether a program is right."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+from codebotler.core.errors import UserError
+from codebotler.core.trace import Outcome, Status, Trace
+from codebotler.core.world import World
+from codebotler.rtl import Inconclusive, holds
+from codebotler.rtl.semantics import visible
+from codebotler.simulator.guard.contract import Contract
+from codebotler.simulator.guard.rule_guard import RuleGuard
+from codebotler.simulator.worker import Worker
+from codebotler.simulator.worlds.robot import SimulatedRobot
+from roboeval.evaluation.engines.engine import Local, OpenEngine, Work
+from roboeval.evaluation.judging.failures import Verdict
+from roboeval.evaluation.judging.result_cache import ResultCache
+from roboeval.evaluation.judging.serialization import add_reply_fault, judgements_for, row_line
+from roboeval.evaluation.judging.time_limit import TimeLimitExceeded, time_limit
+from roboeval.evaluation.runs.completions import Acted, Completion, find_key_fault, name_of
+from roboeval.evaluation.runs.endings import apply_ending
+from roboeval.evaluation.runs.rows import Row
+from roboeval.suites.load import Requirement, Scenario, Suite
+
+_log = logging.getLogger("roboeval.evaluation.judging.judge")
+
+BUDGET = 60  # seconds of processor time for judging one program in all its worlds
+
+REQUIREMENT_CACHE: ResultCache[tuple[bool, ...]] = ResultCache()
+JUDGEMENT_CACHE: ResultCache[tuple[bytes, ...]] = ResultCache()
+
+
+def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
+    """Judge a run in a world by the requirements of all prompts.
+
+    A run that ends in an error fails, whatever it did before. A run that reaches a limit also fails, unless
+    programs may wait forever in that world. In that case, the requirements decide.
+    """
+    if not may_satisfy(outcome, scenario):
+        return Verdict(scenario.world.about, outcome, (), satisfied=False)
+    failed = tuple(r for r, met in zip(scenario.require, are_met(outcome, scenario), strict=True) if not met)
+    return Verdict(scenario.world.about, outcome, failed, satisfied=not failed)
+
+
+def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
+    """Whether the requirements decide, because the run ended normally or was allowed to wait forever."""
+    waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
+    return waited or outcome.status is Status.FINISHED
+
+
+def are_met(outcome: Outcome, scenario: Scenario) -> tuple[bool, ...]:
+    """Return, for each requirement, whether the trace of a run satisfies it."""
+
+    def check() -> tuple[bool, ...]:
+        return tuple([is_met(one, outcome.trace) for one in scenario.require])
+
+    formulas = [id(one.formula) for one in scenario.require]
+    return REQUIREMENT_CACHE.of((visible(outcome.trace), *formulas), scenario, [outcome], check)
+
+
+def is_met(requirement: Requirement, trace: Trace) -> bool:
+    """Whether a trace satisfies a requirement. An inconclusive result counts as not satisfied."""
+    try:
+        return holds(requirement.formula, trace)
+    except Inconclusive:
+        return False
+
+
+def evaluate(
+    completions: Iterable[Completion],
+    suite: Suite,
+    *,
+    ablated: bool = False,
+    workers: int = 1,
+    require_isolation: bool = False,
+    engine: OpenEngine | None = None,
+) -> Iterator[Row]:
+    """Judge completions and yield a row for each, in input order. Equal programs of a task run once.
+
+    A completion that takes more than 60 seconds of processor time to judge gets no row, and a warning is
+    logged. This limit applies only in the main thread.
+
+    Args:
+        completions: completions for tasks of the suite; an iterator is consumed lazily.
+        suite: the tasks and simulation settings.
+        ablated: whether to require only common sense; then every task needs an ablation.
+        workers: the number of programs to run in parallel.
+        require_isolation: whether to raise an error, rather than warn, if programs are not fully isolated.
+        engine: the engine that runs programs; by default a pool of workers on this machine.
+
+    Raises:
+        UserError: there are no workers, or a completion does not belong to the suite.
+        EngineError: no isolated process can be started.
+    """
+    chosen = engine or Local(workers, require_isolation=require_isolation)
+    found = judgements(completions, suite, ablated=ablated, engine=chosen)
+    return (json.loads(row_line(completion, one)) for completion, one in found if one is not None)
+
+
+def judgements(
+    completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
+) -> Iterator[tuple[Completion, bytes | None]]:
+    """Yield each completion and its judgement as JSON, or None and a warning if judging takes too long."""
+    waiting: deque[Completion] = deque()
+
+    def works() -> Iterator[Work]:
+        for completion in completions:
+            _expect_judgeable(completion, suite, ablated=ablated)
+            waiting.append(completion)
+            acted = completion.acted
+            where = () if acted is None else (str(acted.world), acted.ending)
+            yield completion.task, completion.program, *where
+
+    with engine as opened:
+        running = partial(run_in_worlds, suite, ablated=ablated)
+        judging = partial(judge_outcomes, suite, ablated=ablated)
+        for by_prompt in opened.map_distinct(running, works(), judging):
+            completion = waiting.popleft()
+            if by_prompt is None:
+                _log.warning(
+                    "%s was not judged, because that takes more than %g seconds of processor time; "
+                    "`roboeval tasks --lint` finds slow regexes",
+                    name_of(completion.key),
+                    BUDGET,
+                )
+                yield completion, None
+            else:
+                yield completion, add_reply_fault(completion, by_prompt[completion.prompt])
+
+
+def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:
+    if not isinstance(completion, Completion):  # for example a row of a file
+        kind = type(completion).__name__
+        what = "make it a Completion(task=..., prompt=..., index=..., program=...)"
+        raise UserError(f"a completion has the type {kind}; {what}")
+    if (problem := find_key_fault(completion.key, suite)) is not None:
+        raise UserError(problem)
+    if ablated and suite.tasks[completion.task].ablation is None:
+        raise UserError(f'the task "{completion.task}" has no ablation')
+    worlds = suite.tasks[completion.task].judged_in(ablated=ablated)
+    if completion.acted is not None and (ablated or completion.acted.world >= len(worlds)):
+        what = "an ablation" if ablated else f"world {completion.acted.world}"
+        raise UserError(
+            f"{name_of(completion.key)} is a mission of an agent, which cannot be judged in {what}"
+        )
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What a program did in the worlds in which it is judged."""
+
+    task: str
+    acted: Acted | None  # where an agent acted; None for a program, which is judged in all worlds
+    outcomes: Sequence[Outcome]
+
+    def scenarios(self, suite: Suite, *, ablated: bool) -> tuple[Scenario, ...]:
+        """Return the worlds with their requirements."""
+        scenarios = suite.tasks[self.task].judged_in(ablated=ablated)
+        return scenarios if self.acted is None else scenarios[self.acted.world :][:1]
+
+
+def run_in_worlds(suite: Suite, worker: Worker, works: Sequence[Work], *, ablated: bool) -> list[Ran]:
+    """Run programs in the worlds of their tasks, and missions of agents in the worlds where they acted."""
+    planned = [
+        (program, Ran(task, Acted(int(where[0]), where[1]) if where else None, ()))
+        for task, program, *where in works
+    ]
+    jobs = [
+        (program, [partial(robot_in, one.world, suite) for one in ran.scenarios(suite, ablated=ablated)])
+        for program, ran in planned
+    ]
+    return [
+        replace(ran, outcomes=_with_ending(outcomes, ran.acted))
+        for (_, ran), outcomes in zip(planned, worker.run_all(jobs), strict=True)
+    ]
+
+
+def _with_ending(outcomes: list[Outcome], acted: Acted | None) -> list[Outcome]:
+    return outcomes if acted is None else [apply_ending(outcome, acted.ending) for outcome in outcomes]
+
+
+def robot_in(world: World, suite: Suite, contracts: Sequence[Contract] = ()) -> SimulatedRobot:
+    """Return a simulated robot in a world, with the simulation settings and house rules of a suite."""
+    return SimulatedRobot(world, suite.settings, suite.skills, guard=guard_of(suite, contracts))
+
+
+def guard_of(suite: Suite, contracts: Sequence[Contract] = ()) -> RuleGuard | None:
+    """Return what holds calls against the house rules of a suite and some contracts, or None without any."""
+    if suite.house is None and not contracts:
+        return None
+    return RuleGuard(suite.house_rules, contracts=contracts)
+
+
+def run_in(
+    worker: Worker, programs: Sequence[str], scenarios: Iterable[Scenario], suite: Suite
+) -> list[list[Outcome]]:
+    """Run each program in each of some worlds."""
+    robots = [partial(robot_in, scenario.world, suite) for scenario in scenarios]
+    return worker.run_all([(program, robots) for program in programs])
+
+
+def judge_outcomes(suite: Suite, ran: Ran, *, ablated: bool) -> tuple[bytes, ...] | None:
+    """Return the judgement on a program for each prompt as JSON, or None if judging takes too long."""
+    outcomes, scenarios = ran.outcomes, ran.scenarios(suite, ablated=ablated)
+
+    def compute() -> tuple[bytes, ...]:
+        with time_limit(BUDGET):
+            verdicts = [judge(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)]
+            return judgements_for(verdicts, len(suite.tasks[ran.task].prompts))
+
+    try:
+        key = (*map(id, outcomes), *map(id, scenarios))
+        return JUDGEMENT_CACHE.of(key, (tuple(outcomes), scenarios), outcomes, compute)
+    except TimeLimitExceeded:
+        return None

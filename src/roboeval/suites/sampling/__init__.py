@@ -1,0 +1,1 @@
+"""Samples the worlds of tasks."""
