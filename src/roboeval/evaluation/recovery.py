@@ -184,6 +184,7 @@ def recovery_data(results: Sequence[FaultResult]) -> dict[str, int | float | Non
         "continued": continued,
         "passed": len(passed) / continued if continued else None,
         "rejected": ends["rejected"] / continued if continued else None,
+        "failed": ends["failed"] / continued if continued else None,
         "steps": sum(one.steps for one in passed),
         "shortest_steps": sum(one.shortest for one in passed),
         "repeated": sum(one.repeated for one in results),

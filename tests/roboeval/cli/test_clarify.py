@@ -66,4 +66,4 @@ def test_a_run_keeps_the_result_for_the_report(source: Path, tmp_path: Path) -> 
 
 
 def test_too_few_completions(source: Path) -> None:
-    assert "--candidates" in refused("clarify", source, "--workers", "1").sentence
+    assert "--candidates" in refused("clarify", source, "--candidates", "10", "--workers", "1").sentence

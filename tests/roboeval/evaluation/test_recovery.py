@@ -156,6 +156,7 @@ def test_shares_are_of_missions_with_a_continuation() -> None:
         "continued": 4,
         "passed": 0.25,
         "rejected": 0.5,
+        "failed": 0.25,
         "steps": 5,
         "shortest_steps": 4,
         "repeated": 3,

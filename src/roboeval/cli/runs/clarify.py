@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Annotated
 
 import typer
@@ -22,8 +23,14 @@ def clarify(
     source: SourceArgument,
     suite: SuiteOption = "paper",
     candidates: Annotated[
-        int, typer.Option(min=2, max=20, help="Number of candidates that a model writes for a prompt.")
-    ] = 10,
+        int | None,
+        typer.Option(
+            min=2,
+            max=20,
+            help="Number of candidates that a model writes for a prompt; by default 10, or all there are.",
+            show_default=False,
+        ),
+    ] = None,
     noise: Annotated[
         float,
         typer.Option(min=0, max=1, help="Share of questions that the simulated person answers wrongly."),
@@ -49,8 +56,9 @@ def clarify(
     completions = opened.of(None)
     if opened.run is not None:
         known = with_judged_worlds(opened.run, known, ablated=False)
-    settings = ClarifySettings(candidates, noise, seed)
-    count = len({(one.task, one.prompt) for one in completions})
+    by_prompt = Counter((one.task, one.prompt) for one in completions)
+    candidates = candidates or max(2, min(10, max(by_prompt.values(), default=0)))
+    settings, count = ClarifySettings(candidates, noise, seed), len(by_prompt)
     with WorkerPool(workers or cores()) as pool:
         prompts = [*show_progress(clarify(completions, known, pool, settings), "asking", count)]
     data = measurement_data(completions, known, settings, prompts)

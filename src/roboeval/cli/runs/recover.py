@@ -86,18 +86,19 @@ def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
     from roboeval.cli.views.results import ruled
     from roboeval.evaluation.recovery import recovery_data
 
-    table = ruled(
-        "task", "faults", "handled", "missing", "continued", "passed", "rejected", "steps", "repeated"
-    )
+    shares = "passed", "rejected", "failed"
+    table = ruled("task", "faults", "handled", "missing", "continued", *shares, "steps", "fewest", "repeated")
     for task in [*dict.fromkeys(one.task for one in results), "all"]:
         data = recovery_data([one for one in results if task in {one.task, "all"}])
-        *counts, passed, rejected, steps, shortest, repeated = data.values()
-        shares = ("-" if share is None else f"{share:.3f}" for share in (passed, rejected))
-        table.add_row(task, *map(str, counts), *shares, f"{steps} of {shortest}", str(repeated))
+        cells = (
+            "-" if value is None else f"{value:.3f}" if name in shares else str(value)
+            for name, value in data.items()
+        )
+        table.add_row(task, *cells)
     lines = [
         "handled: errors that the program handled itself; missing: missions for which the model had no rest",
-        "passed, rejected: shares of the continued missions",
-        "steps: those of the missions that passed, and the fewest possible",
+        "passed, rejected, failed: shares of the continued missions, by the check or in the end",
+        "steps: those of the missions that passed; fewest: without an error",
         "repeated: how often robots spoke, picked up or put down more than without an error",
     ]
     return Group(Text(title, "bold"), Text(), table, *(Text(line, "dim") for line in lines))

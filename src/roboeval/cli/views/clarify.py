@@ -25,7 +25,7 @@ def clarify_view(data: Mapping[str, Any], title: str, candidates: int) -> Render
     table.add_section()
     table.add_row("all", "", *_cells(data), style="bold")
     lines = [
-        "one program, majority and one question: pass@1",
+        "pass@1 of one program, of the largest group with one behaviour, and of what a person chooses",
         "mattered: questions whose answer changed the verdict on the largest group of programs",
     ]
     if data["tokens"] is not None:
