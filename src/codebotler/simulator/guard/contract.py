@@ -111,7 +111,8 @@ class SkillBound:
         if sum(wider) != 1:
             return self if any(wider) else None
         texts = (new if new[1] != () else old for new, old in zip(added, self.texts, strict=True))
-        return SkillBound(tuple(texts), self.places if places == () else places, self.at_most)
+        most = self.at_most if is_more else 0
+        return SkillBound(tuple(texts), self.places if places == () else places, most)
 
 
 @dataclass(frozen=True)
