@@ -77,7 +77,6 @@ async def write_program(
     *,
     retries: int = 0,
     repair: bool = False,
-    on_text: TextListener = ignore_text,
     on_attempt: Callable[[Attempt], None] = ignore_attempt,
 ) -> Generation:
     """Ask a model until the check accepts a program (rejection sampling; paper, section V).
@@ -89,7 +88,7 @@ async def write_program(
     limited, request = RateLimited(model, concurrency=1), prompt
     try:
         for number in range(retries + 1):
-            reply = await limited.reply(request, number=number, on_text=on_text)
+            reply = await limited.reply(request, number=number)
             attempts.append(await make_attempt(number, request, reply, model.settings, find_problems))
             on_attempt(attempts[-1])
             if not attempts[-1].problems:

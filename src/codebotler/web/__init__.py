@@ -1,4 +1,4 @@
 """The operator's console in a browser: a web page and its API.
 
-Start with `page.py` and `panes/`; `server.py` serves them, and `guard.py` protects them.
+Start with `page.py` and `panes/`; `server.py` serves them, and `security/guard.py` protects them.
 """

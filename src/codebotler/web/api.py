@@ -206,7 +206,10 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/stop", status_code=202)
     async def stop(
-        *, only_moving: Annotated[bool, Query(description="Stop only if a program is running.")] = False
+        *,
+        only_moving: Annotated[
+            bool, Query(description="Stop only a program that is approved or runs.")
+        ] = False,
     ) -> dict[str, Any]:
         """Stop the current mission, and return whether there was one to stop."""
         return {"stopping": console.stop(BY_PAGE, only_moving=only_moving)}

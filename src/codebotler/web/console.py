@@ -28,6 +28,7 @@ from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
 from codebotler.simulator.guard.contract import Contract
 from codebotler.simulator.guard.house_rule import Rule
+from codebotler.simulator.pool import SHARED_POOL
 from codebotler.simulator.worlds.room_map import RoomMap
 
 MAX_PROGRAM_CHARACTERS = 200_000
@@ -88,8 +89,12 @@ class Console:
         """Stop the current mission, and wait until it is over, but not for long if nothing has moved."""
         with self._lock:
             session, self._may_recover = self.session, None
+        is_checking = self._checking.locked() or (session is not None and bool(session.view.busy))
         if session is not None:
             session.stop(BY_SHUTDOWN)
+        if is_checking:
+            SHARED_POOL.end()  # else a check delays the end of this process
+        if session is not None:
             session.join(STOP_GRACE_SECONDS + 1 if session.view.progress.has_begun else CLEANUP_SECONDS)
 
     @property
@@ -180,7 +185,6 @@ class Console:
                 view = session.wait_until(lambda now: now.may_be_approved or now.waits_for_program)
                 if approval is not None and approval.allows(view, past) and self._may_recover is session:
                     session.approve(view.digest, by=f"the approval of mission {past.mission}")
-                    session.wait_until(lambda now: now.is_running)  # from then on, `stop` stops it
                     if self._may_recover is not session:
                         session.stop(BY_PAGE)
 

@@ -59,6 +59,7 @@ def test_known_texts(lines: list[str], texts: set[str]) -> None:
         ["rooms = ['a'] + get_all_rooms()", "for room in rooms:", "    say(room)"],
         ["for letter in 'ab':", "    say(letter)"],
         ["a = 'x'", "f = lambda a: say(a)", "f(get_current_location())"],
+        ["a = 'x'", "f = lambda *, a: say(a)", "f(a=get_current_location())"],
         ["x = 'a'", "for _ in range(3):", "    x = x + x", "say(x)"],
     ],
 )

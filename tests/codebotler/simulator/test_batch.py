@@ -480,7 +480,7 @@ FORGED = {
     "no end": b"[[],0,{}]",
     "an error of the robot that there was not": b'[[],0,{"end":"robot-error","number":0,"line":1}]',
     "an error without a name": b'[[],0,{"end":"python-error","kind":1,"message":"a"}]',
-    "a drive that cannot be": b'[[["go_to",["moon"],"ok",null]],[],{"end":"finished"}]',
+    "a drive that cannot be": b'[[["go_to",["moon"],0,"ok",null]],0,{"end":"finished"}]',
     "too much": b" " * (MAX_FRAME + 1),
 }
 

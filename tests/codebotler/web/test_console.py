@@ -532,6 +532,19 @@ def test_a_draft_that_nobody_saw_is_no_draft_before(tmp_path: Path, monkeypatch:
         assert until(console, lambda view: view.may_be_approved and view.program == HELLO).earlier is not None
 
 
+@pytest.mark.slow
+def test_a_check_does_not_delay_the_end(tmp_path: Path) -> None:
+    slow = "def task_program():\n    while True:\n        sum(range(10**9))\n"
+    with desk_of(tmp_path) as console:
+        session = console.begin(MissionOrder(program=slow))
+        until(console, lambda view: view.busy == "checking" and bool(view.id))
+        time.sleep(0.3)
+        began = time.monotonic()
+        console.end()
+        session.join(20)
+        assert time.monotonic() - began < 5
+
+
 def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     go_on = threading.Event()
 

@@ -50,7 +50,7 @@ class PossibleValues:
             for target, value in _bindings(node):
                 self._bind(target, value)
             if isinstance(node, ast.Lambda):
-                for one in node.args.args:
+                for one in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs):
                     self._values[one.arg].append(None)
             elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
                 self._bind_parameters(node, self._functions.get(node.func.id))

@@ -91,7 +91,7 @@ def run(console: Console, request: Request) -> int:
     Returns:
         the exit status: 0 if the mission is done, 128 plus the number of a signal that stopped it, or else 1.
     """
-    order, approval = request.order_on(console), None
+    order, approval, begun = request.order_on(console), None, SessionView()
     with console:
         for left in range(request.recoveries, -1, -1):
             session = console.begin(order)
@@ -104,11 +104,12 @@ def run(console: Console, request: Request) -> int:
                 if left == request.recoveries:
                     raise
                 note(error.sentence)
-                return 1
+                status = 1
+            begun = session.view if session.view.progress.has_begun else begun
             past = past_to_recover(session, console.robot, console.home) if left and status == 1 else None
             if past is None:
-                if status and session.view.progress.has_begun:
-                    print_rich(continue_view(session.view))
+                if status and begun.id:
+                    print_rich(continue_view(begun))
                 return status
             approval = approval or PriorApproval.of(session.view)
             order = console.rest_of(past)

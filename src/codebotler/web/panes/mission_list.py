@@ -77,7 +77,8 @@ class _MissionList:
 
     def _show(self) -> None:
         words = (self._text.value or "").casefold().split()
-        found = [summary for summary in reversed(self._known) if has_words(summary, words)]
+        view = self._console.view
+        found = [one for one in reversed(self._known) if has_words(one, state_words(one, view), words)]
         self._count.say(_count_text(len(found), len(self._known)))
         found = found[:MAX_LISTED_MISSIONS]
         for gone in self._rows.keys() - {summary.id for summary in found}:
@@ -99,9 +100,9 @@ def state_words(summary: MissionSummary, view: SessionView) -> str:
     return "waits for approval" if summary.state is MissionState.CHECKED else str(summary.state)
 
 
-def has_words(summary: MissionSummary, words: Sequence[str]) -> bool:
+def has_words(summary: MissionSummary, state: str, words: Sequence[str]) -> bool:
     """Whether all words, in lower case, are in the state, robot, instruction, program or reason."""
-    texts = (summary.state, summary.robot, summary.instruction, summary.program, summary.reason)
+    texts = (state, summary.robot, summary.instruction, summary.program, summary.reason)
     everything = "\n".join(texts).casefold()
     return all(word in everything for word in words)
 

@@ -97,7 +97,7 @@ def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
         table.add_row(task, *cells)
     lines = [
         "handled: errors that the program handled itself; missing: missions for which the model had no rest",
-        "passed, rejected, failed: shares of the continued missions, by the check or in the end",
+        "passed, rejected (by the check), failed: shares of the continued missions",
         "steps: those of the missions that passed; fewest: without an error",
         "repeated: how often robots spoke, picked up or put down more than without an error",
     ]
