@@ -18,10 +18,9 @@ from codebotler.candidates.question import ClarifyingQuestion
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.missions.mission import MissionError
-from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.session import MissionSession
 from codebotler.missions.storage.past import MissionPast
-from codebotler.models.base import ModelError, ignore_text
+from codebotler.models.base import ModelError
 
 MAX_ARGUMENT = 10_000
 """The limit for an instruction, in characters."""
@@ -92,17 +91,14 @@ async def read_last_past(ctx: AgentContext) -> MissionPast:
         return await gatekeeper.alone(READING_PAST, partial(console.past_of, "last"))
 
 
-async def ask_whether(
+def ask_whether(
     past: Annotated[MissionPast, Resolve(read_last_past)], ctx: AgentContext
 ) -> Elicit[StepWord] | NotAsked:
-    """Have the client ask its person whether an unsure step happened, beside what the robot says."""
+    """Have the client ask its person whether an unsure step happened, beside what the log says."""
     gatekeeper = gatekeeper_of(ctx)
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
         return NotAsked()
-    robot, home = gatekeeper.console.robot, gatekeeper.console.home
-    with as_tool_errors():
-        evidence = await gatekeeper.alone(READING_PAST, partial(ask_evidence, robot, home, past, ignore_text))
-    return Elicit("\n".join((past.question, *evidence)), StepWord)
+    return Elicit(f"{past.question}\n{past.was}".rstrip(), StepWord)  # an agent may not occupy the robot
 
 
 async def find_session(digest: str, ctx: AgentContext) -> MissionSession:
@@ -135,7 +131,10 @@ def gatekeeper_of(ctx: AgentContext) -> Gatekeeper:
 def agent_name(ctx: AgentContext) -> str:
     """Return the agent's name for logs, as its client gives it."""
     known = ctx.session.client_params
-    return f"agent {shortened(known.client_info.name, 60)}" if known is not None else "an agent"
+    if known is None:
+        return "an agent"
+    name = shortened(known.client_info.name, 60).replace('"', "'")
+    return f'agent "{name}"'
 
 
 def _has_dialogs(ctx: AgentContext) -> bool:

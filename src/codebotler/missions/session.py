@@ -117,7 +117,7 @@ class MissionSession(SharedView):
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
             self._next_task = partial(self._take, program=program)
-            self._change(program=program, author="", disabled_rules=(), **UNCHECKED)
+            self._change(program=program, author="", question=None, disabled_rules=(), **UNCHECKED)
 
     def switch_off(self, name: str, reason: str) -> None:
         """Switch off a rule for this program only, log the reason, and check the program again."""
@@ -169,7 +169,7 @@ class MissionSession(SharedView):
         """Approve the program that the person saw, identified by its digest. `by` goes to the log."""
         with self._editing:
             view, mission = self._view, self._mission
-            if mission is None or view.busy:
+            if mission is None or view.busy or view.question is not None:
                 raise MissionError("the program has not been checked yet")
             if seen != view.digest or seen != program_digest(mission.summary.program):
                 raise MissionError("the program has changed; review it again")

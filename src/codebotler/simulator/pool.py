@@ -287,10 +287,14 @@ class ResultFile:
 
 
 def shared_pool() -> WorkerPool:
-    """Return this process's pool, started on first use with a worker per core. A fork gets its own pool."""
+    """Return this process's pool, started on first use with a worker per core. A fork gets its own pool.
+
+    There are at least two workers, so that the check of an agent's program does not hold up a person's.
+    """
     with SHARED_POOL.lock:
         if SHARED_POOL.pool is None:
-            SHARED_POOL.pool = WorkerPool(cores()).__enter__()  # raises EngineError if it cannot start
+            workers = max(2, cores())
+            SHARED_POOL.pool = WorkerPool(workers).__enter__()  # raises EngineError if it cannot start
         return SHARED_POOL.pool
 
 

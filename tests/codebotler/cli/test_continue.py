@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import json
 import os
+import signal
+import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from codebotler.cli.operating.run import Request, run
+from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
 from codebotler.missions.storage.log import EVENTS_FILE, SUMMARY_FILE
+from codebotler.missions.storage.store import read_missions
+from codebotler.robots.simulated import Simulated
+from codebotler.web.console import Console
 from command_line import Ended, command
+from doubles import Several
 from ended import cut, failed_mission, line_of
-from server import Request, Server
+from server import Request as ModelRequest
+from server import Server
 
 WORLD = """
 robot: hall
@@ -79,7 +88,7 @@ def server(*programs: str) -> Server:
     return one
 
 
-def asked(request: Request) -> str:
+def asked(request: ModelRequest) -> str:
     return str(request.body["messages"][-1]["content"])
 
 
@@ -141,6 +150,28 @@ def test_recover_gives_up_after_so_many_times(folder: Path, times: int) -> None:
         gave_up = ended(folder, "run", "Ask Bob.", *at(model), "--yes", "--recover", str(times))
     assert gave_up.status == 1
     assert len(missions(folder)) == times + 1
+
+
+class Interrupted(Simulated):
+    """A robot whose user presses Ctrl-C as soon as the mission has failed."""
+
+    def disconnect(self) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.1)
+        super().disconnect()
+
+
+def test_nothing_is_recovered_after_a_signal(tmp_path: Path) -> None:
+    world = World((Room("hall"), Room("kitchen")), "hall")
+    model = Several(('def task_program():\n    go_to("kitchen")\n    pick("mug")\n', REST))
+    console = Console(Interrupted(world, speed=None), tmp_path, lambda _: model, models=("m",), world=world)
+    handlers = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    try:
+        status = run(console, Request("Fetch the mug.", yes=True, recoveries=1))
+    finally:
+        for one, handler in handlers.items():
+            signal.signal(one, handler)
+    assert (status, len(read_missions(tmp_path))) == (128 + signal.SIGINT, 1)
 
 
 def test_recover_asks_for_approval_of_what_was_not_approved(folder: Path) -> None:

@@ -150,6 +150,14 @@ def test_an_answer_to_an_earlier_question_is_refused(tmp_path: Path) -> None:
         assert session.view.waits_for_answer
 
 
+def test_an_edit_takes_the_place_of_the_question(tmp_path: Path) -> None:
+    with asking(tmp_path, STAY, FETCH) as (session, _):
+        waited(session)
+        session.edit(GO)
+        view = session.wait_until(lambda now: now.may_be_approved)
+        assert (view.program, view.question) == (GO, None)
+
+
 def test_a_stop_ends_the_question(tmp_path: Path) -> None:
     with asking(tmp_path, STAY, FETCH) as (session, _):
         waited(session)

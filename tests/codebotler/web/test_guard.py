@@ -131,6 +131,12 @@ def test_only_names_have_control_characters(server: PageServer, path: str, statu
     assert server.call("GET", path).status == status
 
 
+def test_a_cookie_cannot_be_made_from_a_token() -> None:
+    one, other = (Access.from_options("a token that a person chose") for _ in range(2))
+    assert one.of_cookie(one.cookie(Role.OPERATOR)) is Role.OPERATOR
+    assert other.of_cookie(one.cookie(Role.OPERATOR)) is None
+
+
 def test_wrong_tokens_and_cookies_open_nothing(server: PageServer) -> None:
     assert server.ask("GET", "/?token=wrong").status == 401
     assert server.ask("GET", "/api/robot", authorization="Bearer wrong").status == 401

@@ -202,9 +202,9 @@ def _watched(session: MissionSession, view: SessionView, robot: Robot, request: 
     if session.error is not None:
         raise session.error
     print_rich(ending_view(view))
-    if view.state is MissionState.STOPPED and got:
-        return SIGNAL_EXIT_BASE + got[0]
-    return 0 if view.state is MissionState.DONE else 1
+    if view.state is MissionState.DONE:
+        return 0
+    return SIGNAL_EXIT_BASE + got[0] if got else 1  # after a signal, nothing is recovered
 
 
 @contextmanager

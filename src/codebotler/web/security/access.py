@@ -58,6 +58,7 @@ class Access:
     agent: str = field(default_factory=new_token)
     unguessable: frozenset[Role] = frozenset()  # roles with random tokens, for which there is no limit
     now: Callable[[], float] = time.monotonic
+    _secret: bytes = field(default_factory=lambda: secrets.token_bytes(32))  # makes cookies unguessable
     _wrong: dict[str, deque[float]] = field(default_factory=dict)
 
     @classmethod
@@ -101,11 +102,14 @@ class Access:
 
     def of_cookie(self, value: str) -> Role | None:
         """Return the role for a cookie, or None if the cookie is invalid."""
-        return self._of(value, _cookie_value)
+        return self._of(value, self._cookie_value)
 
     def cookie(self, role: Role) -> str:
         """Return a role's cookie, from which the token cannot be derived."""
-        return _cookie_value(self._tokens[role] or "")
+        return self._cookie_value(self._tokens[role] or "")
+
+    def _cookie_value(self, token: str) -> str:
+        return hmac.new(self._secret, token.encode(), hashlib.sha256).hexdigest()
 
     @property
     def _tokens(self) -> Mapping[Role, str | None]:
@@ -116,10 +120,6 @@ class Access:
             if token and hmac.compare_digest(form(token).encode(), shown.encode(errors="replace")):
                 return role
         return None
-
-
-def _cookie_value(token: str) -> str:
-    return hmac.new(token.encode(), b"codebotler cookie", hashlib.sha256).hexdigest()
 
 
 @dataclass(frozen=True)
