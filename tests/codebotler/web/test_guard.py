@@ -24,6 +24,7 @@ from codebotler.web.security.access import (
     PageAddress,
     Role,
     TooManyTriesError,
+    read_cookie_secret,
 )
 from codebotler.web.security.guard import MAX_AGENT_BODY_BYTES, MAX_BODY_BYTES, Guard, _is_same
 from codebotler.web.security.proxy import OuterAddress, proxies_in_front
@@ -135,6 +136,16 @@ def test_a_cookie_cannot_be_made_from_a_token() -> None:
     one, other = (Access.from_options("a token that a person chose") for _ in range(2))
     assert one.of_cookie(one.cookie(Role.OPERATOR)) is Role.OPERATOR
     assert other.of_cookie(one.cookie(Role.OPERATOR)) is None
+
+
+def test_the_secret_of_cookies_outlives_a_restart(tmp_path: Path) -> None:
+    first = read_cookie_secret(tmp_path / "home")
+    assert read_cookie_secret(tmp_path / "home") == first
+    file = tmp_path / "home" / "cookie-secret"
+    assert file.stat().st_mode & 0o777 == 0o600
+    file.write_bytes(b"short")
+    with pytest.raises(UserError):
+        read_cookie_secret(tmp_path / "home")
 
 
 def test_wrong_tokens_and_cookies_open_nothing(server: PageServer) -> None:

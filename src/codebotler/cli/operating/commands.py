@@ -217,10 +217,12 @@ def serve_page(
 
     Ctrl-C ends the server and stops the robot.
     """
+    from dataclasses import replace
+
     from codebotler.cli.operating.serving import open_console
     from codebotler.robots.face import Face
     from codebotler.web.frame import installed_pages
-    from codebotler.web.security.access import Access, PageAddress
+    from codebotler.web.security.access import Access, PageAddress, read_cookie_secret
     from codebotler.web.security.proxy import proxies_in_front
     from codebotler.web.server import serve
 
@@ -228,6 +230,7 @@ def serve_page(
     access = Access.from_options(token, face_token, open_to_all=no_token, is_private=place.is_private)
     shown = Face(face_timeout) if face else None
     console = open_console(model, base_url, shared, candidates=candidates, face=shown, recoveries=recover)
+    access = replace(access, cookie_secret=read_cookie_secret(console.home))
     serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
 
 

@@ -6,15 +6,19 @@ import errno
 import hashlib
 import hmac
 import ipaddress
+import os
 import secrets
 import socket
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 
 from codebotler.core.errors import UserError
+from codebotler.core.files import make_folder
 from codebotler.web.security.proxy import OuterAddress
 
 MAX_WRONG_TOKENS, WRONG_TOKEN_SECONDS = 10, 60.0
@@ -22,6 +26,7 @@ MAX_WRONG_TOKENS, WRONG_TOKEN_SECONDS = 10, 60.0
 
 MAX_ADDRESSES = 10_000
 MIN_TOKEN_LENGTH = 16
+SECRET_BYTES = 32
 LOCAL_HOST_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 PAGE_PORTS = range(8080, 8100)
 AGENT_PATH = "/mcp"
@@ -58,7 +63,7 @@ class Access:
     agent: str = field(default_factory=new_token)
     unguessable: frozenset[Role] = frozenset()  # roles with random tokens, for which there is no limit
     now: Callable[[], float] = time.monotonic
-    _secret: bytes = field(default_factory=lambda: secrets.token_bytes(32))  # makes cookies unguessable
+    cookie_secret: bytes = field(default_factory=lambda: secrets.token_bytes(SECRET_BYTES))
     _wrong: dict[str, deque[float]] = field(default_factory=dict)
 
     @classmethod
@@ -109,7 +114,7 @@ class Access:
         return self._cookie_value(self._tokens[role] or "")
 
     def _cookie_value(self, token: str) -> str:
-        return hmac.new(self._secret, token.encode(), hashlib.sha256).hexdigest()
+        return hmac.new(self.cookie_secret, token.encode(), hashlib.sha256).hexdigest()
 
     @property
     def _tokens(self) -> Mapping[Role, str | None]:
@@ -120,6 +125,25 @@ class Access:
             if token and hmac.compare_digest(form(token).encode(), shown.encode(errors="replace")):
                 return role
         return None
+
+
+def read_cookie_secret(home: Path) -> bytes:
+    """Return the secret that makes cookies unguessable, which the first call stores for later starts.
+
+    Raises:
+        UserError: the file is damaged.
+        OSError: the folder cannot be written.
+    """
+    make_folder(home)
+    file = home / "cookie-secret"
+    with suppress(FileExistsError):
+        descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(descriptor, "wb") as new:
+            new.write(secrets.token_bytes(SECRET_BYTES))
+    secret = file.read_bytes()
+    if len(secret) != SECRET_BYTES:
+        raise UserError("this is not the secret of the page's cookies; remove the file", file=file)
+    return secret
 
 
 @dataclass(frozen=True)
