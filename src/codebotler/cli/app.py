@@ -42,8 +42,6 @@ def generate(
 
     The exit status is 1 if the check finds problems.
     """
-    from functools import partial
-
     from codebotler.checking.sampled import CheckSettings
     from codebotler.cli.programs.candidates import choose_candidate, line_reader, print_checked
     from codebotler.cli.programs.generate import print_prompt, prompt_maker, write
@@ -70,9 +68,8 @@ def generate(
         raise UserError("--candidates cannot be combined with --retries or --repair")
     with suggesting_here(room_map):
         if candidates > 1:
-            opener = partial(open_model, chosen.name, settings)
             how, ask = CheckSettings(skills=table, house_rules=house_rules), line_reader(is_allowed=not yes)
-            given = opener, make_prompt, instruction, how, room_map
+            given = (lambda: open_model(chosen.name, settings)), make_prompt, instruction, how, room_map
             program = choose_candidate(*given, count=candidates, ask=ask)
             accepted = program is not None and print_checked(program, how, room_map)
         else:

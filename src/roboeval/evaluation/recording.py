@@ -93,8 +93,8 @@ class RecordingRobot(SimulatedRobot):
             self.events[before:] = [replace(event, failed=error.kind) for event in self.events[before:]]
             self._write_error(source, error)
             raise
-        told = self.result_text(skill, arguments, result)
-        self.lines.append(source if told == "null" else f"{source}  # {shortened(told)}")
+        text = self.result_text(skill, arguments, result)
+        self.lines.append(source if text == "null" else f"{source}  # {shortened(text)}")
         return result
 
     def sleep_until(self, now: float) -> None:

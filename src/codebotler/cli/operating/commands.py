@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class RunSettings(NamedTuple):
-    """What `run` and `continue` make of the options that they share."""
+    """The values that `run` and `continue` derive from their shared options."""
 
     request: Callable[..., Request]  # takes the other fields of a request
     open_console: Callable[..., Console]

@@ -1,1 +1,1 @@
-"""What people and agents see of a mission while it runs."""
+"""Views of a running mission, for people and agents."""

@@ -40,7 +40,7 @@ def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True)
 
 @dataclass
 class ExploredRoom:
-    """What a program knows about one room."""
+    """The knowledge of a program about one room."""
 
     missed: set[str] = field(default_factory=set)  # looked for and not found
     gone: set[str] = field(default_factory=set)  # picked up here

@@ -123,8 +123,8 @@ async def serve_agent(desk: MissionDesk) -> None:
         return ListToolsResult(tools=desk.tools())
 
     async def call_tool(_: object, asked: CallToolRequestParams) -> CallToolResult:
-        told = desk.call(asked.name, asked.arguments or {})
-        return CallToolResult(content=[TextContent(text=told)])
+        text = desk.call(asked.name, asked.arguments or {})
+        return CallToolResult(content=[TextContent(text=text)])
 
     server: Server[Any] = Server(
         "roboeval",

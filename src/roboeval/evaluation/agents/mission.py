@@ -156,8 +156,8 @@ class AgentMission:
         self._in_a_row = 0
         match self._ledger.perform(skill.name, values):
             case ("ok", result):
-                told = self.robot.result_text(skill.name, values, result)
-                return "done" if told == "null" else told
+                text = self.robot.result_text(skill.name, values, result)
+                return "done" if text == "null" else text
             case ("error", (_, kind, message)):
                 self.mistakes[kind] += 1
                 return f"{kind}: {message}"
