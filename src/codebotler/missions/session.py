@@ -224,15 +224,17 @@ class MissionSession(SharedView):
         with Reservation(self._robot, self._home) as reserved:
             self._stop_button.attach(self._robot)
             name, instruction = self._robot.name, self._order.instruction
+            if (past := self._order.past) is not None:
+                # Another mission may have done the rest since this past was read.
+                expect_rest(find_mission(self._home, past.mission))
             with Mission(self._home, name, instruction, self._add_event, self._stop_button) as mission:
                 self._mission = mission
+                if past is not None:
+                    mission.continue_from(past)
                 self._show(id=mission.id)
                 if self._world is not None:
                     mission.show_map(self._world)
-                if (past := self._order.past) is not None:
-                    # Another mission may have done the rest since this past was read.
-                    expect_rest(find_mission(self._home, past.mission))
-                    mission.continue_from(past)
+                if past is not None:
                     resume_robot(self._robot, past)
                 room_map, place = self._prepare_rooms()
                 self._await_approval(mission)

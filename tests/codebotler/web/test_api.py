@@ -324,7 +324,7 @@ def test_missions_that_cannot_be_kept_are_said_before_the_page_is_there(tmp_path
         timeout=60,
     )
     assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1)
-    assert ended.stderr.startswith("codebotler: /sys/home/missions: ")
+    assert ended.stderr.startswith("codebotler: /sys/home: ")
     assert "CODEBOTLER_HOME" in ended.stderr
 
 
