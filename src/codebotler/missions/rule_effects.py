@@ -15,7 +15,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.text.phrases import phrase
 from codebotler.core.trace import Outcome, trace_from
 from codebotler.core.world import World
-from codebotler.missions.storage.log import SKILL_END_EVENTS, LogLine, MissionState, read_log
+from codebotler.missions.storage.log import LogLine, MissionState, find_skill_end, read_log
 from codebotler.missions.storage.map_event import map_from
 from codebotler.missions.storage.past import LoggedRobot, arguments_in
 from codebotler.robots.simulated import SIMULATION
@@ -130,8 +130,7 @@ def _log_effect(events: Sequence[LogLine], guard: RuleGuard, robot: LoggedRobot)
     for number, line in enumerate(events, 1):
         try:
             if line["event"] == "skill":
-                ends = (later for later in events[number:] if later["event"] in SKILL_END_EVENTS)
-                robot.end = next(ends, {"event": "cancelled"})
+                robot.end = find_skill_end(events, number) or {"event": "cancelled"}
                 guard.perform(robot, line["skill"], arguments_in(line, robot.skills))
             elif line["event"] == "rule" and line.get("prevented"):  # the log has no skill for this step
                 step = trace_from([line["what"]])[0]

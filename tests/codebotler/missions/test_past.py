@@ -495,6 +495,15 @@ def test_a_mission_is_continued_only_once(tmp_path: Path) -> None:
         read_past(folder, SKILLS)
     *again, failed_drive = read_past(mission.folder, SKILLS).trace
     assert (tuple(again), failed_drive.failed) == (past.trace, "GoToInvalidLocation")
+    with Mission(tmp_path, "simulated") as last:
+        last.continue_from(read_past(mission.folder, SKILLS))
+        last.draft('def task_program():\n    say("done")\n')
+        last.check([])
+        last.approve()
+        with Reservation(Simulated(WORLD, speed=None), tmp_path) as reserved:
+            last.run(reserved, "lab")
+    with pytest.raises(UserError, match=f"{last.id} is done"):
+        read_past(folder, SKILLS)
 
 
 def test_a_mission_of_another_robot_is_not_continued(tmp_path: Path) -> None:
@@ -540,3 +549,12 @@ def test_own_skills_are_not_repeated_either(tmp_path: Path) -> None:
         past = read_past(mission.folder, table)
         assert past.unsure is not None, skill
         assert past.resolve(happened=True).steps
+
+
+def test_a_mission_that_never_ran_has_no_rest(tmp_path: Path) -> None:
+    with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
+        mission.draft(BRING, "somebody")
+        mission.check([])
+        mission.stop("a person")
+    with pytest.raises(UserError):
+        read_past(mission.folder, SKILLS)

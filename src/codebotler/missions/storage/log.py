@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -164,6 +164,12 @@ def _is_event(line: LogLine) -> bool:
 
 SKILL_END_EVENTS = frozenset({"result", "error", "cancelled", "late"})
 """The kinds of events that end a skill."""
+
+
+def find_skill_end(events: Sequence[LogLine], number: int) -> LogLine | None:
+    """Return the first event from a position on that ends a skill, or None if there is none."""
+    later = (events[at] for at in range(number, len(events)))
+    return next((line for line in later if line["event"] in SKILL_END_EVENTS), None)
 
 
 def find_unfinished_skill(events: Iterable[LogLine]) -> LogLine | None:

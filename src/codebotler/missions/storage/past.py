@@ -24,13 +24,13 @@ from codebotler.core.trace import (
 from codebotler.core.world import World
 from codebotler.missions.display.progress import Progress
 from codebotler.missions.storage.log import (
-    SKILL_END_EVENTS,
     LogLine,
     MissionState,
     MissionSummary,
+    find_skill_end,
     read_events,
 )
-from codebotler.missions.storage.store import find_continuations, find_mission
+from codebotler.missions.storage.store import find_mission, find_rest
 from codebotler.robots.simulated import SIMULATION
 from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.worlds.room_map import RoomMap
@@ -185,8 +185,8 @@ def read_past(
     has_run = any(line["event"] == "state" and line["state"] == MissionState.RUNNING for line in events)
     if before and not has_run:  # the rest is still that of the mission before it
         return read_past(find_mission(folder.parent.parent, summary.continues), skills, robot_kind, world)
-    if not summary.program:
-        raise UserError(f"mission {summary.id} ended before it had a program; give the instruction again")
+    if not has_run:  # nobody approved its program
+        raise UserError(f"mission {summary.id} never ran; give the instruction again")
     try:
         if world is not None:
             _expect_same_map(summary.id, events, world)
@@ -217,9 +217,10 @@ def expect_rest(folder: Path) -> None:
         raise UserError(f"mission {summary.id} has not ended; stop it first")
     if summary.state is MissionState.DONE:
         raise UserError(f"mission {summary.id} is done; there is nothing to continue")
-    for later in find_continuations(folder):
-        if later.if_tool_dies:  # it has done a part of the rest
-            raise UserError(f"mission {summary.id} was continued by mission {later.id}; continue that one")
+    rest = find_rest(folder)
+    if rest is not None:
+        mend = "is done" if rest.state is MissionState.DONE else "can be continued instead"
+        raise UserError(f"mission {summary.id} was continued already; mission {rest.id} {mend}")
 
 
 def _expect_same_map(mission: str, events: Sequence[LogLine], world: World) -> None:
@@ -241,8 +242,7 @@ def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[
     for number, line in enumerate(events, 1):
         if line["event"] != "skill":
             continue
-        ends = (later for later in events[number:] if later["event"] in SKILL_END_EVENTS)
-        robot.end = next(ends, {"event": "unknown"})
+        robot.end = find_skill_end(events, number) or {"event": "unknown"}
         row, arguments = skills[line["skill"]], arguments_in(line, skills)
         if robot.end["event"] in {"unknown", "cancelled"} and _has_effect(row):
             holding = robot.held or ""
