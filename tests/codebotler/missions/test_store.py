@@ -21,7 +21,13 @@ from codebotler.missions.storage.log import (
     open_log,
     read_events,
 )
-from codebotler.missions.storage.store import find_mission, last_rest, read_missions, recover_missions
+from codebotler.missions.storage.store import (
+    find_interrupted,
+    find_mission,
+    last_rest,
+    read_missions,
+    recover_missions,
+)
 
 IF_TOOL_DIES = "its worker cancelled the goal"
 
@@ -64,8 +70,8 @@ def test_the_rest_of_a_mission_is_what_ran_last() -> None:
 @pytest.mark.parametrize(
     ("state", "events", "named"),
     [
-        (MissionState.DRAFTING, [], ["before the robot moved"]),
-        (MissionState.APPROVED, [], ["before the robot moved"]),
+        (MissionState.DRAFTING, [], ["before the program ran"]),
+        (MissionState.APPROVED, [], ["before the program ran"]),
         (MissionState.RUNNING, [RUNNING, DRIVE, AT], ['go_to("kitchen"), at (1.0, 2.0); ', IF_TOOL_DIES]),
         (MissionState.STOPPING, [RUNNING, DRIVE], ['go_to("kitchen"); ', IF_TOOL_DIES]),
         (MissionState.RUNNING, [RUNNING, DRIVE, AT, THERE], ["robot was idle"]),
@@ -191,3 +197,19 @@ def test_summary_of_a_later_version_is_read(tmp_path: Path) -> None:
     data = json.loads((folder / SUMMARY_FILE).read_text())
     (folder / SUMMARY_FILE).write_text(json.dumps({**data, "colour": "red"}))
     assert read_missions(tmp_path)[0].state == "done"
+
+
+def test_an_interrupted_mission_is_found_until_a_rest_has_run(tmp_path: Path) -> None:
+    interrupted = left(tmp_path, MissionState.INTERRUPTED)
+
+    def add(number: int, dies: str) -> None:
+        folder = interrupted.with_name(f"{interrupted.name}-{number}")
+        folder.mkdir()
+        MissionSummary(
+            folder.name, MissionState.STOPPED, "sim", 1_000.0 + number, "", continues="x", if_tool_dies=dies
+        ).write(folder)
+
+    add(2, "")  # a rest that was stopped before it ran
+    assert [one.id for one in find_interrupted(tmp_path)] == [interrupted.name]
+    add(3, IF_TOOL_DIES)
+    assert find_interrupted(tmp_path) == []

@@ -98,10 +98,14 @@ def recover_missions(home: Path) -> list[MissionSummary]:
 
 
 def find_interrupted(home: Path) -> list[MissionSummary]:
-    """Close missions whose process died. Return them, with the last mission if it was interrupted before."""
+    """Close missions whose process died. Return them, with the last mission if it was interrupted before.
+
+    A rest that never ran changed nothing, so the mission before it counts.
+    """
     found = recover_missions(home)
     with suppress(UserError):
-        last = read_missions(home, 1)
+        known = read_missions(home, RECENT_MISSIONS)
+        last = [one for one in known if one.if_tool_dies or not one.continues][-1:]
         found += [one for one in last if one.state is MissionState.INTERRUPTED and one not in found]
     return found
 
@@ -150,7 +154,7 @@ def _close_interrupted(folder: Path) -> list[MissionSummary]:
 
 def _interruption_reason(summary: MissionSummary, events: list[LogLine]) -> str:
     if not summary.state.is_moving:
-        return "CodeBotler ended unexpectedly before the robot moved"
+        return "CodeBotler ended unexpectedly before the program ran"
     skill = find_unfinished_skill(events)
     if skill is None:
         return "CodeBotler ended unexpectedly while the robot was idle"
