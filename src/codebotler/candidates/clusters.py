@@ -64,10 +64,12 @@ class CandidateClusters:
     Args:
         clusters: at least one; if the check rejects all candidates, it consists of the first of them.
         rejected: the number of candidates that the check rejects.
+        unwanted: the number of candidates that do what a person did not mean.
     """
 
     clusters: tuple[CandidateCluster, ...]
     rejected: int = 0
+    unwanted: int = 0
 
     @property
     def total(self) -> int:
@@ -82,6 +84,7 @@ class CandidateClusters:
             every = counted(self.total + self.rejected, "program")
             return f"the check rejected all of {every}; took the first"
         rejected = f"; the check rejected {self.rejected}" if self.rejected else ""
+        rejected += f"; {self.unwanted} would do what was not meant" if self.unwanted else ""
         if any(other.size == largest.size for other in self.clusters[1:]):
             return f"took the first of the most frequent behaviours: {largest.size} of {total}{rejected}"
         return f"took the most frequent behaviour: {largest.size} of {total}{rejected}"
@@ -129,7 +132,8 @@ def cluster_candidates(
         raise UserError(f"{again} would do again what was not meant; give the instruction in other words")
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
     rejected = len(programs) - sum(counts[one] for one in accepted)
-    return CandidateClusters(tuple(sorted(clusters, key=lambda one: -one.size)), rejected)
+    unwanted_count = len(programs) - rejected - sum(one.size for one in clusters)
+    return CandidateClusters(tuple(sorted(clusters, key=lambda one: -one.size)), rejected, unwanted_count)
 
 
 def compare_candidates(

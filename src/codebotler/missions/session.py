@@ -328,7 +328,9 @@ class MissionSession(SharedView):
         is_second = self._rejected is not None
         question = question_about(groups, model=self._view.model, is_second=is_second)
         if question is not None and self._order.asks:
-            self._show(question=question, busy="")
+            with self._lock:
+                if self._next_task is None:  # else a person has written a program meanwhile
+                    self._change(question=question, busy="")
         else:
             self._add_remark(groups.summary)
             self._take(mission, groups.clusters[0].program)

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Event
+from typing import Any
 
 import pytest
 
+from codebotler.candidates.clusters import CandidateClusters, compare_candidates
 from codebotler.candidates.question import ClarifyingAnswer
 from codebotler.core.world import Room, World
 from codebotler.missions.display.view import MissionOrder, SessionView
@@ -97,7 +100,9 @@ def test_what_a_person_did_not_mean_is_not_taken_again(tmp_path: Path) -> None:
         waited(session)
         model.programs = [FETCH, GO, STAY]
         session.answer(session.view.question, "none", "But quietly.")
-        assert session.wait_until(lambda view: view.may_be_approved).program == GO
+        view = session.wait_until(lambda view: view.may_be_approved)
+        assert view.program == GO
+        assert "2 would do what was not meant" in view.remarks[-1]
     with asking(tmp_path, STAY, FETCH) as (session, _):
         waited(session)
         session.answer(session.view.question, "none", "But quietly.")
@@ -181,3 +186,22 @@ def test_an_old_program_cannot_be_approved_while_a_question_waits(tmp_path: Path
         view = session.wait_until(lambda now: now.waits_for_answer)
         assert view.state is MissionState.CHECKED
         assert (view.may_be_approved, view.may_be_asked_again) == (False, False)
+
+
+def test_an_edit_while_programs_are_compared_takes_the_place_of_the_question(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, go_on = Event(), Event()
+
+    def slow(*given: Any) -> CandidateClusters:  # noqa: ANN401 - passed on
+        begun.set()
+        assert go_on.wait(10)
+        return compare_candidates(*given)
+
+    monkeypatch.setattr("codebotler.missions.session.compare_candidates", slow)
+    with asking(tmp_path, STAY, FETCH) as (session, _):
+        assert begun.wait(10)
+        session.edit(GO)
+        go_on.set()
+        view = waited(session)
+        assert (view.program, view.question, view.author) == (GO, None, "")
