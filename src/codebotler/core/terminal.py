@@ -8,6 +8,7 @@ import logging
 import os
 import re
 import sys
+import termios
 import threading
 import traceback
 import warnings
@@ -159,7 +160,12 @@ def confirm(question: str) -> bool:
 
 
 def read_line(question: str) -> str:
-    """Ask a question on stderr, and return the answer, which is empty at the end of the input."""
+    """Ask a question on stderr, and return the answer, which is empty at the end of the input.
+
+    What a person typed before the question was there is not an answer to it, and is discarded.
+    """
+    if sys.stdin.isatty():
+        termios.tcflush(sys.stdin, termios.TCIFLUSH)
     print(visible(question), end="", file=sys.stderr, flush=True)
     return sys.stdin.readline()
 

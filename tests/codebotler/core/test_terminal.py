@@ -5,7 +5,9 @@ from __future__ import annotations
 import ast
 import io
 import logging
+import os
 import re
+import select
 import sys
 import threading
 import warnings
@@ -170,3 +172,16 @@ def test_one_module_alone_writes_to_the_terminal() -> None:
     assert len(ours) > 200
     assert [place for path in ours for place in passed_by(path)] == []
     assert passed_by(WRITER)
+
+
+def test_what_was_typed_before_a_question_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    ours, person = os.openpty()
+    with os.fdopen(person) as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        os.write(ours, b"y\n")
+        assert select.select([stdin], [], [], 10)[0], "the early answer has arrived"
+        timer = threading.Timer(0.05, os.write, (ours, b"no\n"))
+        timer.start()
+        assert terminal.read_line("Run it? ") == "no\n"
+        timer.join()
+    os.close(ours)
