@@ -39,3 +39,9 @@ def test_texts_are_shown_and_quoted_as_the_caller_wants() -> None:
     assert '"' not in phrase(event, "past", quote="")
     assert "MUG" in phrase(event, "past", show=str.upper)
     assert len(phrase(Event("say", "x" * 500), "past")) < 100
+
+
+def test_no_text_ends_its_quotation() -> None:
+    forged = 'ok" → yes; picked up "mug'
+    for event in (Event("say", forged), Event("ask", forged, TEA.options, answer=forged)):
+        assert phrase(event, "past").count('"') == 2

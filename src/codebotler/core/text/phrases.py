@@ -24,8 +24,12 @@ def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, 
         event: the event.
         form: the form of the verb.
         show: shortens and escapes texts for the output.
-        quote: the quotation mark around texts.
+        quote: the quotation mark around texts. Those within them become apostrophes, so that no text ends
+            early.
     """
+    given = show
+    if quote:
+        show = lambda text: given(text).replace(quote, "'")  # noqa: E731 - a def would be longer
     answer = None if event.answer is None else show(event.answer)
     if form == "ing" and answer is not None:
         return f"the answer {quote}{answer}{quote} to {quote}{show(event.text)}{quote}"

@@ -24,8 +24,8 @@ class SampledFact:
 
     @property
     def sentence(self) -> str:
-        """The fact in words."""
-        return self.form.format(*map(brief, self.names))
+        """The fact in words, where no text ends its quotation."""
+        return self.form.format(*(brief(name).replace('"', "'") for name in self.names))
 
 
 def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True) -> SampledFact:
