@@ -7,6 +7,7 @@ import http.client
 import json
 import re
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from socket import create_connection
@@ -721,3 +722,11 @@ def test_config_names_proxies_unless_the_command_line_does(
     with pytest.raises(UserError) as caught:
         proxies_in_front(None)
     assert (caught.value.file, caught.value.line) == (config, 2)
+
+
+def test_several_starts_at_once_have_one_secret(tmp_path: Path) -> None:
+    for number in range(20):
+        with ThreadPoolExecutor(4) as pool:
+            secrets = [*pool.map(lambda _, home=tmp_path / str(number): read_cookie_secret(home), range(4))]
+        assert len({*secrets}) == 1
+        assert [file.name for file in (tmp_path / str(number)).iterdir()] == ["cookie-secret"]

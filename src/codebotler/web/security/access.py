@@ -16,6 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import make_folder
@@ -136,10 +137,11 @@ def read_cookie_secret(home: Path) -> bytes:
     """
     make_folder(home)
     file = home / "cookie-secret"
-    with suppress(FileExistsError):
-        descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        with os.fdopen(descriptor, "wb") as new:
+    if not file.exists():
+        with NamedTemporaryFile(dir=home) as new, suppress(FileExistsError):
             new.write(secrets.token_bytes(SECRET_BYTES))
+            new.flush()
+            os.link(new.name, file)  # whole at once, since another process may start, too
     secret = file.read_bytes()
     if len(secret) != SECRET_BYTES:
         raise UserError("this is not the secret of the page's cookies; remove the file", file=file)
