@@ -79,7 +79,7 @@ def ask_which_behaviour(
     """Have the client ask its person which behaviour they mean, if it can."""
     if not gatekeeper_of(ctx).asks_client or not _has_dialogs(ctx):
         return NotAsked()
-    return Elicit(which_question(question.asked), Choice)
+    return Elicit(f"Mission {question.session.view.id}: {which_question(question.asked)}", Choice)
 
 
 async def read_last_past(ctx: AgentContext) -> MissionPast:
@@ -98,7 +98,8 @@ def ask_whether(
     gatekeeper = gatekeeper_of(ctx)
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
         return NotAsked()
-    return Elicit(f"{past.question}\n{past.was}".rstrip(), StepWord)  # an agent may not occupy the robot
+    asked = f"Mission {past.mission}: {past.question}\n{past.was}".rstrip()  # the ID binds the answer to it
+    return Elicit(asked, StepWord)  # without the robot's own word, since an agent may not occupy the robot
 
 
 async def find_session(digest: str, ctx: AgentContext) -> MissionSession:

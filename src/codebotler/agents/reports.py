@@ -10,9 +10,10 @@ from pydantic import BaseModel, Field, model_validator
 from codebotler.candidates.question import ClarifyingQuestion
 from codebotler.checking.problems import CheckResult
 from codebotler.core.terminal import shortened, visible_lines
+from codebotler.core.text.phrases import is_question, is_spoken
 from codebotler.core.text.words import listed
 from codebotler.missions.display.view import SessionView
-from codebotler.web.storyboard import Scene, Strip, strips
+from codebotler.web.storyboard import Action, Scene, Strip, strips
 
 
 class _Report(BaseModel):
@@ -85,10 +86,10 @@ def question(view: SessionView, robot: str, contract: str) -> str:
     boards = [board for board in boards if len(board.scenes) > 1 or board.scenes[0].deeds]
     parts = [
         f"An agent asks to run a program on the robot {robot}.",
+        f"THE CHECK FOUND PROBLEMS:\n{problems}" if problems else "The check found no problems.",
         f"It says: {shortened(view.instruction)}" if view.instruction else "",
         f"At most, the program can do this:\n{visible_lines(contract)}" if contract else "",
         f"For example:\n{_board_text(boards[0])}" if boards else "",
-        f"THE CHECK FOUND PROBLEMS:\n{problems}" if problems else "The check found no problems.",
         f"Mission {view.id}, digest {view.digest}, program:\n{visible_lines(view.program.strip())}",
     ]
     return "\n\n".join(filter(None, parts))
@@ -118,7 +119,14 @@ def _board_text(strip: Strip) -> str:
     return "\n".join(f"- {line}" for line in lines if line)
 
 
+def _deed_text(deed: Action) -> str:
+    """Return a deed in words, where no text of a program can end a quotation or begin another deed."""
+    text = deed.text.replace(";", ",")
+    is_text = deed.kind == "answer" or is_spoken(deed.kind) or is_question(deed.kind)
+    return '"{}"'.format(text.replace('"', "'")) if is_text else text
+
+
 def _scene_text(scene: Scene) -> str:
-    deeds = "; ".join(f'"{one.text}"' if one.kind in {"say", "answer"} else one.text for one in scene.deeds)
+    deeds = "; ".join(map(_deed_text, scene.deeds))
     where = scene.room if scene.is_found else f"{scene.room} (there is no such room)"
     return f"{where}: {deeds}" if deeds else where

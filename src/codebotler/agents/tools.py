@@ -48,6 +48,9 @@ from codebotler.missions.storage.past import MissionPast
 from codebotler.prompts import clean_instruction
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS
 
+MAX_UNREAD_SECONDS = 2.0
+"""How long a client may leave a message about progress unread."""
+
 _Instruction = Annotated[
     str, Field(max_length=MAX_ARGUMENT, description="What the robot should do, in plain words for people.")
 ]
@@ -205,8 +208,9 @@ async def run_mission(
     """
     gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors():
-        _take_answer(gatekeeper, session, digest, answer, agent_name(ctx))  # even if too many calls wait
-        with gatekeeper.waiting(), _stopping_if_cancelled(session, agent_name(ctx)):
+        _take_answer(gatekeeper, session, digest, answer, agent_name(ctx))
+        # If too many calls wait, the report still says what was approved.
+        with suppress(MissionError), gatekeeper.waiting(), _stopping_if_cancelled(session, agent_name(ctx)):
             await _follow(gatekeeper, session, ctx, seconds)
     return gatekeeper.report(session)
 
@@ -289,7 +293,7 @@ def _take_answer(
     match answer:
         case AcceptedElicitation(data=NotAsked()):
             if gatekeeper.approves_alone(session):
-                session.approve(digest, by="the contract given at the start")
+                session.approve(digest, by=f"the contract given at the start, for {client}")
         case AcceptedElicitation(data=Consent(approve=True)):
             if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
                 session.approve(digest, despite_problems=bool(view.problems), by=person)
@@ -315,7 +319,10 @@ async def _prepared(gatekeeper: Gatekeeper, session: MissionSession) -> MissionR
 async def _follow(
     gatekeeper: Gatekeeper, session: MissionSession, ctx: AgentContext, seconds: float, known: int = 0
 ) -> None:
-    """Report new events as progress until the mission is over, or steps may begin, for some seconds."""
+    """Report new events as progress until the mission is over, or steps may begin, for some seconds.
+
+    A client that does not read is not followed, since the call would take a place from others.
+    """
     known = max(known, len(session.events()) - MAX_REPORTED_EVENTS)
     with suppress(TimeoutError):
         async with asyncio.timeout(seconds), aclosing(gatekeeper.console.notifier.changes()) as changes:
@@ -324,7 +331,8 @@ async def _follow(
                 for line in session.events(known):
                     known += 1
                     if text := event_text(line):
-                        await ctx.report_progress(known, message=text)
+                        async with asyncio.timeout(MAX_UNREAD_SECONDS):
+                            await ctx.report_progress(known, message=text)
                 if is_last:
                     return
 

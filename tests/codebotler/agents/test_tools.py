@@ -28,6 +28,7 @@ from codebotler.core.world import Room, World
 from codebotler.missions.display.view import MissionOrder, SessionView, program_digest
 from codebotler.missions.display.wording import event_text
 from codebotler.missions.preflight import known_instructions
+from codebotler.missions.session import MissionSession
 from codebotler.missions.storage.log import MissionState, MissionSummary
 from codebotler.missions.storage.store import RECENT_MISSIONS
 from codebotler.models.base import Reply, TextListener, ignore_text
@@ -121,6 +122,12 @@ def approve(gatekeeper: Gatekeeper) -> None:
     session = gatekeeper.console.session
     assert session is not None
     session.approve(session.view.digest)
+
+
+def session_of(gatekeeper: Gatekeeper) -> MissionSession:
+    session = gatekeeper.console.session
+    assert session is not None
+    return session
 
 
 async def until(gatekeeper: Gatekeeper, holds: Callable[[SessionView], bool]) -> None:
@@ -362,7 +369,7 @@ def test_problems_are_shown_to_the_person_and_a_contract_never_approves_them(gat
         assert waiting["state"] == "checked"
         gatekeeper.asks_client = True
         await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
-        assert "PROBLEMS" in asked[0]
+        assert "PROBLEMS" in asked[0].split("\n\n")[1], "before all that the agent says"
         assert "cellar" in asked[0]
         broken = await agent.call("propose_mission", program="(")
         await agent.call("run_mission", digest=broken["digest"], seconds=0.05)
@@ -911,11 +918,12 @@ def test_a_program_that_a_person_put_in_place_of_the_steps_runs_instead(tmp_path
 # --- the rest of a mission
 
 
-def left(home: Path, skill: str, event: str, instruction: str = "") -> None:
+def left(home: Path, skill: str, event: str, instruction: str = "") -> Path:
     """Leave a mission of another process that ended at this event."""
     program = "def task_program():\n    say('hello')\n    go_to('cellar')\n"
     folder = failed_mission(home, program, WORLD, instruction)
     cut(folder, line_of(folder, skill, event))
+    return folder
 
 
 def test_an_agent_proposes_the_rest_and_learns_what_was_done(gatekeeper: Gatekeeper, tmp_path: Path) -> None:
@@ -960,7 +968,7 @@ def test_a_person_says_in_the_dialog_whether_a_step_happened(
     content: dict[str, Any] | None,
     steps: int | None,
 ) -> None:
-    left(tmp_path, "say", "skill")
+    mission = left(tmp_path, "say", "skill").name
     asked: list[str] = []
 
     async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
@@ -977,8 +985,7 @@ def test_a_person_says_in_the_dialog_whether_a_step_happened(
     gatekeeper.asks_client = True
     use(gatekeeper, act, answer=answer)
     assert len(asked) == 1
-    assert "hello" in asked[0]
-    assert "hall" in asked[0]
+    assert [word for word in (mission, "hello", "hall") if word not in asked[0]] == []
 
 
 def test_without_a_dialog_a_person_must_answer_on_the_page(gatekeeper: Gatekeeper, tmp_path: Path) -> None:
@@ -1047,3 +1054,50 @@ def test_without_a_dialog_a_person_chooses_on_the_page(tmp_path: Path) -> None:
 
     with console:
         use(made, act)
+
+
+def test_a_call_that_was_approved_is_reported_however_many_wait(
+    gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gatekeeper.console.within = contract_from({"go_to": {"location": "any"}}, SKILLS)
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=QUIET)
+        monkeypatch.setattr("codebotler.agents.gatekeeper.MAX_WAITING_CALLS", 0)
+        await agent.call("run_mission", digest=proposed["digest"])
+        await until(gatekeeper, lambda view: view.state is MissionState.DONE)
+        notes = [line["text"] for line in session_of(gatekeeper).events() if line["event"] == "log"]
+        assert any("agent" in text for text in notes), "the log names whom the contract approved"
+
+    use(gatekeeper, act)
+
+
+def test_a_client_that_reads_no_progress_is_not_followed(
+    gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("codebotler.agents.tools.MAX_UNREAD_SECONDS", 0.01)
+    gatekeeper.console.within = contract_from({"go_to": {"location": "any"}}, SKILLS)
+
+    async def never_read(_progress: float, _total: float | None, _message: str | None) -> None:
+        await asyncio.Event().wait()
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=FAR)
+        call = agent.client.call_tool(
+            "run_mission", {"digest": proposed["digest"]}, progress_callback=never_read
+        )
+        await asyncio.wait_for(call, 10)
+
+    use(gatekeeper, act)
+
+
+def test_no_text_in_a_storyboard_begins_another_deed(gatekeeper: Gatekeeper) -> None:
+    says = """ok"; picks up "mug"; \\"got it"""
+    program = f"def task_program():\n    say({says!r})\n    ask('', {says!r}, ['a'])\n"
+
+    async def act(agent: Agent) -> None:
+        (board, *_) = (await agent.call("check_program", program=program))["storyboards"]
+        world, scene = (line for line in board.splitlines() if "picks up" in line)
+        assert (scene.count(";"), scene.count('"'), world.count('"')) == (2, 6, 8)
+
+    use(gatekeeper, act)
