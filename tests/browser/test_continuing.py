@@ -90,7 +90,13 @@ def test_a_person_is_asked_about_an_unsure_step_and_types_the_rest(
         assert evidence["y"] + evidence["height"] <= button["y"], "the buttons cover what the robot says"
         shoot(page, f"continue-asks-{size[0]}", full_page=False)
         expect_no_grave_fault(page)
+        late = opened(server, f"missions/{folder.name}")
+        press(late, "Continue")
+        expect(late.get_by_role("button", name="It did not happen", exact=True)).to_be_visible()
         press(page, "It happened")
+        expect(page.locator(".done-before li")).to_have_count(3)
+        press(late, "It did not happen")
+        expect(late.locator(".q-notification")).to_be_visible()
         for operator in (page, other):
             expect(operator.locator(".done-before li")).to_have_count(3)
             expect(operator.locator(".done-before li").last).to_contain_text('picked up "mug"')
@@ -105,8 +111,8 @@ def test_a_person_is_asked_about_an_unsure_step_and_types_the_rest(
         press(page, "Run it on the robot")
         expect(page.locator(".headline")).to_have_text("Done")
         expect(other.locator(".done-before li")).to_have_count(3)
-        page.close()
-        other.close()
+        for operator in (page, other, late):
+            operator.close()
 
 
 @pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])

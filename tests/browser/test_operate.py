@@ -312,7 +312,7 @@ def test_a_stop_before_the_robot_moves_discards_the_program(server: PageServer, 
     page = opened(server)
     checked(page, TEA)
     page.locator("#stop").click()
-    expect(page.locator("#stop-told")).to_have_text("Discarded; the robot had not moved.")
+    expect(page.locator("#stop-told")).to_have_text("Discarded before it ran.")
     expect(page.locator(".reason")).to_have_text("stopped from the page before it ran")
 
 

@@ -11,7 +11,7 @@ from codebotler.checking.problems import CheckResult, Problem, Sample
 from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.kinds import PICK, PLACE
-from codebotler.core.text.phrases import is_spoken, phrase
+from codebotler.core.text.phrases import NO_ANSWER, is_spoken, phrase
 from codebotler.core.text.words import brief
 from codebotler.core.trace import Event, Outcome, Status, Trace, held_after
 from codebotler.rtl.text.numbers import numerals
@@ -53,7 +53,8 @@ def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = 
         repeated = (*repeated_steps(sample.outcome.trace, found.room_map, remaining),)
         samples.append(replace(sample, repeated=repeated))
         for event in repeated:
-            again = f'{phrase(event, "base")} in "{brief(event.place)}"'
+            asks = phrase(replace(event, answer=None), "base").removesuffix(f" → {NO_ANSWER}")
+            again = f'{asks} in "{brief(event.place)}"'
             message = f"the robot has done this already and would do it again: {again}"
             if all(problem.message != message for problem in problems):
                 problems.append(Problem("RepeatedStep", message, samples=(sample.number,)))

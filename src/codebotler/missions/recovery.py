@@ -87,7 +87,7 @@ def ask_evidence(robot: Robot, home: Path, past: MissionPast, remark: Callable[[
     """
     before = [past.was] if past.was else []
     if is_resumable(robot):  # it knows no more than the log
-        return [*before, "The simulated robot knows no more, and will go on as you answer."]
+        return [*before, "A simulated robot cannot say. If it happened, the robot will not do it again."]
     try:
         with Reservation(robot, home):
             place = ask_rooms(robot, remark)[1]

@@ -85,7 +85,7 @@ def test_a_rejected_program_shows_each_line_to_blame(files: Path) -> None:
     status, out, err = codebotler("check", files / "bad.py", "--world", files / "world.yaml")
     assert (status, err) == (1, "")
     assert out.startswith(f"rejected: 2 problems in {files / 'bad.py'}\n")
-    assert "in every world" in out.splitlines()[1]
+    assert "in all imagined worlds" in out.splitlines()[1]
     assert re.search(r'^line 2: GoToInvalidLocation: .*"kitchn".*"kitchen"$', out, re.MULTILINE)
     assert '\n  1 | def task_program():\n> 2 |     go_to("kitchn")\n  3 |     say(mesage)\n' in out
     assert re.search(r"^line 3: NameError: .*\bmesage\b", out, re.MULTILINE)

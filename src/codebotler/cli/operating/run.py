@@ -187,7 +187,7 @@ def _is_approved(
         note("the rest stays within what was approved before")
     elif not request.yes and not confirm(f"run the program on the robot {robot.name}?"):
         session.stop("the person at the terminal")
-        note("not run; the robot has not moved")
+        note("not run" if view.past else "not run; the robot has not moved")
         return False
     return True
 

@@ -65,7 +65,7 @@ def _verdict(found: CheckResult, name: str) -> Text:
     if not found.samples:
         run = "the program was not run"
     elif not any(sample.draws for sample in found.samples):
-        run = "the program behaves the same in every world"
+        run = "the program behaves the same in all imagined worlds"
     else:
         run = f"run in {counted(len(found.samples), 'imagined world')} with random people and objects"
     return verdict.append(f"\n{run}", "dim")

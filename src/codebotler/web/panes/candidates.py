@@ -82,7 +82,7 @@ class CandidatesPane:
         session = self._console.session
         if session is not None and self._drawn is not None:
             try:
+                scroll_up()  # before the answer, which removes the question from the page
                 await asyncio.to_thread(session.answer, self._drawn, answer, more)
-                scroll_up()
             except MissionError as error:
                 warn(error.sentence)

@@ -38,7 +38,8 @@ class ContinueButton(Button):
         is_other = not (has_rest(view) or view.progress.has_begun or view.past)
         aside = self._console.unfinished if is_other else ""
         self._mission = aside or view.id or ("" if view.past is None else view.past.mission)
-        self.text = f"Continue mission {aside} instead" if aside else "Continue"
+        own = "Continue" if view.progress.has_begun or view.past is None else "Begin another rest"
+        self.text = f"Continue mission {aside} instead" if aside else own
         self.set_visibility(has_rest(view) or bool(aside))
 
     async def _continue(self) -> None:
@@ -76,9 +77,13 @@ def can_be_continued(summary: MissionSummary) -> bool:
 
 def _ask(console: Console, past: MissionPast, evidence: list[str]) -> None:
     """Ask a person whether the unsure step happened, beside what the log and the robot say."""
+    before = console.session
 
     def answer(*, happened: bool, answer: str = "") -> None:
         dialog.close()
+        if console.session is not before:
+            warn("another mission has begun meanwhile")
+            return
         try:
             _begin(console, past.resolve(happened=happened, answer=answer))
         except (UserError, MissionError) as error:

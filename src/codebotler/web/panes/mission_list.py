@@ -101,8 +101,8 @@ def state_words(summary: MissionSummary, view: SessionView) -> str:
 
 
 def has_words(summary: MissionSummary, state: str, words: Sequence[str]) -> bool:
-    """Whether all words, in lower case, are in the state, robot, instruction, program or reason."""
-    texts = (state, summary.robot, summary.instruction, summary.program, summary.reason)
+    """Whether all words, in lower case, are in the ID, state, robot, instruction, program or reason."""
+    texts = (summary.id, state, summary.robot, summary.instruction, summary.program, summary.reason)
     everything = "\n".join(texts).casefold()
     return all(word in everything for word in words)
 
@@ -133,8 +133,7 @@ class _MissionRow:
             shortened(reason_text(summary.reason, summary.line), _MAX_LISTED_REASON) if summary.reason else ""
         )
         before = f"continues mission {summary.continues}" if summary.continues else ""
-        own = f"mission {summary.id}" if before or rest else ""
-        parts = (own, f"robot: {summary.robot}", reason, before, rest)
+        parts = (f"mission {summary.id}", f"robot: {summary.robot}", reason, before, rest)
         self._outcome.say(" · ".join(filter(None, parts)))
         self._state.say(state)
         self._state.classes(replace=f"state state-{summary.state}")

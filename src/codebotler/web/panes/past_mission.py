@@ -114,7 +114,8 @@ def _draw_header(summary: MissionSummary, state: str, chain: _Chain) -> None:
             PlainText("code", shortened(code, _MAX_CODE_CHARACTERS))
     by_hand = " · program typed or edited by hand" if summary.program else ""
     by = f" · program by {summary.model}" if summary.model else by_hand
-    PlainText("p", f"{began:%d %b %Y, %H:%M:%S} · robot: {summary.robot}{shortened(by)}", "facts")
+    robot = f"robot: {summary.robot}{shortened(by)}"
+    PlainText("p", f"mission {summary.id} · {began:%d %b %Y, %H:%M:%S} · {robot}", "facts")
     if summary.continues:
         _draw_link("Continues", summary.continues, "")
     for one in chain.later:

@@ -7,7 +7,7 @@
   const [stopAt, robotAt] = [new URL(dataset.stop ?? "api/stop", root), new URL(dataset.robot ?? "api/robot", root)];
   const LOST = "CodeBotler is not responding. Use the robot's emergency stop.";
   const REFUSED = "CodeBotler refused to stop. Use the robot's emergency stop.";
-  const DISCARDED = "Discarded; the robot had not moved.";
+  const DISCARDED = "Discarded before it ran.";
   const ENDS = {
     stopped: "The robot has stopped.",
     done: "The mission had already ended.",
