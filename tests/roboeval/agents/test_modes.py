@@ -11,7 +11,10 @@ from codebotler.core.files import to_line
 from command_line import refused, roboeval
 from roboeval.analysis.comparisons.compare import compare_tables
 from roboeval.analysis.comparisons.missions import has_missions, mission_costs
+from roboeval.cli.inputs import open_current
+from roboeval.cli.results.report import judged_run
 from roboeval.evaluation.runs.results import load_results
+from roboeval.report.sections.modes import ending_sheet, mode_sheet
 from small_suite import a_suite
 
 WORLDS = """\
@@ -100,6 +103,24 @@ def test_the_command_compares_them_and_says_how(runs: tuple[Path, Path, str]) ->
     assert (data["first"]["pass@1"], data["second"]["pass@1"]) == (0.5, 0.75)
     assert data["first"]["failures"]["RobotExecutionError"] == 0.5  # of missions
     assert any("mission" in warning for warning in data["warnings"])
+
+
+@pytest.mark.slow
+def test_a_report_with_house_rules_counts_the_missions_that_they_end(
+    runs: tuple[Path, Path, str], tmp_path: Path
+) -> None:
+    _, agents, suite = runs
+    rules = tmp_path / "house.yaml"
+    rules.write_text("rules: [{name: stay, says: Stay., always: 'not tr.Exists(goto(\".*\"))'}]")
+    roboeval("evaluate", str(agents), "--suite", suite, "--rules", str(rules))
+    results = open_current(agents, suite, ablated=False)
+    run = judged_run(results, suite, beside=None, rules=rules, engine=None)
+    ((_, _, missions, succeed, _, _, forbidden, *_),) = mode_sheet([run]).rows
+    assert (missions, succeed, forbidden) == (4, 0.5, 0.25)
+    assert [(ending, share) for _, ending, _, share, *_ in ending_sheet([run]).rows] == [
+        ("answer", pytest.approx(2 / 3)),
+        ("TurnLimit", 0),
+    ]
 
 
 @pytest.mark.slow

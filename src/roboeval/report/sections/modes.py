@@ -22,7 +22,7 @@ def mode_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """Build the table of missions by run."""
     rows: list[list[Cell]] = []
     for run in runs:
-        one = mission_costs(run.table)
+        one = mission_costs(_table(run))
         share = one.satisfied.mean, one.satisfied.low, one.satisfied.high, one.forbidden
         means = one.turns, one.tool_errors, one.tokens, one.tokens_per_success
         rows.append([run.name, one.mode, one.missions, *share, *means])
@@ -42,10 +42,14 @@ def ending_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     rows = [
         [run.name, *ended]
         for run in runs
-        for ended in completions_of(run.table)
+        for ended in completions_of(_table(run))
         .group_by("ending")
         .agg(*columns)
         .sort(["len", "ending"], descending=[True, False])
         .rows()
     ]
     return sheet("endings", rows)
+
+
+def _table(run: JudgedRun) -> pl.DataFrame:
+    return run.table if run.house is None else run.house.table
