@@ -255,7 +255,9 @@ def test_after_a_failure_the_model_writes_the_rest(tmp_path: Path, suite: Suite)
         ("say(undefined)", "PythonError", "NameError"),
         ("say('x'", "PythonError", "SyntaxError"),
         ("import time\n    while True: time.sleep(1)", "PythonError", "TimeoutError"),
-        ("'x'.encode().decode('utf-16')", "PythonError", "Exception"),  # its kind takes more than a text
+        ("'x'.encode().decode('utf-16')", "PythonError", "UnicodeDecodeError"),  # takes more than a text
+        ("1 / 0", "PythonError", "ZeroDivisionError"),
+        ("raise Exception('no path')", "PythonError", "Exception"),
     ],
 )
 def test_the_last_failure_counts(tmp_path: Path, small: Suite, body: str, name: str, kind: str) -> None:
@@ -267,6 +269,11 @@ def test_the_last_failure_counts(tmp_path: Path, small: Suite, body: str, name: 
         assert (row["failure"]["class"], row["failure"]["kind"]) == (name, kind)
     counts = [sum(one.more["tool_errors"].values()) for one in completions]
     assert counts == [one.turns for one in completions]
+
+
+def test_the_text_of_the_last_failure_is_not_quoted_again(tmp_path: Path, small: Suite) -> None:
+    _, rows, _ = replan(tmp_path, small, ["say('hello'); {}['a']"], turns=1)
+    assert rows[0]["verdicts"][0]["error"] == {"kind": "KeyError", "message": "'a'"}
 
 
 def test_a_program_may_look_as_often_as_it_likes(tmp_path: Path, suite: Suite) -> None:

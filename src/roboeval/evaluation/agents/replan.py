@@ -11,13 +11,8 @@ from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.worker import EngineError
 from roboeval.evaluation.agents.conversation import Conversation, TurnLimits
 from roboeval.evaluation.agents.mission import AgentMission
-from roboeval.evaluation.judging.failures import FAILURE_CLASSES, PYTHON_ERROR_CLASS
-from roboeval.evaluation.recording import RecordingRobot
 from roboeval.evaluation.recovery import rest_prompt
 from roboeval.evaluation.runs.endings import ERROR, OUTSIDE_CONTRACT, TIMEOUT
-
-USUAL_ERRORS = FAILURE_CLASSES[PYTHON_ERROR_CLASS].kinds
-"""The kinds of Python errors that are raised with one text, as the last line of a mission's program."""
 
 
 class ReplanConversation(Conversation):
@@ -53,8 +48,9 @@ class ReplanConversation(Conversation):
         elif outcome.status is Status.TIMEOUT:
             mission.end(TIMEOUT)
         else:
-            kind = error.kind if error.kind in USUAL_ERRORS else "Exception"
-            mission.robot.lines.append(f"raise {kind}({error.message!r})")
+            if error.kind != "Exception":  # Python's own classes may take more than a text, or quote it again
+                mission.robot.lines.append(f"class {error.kind}(Exception): pass")
+            mission.robot.lines.append(f"raise {error.kind}({error.message!r})")
             mission.end(ERROR)
 
 
