@@ -31,7 +31,7 @@ CPU_SECONDS = 30
 MEMORY = 2 * 1024**3
 DEEPER = 500  # extra stack for a robot that is called as a function instead of through a socket
 OPTION_OVERHEAD = 10  # characters that count for an option in addition to its text
-Execution: TypeAlias = tuple[bytes, tuple[int, float, float, bool]]
+Execution: TypeAlias = tuple[bytes, tuple[int, float, float, float, bool]]
 ORDINARY = Path(__file__).with_name("ordinary_process.py")
 
 

@@ -56,6 +56,9 @@ class SkillProtocol:
             return Outcome(cause, self.robot.trace, fault)
         self.child.kill()
         self.child.hang_up()
+        match final:
+            case {"now": float(now)} if self.ledger.limit is None and not self.robot.is_live:
+                self.ledger.let_time_pass(now)  # it slept before it failed
         return self.ledger.outcome_at_end(final or {})
 
     def talk(self) -> dict[str, object] | None:
@@ -112,10 +115,10 @@ def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
     )
 
 
-def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, bool]:
-    """Return a run's parameters: fuel, simulated seconds, start of the clocks, and whether it is live."""
-    settings = robot.settings
-    return settings.limits.ticks, settings.limits.seconds, settings.clock_starts.timestamp(), robot.is_live
+def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, float, bool]:
+    """Return a run's fuel, time now, limit of time, start of the clocks, and whether it is live."""
+    settings, limits = robot.settings, robot.settings.limits
+    return limits.ticks, robot.now, limits.seconds, settings.clock_starts.timestamp(), robot.is_live
 
 
 def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:

@@ -276,6 +276,23 @@ def test_the_text_of_the_last_failure_is_not_quoted_again(tmp_path: Path, small:
     assert rows[0]["verdicts"][0]["error"] == {"kind": "KeyError", "message": "'a'"}
 
 
+LOOKS = "[is_in_room('jill') for _ in range(600)]"
+SLEEP = "time.sleep(1900)"  # of 3600 seconds
+
+
+@pytest.mark.parametrize("use", [LOOKS, f"import time; {SLEEP}"])
+def test_the_programs_of_a_mission_share_its_limits(tmp_path: Path, small: Suite, use: str) -> None:
+    completions, rows, _ = replan(tmp_path, small, [f"{use}; int('x')", f"{use}; say('hello')"])
+    assert {(one.more["ending"], one.turns) for one in completions} == {("TimeoutError", 2)}
+    assert {row["failure"]["kind"] for row in rows if row["failure"]} == {"TimeoutError"}
+
+
+def test_time_goes_on_from_one_program_to_the_next(tmp_path: Path, small: Suite) -> None:
+    says = "time.sleep(50); say(str(time.monotonic()))"
+    _, rows, _ = replan(tmp_path, small, ["import time; time.sleep(100); int('x')", f"import time; {says}"])
+    assert {event[1] for row in rows for event in row["verdicts"][0]["trace"]} == {"150.0"}
+
+
 def test_a_program_may_look_as_often_as_it_likes(tmp_path: Path, suite: Suite) -> None:
     body = "[is_in_room('jill') for _ in range(150)]; say('hello')"
     completions, rows, _ = replan(tmp_path, suite, [body])

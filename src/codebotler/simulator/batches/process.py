@@ -117,6 +117,7 @@ class TranscribedRun(ProgramRun):
         sys.setrecursionlimit(BATCH_RECURSION_LIMIT)
         parameters = (
             settings.limits.ticks,
+            self.ledger.robot.now,
             settings.limits.seconds,
             settings.clock_starts.timestamp(),
             False,
@@ -129,7 +130,6 @@ class TranscribedRun(ProgramRun):
         self.ledger = RememberingLedger(robot)
         self.namespace = ModuleType("__main__")
         vars(self.namespace).update(self.provided)
-        self.now = 0.0
         self._calls: list[Called] = []
         self.spent = self.entered = self.is_undecided = False
         self.refused_at = None

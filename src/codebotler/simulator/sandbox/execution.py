@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     ParameterDescription: TypeAlias = tuple[str, str, tuple[Any, ...], str]  # name, kind, choices, words
     SkillDescriptions: TypeAlias = tuple[tuple[str, tuple[ParameterDescription, ...]], ...]
-    RunParameters: TypeAlias = tuple[int, float, float, bool]  # fuel, seconds, start of clocks, is live
+    RunParameters: TypeAlias = tuple[int, float, float, float, bool]  # as `run_parameters` says
 
 # This module's own copy of the builtins, which a program cannot change.
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # Python also accepts a dict
@@ -63,7 +63,7 @@ class ProgramRun:
 
     def execute(self, code: bytes | types.CodeType, parameters: RunParameters) -> str:
         """Run the program, whose code may be marshalled, and return how it ended, as JSON."""
-        self.fuel, self.seconds, self.start, self.is_live = parameters
+        self.fuel, self.now, self.seconds, self.start, self.is_live = parameters
         names = vars(self.namespace)
         sys.modules["__main__"] = self.namespace
         try:
@@ -97,6 +97,7 @@ class ProgramRun:
             lineno = _own(SyntaxError, "lineno", error)
             where = f'"line":{lineno if type(lineno) is int else "null"}'
         name = str.__getitem__(NAME_OF(kind), slice(100))
+        where += f',"now":{self.now!r}'
         return f'{{"end":"python-error","kind":{quoted(name)},"message":{quoted(message)},{where}}}'
 
     def counters(self) -> dict[str, Callable[[], None]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from codebotler.core.errors import VIOLATION
 from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.missions.storage.past import MissionPast
@@ -11,6 +13,7 @@ from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.worker import EngineError
 from roboeval.evaluation.agents.conversation import Conversation, TurnLimits
 from roboeval.evaluation.agents.mission import AgentMission
+from roboeval.evaluation.recording import RecordingRobot
 from roboeval.evaluation.recovery import rest_prompt
 from roboeval.evaluation.runs.endings import ERROR, OUTSIDE_CONTRACT, TIMEOUT
 
@@ -24,7 +27,7 @@ class ReplanConversation(Conversation):
 
     def _act(self, reply: Reply) -> Prompt | None:
         """Run a reply's program where the last one has stopped."""
-        robot, outcome = self.mission.robot, _run(reply.program, self.mission.robot)
+        robot, outcome = self.mission.robot, _run(reply.program, self.mission)
         if outcome.error is None:
             self.mission.answer("")
             return None
@@ -60,9 +63,11 @@ def _may_go_on(outcome: Outcome) -> bool:
     return is_failure and outcome.error is not None and outcome.error.kind != VIOLATION
 
 
-def _run(program: str, robot: RecordingRobot) -> Outcome:
+def _run(program: str, mission: AgentMission) -> Outcome:
     """Run a program on the robot of a mission, which cannot make its calls a second time."""
-    robots = [robot]
+    settings, robots = mission.suite.settings, [mission.robot]
+    left = settings.limits.calls - mission.robot.skill_calls  # for one program, as the mission is judged
+    mission.robot.settings = replace(settings, limits=replace(settings.limits, calls=left))
 
     def only_robot() -> RecordingRobot:
         if not robots:
