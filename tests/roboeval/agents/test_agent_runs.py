@@ -198,18 +198,37 @@ def test_a_reasoning_models_thoughts_are_kept(tmp_path: Path, small: Suite) -> N
     assert {one.more["reasoning"] for one in completions} == {"She is away."}
 
 
-def test_a_server_may_reject_what_has_become_too_long(tmp_path: Path, suite: Suite) -> None:
-    run = RunFolder(tmp_path / "run")
+def rejecting(turns: int) -> Server:
+    """A server that rejects conversations with this number of turns."""
     _, server = serve(lambda _: [GO, LOOK, "Done."])
     answers = server.sends
 
     def sends(request: Request) -> tuple[int, dict[str, str], bytes] | None:
-        if turns_before(request) == 2:
+        if turns_before(request) == turns:
             return 400, {"Content-Type": "application/json"}, b'{"error": {"message": "Too long."}}'
         return answers(request)
 
     server.sends = sends
-    with server:
+    return server
+
+
+def test_a_server_that_takes_no_results_stops_the_command(tmp_path: Path, suite: Suite) -> None:
+    run = RunFolder(tmp_path / "run")
+    with rejecting(1) as server:
+        assert "Too long" in str(act(run, suite, server, count=9).missing)
+    assert not run.completions.read_bytes()  # so that the same command can go on once the server is mended
+
+
+def test_many_rejected_missions_in_a_row_stop_the_command(tmp_path: Path, suite: Suite) -> None:
+    run = RunFolder(tmp_path / "run")
+    with rejecting(2) as server:
+        assert "Too long" in str(act(run, suite, server, count=9).missing)
+    assert Pace().concurrency <= len([*run.read(suite)]) < 2 * Pace().concurrency
+
+
+def test_a_server_may_reject_what_has_become_too_long(tmp_path: Path, suite: Suite) -> None:
+    run = RunFolder(tmp_path / "run")
+    with rejecting(2) as server:
         assert act(run, suite, server).missing is None
     completions = [*run.read(suite)]
     assert {(one.more["ending"], one.turns) for one in completions} == {("Rejected", 2)}

@@ -74,7 +74,8 @@ class AgentPlan(GenerationPlan):
             try:
                 reply = await ask(prompt)
             except ModelError as error:
-                if not error.is_refusal or not conversation.replies:  # a server may refuse all first requests
+                # A server may refuse all first requests, or all that contain the result of a call.
+                if not error.is_refusal or len(conversation.replies) <= 1:
                     raise
                 conversation.end(SERVER_REJECTED, error.sentence)
             else:

@@ -23,6 +23,7 @@ from roboeval.evaluation.generating.requests import (
     with_batch,
 )
 from roboeval.evaluation.runs.completions import CompletionKey, how_many
+from roboeval.evaluation.runs.endings import SERVER_REJECTED
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.turns import TurnLog
 
@@ -155,13 +156,20 @@ class _Generation:
             self.progress.failures[key] = error.sentence
             if error.is_refusal:
                 self._refused[key] = error
-            self._failures_in_a_row += 1
-            if self._failures_in_a_row >= max(FAILURES_IN_A_ROW, self.pace.concurrency):
-                self.progress.stopped = error.sentence
+            self._count_failure()
+
+    def _count_failure(self) -> None:
+        self._failures_in_a_row += 1
+        if self.error and self._failures_in_a_row >= max(FAILURES_IN_A_ROW, self.pace.concurrency):
+            self.progress.stopped = self.error.sentence
 
     async def _ask(self, key: CompletionKey, prompt: Prompt) -> Reply:
         logged = partial(self._logged, key)
-        reply = await self._paced.reply(prompt, number=self.plan.sample(key), around=logged)
+        try:
+            reply = await self._paced.reply(prompt, number=self.plan.sample(key), around=logged)
+        except ModelError as error:
+            self.error = error
+            raise
         if self.turns is not None:
             await self.turns.keep(key, reply)
             self.log.ended(key)
@@ -194,7 +202,10 @@ class _Generation:
         finally:  # also after an interrupt, because closing the file syncs it to disk
             add_usage(self.progress.usage, row["usage"])
             self.progress.done += 1
-        self._failures_in_a_row = 0
+        if row.get("ending") == SERVER_REJECTED:
+            self._count_failure()
+        else:
+            self._failures_in_a_row = 0
         self.on_progress(self.progress)
 
     async def _keep_refused(self) -> None:
