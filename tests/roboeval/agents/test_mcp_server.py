@@ -1,7 +1,10 @@
 """Missions that a client of the Model Context Protocol carries out."""
 
 import asyncio
+import json
 import os
+import signal
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -36,14 +39,14 @@ def suite(tmp_path: Path) -> Suite:
     return load_suite(a_suite(folder, WORLDS))
 
 
+def command(run: Path, suite: Suite) -> list[str]:
+    arguments = ["-m", "roboeval", "mcp", "--out", str(run), "--suite", str(suite.folder), "--name", "coder"]
+    return [*arguments, "--max-turns", "4"]
+
+
 def client(run: Path, suite: Suite) -> Client:
     """A client that starts the command, as a coding agent does."""
-    arguments = ["-m", "roboeval", "mcp", "--out", str(run), "--suite", str(suite.folder), "--name", "coder"]
-    return Client(
-        StdioServerParameters(
-            command=sys.executable, args=[*arguments, "--max-turns", "4"], env={**os.environ}
-        )
-    )
+    return Client(StdioServerParameters(command=sys.executable, args=command(run, suite), env={**os.environ}))
 
 
 async def call(to: Client, name: str, **arguments: Any) -> str:  # noqa: ANN401 - JSON
@@ -86,3 +89,28 @@ def test_a_client_carries_out_missions_and_goes_on_later(tmp_path: Path, suite: 
     ]
     rows = [*evaluate_run(RunFolder(run), suite, ablated=False, tasks=None, redo=False)]
     assert [row["passed"] for row in rows] == [True, False, False]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_the_mission_as_the_end_of_input_does(
+    tmp_path: Path, suite: Suite, number: signal.Signals
+) -> None:
+    about = {"protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": {"name": "c", "version": "1"}}
+    asked: list[tuple[str, Any]] = [
+        ("initialize", about),
+        ("tools/call", {"name": "next_mission", "arguments": {}}),
+    ]
+    with subprocess.Popen(
+        [sys.executable, *command(tmp_path / "run", suite)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        for one, (method, parameters) in enumerate(asked):
+            request = {"jsonrpc": "2.0", "id": one, "method": method, "params": parameters}
+            process.stdin.write(json.dumps(request).encode() + b"\n")
+            process.stdin.flush()
+            process.stdout.readline()
+        process.send_signal(number)
+        assert process.wait(SOON) == -number
+    assert [one.more["ending"] for one in RunFolder(tmp_path / "run").read(suite)] == ["GaveUp"]

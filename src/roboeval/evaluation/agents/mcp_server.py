@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
+import signal
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -117,7 +119,9 @@ def open_desk(run: RunFolder, plan: AgentPlan, model: str) -> Iterator[MissionDe
 
 
 async def serve_agent(desk: MissionDesk) -> None:
-    """Serve one client on standard input and output until it closes them."""
+    """Serve one client on standard input and output until it closes them, or a signal arrives."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, _end, desk, number)
 
     async def list_tools(*_: object) -> ListToolsResult:
         return ListToolsResult(tools=desk.tools())
@@ -135,3 +139,9 @@ async def serve_agent(desk: MissionDesk) -> None:
     )
     async with stdio_server() as (reading, writing):
         await server.run(reading, writing, server.create_initialization_options())
+
+
+def _end(desk: MissionDesk, number: int) -> None:
+    desk.leave()
+    signal.signal(number, signal.SIG_DFL)
+    signal.raise_signal(number)  # any other end would wait for the thread that reads standard input
