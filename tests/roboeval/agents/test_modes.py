@@ -9,8 +9,9 @@ import pytest
 
 from codebotler.core.files import to_line
 from command_line import refused, roboeval
-from roboeval.analysis.comparisons.compare import compare_tables
+from roboeval.analysis.comparisons.compare import compare_tables, sample_size_sentences
 from roboeval.analysis.comparisons.missions import has_missions, mission_costs
+from roboeval.analysis.statistics import SampleSizes
 from roboeval.cli.inputs import open_current
 from roboeval.cli.results.report import judged_run
 from roboeval.evaluation.runs.results import load_results
@@ -73,11 +74,16 @@ def test_both_are_counted_by_missions(runs: tuple[Path, Path, str]) -> None:
     assert (has_missions(programs), has_missions(agents)) == (False, True)
     found = compare_tables(programs, agents)
     assert (found.first, found.second) == (0.5, 0.75)
+    assert found.counts_missions
+    assert not sample_size_sentences(found)  # which would be about completions
+    assert found.sample_sizes == SampleSizes(None, None)
 
 
 def test_two_runs_of_programs_are_counted_by_programs(runs: tuple[Path, Path, str]) -> None:
     programs, _ = tables(runs)
-    assert compare_tables(programs, programs).first == 0.0
+    found = compare_tables(programs, programs)
+    assert (found.first, found.counts_missions) == (0.0, False)
+    assert sample_size_sentences(found)
 
 
 def test_costs_are_those_of_a_mission(runs: tuple[Path, Path, str]) -> None:
@@ -103,6 +109,9 @@ def test_the_command_compares_them_and_says_how(runs: tuple[Path, Path, str]) ->
     assert (data["first"]["pass@1"], data["second"]["pass@1"]) == (0.5, 0.75)
     assert data["first"]["failures"]["RobotExecutionError"] == 0.5  # of missions
     assert any("mission" in warning for warning in data["warnings"])
+    shown = roboeval("compare", *paths, "--suite", suite).out
+    assert "pass@1" not in shown
+    assert "missions that succeed" in shown
 
 
 @pytest.mark.slow

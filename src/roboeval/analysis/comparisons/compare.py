@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import combinations
 from typing import Any, TypeVar
 
@@ -13,7 +13,7 @@ import polars as pl
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.core.text.words import counted
-from roboeval.analysis.comparisons.missions import comparable_tables
+from roboeval.analysis.comparisons.missions import comparable_tables, has_missions
 from roboeval.analysis.counting.counts import tally_of, task_scores
 from roboeval.analysis.counting.summary import failures
 from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of, pass_at_1
@@ -56,6 +56,7 @@ class Comparison:
     p_tasks: float  # p-value of the same test over tasks
     sample_sizes: SampleSizes
     tasks: tuple[TaskDifference, ...]  # sorted by contribution, largest first
+    counts_missions: bool = False  # rather than completions; then no sample sizes are known
 
 
 def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
@@ -86,7 +87,10 @@ def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
 
 def compare_tables(first: pl.DataFrame, second: pl.DataFrame) -> Comparison:
     """Compare two runs with `compare_scores`, by missions if an agent carried out those of any run."""
-    return compare_scores(*(pass_at_1(task_scores(table)) for table in comparable_tables(first, second)))
+    found = compare_scores(*(pass_at_1(task_scores(table)) for table in comparable_tables(first, second)))
+    if not (has_missions(first) or has_missions(second)):
+        return found
+    return replace(found, sample_sizes=SampleSizes(None, None), counts_missions=True)
 
 
 def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[TaskDifference]:
@@ -228,6 +232,8 @@ def _ends(estimate: Estimate) -> dict[str, float]:
 def sample_size_sentences(comparison: Comparison) -> list[str]:
     """Describe how many completions or prompts are needed to detect the difference."""
     sizes = comparison.sample_sizes
+    if comparison.counts_missions:
+        return []
     if sizes.completions is None:
         return ["There is no difference, so no sample size can be computed."]
     each = how_many(sizes.completions)

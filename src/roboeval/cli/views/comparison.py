@@ -31,8 +31,9 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
     names = runs[0].name, runs[1].name
     a, b = map(visible, names)
     rows = grid("left", "right", "left")
-    rows.add_row(f"pass@1 of {a}", f"{comparison.first:.3f}", str(runs[0].coverage))
-    rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}", str(runs[1].coverage))
+    what = "missions that succeed, of" if comparison.counts_missions else "pass@1 of"
+    rows.add_row(f"{what} {a}", f"{comparison.first:.3f}", str(runs[0].coverage))
+    rows.add_row(f"{what} {b}", f"{comparison.second:.3f}", str(runs[1].coverage))
     over = f"over {counted(comparison.prompts, 'prompt')} that both have"
     rows.add_row("difference, second minus first", f"{comparison.over_tasks.mean:+.3f}", over)
     few = "too narrow with so few tasks" * (1 < len(comparison.tasks) < MIN_CLUSTERS)
