@@ -88,7 +88,7 @@ def group_failures(failed: Iterable[Row], programs: Mapping[CompletionKey, str])
 def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[FailureGroup]:
     """Explain the failure of each group, and find the smallest fix for it."""
     programs = results.programs
-    candidates = cache(partial(_passing_of_task, results))
+    candidates = cache(partial(_passing_in, results))
     for rows in groups:
         often = Counter(programs.get(key_of(row)) for row in rows)
         most = max(often.values())
@@ -102,19 +102,25 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
             representative=key_of(row),
             program=program,
             reason=reason(row, results.suite, ablated=results.is_ablated),
-            fix=None if has_none else shortest_fix(str(program), candidates(row["task"])),
+            fix=None
+            if has_none
+            else shortest_fix(str(program), candidates(row["task"], row.get("mission_world"))),
         )
 
 
 def nearest_fix(results: Results, key: CompletionKey) -> Fix | None:
     """Find the smallest fix for a completion, or None if its program was removed or no program passes."""
     program = results.programs.get(key)
-    return None if program is None else shortest_fix(program, _passing_of_task(results, key[0]))
+    if program is None:
+        return None
+    return shortest_fix(program, _passing_in(results, key[0], results.completions[key].more.get("world")))
 
 
-def _passing_of_task(results: Results, task: str) -> list[PassingProgram]:
+def _passing_in(results: Results, task: str, world: int | None) -> list[PassingProgram]:
+    """Return the passing programs of a task or, for missions of an agent, those in one world."""
     programs = results.programs
-    right = sorted(key for key in results.passed if key[0] == task and key in programs)
+    of_task = [key for key in results.passed if key[0] == task and key in programs]
+    right = sorted(key for key in of_task if results.completions[key].more.get("world") == world)
     return passing_programs((name_of(key), programs[key]) for key in right)
 
 

@@ -30,6 +30,7 @@ class TraceMatch:
     key: CompletionKey
     worlds: tuple[tuple[int, str], ...]
     cut: tuple[tuple[int, str], ...] = ()  # worlds whose trace was too long to be stored
+    is_in_scope: bool = True  # whether it was judged in a world of the query
 
 
 def search(lines: Iterable[bytes], query: TraceQuery) -> Iterator[TraceMatch]:
@@ -41,12 +42,13 @@ def search(lines: Iterable[bytes], query: TraceQuery) -> Iterator[TraceMatch]:
 def match_row(row: Mapping[str, Any], query: TraceQuery, formula: Formula | None) -> TraceMatch:
     """Match the traces of one completion."""
     worlds, cut = [], []
-    for number, verdict in _verdicts_in_scope(row, query):
+    verdicts = [*_verdicts_in_scope(row, query)]
+    for number, verdict in verdicts:
         if formula is not None and "cut" in verdict:
             cut.append((number, verdict["world"]))
         elif formula is None or _holds(formula, verdict) != query.negated:
             worlds.append((number, verdict["world"]))
-    return TraceMatch(key_of(row), tuple(worlds), tuple(cut))
+    return TraceMatch(key_of(row), tuple(worlds), tuple(cut), bool(verdicts))
 
 
 def _verdicts_in_scope(row: Mapping[str, Any], query: TraceQuery) -> Iterator[tuple[int, Mapping[str, Any]]]:

@@ -11,6 +11,7 @@ from codebotler.core.files import to_line
 from command_line import refused, roboeval
 from roboeval.analysis.comparisons.compare import compare_tables, sample_size_sentences
 from roboeval.analysis.comparisons.missions import has_missions, mission_costs
+from roboeval.analysis.failure_groups import nearest_fix
 from roboeval.analysis.statistics import SampleSizes
 from roboeval.cli.inputs import open_current
 from roboeval.cli.results.report import judged_run
@@ -159,6 +160,20 @@ def test_a_search_in_a_world_finds_its_missions(runs: tuple[Path, Path, str]) ->
         ("T/0/1", 2),
         ("T/0/3", 2),
     ]
+
+    assert data["looked_at"] == 2
+
+
+def test_the_nearest_passing_mission_is_from_the_same_world(
+    runs: tuple[Path, Path, str], tmp_path: Path
+) -> None:
+    twice = f'{SAY}    say("hello")\n'
+    run = a_run(tmp_path / "run", runs[2], [mission(0, SAY), mission(1, twice), mission(1, GO)], "agent")
+    fix = nearest_fix(open_current(run, runs[2], ablated=False), ("T", 0, 2))
+    assert fix is not None
+    assert fix.name == "T/0/1"
+    (group,) = json.loads(roboeval("find", str(run), "--suite", runs[2], "--json").out)["groups"]
+    assert group["fix"]["program"] == "T/0/1"
 
 
 @pytest.mark.parametrize("name", ["resample", "clarify"])

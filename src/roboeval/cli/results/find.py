@@ -68,7 +68,7 @@ def find(
     undecided = [one for one in every if one.cut]
     if undecided:
         note(f"undecided because their traces were too long to save: {how_many(len(undecided))}")
-    total = sum(task in {None, key[0]} for key in results.places)
+    total = sum(one.is_in_scope for one in every)
     if json:
         data = {
             "looked_at": total,
