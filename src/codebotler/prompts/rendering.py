@@ -26,7 +26,7 @@ MAX_SEARCHED_LENGTH, MAX_END_TRIES = 100_000, 20  # limits of the search for the
 STOP_TEXTS = ("\ndef ", "\nclass ", "\n# Instruction", "\n```")  # OpenAI accepts at most four
 
 
-NO_STEP = "nothing"
+NO_STEP = "no step was finished"
 """The words for a mission without any step."""
 
 

@@ -267,6 +267,12 @@ def test_after_a_failure_the_model_writes_the_rest(tmp_path: Path, suite: Suite)
     assert 'failed to go to "the moon"' in told  # rather than that the robot went there
 
 
+def test_rooms_and_waits_are_no_steps(tmp_path: Path, small: Suite) -> None:
+    _, _, server = replan(tmp_path, small, ["get_all_rooms(); time.sleep(1); int('x')", "say('hello')"])
+    told = max(server.requests, key=turns_before).body["messages"][-1]["content"]
+    assert "- no step was finished" in told  # rather than that nothing was seen
+
+
 @pytest.mark.parametrize(
     ("body", "name", "kind"),
     [
@@ -324,7 +330,7 @@ def test_a_run_keeps_to_one_mode(tmp_path: Path, suite: Suite) -> None:
     _, server = serve(lambda _: [PROGRAM.format(body="say('hello')")])
     with server:
         model = open_model("openai-chat:agent", SamplingSettings(base_url=server.url, seed=0))
-        with pytest.raises(UserError, match="mode"):
+        with pytest.raises(UserError, match=r"different mode \(replan, now program\)"):
             generate_run(RunFolder(tmp_path / "run"), GenerationPlan(suite, None, 9), model, Pace())
 
 

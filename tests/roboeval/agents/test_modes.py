@@ -176,10 +176,10 @@ def test_the_nearest_passing_mission_is_from_the_same_world(
     assert group["fix"]["program"] == "T/0/1"
 
 
-@pytest.mark.parametrize("name", ["resample", "clarify"])
+@pytest.mark.parametrize("name", ["recover", "resample", "clarify"])
 def test_what_needs_programs_refuses_missions(runs: tuple[Path, Path, str], name: str) -> None:
     _, agents, suite = runs
-    refused(name, str(agents), "--suite", suite)
+    assert "of an agent" in refused(name, str(agents), "--suite", suite).sentence
 
 
 @pytest.mark.parametrize("mode", ["agent", "replan"])

@@ -55,6 +55,8 @@ def recover(
 
     known, chosen = load(suite), choose_model(model, base_url)
     completions = open_source(source, known).of(tasks_to_judge(known, tasks, ablated=False)[0])
+    if any(one.acted is not None for one in completions):
+        fail(f"{source}: holds missions of an agent; name a run of programs")
     settings = chosen.add_server(model_settings(**sampling))
     is_own = is_recorded(chosen.name) and settings.base_url is None
     opened = recorded_model_for(chosen.name, known) if is_own else open_model(chosen.name, settings)
@@ -96,9 +98,9 @@ def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
         )
         table.add_row(task, *cells)
     lines = [
-        "handled: errors that the program handled itself; missing: missions for which the model had no rest",
-        "passed, rejected (by the check), failed: shares of the continued missions",
-        "steps: those of the missions that passed; fewest: without an error",
-        "repeated: how often robots spoke, picked up or put down more than without an error",
+        "handled: faults that the program handled itself; missing: missions for which the model had no rest",
+        "passed, rejected (by the check), failed: shares of the continued missions, without the missing ones",
+        "steps: those of the missions that passed; fewest: without a fault",
+        "repeated: how often robots spoke, picked up or put down more than without a fault",
     ]
     return Group(Text(title, "bold"), Text(), table, *(Text(line, "dim") for line in lines))

@@ -165,12 +165,15 @@ def requested_tasks(metadata: Mapping[str, Any]) -> frozenset[str] | None:
     return frozenset(requested)
 
 
-OPTIONAL_ENTRIES = ("mode", "contract", "max_mission_tokens")  # left out of run.json if unset
+OPTIONAL_ENTRIES = {"mode": "program", "contract": None, "max_mission_tokens": None}
+"""Entries that are left out of run.json if they have these values."""
 
 
 def _expect_same(earlier: dict[str, Any], fixed: dict[str, Any], file: Path) -> None:
-    before, now = ({**values, **values["settings"], "settings": None} for values in (earlier, fixed))
-    for name, value in {**dict.fromkeys(OPTIONAL_ENTRIES), **now}.items():
+    before, now = (
+        {**OPTIONAL_ENTRIES, **values, **values["settings"], "settings": None} for values in (earlier, fixed)
+    )
+    for name, value in now.items():
         if before.get(name) != value:
             what = "prompt template" if name == "template" else name.replace("_", "-")
             which = f"a different {what} ({_brief(before.get(name))}, now {_brief(value)})"
