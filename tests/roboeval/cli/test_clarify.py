@@ -65,5 +65,23 @@ def test_a_run_keeps_the_result_for_the_report(source: Path, tmp_path: Path) -> 
     ]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("counts", "candidates", "judged"), [((4, 2, 2), 2, 3), ((4, 4, 1), 4, 2)])
+def test_by_default_half_of_the_prompts_are_measured(
+    tmp_path: Path, counts: tuple[int, ...], candidates: int, judged: int
+) -> None:
+    path = tmp_path / "completions.jsonl"
+    rows = [
+        {"task": "SayGoodDay", "prompt": prompt, "index": index, "program": GREETS}
+        for prompt, count in enumerate(counts)
+        for index in range(count)
+    ]
+    path.write_text("".join(f"{json.dumps(row)}\n" for row in rows))
+    ended = roboeval("clarify", path, "--workers", "1")
+    assert f"{candidates} candidates" in " ".join(ended.out.split())
+    assert ended.out.count("SayGoodDay") == judged
+    assert ("2 of 3 prompts" in " ".join(ended.out.split())) is (judged < len(counts))
+
+
 def test_too_few_completions(source: Path) -> None:
     assert "--candidates" in refused("clarify", source, "--candidates", "10", "--workers", "1").sentence

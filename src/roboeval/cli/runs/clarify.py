@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from statistics import median_high
 from typing import Annotated
 
 import typer
@@ -27,7 +28,7 @@ def clarify(
         typer.Option(
             min=2,
             max=20,
-            help="Number of candidates that a model writes for a prompt; by default 10, or all there are.",
+            help="Number of candidates for a prompt; by default 10, or what half of the prompts have.",
             show_default=False,
         ),
     ] = None,
@@ -57,7 +58,7 @@ def clarify(
     if opened.run is not None:
         known = with_judged_worlds(opened.run, known, ablated=False)
     by_prompt = Counter((one.task, one.prompt) for one in completions)
-    candidates = candidates or max(2, min(10, max(by_prompt.values(), default=0)))
+    candidates = candidates or max(2, min(10, median_high(by_prompt.values() or [0])))
     settings, count = ClarifySettings(candidates, noise, seed), len(by_prompt)
     with WorkerPool(workers or cores()) as pool:
         prompts = [*show_progress(clarify(completions, known, pool, settings), "asking", count)]
@@ -65,7 +66,8 @@ def clarify(
     if json:
         print_json(data)
     else:
-        print_rich(clarify_view(data, source, candidates))
+        some = f", {len(prompts)} of {count} prompts" * (len(prompts) < count)
+        print_rich(clarify_view(data, f"{source}{some}", candidates))
     if left_out := count - len(prompts):
         note(f"left out, with fewer than {candidates} completions: {counted(left_out, 'prompt')} of {count}")
     if opened.run is not None and rules is None:

@@ -26,6 +26,7 @@ def clarify_view(data: Mapping[str, Any], title: str, candidates: int) -> Render
     table.add_row("all", "", *_cells(data), style="bold")
     lines = [
         "pass@1 of one program, of the largest group with one behaviour, and of what a person chooses",
+        "asked: share of the trials in which the programs differed enough for a question",
         "mattered: questions whose answer changed the verdict on the largest group of programs",
     ]
     if data["tokens"] is not None:
