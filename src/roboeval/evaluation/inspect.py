@@ -63,7 +63,7 @@ def roboeval(
         worlds: the number of worlds, 1 to 10,000, if the suite samples worlds.
         seed: the random seed for sampling worlds.
         mode: `program`, or `agent` to let models call skills. Then a sample is a prompt in one world.
-        max_turns: the maximum number of replies of an agent in a mission, 1 to 1,000; by default 100.
+        max_turns: the maximum number of replies of an agent in a mission, 1 to 1,000; by default 300.
     """
     is_agent = mode == "agent"
     if mode not in {"program", "agent"}:
