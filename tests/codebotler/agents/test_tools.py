@@ -1078,7 +1078,7 @@ def test_a_client_that_reads_no_progress_is_not_followed(
     monkeypatch.setattr("codebotler.agents.tools.MAX_UNREAD_SECONDS", 0.01)
     gatekeeper.console.within = contract_from({"go_to": {"location": "any"}}, SKILLS)
 
-    async def never_read(_progress: float, _total: float | None, _message: str | None) -> None:
+    async def never_read(progress: float, total: float | None, message: str | None) -> None:  # noqa: ARG001 - as the SDK calls it
         await asyncio.Event().wait()
 
     async def act(agent: Agent) -> None:
