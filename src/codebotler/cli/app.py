@@ -109,11 +109,10 @@ def check(
     """
     from codebotler.checking import check
     from codebotler.checking.proof import hold_within
-    from codebotler.cli.programs.check import check_view, read_program
-    from codebotler.cli.programs.contract import contract_view, write_contract
+    from codebotler.cli.programs.check import check_view, contract_view, read_program, write_contract
     from codebotler.cli.programs.rules import rules_for
     from codebotler.core.skills.files import skills_from
-    from codebotler.core.terminal import busy, print_json, print_rich
+    from codebotler.core.terminal import busy, print_found, print_rich
     from codebotler.simulator.pool import WorkerPool
     from codebotler.simulator.worlds.room_map import RoomMap
 
@@ -138,11 +137,12 @@ def check(
         )
     found = found if allowed is None else hold_within(found, allowed, table)
     write_contract(save_contract, found.contract)
-    if json:
-        print_json(found.data(table))
-    else:
-        name = "the program" if program == "-" else program
-        print_rich(check_view(found, source, name, shows_all=shows_all))
+    name = "the program" if program == "-" else program
+    print_found(
+        lambda: check_view(found, source, name, shows_all=shows_all),
+        lambda: found.data(table),
+        as_json=json,
+    )
     if contract and found.contract is not None and not json:
         print_rich(contract_view(found.contract, table))
     raise typer.Exit(1 if found.problems else 0)
@@ -163,7 +163,7 @@ def rules(
     from codebotler.checking.house_rules.review import review_rules
     from codebotler.cli.programs.rules import review_data, review_view, rooms_of
     from codebotler.core.skills.files import skills_from
-    from codebotler.core.terminal import busy, note, print_json, print_rich
+    from codebotler.core.terminal import busy, print_found
     from codebotler.core.world_file import read_world
 
     table = skills_from(*(skills or ()))
@@ -175,10 +175,7 @@ def rules(
         note("goto covers destinations only; to keep the robot from driving through a room, use inside")
     with busy("looking for examples"):
         found = review_rules(house_rules, known)
-    if json:
-        print_json(review_data(found))
-    else:
-        print_rich(review_view(found))
+    print_found(lambda: review_view(found), lambda: review_data(found), as_json=json)
 
 
 def replay(
@@ -198,7 +195,7 @@ def replay(
     from codebotler.cli.programs.replay import find_replayed_files, replay, replay_data, replay_view
     from codebotler.cli.programs.rules import rules_for
     from codebotler.core.skills.files import skills_from
-    from codebotler.core.terminal import busy, print_json, print_rich
+    from codebotler.core.terminal import busy, print_found
     from codebotler.core.text.words import counted
     from codebotler.core.world_file import read_world
 
@@ -208,10 +205,9 @@ def replay(
     found = find_replayed_files(files)
     with busy(f"replaying {counted(len(found), 'file')}"):
         effects = replay(found, house_rules, known, table)
-    if json:
-        print_json(replay_data(effects, house_rules))
-    else:
-        print_rich(replay_view(effects, house_rules))
+    print_found(
+        lambda: replay_view(effects, house_rules), lambda: replay_data(effects, house_rules), as_json=json
+    )
 
 
 def skills(
@@ -238,7 +234,7 @@ def skills(
     from codebotler.cli.programs.skills import SKILLS_TEMPLATE, skills_data, skills_view, write_new
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.ros_package import write_ros_packages
-    from codebotler.core.terminal import print_json, print_rich
+    from codebotler.core.terminal import print_found
 
     if new is not None:
         write_new(new, SKILLS_TEMPLATE.replace("NAME", str(new)))
@@ -248,10 +244,8 @@ def skills(
     if ros_package is not None:
         written = write_ros_packages(table, ros_package)
         note(f"wrote {', '.join(map(str, written))}; build them with colcon")
-    elif json:
-        print_json(skills_data(table))
     else:
-        print_rich(skills_view(table))
+        print_found(lambda: skills_view(table), lambda: skills_data(table), as_json=json)
 
 
 def models(
@@ -264,15 +258,12 @@ def models(
     from dataclasses import asdict
 
     from codebotler.cli.views import models_view
-    from codebotler.core.terminal import print_json, print_rich
+    from codebotler.core.terminal import print_found
     from codebotler.models.chosen import choose_model
     from codebotler.models.usable import find_usable_models
 
     found = find_usable_models()
-    if json:
-        print_json([asdict(model) for model in found])
-    else:
-        print_rich(models_view(found, choose_model()))
+    print_found(lambda: models_view(found, choose_model()), lambda: list(map(asdict, found)), as_json=json)
 
 
 app = options.command_line(
