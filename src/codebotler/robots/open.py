@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
-from codebotler.core.errors import UserError, install_command, installed, missing_package
+from codebotler.core.errors import UserError, install_command
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness, Robot
 from codebotler.robots.face import Face, RobotWithFace, without_speech
 from codebotler.robots.own import OwnRobot, is_own
@@ -22,8 +22,18 @@ ROBOT_MODULES = {
 }
 """The module of each kind of robot, which must import quickly.
 
-Each module has the functions `readiness(ros_python)` and `robot(options)`, which does not connect yet.
+Each module has a function `robot(options)`, which does not connect yet. For kinds without a note below, it
+also has a function `readiness(ros_python)`.
 """
+PACKAGES = {"pyrobosim": "pyrobosim", "rosbridge": "websockets"}
+"""The optional package that a kind of robot needs."""
+NOTES = {
+    "sim": "simulates the rooms and people of --world FILE",
+    "pyrobosim": "plans and drives through --world FILE, without a window",
+    "rosbridge": "at --address, ws://localhost:9090 by default; with ROS 2, tested only against a simulated "
+    "rosbridge",
+}
+"""Advice for users of a kind of robot that works wherever its package is installed."""
 
 
 def open_robot(name: str, options: Options | None = None) -> Robot:
@@ -39,8 +49,9 @@ def open_robot(name: str, options: Options | None = None) -> Robot:
     if name not in ROBOT_MODULES:
         own = "or your own class, such as lab_robot.py:Spot"
         raise UserError(f'unknown robot "{name}"; choose one of {", ".join(ROBOT_MODULES)}, {own}')
-    with installed():
-        robot: Robot = _import_kind(name).robot(options or Options())
+    if package := _missing_package(name):
+        raise UserError(f"{package} is not installed; `{install_command(package)}` installs it")
+    robot: Robot = _import_kind(name).robot(options or Options())
     return robot if name == "sim" else SpellingRobot(robot)
 
 
@@ -57,15 +68,18 @@ def check_readiness(ros_python: Path = ROS_PYTHON) -> list[Readiness]:
 
 
 def _readiness(name: str, ros_python: Path) -> Readiness:
-    try:
-        readiness: Readiness = _import_kind(name).readiness(ros_python)
-    except ModuleNotFoundError as error:
-        package = missing_package(error)
-        if not package:
-            raise
+    if package := _missing_package(name):
         missing, mend = f"{package} is not installed", install_command(package)
         return Readiness(name, works=False, missing=missing, mend=mend)
+    if name in NOTES:
+        return Readiness(name, works=True, note=NOTES[name])
+    readiness: Readiness = _import_kind(name).readiness(ros_python)
     return readiness
+
+
+def _missing_package(name: str) -> str:
+    package = PACKAGES.get(name)
+    return package if package and importlib.util.find_spec(package) is None else ""
 
 
 def _import_kind(name: str) -> ModuleType:
