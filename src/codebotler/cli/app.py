@@ -50,8 +50,7 @@ def generate(
     from codebotler.core.skills.files import skills_from
     from codebotler.core.world_file import read_world
     from codebotler.missions.preflight import suggesting_here
-    from codebotler.models.chosen import choose_model
-    from codebotler.models.open import open_model
+    from codebotler.models.open import choose_model, open_model
     from codebotler.simulator.worlds.room_map import RoomMap
 
     chosen = choose_model(model, base_url)
@@ -259,7 +258,7 @@ def models(
 
     from codebotler.cli.views import models_view
     from codebotler.core.terminal import print_found
-    from codebotler.models.chosen import choose_model
+    from codebotler.models.open import choose_model
     from codebotler.models.usable import find_usable_models
 
     found = find_usable_models()

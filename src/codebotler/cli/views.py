@@ -16,7 +16,7 @@ from codebotler.missions.display.view import SessionView
 from codebotler.missions.display.wording import event_text, timeline, title
 from codebotler.missions.storage.log import LogLine, MissionState, MissionSummary
 from codebotler.missions.storage.store import last_rest, rest_text
-from codebotler.models.chosen import ChosenModel
+from codebotler.models.open import ChosenModel
 from codebotler.models.usable import MODEL_HINT, UsableModel
 from codebotler.robots.base import Readiness
 

@@ -40,7 +40,7 @@ def run_settings(
 
     from codebotler.cli.operating.run import Request
     from codebotler.cli.operating.serving import open_console
-    from codebotler.models.chosen import choose_model
+    from codebotler.models.open import choose_model
 
     request = partial(Request, yes=yes, despite_problems=despite_problems, shows_all=shows_all)
     models = [choose_model(model, base_url).name]

@@ -10,7 +10,7 @@ from codebotler.cli.model_options import model_settings, options_for
 from codebotler.core.files import home
 from codebotler.core.terminal import note
 from codebotler.core.text.words import listed
-from codebotler.models.chosen import choose_model, make_opener
+from codebotler.models.open import choose_model, make_opener
 from codebotler.robots.face import Face
 from codebotler.robots.open import open_robot, open_with_face
 from codebotler.web.console import Console
