@@ -43,8 +43,7 @@ def generate(
     The exit status is 1 if the check finds problems.
     """
     from codebotler.checking.sampled import CheckSettings
-    from codebotler.cli.programs.candidates import choose_candidate, line_reader, print_checked
-    from codebotler.cli.programs.generate import print_prompt, prompt_maker, write
+    from codebotler.cli.programs import generate as programs
     from codebotler.cli.programs.rules import rules_for
     from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
@@ -59,20 +58,21 @@ def generate(
     known = None if world is None else read_world(world, table)
     house_rules = rules_for(known, rules, table)
     room_map = None if known is None else RoomMap.of(known)
-    make_prompt = prompt_maker(table, room_map, house_rules)
+    make_prompt = programs.prompt_maker(table, room_map, house_rules)
     if show_prompt:
-        print_prompt(make_prompt(instruction), chosen.name)
+        programs.print_prompt(make_prompt(instruction), chosen.name)
         return
     if candidates > 1 and (repair or retries is not None):
         raise UserError("--candidates cannot be combined with --retries or --repair")
     with suggesting_here(room_map):
         if candidates > 1:
-            how, ask = CheckSettings(skills=table, house_rules=house_rules), line_reader(is_allowed=not yes)
+            how = CheckSettings(skills=table, house_rules=house_rules)
+            ask = programs.line_reader(is_allowed=not yes)
             given = (lambda: open_model(chosen.name, settings)), make_prompt, instruction, how, room_map
-            program = choose_candidate(*given, count=candidates, ask=ask)
-            accepted = program is not None and print_checked(program, how, room_map)
+            program = programs.choose_candidate(*given, count=candidates, ask=ask)
+            accepted = program is not None and programs.print_checked(program, how, room_map)
         else:
-            accepted = write(
+            accepted = programs.write(
                 make_prompt(instruction),
                 chosen.name,
                 settings,

@@ -11,9 +11,8 @@ from pathlib import Path
 from rich.console import Group
 from rich.text import Text
 
-from codebotler.cli.programs.candidates import ADD_SENTENCE, ask_which, line_reader
 from codebotler.cli.programs.check import check_view, contract_view, read_program
-from codebotler.cli.programs.generate import note_programless
+from codebotler.cli.programs.generate import ADD_SENTENCE, ask_which, line_reader, note_programless
 from codebotler.cli.views import EventPrinter, continue_view, ending_view, source_view
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import (
