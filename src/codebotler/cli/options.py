@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 def robot_names(incomplete: str) -> list[str]:
     """Return the kinds of robots that start with a string, for shell completion."""
-    from codebotler.robots.open import ROBOT_MODULES
+    from codebotler.robots.open import ROBOT_KINDS
 
-    return [name for name in ROBOT_MODULES if name.startswith(incomplete)]
+    return [name for name in ROBOT_KINDS if name.startswith(incomplete)]
 
 
 RobotOption = Annotated[

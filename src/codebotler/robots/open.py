@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 from codebotler.core.errors import UserError, install_command
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness, Robot
@@ -13,18 +12,14 @@ from codebotler.robots.face import Face, RobotWithFace, without_speech
 from codebotler.robots.own import OwnRobot, is_own
 from codebotler.robots.spelling import SpellingRobot
 
-ROBOT_MODULES = {
-    "sim": "simulated",
-    "pyrobosim": "pyrobosim.robot",
-    "ros1": "ros.ros1",
-    "rosbridge": "ros.rosbridge",
-    "ros2": "ros.ros2",
+ROBOT_KINDS = {
+    "sim": "simulated:robot",
+    "pyrobosim": "pyrobosim.robot:robot",
+    "ros1": "ros.kinds:ros1",
+    "rosbridge": "ros.kinds:rosbridge",
+    "ros2": "ros.kinds:ros2",
 }
-"""The module of each kind of robot, which must import quickly.
-
-Each module has a function `robot(options)`, which does not connect yet. For kinds without a note below, it
-also has a function `readiness(ros_python)`.
-"""
+"""The function that opens each kind of robot without connecting it, in a module that must import quickly."""
 PACKAGES = {"pyrobosim": "pyrobosim", "rosbridge": "websockets"}
 """The optional package that a kind of robot needs."""
 NOTES = {
@@ -46,12 +41,14 @@ def open_robot(name: str, options: Options | None = None) -> Robot:
     """
     if is_own(name):
         return SpellingRobot(OwnRobot(name, options or Options()))
-    if name not in ROBOT_MODULES:
+    if name not in ROBOT_KINDS:
         own = "or your own class, such as lab_robot.py:Spot"
-        raise UserError(f'unknown robot "{name}"; choose one of {", ".join(ROBOT_MODULES)}, {own}')
+        raise UserError(f'unknown robot "{name}"; choose one of {", ".join(ROBOT_KINDS)}, {own}')
     if package := _missing_package(name):
         raise UserError(f"{package} is not installed; `{install_command(package)}` installs it")
-    robot: Robot = _import_kind(name).robot(options or Options())
+    module, _, function = ROBOT_KINDS[name].partition(":")
+    make = getattr(importlib.import_module(f"{__package__}.{module}"), function)
+    robot: Robot = make(options or Options())
     return robot if name == "sim" else SpellingRobot(robot)
 
 
@@ -64,7 +61,7 @@ def open_with_face(name: str, options: Options, face: Face) -> Robot:
 
 def check_readiness(ros_python: Path = ROS_PYTHON) -> list[Readiness]:
     """Check for each kind of robot whether it can be used on this machine, and what is missing if not."""
-    return [_readiness(name, ros_python) for name in ROBOT_MODULES]
+    return [_readiness(name, ros_python) for name in ROBOT_KINDS]
 
 
 def _readiness(name: str, ros_python: Path) -> Readiness:
@@ -73,14 +70,11 @@ def _readiness(name: str, ros_python: Path) -> Readiness:
         return Readiness(name, works=False, missing=missing, mend=mend)
     if name in NOTES:
         return Readiness(name, works=True, note=NOTES[name])
-    readiness: Readiness = _import_kind(name).readiness(ros_python)
-    return readiness
+    from codebotler.robots.ros.kinds import ros_readiness  # noqa: PLC0415 - only where ROS is asked for
+
+    return ros_readiness(name, ros_python)
 
 
 def _missing_package(name: str) -> str:
     package = PACKAGES.get(name)
     return package if package and importlib.util.find_spec(package) is None else ""
-
-
-def _import_kind(name: str) -> ModuleType:
-    return importlib.import_module(f"{__package__}.{ROBOT_MODULES[name]}")

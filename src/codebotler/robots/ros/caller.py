@@ -5,29 +5,25 @@ from __future__ import annotations
 import base64
 import re
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 from codebotler.core.errors import RobotError
 from codebotler.robots.base import (
-    ROS_PYTHON,
     STOP_BY_HAND,
     CameraPicture,
     CancelledError,
     Feedback,
     NotReadyError,
     Options,
-    Readiness,
     RobotLostError,
     RobotResult,
 )
 from codebotler.robots.clock import Clock
 from codebotler.robots.reservation import robot_file
 from codebotler.robots.ros.connections.connection import Connection, SkillCall, Values, default_connection
-from codebotler.robots.ros.worker import RosWorker, WorkerMessage, find_missing
+from codebotler.robots.ros.worker import RosWorker, WorkerMessage
 
-USE_OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
 NOT_CANCELLED = f"its goals could not be cancelled: {STOP_BY_HAND}"
 CANCEL_SECONDS = 1.0  # the time limit for the worker to send a cancel
 NAMED_ERROR = re.compile(r"([A-Z][A-Za-z]+): (.+)", re.DOTALL)
@@ -214,19 +210,6 @@ class RosCaller:
                 return NOT_CANCELLED
             self._in_doubt = False
             return "another worker has cancelled all goals"
-
-
-def ros_readiness(name: str, python: Path, needs: Sequence[str], mend: str, note: str) -> Readiness:
-    """Check whether an interpreter has a worker's modules. `mend` is the fix for missing ones."""
-    missing = find_missing(python, needs)
-    if missing is None:
-        return Readiness(
-            name, works=False, missing=f"{python} cannot be run", mend=USE_OTHER_PYTHON, note=note
-        )
-    if missing:
-        lacking = f"{python} lacks {', '.join(missing)}"
-        return Readiness(name, works=False, missing=lacking, mend=mend, note=note)
-    return Readiness(name, works=True, note=note)
 
 
 def calls_data(connection: Connection) -> WorkerMessage:
