@@ -127,7 +127,7 @@ def missions(
     from codebotler.missions.storage.pictures import PICTURE_FOLDER, read_picture
 
     if mcap is not None:
-        from codebotler.missions.storage.mcap import export_mcap  # an optional package
+        from codebotler.missions.storage.mcap import export_mcap  # fails first if its package is missing
 
     if mcap is not None and mission is None:
         raise UserError("--mcap writes one mission; give its ID, or `last`")
@@ -144,7 +144,9 @@ def missions(
     folder = store.find_mission(home(), mission)
     summary, events = MissionSummary.read(folder), read_events(folder)
     if mcap is not None:
-        export_mcap(mcap, summary, events, "robot" if clock == "robot" else "wall", folder)
+        export_mcap(  # type: ignore[possibly-undefined]  # imported above
+            mcap, summary, events, "robot" if clock == "robot" else "wall", folder
+        )
         note(f"wrote {len(events):,} events of mission {summary.id} to {mcap}")
         return
     print_found(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -87,7 +88,8 @@ def choose_python(named: Path = ROS_PYTHON) -> Path:
 def ros_readiness(name: str, python: Path = ROS_PYTHON) -> Readiness:
     """Check whether an interpreter has the modules for ros1 or ros2, which builds missing message types."""
     if name == "ros1":
-        needs, mend = ROS1_MODULES, INSTALL_ROS1 if python == ROS_PYTHON else USE_OTHER_PYTHON
+        needs: Sequence[str] = ROS1_MODULES
+        mend = INSTALL_ROS1 if python == ROS_PYTHON else USE_OTHER_PYTHON
         note = f"with {python}; needs a master, see ROS_MASTER_URI"
     else:
         python = choose_python(python)
