@@ -17,7 +17,6 @@ from codebotler.core.errors import UserError, installed
 from codebotler.core.terminal import (
     DISK_FULL,
     drop_output,
-    flush_output,
     note,
     open_streams,
     shortened,
@@ -51,7 +50,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
     try:
         with installed():
             status = _command(app)(standalone_mode=False, prog_name=name)
-        flush_output()
+        sys.stdout.flush()
     except KeyboardInterrupt:
         status = STOPPED
     except BrokenPipeError:  # the reader of the output, such as `head`, has exited

@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from codebotler.core.errors import UserError, install_command
-from codebotler.robots.base import ROS_PYTHON, Options, Readiness, Robot
+from codebotler.core.text.unicode import compose
+from codebotler.robots.base import (
+    ROS_PYTHON,
+    Feedback,
+    Options,
+    Readiness,
+    Robot,
+    RobotArgument,
+    RobotResult,
+    ignore_feedback,
+)
 from codebotler.robots.face import Face, RobotWithFace, without_speech
 from codebotler.robots.own import OwnRobot, is_own
-from codebotler.robots.spelling import SpellingRobot
 
 ROBOT_KINDS = {
     "sim": "simulated:robot",
@@ -78,3 +89,25 @@ def _readiness(name: str, ros_python: Path) -> Readiness:
 def _missing_package(name: str) -> str:
     package = PACKAGES.get(name)
     return package if package and importlib.util.find_spec(package) is None else ""
+
+
+class SpellingRobot:
+    """Wraps a robot so that programs see composed names, while the robot gets names in its own spelling."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._spellings: dict[str, str] = {}  # the robot's spelling of each composed name
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute of the robot
+        return getattr(self._robot, name)
+
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
+        """Perform a skill with names in the robot's own spelling."""
+        given = [self._spellings.get(one, one) if isinstance(one, str) else one for one in arguments]
+        result = self._robot.perform(skill, given, feedback)
+        for text in result if isinstance(result, list) else [result]:
+            if isinstance(text, str) and compose(text) != text:
+                self._spellings[compose(text)] = text
+        return compose(result)
