@@ -65,14 +65,6 @@ class SkillCall:
 
 
 @dataclass(frozen=True)
-class MotionTopic:
-    """A topic on which a robot publishes its poses or velocities."""
-
-    topic: str
-    frames: tuple[str, str] | None = None  # the frames of the map and of the robot, for poses from tf
-
-
-@dataclass(frozen=True)
 class Connection:
     """A robot's ROS interface.
 
@@ -80,8 +72,9 @@ class Connection:
         calls: the action, service or topic for each skill.
         robot: the kind of robot: ros1, rosbridge or ros2.
         places: the places that the robot can drive to, or None if unknown.
-        pose: the topic with the robot's poses.
-        velocity: the topic with the robot's velocities.
+        pose: the topic with the robot's poses, or an empty string.
+        velocity: the topic with the robot's velocities, or an empty string.
+        frames: the frames of the map and of the robot, for poses from tf.
         packages: folders of message packages to build if they are not installed.
         cameras: the camera topic and the detector model for each skill that looks at pictures.
         keepout: the topics of Nav2's keepout mask and its CostmapFilterInfo.
@@ -90,8 +83,9 @@ class Connection:
     calls: Mapping[str, SkillCall]
     robot: str = "ros2"
     places: Places | None = None
-    pose: MotionTopic | None = None
-    velocity: MotionTopic | None = None
+    pose: str = ""
+    velocity: str = ""
+    frames: tuple[str, str] | None = None
     packages: tuple[str, ...] = ()
     cameras: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     keepout: tuple[str, str] | None = None
