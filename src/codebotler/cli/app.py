@@ -42,6 +42,8 @@ def generate(
 
     The exit status is 1 if the check finds problems.
     """
+    from functools import partial
+
     from codebotler.checking.sampled import CheckSettings
     from codebotler.cli.programs import generate as programs
     from codebotler.cli.programs.rules import rules_for
@@ -50,6 +52,7 @@ def generate(
     from codebotler.core.world_file import read_world
     from codebotler.missions.preflight import suggesting_here
     from codebotler.models.open import choose_model, open_model
+    from codebotler.prompts import prompt_for
     from codebotler.simulator.worlds.room_map import RoomMap
 
     chosen = choose_model(model, base_url)
@@ -58,7 +61,8 @@ def generate(
     known = None if world is None else read_world(world, table)
     house_rules = rules_for(known, rules, table)
     room_map = None if known is None else RoomMap.of(known)
-    make_prompt = programs.prompt_maker(table, room_map, house_rules)
+    sentences, rooms = [rule.says for rule in house_rules], () if room_map is None else room_map.described
+    make_prompt = partial(prompt_for, rooms=rooms, rules=sentences, skills=table)
     if show_prompt:
         programs.print_prompt(make_prompt(instruction), chosen.name)
         return

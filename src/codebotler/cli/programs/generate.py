@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 from rich.console import Group, RenderableType
@@ -35,20 +35,12 @@ from codebotler.models.base import Model
 from codebotler.models.open import kind_of, open_model
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
 from codebotler.models.sampling import SamplingSettings
-from codebotler.prompts import Prompt, prompt_for
+from codebotler.prompts import Prompt
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.worlds.room_map import RoomMap
 
 MAX_REPLY_SHOWN = 300  # how many characters to show of a reply without a program
 ADD_SENTENCE = "What should be different? (Enter to give up) "
-
-
-def prompt_maker(
-    skills: SkillTable, room_map: RoomMap | None, house_rules: Sequence[Rule]
-) -> Callable[[str], Prompt]:
-    """Return a function that makes the prompt for an instruction."""
-    rooms = () if room_map is None else room_map.described
-    return partial(prompt_for, skills=skills, rooms=rooms, rules=[rule.says for rule in house_rules])
 
 
 def write(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from codebotler.core.skills.declaration import by_event, verb_for
+from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.table import Recording
 from codebotler.core.skills.verbs import Verb, VerbForm
 from codebotler.core.terminal import visible
@@ -13,6 +13,7 @@ from codebotler.core.trace import Event, Option
 
 NO_ANSWER = "no answer"
 MAX_BRACKETED_OPTIONS = 20
+UNKNOWN_RECORDING = Recording("", "text", names="thing")  # of a kind that no loaded skill records
 
 
 def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, quote: str = '"') -> str:
@@ -59,30 +60,28 @@ def bracket_options(options: Sequence[Option], show: Callable[[str], str] = brie
 
 def verb(kind: str) -> Verb:
     """Return the verb for a kind of event, or a generic verb if no loaded skill records this kind."""
-    if (known := verb_for(kind)) is not None:
-        return known
+    row = by_event(kind)
+    if row is not None and row.verb is not None:
+        return row.verb
     shown = visible(kind)
     return Verb(f"do {shown}", f"does {shown}", f"did {shown}", f"doing {shown}", f"did {shown}")
 
 
 def has_no_text(kind: str) -> bool:
     """Whether events of a kind have no text because their skill has no parameters."""
-    recording = _recording(kind)
-    return recording is not None and not recording.text
+    return not _recording(kind).text
 
 
 def is_spoken(kind: str) -> bool:
     """Whether events of a kind are spoken."""
-    recording = _recording(kind)
-    return recording is not None and recording.is_spoken
+    return _recording(kind).is_spoken
 
 
 def is_question(kind: str) -> bool:
     """Whether events of a kind offer options."""
-    recording = _recording(kind)
-    return recording is not None and recording.options is not None
+    return _recording(kind).options is not None
 
 
-def _recording(kind: str) -> Recording | None:
+def _recording(kind: str) -> Recording:
     row = by_event(kind)
-    return None if row is None else row.recording
+    return UNKNOWN_RECORDING if row is None or row.recording is None else row.recording
