@@ -17,6 +17,7 @@ from codebotler.core.errors import UserError, installed
 from codebotler.core.terminal import (
     DISK_FULL,
     drop_output,
+    flush_output,
     note,
     open_streams,
     shortened,
@@ -50,7 +51,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
     try:
         with installed():
             status = _command(app)(standalone_mode=False, prog_name=name)
-        sys.stdout.flush()
+        flush_output()
     except KeyboardInterrupt:
         status = STOPPED
     except BrokenPipeError:  # the reader of the output, such as `head`, has exited

@@ -63,6 +63,11 @@ def open_streams() -> None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
 
 
+def flush_output() -> None:
+    """Flush stdout."""
+    sys.stdout.flush()
+
+
 def drop_output() -> None:
     """Discard all further output to stdout."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
