@@ -6,6 +6,7 @@ import importlib.util
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 from codebotler.core.errors import UserError, install_command
@@ -57,9 +58,7 @@ def open_robot(name: str, options: Options | None = None) -> Robot:
         raise UserError(f'unknown robot "{name}"; choose one of {", ".join(ROBOT_KINDS)}, {own}')
     if package := _missing_package(name):
         raise UserError(f"{package} is not installed; `{install_command(package)}` installs it")
-    module, _, function = ROBOT_KINDS[name].partition(":")
-    make = getattr(importlib.import_module(f"{__package__}.{module}"), function)
-    robot: Robot = make(options or Options())
+    robot: Robot = resolve_name(f"{__package__}.{ROBOT_KINDS[name]}")(options or Options())
     return robot if name == "sim" else SpellingRobot(robot)
 
 

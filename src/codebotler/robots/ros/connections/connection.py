@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.skills.table import SkillTable
 
 if TYPE_CHECKING:
     from codebotler.robots.places import Places
@@ -100,18 +100,17 @@ class Connection:
 
 def default_connection(skills: SkillTable) -> Connection:
     """Return the connection that uses the actions from the skills' own declarations."""
-    return Connection({row.name: _action_of(row) for row in skills.rows if row.ros is not None})
-
-
-def _action_of(skill: Skill) -> SkillCall:
-    ros = skill.ros
-    assert ros is not None, "the caller selects skills with an action"
-    names = [line.split()[1] for line in ros.goal]
-    request = {name: f"${p.name}" for name, p in zip(names, skill.parameters, strict=True)}
-    result = "" if ros.result is None else "result"
-    failure = ros.failure or f"{ros.type}Failed"
-    type_name = f"{ros.package}/action/{ros.type}"
-    return SkillCall("action", ros.server, type_name, request, ros.definition, result, failure=failure)
+    calls = {}
+    for skill in skills.rows:
+        if (ros := skill.ros) is not None:
+            names = [line.split()[1] for line in ros.goal]
+            request = {name: f"${p.name}" for name, p in zip(names, skill.parameters, strict=True)}
+            type_name, failure = f"{ros.package}/action/{ros.type}", ros.failure or f"{ros.type}Failed"
+            result = "" if ros.result is None else "result"
+            calls[skill.name] = SkillCall(
+                "action", ros.server, type_name, request, ros.definition, result, failure=failure
+            )
+    return Connection(calls)
 
 
 def _fill(request: Any, values: Values) -> Any:  # noqa: ANN401 - a message
@@ -137,11 +136,6 @@ def _put(fields: dict[str, Any], path: str, value: Any) -> None:  # noqa: ANN401
         _put(fields.setdefault(first, {}), rest, value)
     else:
         fields[first] = value
-
-
-def find_variables(request: Values) -> set[str]:
-    """Return the names of the variables in a request."""
-    return set(CALL_VARIABLE.findall(str(request)))
 
 
 def _get(received: Any, path: str) -> Any:  # noqa: ANN401 - a message

@@ -12,10 +12,10 @@ from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.yaml_files import YamlFile
 from codebotler.robots.places import Places, read_places
 from codebotler.robots.ros.connections.connection import (
+    CALL_VARIABLE,
     PLACE_VARIABLES,
     Connection,
     SkillCall,
-    find_variables,
 )
 
 
@@ -146,7 +146,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     known |= {*PLACE_VARIABLES} if places and skill.is_drive else set()
     if known and not request:
         raise file.wrong(f'write the message in "{MESSAGE_KEYS[kind]}", such as {{data: ${min(known)}}}', *at)
-    for variable in find_variables(request):
+    for variable in CALL_VARIABLE.findall(str(request)):
         if variable not in known:
             lacks = "; name a file under places" if variable in PLACE_VARIABLES and skill.is_drive else ""
             given = ", ".join(f"${one}" for one in sorted(known)) or "none"
