@@ -52,7 +52,8 @@ def check_view(found: CheckResult, program: str, name: str, *, shows_all: bool =
     lines = program.rstrip("\n").split("\n")
     for problem in found.problems:
         parts += [Text(), *_problem(problem, lines)]
-    parts += [Text(), _rooms(found), *_vain_searches(found), *_proofs(found)]
+    parts += [Text(), _rooms(found), *_vain_searches(found)]
+    parts += [Text(f'the rule "{one.rule}" {one.words}', PROOF_STYLES[one.verdict]) for one in found.proofs]
     kinds = _distinct_samples(found)
     for sample in kinds if shows_all else kinds[:1]:
         parts += [Text(), *_sample(sample)]
@@ -125,11 +126,6 @@ def _sample(sample: Sample) -> Iterator[RenderableType]:
     if sample.outcome.error is not None:
         error = f"{sample.outcome.error.kind}: {shortened(sample.outcome.error.message)}"
         yield Padding(Text(error, "red"), (0, 0, 0, 4))
-
-
-def _proofs(found: CheckResult) -> Iterator[Text]:
-    for proof in found.proofs:
-        yield Text(f'the rule "{proof.rule}" {proof.words}', PROOF_STYLES[proof.verdict])
 
 
 # --- contracts
