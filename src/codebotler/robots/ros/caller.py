@@ -17,7 +17,6 @@ from codebotler.robots.base import (
     NotReadyError,
     Options,
     RobotLostError,
-    RobotResult,
 )
 from codebotler.robots.clock import Clock
 from codebotler.robots.reservation import robot_file
@@ -93,29 +92,25 @@ class RosCaller:
         self._worker, self._stopped, self._in_doubt = worker, False, False
         self.clock.restart()
 
-    def _call(self, skill: str, values: Values, feedback: Feedback) -> RobotResult:
-        """Perform a skill through its ROS call, with values for the variables in the call.
+    def _request(self, call: SkillCall, request: WorkerMessage, feedback: Feedback) -> Values:
+        """Send a request to the worker and return the robot's answer.
+
+        The robot's reason for a failure may start with a kind of error, as in `PickInvalidObject: no mug`.
 
         Raises:
             RobotError: the server rejected or aborted the goal.
             CancelledError: this or another client cancelled the goal.
             RobotLostError: the server or the worker died, or does not respond.
         """
-        call = self.connection.calls.get(skill)
-        if call is None:
-            raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
-        request = {"do": "perform", "skill": skill, "fields": call.fields(values)}
-        result: RobotResult = call.answer(self._request(call, request, feedback))
-        return result
-
-    def _request(self, call: SkillCall, request: WorkerMessage, feedback: Feedback) -> Values:
-        """Send a request to the worker and return the robot's answer, or raise an error if it failed."""
         message = self._await_end(request, feedback)
         match message:
             case {"is": "result", "values": dict(values)}:
                 return values
             case {"is": "error", "text": str(text), "state": str(state)}:
-                raise to_robot_error(call, text or call.why(message.get("values", {})), state)
+                why = text or call.why(message.get("values", {}))
+                named = NAMED_ERROR.fullmatch(why)
+                kind, why = (named[1], named[2]) if named else (call.failure, why)
+                raise RobotError(kind, why or f"{call.name} {state} the goal without a reason")
             case {"is": "cancelled"}:
                 raise CancelledError
         self._in_doubt = self._in_doubt or message["is"] == "lost"
@@ -219,14 +214,3 @@ def calls_data(connection: Connection) -> WorkerMessage:
         skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
         for skill, call in connection.calls.items()
     }
-
-
-def to_robot_error(call: SkillCall, text: str, state: str) -> RobotError:
-    """Return the exception for a rejected or aborted goal (see `state`), with the server's message.
-
-    The message may start with a kind of error, as in `PickInvalidObject: there is no mug`.
-    """
-    named = NAMED_ERROR.fullmatch(text)
-    if named is not None:
-        return RobotError(named[1], named[2])
-    return RobotError(call.failure, text or f"{call.name} {state} the goal without a reason")

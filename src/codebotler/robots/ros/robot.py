@@ -86,7 +86,12 @@ class RosRobot(RosCaller):
         values: dict[str, Any] = dict(zip(names, arguments, strict=True))
         if connection.places is not None and arguments and self.skills[skill].is_drive:
             values |= _place_values(connection.places, str(arguments[0]))
-        return self._call(skill, values, feedback)
+        call = connection.calls.get(skill)
+        if call is None:
+            raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
+        request = {"do": "perform", "skill": skill, "fields": call.fields(values)}
+        result: RobotResult = call.answer(self._request(call, request, feedback))
+        return result
 
     @property
     def failed_stop(self) -> str:
