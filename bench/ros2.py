@@ -20,7 +20,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import Room, World
 from codebotler.robots.base import NotReadyError, Options, RobotLostError
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros.ros2 import choose_python
+from codebotler.robots.ros.kinds import choose_python
 from codebotler.robots.ros.virtual import VirtualRobot
 
 CONNECTIONS = int(os.environ.get("CONNECTIONS", "200"))

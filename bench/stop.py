@@ -37,7 +37,7 @@ from codebotler.robots.open import check_readiness, open_robot
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros.connections.connection_file import read_connection
-from codebotler.robots.ros.ros2 import ROS2_MODULES, choose_python
+from codebotler.robots.ros.kinds import ROS2_MODULES, choose_python
 from codebotler.robots.ros.virtual import VirtualRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER, find_missing
 from codebotler.robots.simulated import Simulated

@@ -33,7 +33,7 @@ MODULES = {
         *("codebotler.core.trace", "codebotler.rtl"),
         *("codebotler.rtl.reasoning", "codebotler.missions.mission"),
         *("codebotler.robots.base", "codebotler.robots.simulated", "codebotler.robots.reservation"),
-        *("codebotler.robots.ros.robot", "codebotler.robots.ros.ros1", "codebotler.robots.ros.virtual"),
+        *("codebotler.robots.ros.robot", "codebotler.robots.ros.kinds", "codebotler.robots.ros.virtual"),
         *("codebotler.robots.ros.worker", "codebotler.models.base", "codebotler.models.open"),
         *("codebotler.models.rate_limit", "codebotler.perception", "codebotler.web.frame"),
     ),

@@ -16,7 +16,7 @@ from playwright.sync_api import expect
 
 from codebotler.robots.base import ROS_PYTHON
 from codebotler.robots.face import without_speech
-from codebotler.robots.ros.ros1 import INSTALL_ROS1, ROS1_MODULES
+from codebotler.robots.ros.kinds import INSTALL_ROS1, ROS1_MODULES
 from codebotler.robots.ros.worker import find_missing
 from faces import SPEAKING
 from pageserver import WORLD, PageServer

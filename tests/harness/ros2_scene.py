@@ -10,7 +10,7 @@ from typing import Any
 
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.robots.base import Options
-from codebotler.robots.ros import ros2
+from codebotler.robots.ros import kinds
 from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
@@ -19,7 +19,7 @@ from ros_graph import Process
 HERE = Path(__file__).parents[1] / "ros2"
 SERVER = HERE / "ros2_action_servers.py"
 PROFILE = HERE / "loopback.xml"
-ROS2_PYTHON = Path(os.environ.get("ROS2_PYTHON") or ros2.choose_python())
+ROS2_PYTHON = Path(os.environ.get("ROS2_PYTHON") or kinds.choose_python())
 SHORT = Timeouts(patience=3.0, silence=0.5, longest=20.0)
 
 
@@ -70,7 +70,7 @@ class Scene:
 
     def robot(self, waits: Timeouts = SHORT, **options: Any) -> RosRobot:  # noqa: ANN401 - fields of Options
         skills = options.pop("skills", None) or SkillTable(tuple(self.served))  # others would be waited for
-        robot = ros2.robot(Options(ros_python=ROS2_PYTHON, skills=skills, **options), waits)
+        robot = kinds.ros2(Options(ros_python=ROS2_PYTHON, skills=skills, **options), waits)
         self.robots.append(robot)
         return robot
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.robots.base import ROS_PYTHON
-from codebotler.robots.ros.ros1 import INSTALL_ROS1, ROS1_MODULES
+from codebotler.robots.ros.kinds import INSTALL_ROS1, ROS1_MODULES
 from codebotler.robots.ros.worker import find_missing
 from ros_graph import Graph
 

@@ -17,7 +17,7 @@ from typing import Any
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.robots.base import ROS_PYTHON, Options
-from codebotler.robots.ros import ros1
+from codebotler.robots.ros import kinds
 from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
@@ -118,7 +118,7 @@ class Graph:
         **options: Any,  # noqa: ANN401 - fields of Options
     ) -> RosRobot:
         short = Timeouts(patience=1.5, silence=1.5, longest=20.0)
-        robot = ros1.robot(Options(address=self.uri, skills=skills, **options), waits or short)
+        robot = kinds.ros1(Options(address=self.uri, skills=skills, **options), waits or short)
         self.robots.append(robot)
         return robot
 

@@ -15,7 +15,7 @@ from bridges import bridge, over_ros
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, Options, RobotLostError
-from codebotler.robots.ros import ros1, rosbridge
+from codebotler.robots.ros import kinds
 from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.robot import RosRobot
@@ -74,10 +74,10 @@ class Robots:
             "connection": read_connection(self.folder / "robot.yaml", table),
         }
         if kind == "ros1":
-            robot: RosRobot = ros1.robot(Options(address=self.graph.uri, **options), WAITS)
+            robot: RosRobot = kinds.ros1(Options(address=self.graph.uri, **options), WAITS)
         else:
             double = self._end.enter_context(bridge(over_ros(self.graph.uri, ())))
-            robot = rosbridge.robot(Options(address=double.address, **options), WAITS)
+            robot = kinds.rosbridge(Options(address=double.address, **options), WAITS)
         self._end.callback(robot.disconnect)
         return robot
 

@@ -14,7 +14,7 @@ from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import CancelledError
 from codebotler.robots.ros.connections.connection_file import read_connection
-from codebotler.robots.ros.ros1 import INSTALL_ROS1
+from codebotler.robots.ros.kinds import INSTALL_ROS1
 from error_tables import errors_on, unsaid
 from ros_graph import Graph, Process, free_port, installed, started
 

@@ -16,7 +16,7 @@ from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.world import Room, World
 from codebotler.robots.base import ROS_PYTHON, Options
-from codebotler.robots.ros import rosbridge
+from codebotler.robots.ros import kinds
 from codebotler.robots.ros.caller import Timeouts, calls_data
 from codebotler.robots.ros.connections.connection import default_connection
 from codebotler.robots.ros.robot import RosRobot
@@ -65,7 +65,7 @@ def robot_(request: pytest.FixtureRequest, graph: Graph, table: SkillTable) -> I
         yield graph.robot(waits, skills=table)
     else:
         with bridge(over_ros(graph.uri, tuple(table), table)) as double:
-            behind = rosbridge.robot(Options(address=double.address, skills=table), waits)
+            behind = kinds.rosbridge(Options(address=double.address, skills=table), waits)
             yield behind
             behind.disconnect()
     virtual.stop()

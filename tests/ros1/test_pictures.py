@@ -25,7 +25,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.missions.storage.log import read_events
 from codebotler.robots.base import CameraPicture, CancelledError, Options
-from codebotler.robots.ros import ros1, rosbridge
+from codebotler.robots.ros import kinds
 from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.robot import RosRobot
@@ -72,10 +72,10 @@ class Eyes:
         path.write_text(CONNECTION.replace("ros1", kind).replace(TOPIC, topic))
         connection = read_connection(path, SKILLS)
         if kind == "ros1":
-            robot = ros1.robot(Options(address=self.graph.uri, connection=connection), WAITS)
+            robot = kinds.ros1(Options(address=self.graph.uri, connection=connection), WAITS)
         else:
             double = self._end.enter_context(bridge(over_ros(self.graph.uri, ())))
-            robot = rosbridge.robot(Options(address=double.address, connection=connection), WAITS)
+            robot = kinds.rosbridge(Options(address=double.address, connection=connection), WAITS)
         self._end.callback(robot.disconnect)
         robot.connect()
         return robot

@@ -25,7 +25,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, Options, RobotLostError
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.ros import rosbridge
+from codebotler.robots.ros import kinds
 from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.robot import RosRobot
 from processes import are_gone, children_of
@@ -35,7 +35,7 @@ WAITS = Timeouts(patience=5.0, silence=1.5, longest=20.0)
 
 
 def behind(address: str, waits: Timeouts | None = None, skills: SkillTable = FEW) -> RosRobot:
-    return rosbridge.robot(Options(address=address, skills=skills), waits)
+    return kinds.rosbridge(Options(address=address, skills=skills), waits)
 
 
 @pytest.fixture
@@ -178,9 +178,9 @@ def test_goal_is_cancelled_over_another_connection_when_one_is_lost(
 
 TOOL = """
 import sys
-from codebotler.robots.ros import rosbridge
+from codebotler.robots.ros import kinds
 from codebotler.robots.base import Options
-robot = rosbridge.robot(Options(address=sys.argv[1]))
+robot = kinds.rosbridge(Options(address=sys.argv[1]))
 robot.connect()
 robot.perform("get_all_rooms", [])
 robot.perform("go_to", ["never"])

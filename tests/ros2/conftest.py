@@ -12,7 +12,7 @@ import pytest
 
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.reservation import lock_folder
-from codebotler.robots.ros.ros2 import INSTALL_ROS2, ROS2_MODULES
+from codebotler.robots.ros.kinds import INSTALL_ROS2, ROS2_MODULES
 from codebotler.robots.ros.worker import find_missing
 from ros2_scene import PROFILE, ROS2_PYTHON, Scene, installed
 

@@ -33,8 +33,8 @@ from pathlib import Path
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.robots.base import Options
-from codebotler.robots.ros import ros2
-robot = ros2.robot(Options(ros_python=Path(sys.argv[1]), skills=SkillTable((SKILLS["is_in_room"],))))
+from codebotler.robots.ros import kinds
+robot = kinds.ros2(Options(ros_python=Path(sys.argv[1]), skills=SkillTable((SKILLS["is_in_room"],))))
 robot.connect()
 robot.perform("is_in_room", ["never"])
 """

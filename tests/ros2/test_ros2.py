@@ -197,10 +197,10 @@ TOOL = """
 import sys
 from pathlib import Path
 from codebotler.robots.base import Options
-from codebotler.robots.ros import ros2
+from codebotler.robots.ros import kinds
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-robot = ros2.robot(Options(ros_python=Path(sys.argv[1]), skills=SkillTable((SKILLS["go_to"],))))
+robot = kinds.ros2(Options(ros_python=Path(sys.argv[1]), skills=SkillTable((SKILLS["go_to"],))))
 robot.connect()
 robot.perform("go_to", ["never"])
 """

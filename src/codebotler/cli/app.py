@@ -42,16 +42,17 @@ def generate(
 
     The exit status is 1 if the check finds problems.
     """
+    from functools import partial
+
     from codebotler.checking.sampled import CheckSettings
-    from codebotler.cli.programs.candidates import choose_candidate, line_reader, print_checked
-    from codebotler.cli.programs.generate import print_prompt, prompt_maker, write
+    from codebotler.cli.programs import generate as programs
     from codebotler.cli.programs.rules import rules_for
     from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
     from codebotler.core.world_file import read_world
     from codebotler.missions.preflight import suggesting_here
-    from codebotler.models.chosen import choose_model
-    from codebotler.models.open import open_model
+    from codebotler.models.open import choose_model, open_model
+    from codebotler.prompts import prompt_for
     from codebotler.simulator.worlds.room_map import RoomMap
 
     chosen = choose_model(model, base_url)
@@ -60,20 +61,22 @@ def generate(
     known = None if world is None else read_world(world, table)
     house_rules = rules_for(known, rules, table)
     room_map = None if known is None else RoomMap.of(known)
-    make_prompt = prompt_maker(table, room_map, house_rules)
+    sentences, rooms = [rule.says for rule in house_rules], () if room_map is None else room_map.described
+    make_prompt = partial(prompt_for, rooms=rooms, rules=sentences, skills=table)
     if show_prompt:
-        print_prompt(make_prompt(instruction), chosen.name)
+        programs.print_prompt(make_prompt(instruction), chosen.name)
         return
     if candidates > 1 and (repair or retries is not None):
         raise UserError("--candidates cannot be combined with --retries or --repair")
     with suggesting_here(room_map):
         if candidates > 1:
-            how, ask = CheckSettings(skills=table, house_rules=house_rules), line_reader(is_allowed=not yes)
+            how = CheckSettings(skills=table, house_rules=house_rules)
+            ask = programs.line_reader(is_allowed=not yes)
             given = (lambda: open_model(chosen.name, settings)), make_prompt, instruction, how, room_map
-            program = choose_candidate(*given, count=candidates, ask=ask)
-            accepted = program is not None and print_checked(program, how, room_map)
+            program = programs.choose_candidate(*given, count=candidates, ask=ask)
+            accepted = program is not None and programs.print_checked(program, how, room_map)
         else:
-            accepted = write(
+            accepted = programs.write(
                 make_prompt(instruction),
                 chosen.name,
                 settings,
@@ -109,11 +112,10 @@ def check(
     """
     from codebotler.checking import check
     from codebotler.checking.proof import hold_within
-    from codebotler.cli.programs.check import check_view, read_program
-    from codebotler.cli.programs.contract import contract_view, write_contract
+    from codebotler.cli.programs.check import check_view, contract_view, read_program, write_contract
     from codebotler.cli.programs.rules import rules_for
     from codebotler.core.skills.files import skills_from
-    from codebotler.core.terminal import busy, print_json, print_rich
+    from codebotler.core.terminal import busy, print_found, print_rich
     from codebotler.simulator.pool import WorkerPool
     from codebotler.simulator.worlds.room_map import RoomMap
 
@@ -138,11 +140,12 @@ def check(
         )
     found = found if allowed is None else hold_within(found, allowed, table)
     write_contract(save_contract, found.contract)
-    if json:
-        print_json(found.data(table))
-    else:
-        name = "the program" if program == "-" else program
-        print_rich(check_view(found, source, name, shows_all=shows_all))
+    name = "the program" if program == "-" else program
+    print_found(
+        lambda: check_view(found, source, name, shows_all=shows_all),
+        lambda: found.data(table),
+        as_json=json,
+    )
     if contract and found.contract is not None and not json:
         print_rich(contract_view(found.contract, table))
     raise typer.Exit(1 if found.problems else 0)
@@ -163,7 +166,7 @@ def rules(
     from codebotler.checking.house_rules.review import review_rules
     from codebotler.cli.programs.rules import review_data, review_view, rooms_of
     from codebotler.core.skills.files import skills_from
-    from codebotler.core.terminal import busy, note, print_json, print_rich
+    from codebotler.core.terminal import busy, print_found
     from codebotler.core.world_file import read_world
 
     table = skills_from(*(skills or ()))
@@ -175,10 +178,7 @@ def rules(
         note("goto covers destinations only; to keep the robot from driving through a room, use inside")
     with busy("looking for examples"):
         found = review_rules(house_rules, known)
-    if json:
-        print_json(review_data(found))
-    else:
-        print_rich(review_view(found))
+    print_found(lambda: review_view(found), lambda: review_data(found), as_json=json)
 
 
 def replay(
@@ -198,7 +198,7 @@ def replay(
     from codebotler.cli.programs.replay import find_replayed_files, replay, replay_data, replay_view
     from codebotler.cli.programs.rules import rules_for
     from codebotler.core.skills.files import skills_from
-    from codebotler.core.terminal import busy, print_json, print_rich
+    from codebotler.core.terminal import busy, print_found
     from codebotler.core.text.words import counted
     from codebotler.core.world_file import read_world
 
@@ -208,10 +208,9 @@ def replay(
     found = find_replayed_files(files)
     with busy(f"replaying {counted(len(found), 'file')}"):
         effects = replay(found, house_rules, known, table)
-    if json:
-        print_json(replay_data(effects, house_rules))
-    else:
-        print_rich(replay_view(effects, house_rules))
+    print_found(
+        lambda: replay_view(effects, house_rules), lambda: replay_data(effects, house_rules), as_json=json
+    )
 
 
 def skills(
@@ -238,7 +237,7 @@ def skills(
     from codebotler.cli.programs.skills import SKILLS_TEMPLATE, skills_data, skills_view, write_new
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.ros_package import write_ros_packages
-    from codebotler.core.terminal import print_json, print_rich
+    from codebotler.core.terminal import print_found
 
     if new is not None:
         write_new(new, SKILLS_TEMPLATE.replace("NAME", str(new)))
@@ -248,10 +247,8 @@ def skills(
     if ros_package is not None:
         written = write_ros_packages(table, ros_package)
         note(f"wrote {', '.join(map(str, written))}; build them with colcon")
-    elif json:
-        print_json(skills_data(table))
     else:
-        print_rich(skills_view(table))
+        print_found(lambda: skills_view(table), lambda: skills_data(table), as_json=json)
 
 
 def models(
@@ -264,15 +261,12 @@ def models(
     from dataclasses import asdict
 
     from codebotler.cli.views import models_view
-    from codebotler.core.terminal import print_json, print_rich
-    from codebotler.models.chosen import choose_model
+    from codebotler.core.terminal import print_found
+    from codebotler.models.open import choose_model
     from codebotler.models.usable import find_usable_models
 
     found = find_usable_models()
-    if json:
-        print_json([asdict(model) for model in found])
-    else:
-        print_rich(models_view(found, choose_model()))
+    print_found(lambda: models_view(found, choose_model()), lambda: list(map(asdict, found)), as_json=json)
 
 
 app = options.command_line(

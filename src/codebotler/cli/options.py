@@ -9,7 +9,7 @@ import typer
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import note, print_text
+from codebotler.core.terminal import print_text
 
 if TYPE_CHECKING:
     from codebotler.core.skills.table import SkillTable
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 def robot_names(incomplete: str) -> list[str]:
     """Return the kinds of robots that start with a string, for shell completion."""
-    from codebotler.robots.open import ROBOT_MODULES
+    from codebotler.robots.open import ROBOT_KINDS
 
-    return [name for name in ROBOT_MODULES if name.startswith(incomplete)]
+    return [name for name in ROBOT_KINDS if name.startswith(incomplete)]
 
 
 RobotOption = Annotated[
@@ -228,12 +228,6 @@ def read_within(file: Path | None, skills: SkillTable) -> Contract | None:
     from codebotler.checking.contracts.file import read_contract
 
     return None if file is None else read_contract(file, skills)
-
-
-def note_office(robot: str, file: Path | None) -> None:
-    """Print a note if the simulated robot uses the example office because no world file is given."""
-    if file is None and robot == "sim":
-        note("the robot works in an example office; --world FILE selects another world")
 
 
 def command_line(name: str, about: str) -> typer.Typer:

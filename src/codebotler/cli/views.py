@@ -16,7 +16,7 @@ from codebotler.missions.display.view import SessionView
 from codebotler.missions.display.wording import event_text, timeline, title
 from codebotler.missions.storage.log import LogLine, MissionState, MissionSummary
 from codebotler.missions.storage.store import last_rest, rest_text
-from codebotler.models.chosen import ChosenModel
+from codebotler.models.open import ChosenModel
 from codebotler.models.usable import MODEL_HINT, UsableModel
 from codebotler.robots.base import Readiness
 
@@ -57,9 +57,11 @@ class EventPrinter:
 
     def __call__(self, line: LogLine) -> None:
         """Print an event."""
-        text = _event_line(line)
+        text = Text(event_text(line), EVENT_STYLES.get(line["event"], ""))
         if not text or line["event"] == "state":
             return
+        if line["event"] == "skill" and line["skill"] == "go_to":
+            text.stylize("bold")
         passing = line["event"] == "feedback" and self._console.is_terminal
         self._end_line()
         time = Text(f"{_time_text(line):>10}  " if line["event"] in {"skill", "sleep"} else " " * 12, "dim")
@@ -77,14 +79,6 @@ def _time_text(line: LogLine) -> str:
     """Return the time of an event on the robot's clock, such as `12.5 s`."""
     clock = float(line["clock"])
     return f"{clock:.1f} s" if clock < MAX_PLAIN_SECONDS else f"{clock:.1e} s"
-
-
-def _event_line(line: LogLine) -> Text:
-    """Return the styled text for an event, which may be empty."""
-    text = Text(event_text(line), EVENT_STYLES.get(line["event"], ""))
-    if line["event"] == "skill" and line["skill"] == "go_to":
-        text.stylize("bold")
-    return text
 
 
 def ending_view(ended: SessionView) -> Group:

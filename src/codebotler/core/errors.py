@@ -64,20 +64,14 @@ def install_command(package: str) -> str:
     return f"pip install 'codebotler[{EXTRAS[package]}]'"
 
 
-def missing_package(error: ModuleNotFoundError) -> str:
-    """Return the name of the missing package if one of our extras installs it, else an empty string."""
-    package = (error.name or "").split(".")[0]
-    return package if package in EXTRAS else ""
-
-
 @contextmanager
 def installed() -> Iterator[None]:
     """Guard imports of optional packages: raise UserError with the install command if one is missing."""
     try:
         yield
     except ModuleNotFoundError as error:
-        package = missing_package(error)
-        if not package:
+        package = (error.name or "").split(".")[0]
+        if package not in EXTRAS:
             raise
         raise UserError(f"{package} is not installed; `{install_command(package)}` installs it") from None
 

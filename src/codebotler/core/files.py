@@ -33,7 +33,7 @@ def read_text(path: Path, *, limit: int = MAX_FILE_BYTES) -> str:
 
 def read_bytes(path: Path, most: int) -> bytes:
     """Read at most `most` bytes from the start of a file, or raise UserError."""
-    with _open(path, path) as file:
+    with _open(path) as file:
         try:
             return file.read(most)
         except OSError as error:
@@ -58,33 +58,31 @@ def _expect_not_utf_16(data: bytes, name: Path | str) -> None:
         raise UserError("is UTF-16 text; save it as UTF-8", file=name)
 
 
-def _open(path: Path, name: Path | str) -> BinaryIO:
+def _open(path: Path) -> BinaryIO:
     try:
         return path.open("rb")
     except FileNotFoundError:
-        raise UserError("there is no such file", file=name) from None
+        raise UserError("there is no such file", file=path) from None
     except IsADirectoryError:
-        raise UserError("is a folder; name a file", file=name) from None
+        raise UserError("is a folder; name a file", file=path) from None
     except OSError as error:
-        raise UserError(f"cannot be read ({error.strerror})", file=name) from None
+        raise UserError(f"cannot be read ({error.strerror})", file=path) from None
 
 
 # --- JSON lines
 
 
-def read_lines(
-    path: Path, *, limit: int = MAX_ROW, name: Path | str | None = None
-) -> Iterator[tuple[int, bytes]]:
+def read_lines(path: Path, *, limit: int = MAX_ROW) -> Iterator[tuple[int, bytes]]:
     """Yield the lines of a file, numbered from 1, or raise UserError if a line is longer than the limit."""
-    with _open(path, name or path) as file:
+    with _open(path) as file:
         for number in count(1):
             line = file.readline(limit + 1)
             if not line:
                 return
             if number == 1:
-                _expect_not_utf_16(line, name or path)
+                _expect_not_utf_16(line, path)
             if len(line) > limit:
-                raise UserError(f"this row is longer than {limit:,} bytes", file=name or path, line=number)
+                raise UserError(f"this row is longer than {limit:,} bytes", file=path, line=number)
             yield number, line
 
 

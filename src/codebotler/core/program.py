@@ -13,10 +13,10 @@ import os
 import symtable
 import threading
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from functools import cache, lru_cache
+from functools import lru_cache
 from itertools import islice
 from typing import Any
 
@@ -80,15 +80,7 @@ def parse(source: str) -> ast.Module:
 @lru_cache(maxsize=8)
 def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
     """Return all nodes of a program's tree, in the order of `ast.walk`."""
-    found: list[ast.AST] = [tree]
-    for node in found:  # the list grows as the loop runs
-        for name in node._fields:
-            part = getattr(node, name, None)
-            if isinstance(part, ast.AST):
-                found.append(part)
-            elif isinstance(part, list):
-                found += [one for one in part if isinstance(one, ast.AST)]
-    return tuple(found)
+    return tuple(ast.walk(tree))
 
 
 def parse_expression(source: str) -> ast.expr:
@@ -214,11 +206,13 @@ def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, in
 
 def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
     """Return the line of each undefined name, the name, and whether it is a local variable used too early."""
-    messages, names_in = _pyflakes()
+    from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - takes a tenth of a second
+    from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - see above
+
     # Names in string annotations are never looked up at run time.
     spelled = {(n.lineno, n.col_offset) for n in nodes(tree) if isinstance(n, ast.Name)}
     with _PARSING:
-        found = names_in(tree, builtins={*skills, *GIVEN_MODULES}, withDoctest=False).messages
+        found = Checker(tree, builtins={*skills, *GIVEN_MODULES}, withDoctest=False).messages
     return [
         # pyflakes gives the bare name, not a tuple, where a local variable hides a builtin
         (m.lineno, m.message_args if isinstance(m.message_args, str) else m.message_args[0], is_local)
@@ -226,22 +220,6 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
         for is_local in [isinstance(m, messages.UndefinedLocal)]
         if (is_local or isinstance(m, messages.UndefinedName)) and (m.lineno, m.col) in spelled
     ]
-
-
-@cache
-def _pyflakes() -> tuple[Any, Callable[..., Any]]:
-    """Import pyflakes on first use, since that takes a tenth of a second."""
-    from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - slow
-    from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - slow
-
-    class Names(Checker):  # type: ignore[misc]  # pyflakes has no types
-        def addBinding(self, node: ast.AST | None, value: Any) -> None:  # noqa: ANN401, N802 - pyflakes' own
-            if node is None:  # one of about 170 builtins, which need no further checks
-                self.scope[value.name] = value
-            else:
-                super().addBinding(node, value)
-
-    return messages, Names
 
 
 # --- definite errors

@@ -130,6 +130,14 @@ def busy(doing: str) -> Iterator[None]:
             line.cancel()
 
 
+def print_found(view: Callable[[], RenderableType], data: Callable[[], object], *, as_json: bool) -> None:
+    """Print a result for a person, or as JSON for machines."""
+    if as_json:
+        print_json(data())
+    else:
+        print_rich(view())
+
+
 def print_json(data: object) -> None:
     """Print JSON."""
     import json

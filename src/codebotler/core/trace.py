@@ -33,7 +33,7 @@ def to_options(values: Iterable[object]) -> tuple[Option, ...]:
     )
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True)
 class Event:
     """A skill that the robot executed.
 
@@ -64,27 +64,6 @@ class Event:
     more: tuple[str, ...] = ()
     destination: str | None = field(default=None, compare=False)
     failed: str = field(default="", compare=False)
-
-    def __init__(  # noqa: PLR0917 - the fields of the data class
-        self,
-        kind: str,
-        text: str,
-        options: tuple[Option, ...] = (),
-        answer: str | None = None,
-        found: bool | None = None,  # noqa: FBT001 - a field of the data class
-        place: str = "",
-        time: float = 0.0,
-        holding: str = "",
-        to: str | None = None,
-        more: tuple[str, ...] = (),
-        destination: str | None = None,
-        failed: str = "",
-    ) -> None:
-        values = self.__dict__  # the quickest way to fill a frozen object, since traces have many events
-        values["kind"], values["text"], values["options"] = kind, text, options
-        values["answer"], values["found"], values["place"], values["time"] = answer, found, place, time
-        values["holding"], values["to"], values["more"] = holding, to, more
-        values["destination"], values["failed"] = destination, failed
 
 
 def attempted_event(

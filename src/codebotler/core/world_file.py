@@ -73,12 +73,9 @@ class OptionFile(_Form):
     option: Annotated[int, Field(strict=True, ge=-100, le=100), AfterValidator(_not_zero)]
 
 
-def _kind_of_answer(value: object) -> str:
-    return "option" if isinstance(value, dict | OptionFile) else "text"
-
-
 AnswerFile = Annotated[
-    Annotated[Pattern, Tag("text")] | Annotated[OptionFile, Tag("option")], Discriminator(_kind_of_answer)
+    Annotated[Pattern, Tag("text")] | Annotated[OptionFile, Tag("option")],
+    Discriminator(lambda value: "option" if isinstance(value, dict | OptionFile) else "text"),
 ]
 
 

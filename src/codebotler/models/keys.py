@@ -39,13 +39,13 @@ def read_key(variable: str) -> str | None:
 
 
 @contextmanager
-def unset_blank(variables: Iterable[str]) -> Iterator[None]:
-    """Remove blank variables temporarily, for libraries that only test whether a variable exists."""
-    blank = {name: os.environ.pop(name) for name in variables if not os.environ.get(name, "x").strip()}
+def unset(variables: Iterable[str]) -> Iterator[None]:
+    """Remove environment variables while libraries read them."""
+    before = {name: os.environ.pop(name) for name in variables if name in os.environ}
     try:
         yield
     finally:
-        os.environ.update(blank)
+        os.environ.update(before)
 
 
 def redact(text: str) -> str:

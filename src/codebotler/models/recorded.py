@@ -30,10 +30,12 @@ RECORDED_NOTICE = (
 )
 
 
-class Solution(BaseModel):
-    """A hand-written program for an instruction, deliberately right or wrong."""
-
+class _RecordedPart(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Solution(_RecordedPart):
+    """A hand-written program for an instruction, deliberately right or wrong."""
 
     about: str  # its special feature or its mistake, in a few words
     program: str
@@ -41,10 +43,8 @@ class Solution(BaseModel):
     right: bool = False  # whether it is correct although it fails because the checks are too strict
 
 
-class Continuation(BaseModel):
+class Continuation(_RecordedPart):
     """A hand-written program for the rest of a mission, deliberately right or wrong."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     about: str  # its special feature or its mistake, in a few words
     after: tuple[str, ...]  # the last step before the mission ended, in words; each of these fits
@@ -52,10 +52,8 @@ class Continuation(BaseModel):
     right: bool  # whether it is a reply of the careful model, not of the hasty one
 
 
-class InstructionSolutions(BaseModel):
+class InstructionSolutions(_RecordedPart):
     """The replies of the recorded models to one instruction."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     instruction: str
     careful: Annotated[tuple[Solution, ...], Field(min_length=1)]

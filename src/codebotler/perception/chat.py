@@ -29,13 +29,9 @@ class ChatDetector:
     """Detects objects by asking a chat model. Threads may share a detector, but must take turns."""
 
     def __init__(self, model: Model) -> None:
+        self.name = model.name
         self._runner = asyncio.Runner()
         self._model = RateLimited(model, retries=REQUEST_RETRIES)
-
-    @property
-    def name(self) -> str:
-        """The model's name."""
-        return self._model.name
 
     def look(self, image: Image, label: str) -> Sighting:
         """Show the image to the model, and ask again if the reply is invalid."""

@@ -88,8 +88,11 @@ def agent_prompt(
 
 def tools_for(skills: SkillTable) -> tuple[Tool, ...]:
     """Return a tool for each skill, and those to wait and to give up."""
-    own = {skill.name: Tool(skill.name, _description(skill), schema_of(skill)) for skill in skills.values()}
-    return tuple(({one.name: one for one in _MORE_TOOLS} | own).values())
+    found = {tool.name: tool for tool in _MORE_TOOLS}
+    for skill in skills.values():
+        description = " ".join([skill.doc, *(f"Fails if {when}." for _, when in skill.fails)])
+        found[skill.name] = Tool(skill.name, description, schema_of(skill))
+    return tuple(found.values())
 
 
 def schema_of(skill: Skill) -> str:
@@ -102,11 +105,6 @@ def agent_template_hash(skills: SkillTable = SKILLS) -> str:
     """Return the SHA-256 hash, in hexadecimal, of everything in an agent's prompt except the instruction."""
     shapes = [agent_prompt("INSTRUCTION", rules=rules, skills=skills) for rules in ((), ("RULE",))]
     return hashlib.sha256(json.dumps([asdict(shape) for shape in shapes]).encode()).hexdigest()
-
-
-def _description(skill: Skill) -> str:
-    fails = [f"Fails if {when}." for _, when in skill.fails]
-    return " ".join([skill.doc, *fails])
 
 
 def _schema(value: ValueType) -> dict[str, Any]:

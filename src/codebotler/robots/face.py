@@ -217,7 +217,9 @@ class RobotWithFace:
         )
         text = str(given.pop(spoken.text))
         if spoken.options is None:
-            self._say(text)
+            self._face.say(text)
+            if not self.clock.wait(min(max(MIN_SPEECH, len(text) / CHARACTERS_PER_SECOND), MAX_SPEECH)):
+                raise CancelledError
             return None
         offered = given.pop(spoken.options)
         assert isinstance(offered, tuple), "a mission checks the arguments of a program"
@@ -235,9 +237,3 @@ class RobotWithFace:
         """Withdraw the open question and disconnect the wrapped robot."""
         self._face.withdraw()
         self._robot.disconnect()
-
-    def _say(self, text: str) -> None:
-        self._face.say(text)
-        seconds = min(max(MIN_SPEECH, len(text) / CHARACTERS_PER_SECOND), MAX_SPEECH)
-        if not self.clock.wait(seconds):
-            raise CancelledError

@@ -2,28 +2,45 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
+from pkgutil import resolve_name
+from typing import Any
 
-from codebotler.core.errors import UserError, install_command, installed, missing_package
-from codebotler.robots.base import ROS_PYTHON, Options, Readiness, Robot
+from codebotler.core.errors import UserError, install_command
+from codebotler.core.text.unicode import compose
+from codebotler.robots.base import (
+    ROS_PYTHON,
+    Feedback,
+    Options,
+    Readiness,
+    Robot,
+    RobotArgument,
+    RobotResult,
+    ignore_feedback,
+)
 from codebotler.robots.face import Face, RobotWithFace, without_speech
 from codebotler.robots.own import OwnRobot, is_own
-from codebotler.robots.spelling import SpellingRobot
 
-ROBOT_MODULES = {
-    "sim": "simulated",
-    "pyrobosim": "pyrobosim.robot",
-    "ros1": "ros.ros1",
-    "rosbridge": "ros.rosbridge",
-    "ros2": "ros.ros2",
+ROBOT_KINDS = {
+    "sim": "simulated:robot",
+    "pyrobosim": "pyrobosim.robot:robot",
+    "ros1": "ros.kinds:ros1",
+    "rosbridge": "ros.kinds:rosbridge",
+    "ros2": "ros.kinds:ros2",
 }
-"""The module of each kind of robot, which must import quickly.
-
-Each module has the functions `readiness(ros_python)` and `robot(options)`, which does not connect yet.
-"""
+"""The function that opens each kind of robot without connecting it, in a module that must import quickly."""
+PACKAGES = {"pyrobosim": "pyrobosim", "rosbridge": "websockets"}
+"""The optional package that a kind of robot needs."""
+NOTES = {
+    "sim": "simulates the rooms and people of --world FILE",
+    "pyrobosim": "plans and drives through --world FILE, without a window",
+    "rosbridge": "at --address, ws://localhost:9090 by default; with ROS 2, tested only against a simulated "
+    "rosbridge",
+}
+"""Advice for users of a kind of robot that works wherever its package is installed."""
 
 
 def open_robot(name: str, options: Options | None = None) -> Robot:
@@ -36,11 +53,12 @@ def open_robot(name: str, options: Options | None = None) -> Robot:
     """
     if is_own(name):
         return SpellingRobot(OwnRobot(name, options or Options()))
-    if name not in ROBOT_MODULES:
+    if name not in ROBOT_KINDS:
         own = "or your own class, such as lab_robot.py:Spot"
-        raise UserError(f'unknown robot "{name}"; choose one of {", ".join(ROBOT_MODULES)}, {own}')
-    with installed():
-        robot: Robot = _import_kind(name).robot(options or Options())
+        raise UserError(f'unknown robot "{name}"; choose one of {", ".join(ROBOT_KINDS)}, {own}')
+    if package := _missing_package(name):
+        raise UserError(f"{package} is not installed; `{install_command(package)}` installs it")
+    robot: Robot = resolve_name(f"{__package__}.{ROBOT_KINDS[name]}")(options or Options())
     return robot if name == "sim" else SpellingRobot(robot)
 
 
@@ -53,20 +71,42 @@ def open_with_face(name: str, options: Options, face: Face) -> Robot:
 
 def check_readiness(ros_python: Path = ROS_PYTHON) -> list[Readiness]:
     """Check for each kind of robot whether it can be used on this machine, and what is missing if not."""
-    return [_readiness(name, ros_python) for name in ROBOT_MODULES]
+    return [_readiness(name, ros_python) for name in ROBOT_KINDS]
 
 
 def _readiness(name: str, ros_python: Path) -> Readiness:
-    try:
-        readiness: Readiness = _import_kind(name).readiness(ros_python)
-    except ModuleNotFoundError as error:
-        package = missing_package(error)
-        if not package:
-            raise
+    if package := _missing_package(name):
         missing, mend = f"{package} is not installed", install_command(package)
         return Readiness(name, works=False, missing=missing, mend=mend)
-    return readiness
+    if name in NOTES:
+        return Readiness(name, works=True, note=NOTES[name])
+    from codebotler.robots.ros.kinds import ros_readiness  # noqa: PLC0415 - only where ROS is asked for
+
+    return ros_readiness(name, ros_python)
 
 
-def _import_kind(name: str) -> ModuleType:
-    return importlib.import_module(f"{__package__}.{ROBOT_MODULES[name]}")
+def _missing_package(name: str) -> str:
+    package = PACKAGES.get(name)
+    return package if package and importlib.util.find_spec(package) is None else ""
+
+
+class SpellingRobot:
+    """Wraps a robot so that programs see composed names, while the robot gets names in its own spelling."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._spellings: dict[str, str] = {}  # the robot's spelling of each composed name
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute of the robot
+        return getattr(self._robot, name)
+
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
+        """Perform a skill with names in the robot's own spelling."""
+        given = [self._spellings.get(one, one) if isinstance(one, str) else one for one in arguments]
+        result = self._robot.perform(skill, given, feedback)
+        for text in result if isinstance(result, list) else [result]:
+            if isinstance(text, str) and compose(text) != text:
+                self._spellings[compose(text)] = text
+        return compose(result)

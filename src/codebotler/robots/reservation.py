@@ -8,7 +8,7 @@ import os
 import socket
 import stat
 import threading
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from datetime import datetime
 from hashlib import sha256
 from ipaddress import ip_address
@@ -45,24 +45,17 @@ class Reservation:
         self._is_used = threading.Lock()
 
     def __enter__(self) -> Self:
-        self._lock = os.open(self._path(), os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
-        try:
+        with ExitStack() as stack:
+            self._lock = os.open(self._path(), os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+            stack.callback(os.close, self._lock)
             self._take()
-            try:
-                self.robot.connect()
-            except BaseException:
-                self.robot.disconnect()
-                raise
-        except BaseException:
-            os.close(self._lock)
-            raise
+            stack.callback(self.robot.disconnect)
+            self.robot.connect()
+            self._at_end = stack.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:
-        try:
-            self.robot.disconnect()
-        finally:
-            os.close(self._lock)
+        self._at_end.close()
 
     def use(self) -> None:
         """Claim this connection for a mission, or raise NotReadyError if a mission has already used it."""

@@ -14,11 +14,9 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Option, Trace, arguments_of_event
 from codebotler.core.world import World, laid_out
 from codebotler.robots.base import (
-    ROS_PYTHON,
     CancelledError,
     Feedback,
     Options,
-    Readiness,
     RobotArgument,
     RobotResult,
     ignore_feedback,
@@ -149,11 +147,6 @@ def perform_at_once(robot: SimulatedRobot, skill: str, arguments: Sequence[Robot
         if parameter.is_options and isinstance(argument, tuple) and isinstance(result, int):
             return argument[result]
     return result
-
-
-def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
-    """Report the simulator as available, since it has no requirements."""
-    return Readiness("sim", works=True, note="simulates the rooms and people of --world FILE")
 
 
 def robot(options: Options) -> Simulated:

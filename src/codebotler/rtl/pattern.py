@@ -6,7 +6,7 @@ import re
 from importlib import import_module
 from typing import Any
 
-from codebotler.core.text.regex_flags import scope_flags
+from codebotler.core.text.labels import scope_flags
 
 Tree = Any
 """A parsed regex or part of a regex: pairs of an operation and its arguments, in private classes of `re`."""

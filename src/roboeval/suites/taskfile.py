@@ -12,7 +12,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.program import parse_expression
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.text.regex_flags import scope_flags
+from codebotler.core.text.labels import scope_flags
 from codebotler.core.text.words import listed
 from codebotler.core.yaml_files import YamlFile, YamlPath
 from codebotler.rtl import RtlSyntaxError, parse

@@ -7,7 +7,7 @@ import pytest
 
 import command_line
 from codebotler.checking.sampled import CheckSettings
-from codebotler.cli.programs.candidates import choose_candidate, line_reader
+from codebotler.cli.programs.generate import choose_candidate, line_reader
 from codebotler.core.errors import UserError
 from codebotler.models.recorded import open_recorded
 from codebotler.prompts import prompt_for

@@ -25,10 +25,10 @@ from codebotler.missions.storage.log import EVENTS_FILE, LogLine, MissionState
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import NotReadyError, Robot
 from codebotler.robots.face import Face, RobotWithFace
+from codebotler.robots.open import SpellingRobot
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros.keepout import MASK_RESOLUTION, keepout_messages
 from codebotler.robots.simulated import OFFICE, Simulated
-from codebotler.robots.spelling import SpellingRobot
 from codebotler.rtl import parse
 from codebotler.simulator.guard.house_rule import Rule, RuleViolationError
 from codebotler.simulator.guard.rule_guard import RuleGuard

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.models.chosen import ChosenModel, choose_model
+from codebotler.models.open import ChosenModel, choose_model
 from codebotler.models.sampling import SamplingSettings
 
 URL = "http://localhost:11434/v1"

@@ -31,8 +31,7 @@ def test_what_a_file_maps_is_what_the_robot_has(tmp_path: Path) -> None:
     found = read(tmp_path, text)
     assert [*found.skills(SKILLS)] == ["get_current_location", "get_all_rooms", "go_to"]
     assert found.robot == "ros2"
-    assert found.pose is not None
-    assert (found.pose.topic, found.pose.frames) == ("/tf", ("map", "base"))
+    assert (found.pose, found.frames) == ("/tf", ("map", "base"))
     without_pose = read(tmp_path, text.replace("pose: {tf: {to: base}}\n", ""))
     assert [*without_pose.skills(SKILLS)] == ["get_all_rooms", "go_to"]
     text = "skills:\n  is_in_room: {detector: openai-chat:m, image: /camera}\n"

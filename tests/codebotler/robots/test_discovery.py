@@ -12,7 +12,6 @@ import yaml
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import ROS_PYTHON
-from codebotler.robots.ros.connections.connection import MotionTopic
 from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.connections.discovery import discover_offers, draft_connection
 
@@ -172,7 +171,7 @@ def test_what_is_written_connects_a_robot(tmp_path: Path) -> None:
     speech, file = "hears /speech std_msgs/msg/String", tmp_path / "robot.yaml"
     file.write_text(draft_connection("ros2", [NAV2, TF, ODOM, speech]))
     read = read_connection(file, SKILLS)
-    assert (read.robot, {*read.calls}, read.velocity) == ("ros2", {"say"}, MotionTopic("/odom"))
+    assert (read.robot, {*read.calls}, read.velocity) == ("ros2", {"say"}, "/odom")
     (tmp_path / "places.yaml").write_text("places: {hall: {x: 1, y: 2}}")
     file.write_text(file.read_text().replace("# places:", "places:").replace("# go_to:", "go_to:"))
     assert read_connection(file, SKILLS).calls["go_to"].request == {"pose": "$place"}

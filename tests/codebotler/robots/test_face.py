@@ -29,7 +29,7 @@ from codebotler.robots.face import (
     RobotWithFace,
     without_speech,
 )
-from codebotler.robots.open import ROBOT_MODULES, open_with_face
+from codebotler.robots.open import ROBOT_KINDS, open_with_face
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from doubles import Answering
@@ -136,7 +136,7 @@ def test_a_robot_with_a_face_resumes_a_mission_as_without() -> None:
     assert robot.perform("get_current_location", []) == "kitchen"
 
 
-@pytest.mark.parametrize("kind", [kind for kind in ROBOT_MODULES if kind != "pyrobosim"])
+@pytest.mark.parametrize("kind", [kind for kind in ROBOT_KINDS if kind != "pyrobosim"])
 def test_the_robot_behind_a_face_is_asked_for_nothing_that_is_spoken(kind: str) -> None:
     robot = open_with_face(kind, Options(world=WORLD), Face())
     assert isinstance(robot, RobotWithFace)

@@ -20,9 +20,8 @@ from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.missions.mission import Mission
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Robot, RobotLostError
-from codebotler.robots.open import open_robot
+from codebotler.robots.open import SpellingRobot, open_robot
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.spelling import SpellingRobot
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 Write: TypeAlias = Callable[[str], Robot]

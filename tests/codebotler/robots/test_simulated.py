@@ -14,8 +14,7 @@ from codebotler.core.errors import RobotError, UserError
 from codebotler.core.world import Person, Room, World
 from codebotler.robots.base import CameraPicture, CancelledError, Options, Robot
 from codebotler.robots.open import check_readiness, open_robot
-from codebotler.robots.ros.ros1 import INSTALL_ROS1
-from codebotler.robots.ros.ros2 import find_fix
+from codebotler.robots.ros.kinds import INSTALL_ROS1, find_fix
 from codebotler.robots.simulated import METRES_PER_SECOND, Simulated
 
 WORLD = World(

@@ -14,7 +14,6 @@ import pytest
 
 import closed_functions as closed
 from codebotler.checking.check import check
-from codebotler.core import program as programs
 from codebotler.core.program import MAX_PROGRAM_LENGTH, SOURCE_NAME
 from codebotler.prompts.extract import program_in, program_of
 from codebotler.simulator.process.isolated_call import IsolatedCallError, end_all
@@ -129,7 +128,7 @@ def no_compiler_(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(builtins, "compile", parse_only)
     monkeypatch.setattr(symtable, "symtable", refuse)
-    monkeypatch.setattr(programs, "_pyflakes", refuse)
+    monkeypatch.setattr("pyflakes.checker.Checker", refuse)
 
 
 @pytest.mark.slow

@@ -40,7 +40,7 @@ def run_settings(
 
     from codebotler.cli.operating.run import Request
     from codebotler.cli.operating.serving import open_console
-    from codebotler.models.chosen import choose_model
+    from codebotler.models.open import choose_model
 
     request = partial(Request, yes=yes, despite_problems=despite_problems, shows_all=shows_all)
     models = [choose_model(model, base_url).name]
@@ -93,8 +93,7 @@ def continue_mission(
 
     A model is shown what the robot did and saw, and writes a program for the rest.
     """
-    from codebotler.cli.operating.continuing import choose_past
-    from codebotler.cli.operating.run import run
+    from codebotler.cli.operating.run import choose_past, run
 
     request, open_console = run_settings(**shared)
     console = open_console()
@@ -116,10 +115,19 @@ def missions(
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
     """List past missions, or show what happened in one."""
-    from codebotler.cli.operating.missions import show_mission, show_missions, write_mission
+    from dataclasses import asdict
+
+    from codebotler.cli.views import list_view, mission_view
     from codebotler.core.errors import UserError
     from codebotler.core.files import home
     from codebotler.core.skills.files import skills_from
+    from codebotler.core.terminal import print_found
+    from codebotler.missions.storage import store
+    from codebotler.missions.storage.log import MissionSummary, read_events
+    from codebotler.missions.storage.pictures import PICTURE_FOLDER, read_picture
+
+    if mcap is not None:
+        from codebotler.missions.storage.mcap import export_mcap  # fails first if its package is missing
 
     if mcap is not None and mission is None:
         raise UserError("--mcap writes one mission; give its ID, or `last`")
@@ -128,12 +136,26 @@ def missions(
     if clock not in {"wall", "robot"}:
         raise UserError(f'unknown clock "{clock}"; use wall or robot')
     skills_from(*(skills or ()))  # registers the verbs that describe the skills
+    store.recover_missions(home())
     if mission is None:
-        show_missions(home(), json=json)
-    elif mcap is None:
-        show_mission(home(), mission, json=json)
-    else:
-        write_mission(home(), mission, mcap, clock="robot" if clock == "robot" else "wall")
+        known = store.read_missions(home())
+        print_found(lambda: list_view(known), lambda: list(map(asdict, known)), as_json=json)
+        return
+    folder = store.find_mission(home(), mission)
+    summary, events = MissionSummary.read(folder), read_events(folder)
+    if mcap is not None:
+        export_mcap(  # type: ignore[possibly-undefined]  # imported above
+            mcap, summary, events, "robot" if clock == "robot" else "wall", folder
+        )
+        note(f"wrote {len(events):,} events of mission {summary.id} to {mcap}")
+        return
+    print_found(
+        lambda: mission_view(summary, events, store.find_rest(folder)),
+        lambda: {**asdict(summary), "events": events},
+        as_json=json,
+    )
+    if not json and any(read_picture(folder, line) for line in events):
+        note(f"the pictures are in {folder / PICTURE_FOLDER}")
 
 
 def robots(
@@ -147,14 +169,11 @@ def robots(
     from dataclasses import asdict
 
     from codebotler.cli.views import robots_view
-    from codebotler.core.terminal import print_json, print_rich
+    from codebotler.core.terminal import print_found
     from codebotler.robots.open import check_readiness
 
     found = check_readiness(ros_python)
-    if json:
-        print_json([asdict(kind) for kind in found])
-    else:
-        print_rich(robots_view(found))
+    print_found(lambda: robots_view(found), lambda: list(map(asdict, found)), as_json=json)
 
 
 def connect(

@@ -1,4 +1,4 @@
-"""`codebotler run`: get a program, check it, ask for approval, and run it on the robot."""
+"""`codebotler run` and `continue`: get a program, check it, ask for approval, and run it on the robot."""
 
 from __future__ import annotations
 
@@ -8,20 +8,29 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from codebotler.cli.operating.continuing import past_view
-from codebotler.cli.programs.candidates import ADD_SENTENCE, ask_which, line_reader
-from codebotler.cli.programs.check import check_view, read_program
-from codebotler.cli.programs.contract import contract_view
-from codebotler.cli.programs.generate import note_programless
+from rich.console import Group
+from rich.text import Text
+
+from codebotler.cli.programs.check import check_view, contract_view, read_program
+from codebotler.cli.programs.generate import ADD_SENTENCE, ask_which, line_reader, note_programless
 from codebotler.cli.views import EventPrinter, continue_view, ending_view, source_view
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import busy, confirm, note, print_rich, read_line, shortened
+from codebotler.core.terminal import (
+    busy,
+    confirm,
+    is_interactive,
+    note,
+    print_rich,
+    read_line,
+    shortened,
+)
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.mission import STOP_GRACE_SECONDS, MissionError
-from codebotler.missions.recovery import PriorApproval, past_to_recover
+from codebotler.missions.recovery import PriorApproval, ask_evidence, past_to_recover
 from codebotler.missions.session import MissionSession
 from codebotler.missions.storage.log import MissionState
 from codebotler.missions.storage.past import MissionPast
+from codebotler.missions.storage.store import recover_missions
 from codebotler.models.base import ModelError
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
 from codebotler.robots.base import Robot
@@ -229,3 +238,52 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
     finally:
         for number, handler in before.items():  # further signals must not interrupt the cleanup
             signal.signal(number, signal.SIG_IGN if got else handler)
+
+
+# --- the rest of a mission
+
+
+def choose_past(console: Console, name: str, *, happened: bool | None, answer: str = "") -> MissionPast:
+    """Read the past of a mission, show it, and ask whether an unsure step happened.
+
+    Args:
+        console: the console with the robot, which is asked where it is if a step is unsure.
+        name: the ID of the mission, or `last`.
+        happened: whether the unsure step happened, or None to ask.
+        answer: its answer, if it is a question.
+
+    Raises:
+        UserError: there is no such mission, it cannot be continued, or nobody can answer.
+    """
+    recover_missions(console.home)
+    past = console.past_of(name)
+    print_rich(past_view(past))
+    if past.unsure is None:
+        return past
+    if happened is None:
+        if not is_interactive():
+            raise UserError(f"{past.question}; add --happened or --not-happened")
+        for sentence in (past.question, *ask_evidence(console.robot, console.home, past, note)):
+            note(sentence)
+        happened = _ask_whether(past)
+        if happened and past.answers:
+            known = " | ".join(map(shortened, past.answers))
+            answer = read_line(f"what was the answer [{known}]? (Enter if you do not know) ").strip()
+    return past.resolve(happened=happened, answer=answer)
+
+
+def _ask_whether(past: MissionPast) -> bool:
+    """Ask until a person says whether a step happened. Raise UserError at the end of the input."""
+    while answer := read_line("did this happen? [y/n] "):
+        word = answer.strip().lower()
+        if word in {"y", "yes", "n", "no"}:
+            return word.startswith("y")
+        note("answer y or n, or press Ctrl-C to end here")
+    raise UserError(f"{past.question}; add --happened or --not-happened")
+
+
+def past_view(past: MissionPast) -> Group:
+    """Show what a mission did and saw before it ended."""
+    head = Text.assemble((f"mission {past.mission}", "bold"), f" ended early: {shortened(past.why)}")
+    steps = [Text(f"  {step}", "dim") for step in past.steps] or [Text("  no step was finished", "dim")]
+    return Group(head, Text("done so far:"), *steps)

@@ -10,7 +10,7 @@ from codebotler.cli.model_options import model_settings, options_for
 from codebotler.core.files import home
 from codebotler.core.terminal import note
 from codebotler.core.text.words import listed
-from codebotler.models.chosen import choose_model, make_opener
+from codebotler.models.open import choose_model, make_opener
 from codebotler.robots.face import Face
 from codebotler.robots.open import open_robot, open_with_face
 from codebotler.web.console import Console
@@ -31,7 +31,8 @@ def open_console(
     settings of the robot and of the models. The other arguments are those of the console.
     """
     kind, settings, rules, within = options.robot_settings(**options_for(options.robot_settings, shared))
-    options.note_office(kind, shared["world"])
+    if kind == "sim" and shared["world"] is None:
+        note("the robot works in an example office; --world FILE selects another world")
     models = tuple(model or dict.fromkeys((choose_model().name, "recorded:careful", "recorded:hasty")))
     opener = make_opener(models, base_url, model_settings(**options_for(model_settings, shared)))
     robot = open_robot(kind, settings) if face is None else open_with_face(kind, settings, face)

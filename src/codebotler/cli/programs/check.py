@@ -1,4 +1,4 @@
-"""`codebotler check`: read a program and show the result of the check."""
+"""`codebotler check`: read a program, and show the result of the check and the contract."""
 
 from __future__ import annotations
 
@@ -10,20 +10,25 @@ from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
+from codebotler.checking.contracts.file import contract_yaml
+from codebotler.checking.contracts.text import contract_rows, contract_sentence
 from codebotler.checking.problems import CheckResult, Problem, Sample
-from codebotler.checking.storyboard import steps_of, storyboard
-from codebotler.cli.programs.contract import proof_lines
+from codebotler.checking.storyboard import grid, steps_of, storyboard
+from codebotler.cli.programs.skills import write_new
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_FILE_BYTES, decode_text, read_text
-from codebotler.core.terminal import shortened, visible
+from codebotler.core.skills.table import SkillTable
+from codebotler.core.terminal import note, shortened, visible
 from codebotler.core.text.words import counted
 from codebotler.core.trace import RunError
 from codebotler.prompts.extract import program_in
+from codebotler.simulator.guard.contract import Contract
 
 STANDARD_INPUT = "standard input"
 CONTEXT_LINES = 1
 """The number of lines to show before and after a line with a problem."""
 MAX_ROOMS_SHOWN = 12
+PROOF_STYLES = {"never": "green", "possible": "red", "unknown": "yellow"}
 
 
 def read_program(name: str) -> str:
@@ -47,7 +52,8 @@ def check_view(found: CheckResult, program: str, name: str, *, shows_all: bool =
     lines = program.rstrip("\n").split("\n")
     for problem in found.problems:
         parts += [Text(), *_problem(problem, lines)]
-    parts += [Text(), _rooms(found), *_vain_searches(found), *proof_lines(found)]
+    parts += [Text(), _rooms(found), *_vain_searches(found)]
+    parts += [Text(f'the rule "{one.rule}" {one.words}', PROOF_STYLES[one.verdict]) for one in found.proofs]
     kinds = _distinct_samples(found)
     for sample in kinds if shows_all else kinds[:1]:
         parts += [Text(), *_sample(sample)]
@@ -120,3 +126,26 @@ def _sample(sample: Sample) -> Iterator[RenderableType]:
     if sample.outcome.error is not None:
         error = f"{sample.outcome.error.kind}: {shortened(sample.outcome.error.message)}"
         yield Padding(Text(error, "red"), (0, 0, 0, 4))
+
+
+# --- contracts
+
+
+def contract_view(contract: Contract, skills: SkillTable) -> Group:
+    """Show what a program may do at most: in a sentence or two, and in a table with a row for each skill."""
+    sentence = contract_sentence(contract, skills, shortened)
+    head = Text.assemble(("\nwhat it may do at most", "bold"), f"\n{sentence}\n")
+    table = grid("left", "left", "left", "left")
+    for row in contract_rows(contract, skills, shortened):
+        table.add_row(Text(row.what, "bold"), Text(row.texts), Text(row.places), Text(row.at_most, "dim"))
+    return Group(head, table)
+
+
+def write_contract(file: Path | None, contract: Contract | None) -> None:
+    """Write a contract to a new file, if one is named. Raise UserError if there is none, or if it exists."""
+    if file is None:
+        return
+    if contract is None:
+        raise UserError("the program has no contract, since it cannot run")
+    write_new(file, contract_yaml(contract))
+    note(f"wrote {file}")

@@ -1,32 +1,46 @@
-"""`codebotler generate`: ask a model for a program, and ask again as long as the program has problems."""
+"""`codebotler generate`: ask a model for a program, or for several, of which a person chooses one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import asyncio
+from collections.abc import Callable
 from functools import partial
 
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.text import Text
+
+from codebotler.candidates.clusters import compare_candidates
+from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
+from codebotler.checking.check import check
+from codebotler.checking.sampled import CheckSettings
+from codebotler.checking.storyboard import storyboard
+from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.terminal import busy, note, print_source, shortened, visible
-from codebotler.core.text.words import brief
-from codebotler.generation.generate import Attempt, write_checked_program
+from codebotler.core.terminal import (
+    busy,
+    console,
+    is_interactive,
+    note,
+    print_source,
+    read_line,
+    shortened,
+    visible,
+)
+from codebotler.core.text.words import brief, counted, listed, with_sentence
+from codebotler.generation.generate import Attempt, gather_candidates, write_checked_program
 from codebotler.generation.no_program import ProgramlessReply
+from codebotler.models.base import Model
 from codebotler.models.open import kind_of, open_model
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
 from codebotler.models.sampling import SamplingSettings
-from codebotler.prompts import Prompt, prompt_for
+from codebotler.prompts import Prompt
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.worlds.room_map import RoomMap
 
 MAX_REPLY_SHOWN = 300  # how many characters to show of a reply without a program
-
-
-def prompt_maker(
-    skills: SkillTable, room_map: RoomMap | None, house_rules: Sequence[Rule]
-) -> Callable[[str], Prompt]:
-    """Return a function that makes the prompt for an instruction."""
-    rooms = () if room_map is None else room_map.described
-    return partial(prompt_for, skills=skills, rooms=rooms, rules=[rule.says for rule in house_rules])
+ADD_SENTENCE = "What should be different? (Enter to give up) "
 
 
 def write(
@@ -92,3 +106,104 @@ def print_prompt(prompt: Prompt, model: str) -> None:
             f"{model} gets these messages if its tokenizer has a chat template, or else the text "
             "that --model completions:NAME shows"
         )
+
+
+# --- several programs
+
+
+def line_reader(*, is_allowed: bool) -> Callable[[str], str] | None:
+    """Return a function that asks on the terminal, or None if that is not allowed or there is no terminal."""
+    return read_line if is_allowed and is_interactive() else None
+
+
+def choose_candidate(
+    open_model: Callable[[], Model],
+    make_prompt: Callable[[str], Prompt],
+    instruction: str,
+    settings: CheckSettings,
+    room_map: RoomMap | None = None,
+    *,
+    count: int,
+    ask: Callable[[str], str] | None,
+) -> str | None:
+    """Return the program that a person means, or None if they want none of them.
+
+    After the first "none of these", they may add a sentence to the instruction for a second round.
+
+    Args:
+        open_model: opens the model.
+        make_prompt: makes the prompt for an instruction.
+        instruction: the instruction.
+        settings: the settings for runs in imagined worlds.
+        room_map: the rooms; by default those that the programs name.
+        count: how many programs to request.
+        ask: asks the person for a line, which is empty at the end; None if nobody can answer.
+
+    Raises:
+        UserError: all programs of the second round do what the person did not mean.
+    """
+    rejected: ClarifyingQuestion | None = None
+    while True:
+        opened, prompt = open_model(), make_prompt(instruction)
+        if rejected is not None:
+            prompt = prompt.after(rejected.options[0].program, rejected.rejections)
+        with busy(f"asking {opened.name}"):
+            attempts = asyncio.run(gather_candidates(opened, prompt, count))
+        programs = [one.reply.program for one in attempts if one.programless is None]
+        if not programs and attempts[0].programless is not None:
+            note_programless(attempts[0].programless)
+            return None
+        refused = () if rejected is None else rejected.programs
+        with busy("comparing the programs"):
+            groups = compare_candidates(programs, settings, room_map, refused)
+        question = question_about(groups, model=opened.name, is_second=rejected is not None)
+        if question is None or ask is None:
+            note(groups.summary)
+            return groups.clusters[0].program
+        chosen = question.chosen(ask_which(question, ask))
+        if chosen is not None:
+            return chosen.program
+        more = "" if question.why_last else ask(ADD_SENTENCE).strip()
+        if not more:
+            note("no program chosen")
+            return None
+        rejected, instruction = question, with_sentence(instruction, more)
+
+
+def print_checked(program: str, settings: CheckSettings, room_map: RoomMap | None) -> bool:
+    """Print a program and its problems, and return whether the check accepts it."""
+    print_source(program)
+    rules, skills = settings.house_rules, settings.skills
+    problems = check(program, room_map=room_map, skills=skills, house_rules=rules).problems
+    for problem in problems:
+        note(visible(problem.sentence))
+    return not problems
+
+
+def question_view(question: ClarifyingQuestion) -> RenderableType:
+    """Show a question: the facts of the imagined world, and the storyboard of each option."""
+    facts = f"Suppose that {listed([*map(shortened, question.facts)])}." if question.facts else ""
+    parts: list[RenderableType] = [Text("Which did you mean?", "bold"), *([Text(facts)] if facts else [])]
+    for number, option in enumerate(question.options, 1):
+        head = f"{number}: {visible(option.difference)}"
+        like = f"{option.size} of {counted(question.total, 'program')}"
+        parts += [Text(), Text.assemble((head, "bold"), (f"  ({like})", "dim"))]
+        parts.append(Padding(storyboard(option.steps, set()), (0, 0, 0, 2)))
+    if question.left_out:
+        parts += [Text(), Text(question.left_out, "dim")]
+    last = f'The answer "none" gives up: {question.why_last}.\n' if question.why_last else ""
+    return Group(*parts, Text(), Text(last, "dim", end=""))
+
+
+def ask_which(question: ClarifyingQuestion, read_line: Callable[[str], str]) -> ClarifyingAnswer:
+    """Show a question, and read lines until one is an answer. Raise UserError at the end of the input."""
+    console(stderr=True).print(question_view(question))
+    numbers = ", ".join(str(number) for number in range(1, len(question.options) + 1))
+    while True:
+        line = read_line(f"Answer {numbers}, none, or you decide: ")
+        if not line:
+            raise UserError("no answer; --yes takes the most frequent behaviour without a question")
+        try:
+            return question.parse(line)
+        except UserError as error:
+            note(error.sentence)

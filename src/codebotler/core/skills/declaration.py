@@ -61,12 +61,6 @@ def by_event(kind: str) -> Skill | None:
     return next((row for row in _DECLARED.values() if row.recording and row.recording.kind == kind), other)
 
 
-def verb_for(kind: str) -> Verb | None:
-    """Return the verb for a kind of event, or None if none is declared."""
-    row = by_event(kind)
-    return None if row is None else row.verb
-
-
 @overload
 def skill(does: Callable[..., Any], /) -> Skill: ...
 

@@ -27,6 +27,7 @@ STRESSED_AT_THE_END = frozenset(
     }
 )
 PARAMETER = re.compile(r"\{(\w+)\}")
+PLAIN_REST = re.compile(r"([^{}]*?)(?:(?:^| )\{\w+\})?")  # after a verb: a particle and the only parameter
 
 
 VerbForm: TypeAlias = Literal["base", "third", "past", "ing"]
@@ -67,14 +68,10 @@ def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], 
             raise ValueError(f'the phrase "{template}" names {{{name}}}, which is not a parameter')
     if set("{}") & set(PARAMETER.sub("", template)):
         raise ValueError(f'the phrase "{template}" may use braces only around parameters')
-    fixed, brace, _ = rest.partition("{")
-    particle = fixed.strip() if brace and rest.endswith("}") and rest.count("{") == 1 else ""
-    if rest and not brace:
-        particle = rest
-    is_plain = rest in {particle, f"{particle} {{{parameters[0] if parameters else ''}}}".strip()}
     forms = (head, _third(head), past or _past(head), _ing(head))
-    if is_plain and len(parameters) <= 1:
-        base, third, before, ing = (f"{form} {particle}".strip() for form in forms)
+    plain = PLAIN_REST.fullmatch(rest)
+    if plain is not None and len(parameters) <= 1:
+        base, third, before, ing = (f"{form} {plain[1]}".strip() for form in forms)
         return Verb(base, third, before, ing, results=results)
     order = {name: str(number) for number, name in enumerate(parameters)}
     return Verb(*forms, results=results, object=PARAMETER.sub(lambda found: f"{{{order[found[1]]}}}", rest))

@@ -14,8 +14,7 @@ from importlib import import_module
 from math import prod
 from typing import Any
 
-from codebotler.core.text.regex_flags import scope_flags
-
+LEADING_FLAGS = re.compile(r"\(\?([aiLmsux]+)\)")
 PLAIN_LABEL = re.compile(r"[\w ',;:!%@&/-]*")  # matches texts without special characters, such as most names
 ENDLESS_REPEATS = 100  # repetitions with a higher limit count as unlimited
 MAX_WAYS = 1_000  # ways in which a regex may match a string
@@ -61,6 +60,15 @@ def check_regex(text: str) -> str:
     except (re.error, RecursionError, OverflowError) as error:
         raise ValueError(f"it is not a valid regular expression: {error}") from None
     return text
+
+
+def scope_flags(pattern: str) -> str:
+    """Turn the flags at the start of a regex into flags of a group, so that it can be embedded in another."""
+    found = LEADING_FLAGS.match(pattern)
+    if found is None:
+        return pattern
+    end = "\n" if "x" in found[1] else ""  # a comment would hide the end of the group
+    return f"(?{found[1]}:{scope_flags(pattern[found.end() :])}{end})"
 
 
 @lru_cache(maxsize=1024)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
-from codebotler.core.skills.declaration import by_event, verb_for
+from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.table import Recording
 from codebotler.core.skills.verbs import Verb, VerbForm
 from codebotler.core.terminal import visible
 from codebotler.core.text.words import brief, elide_list
-from codebotler.core.trace import Event, Option
+from codebotler.core.trace import Event
 
 NO_ANSWER = "no answer"
 MAX_BRACKETED_OPTIONS = 20
+UNKNOWN_RECORDING = Recording("", "text", names="thing")  # of a kind that no loaded skill records
 
 
 def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, quote: str = '"') -> str:
@@ -33,21 +34,19 @@ def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, 
     answer = None if event.answer is None else show(event.answer)
     if form == "ing" and answer is not None:
         return f"the answer {quote}{answer}{quote} to {quote}{show(event.text)}{quote}"
-    words = verb_phrase(event.kind, form, [*map(show, (event.text, *event.more))], quote)
+    given = [*map(show, (event.text, *event.more))]
+    is_bare = (not given[0] and by_event(event.kind) is None) or has_no_text(event.kind)
+    known = verb(event.kind)
+    words = known.with_object(getattr(known, form), [] if is_bare else given, quote)
     if form in {"base", "ing"}:
         result = f"answer {quote}{answer}{quote}" if answer is not None else result_words(event)
         return f"{words} ({result})" if result else words
     if event.options:
-        words += f" {bracket_options(event.options, show)}"
+        shown = [f"{show(one.text)}{'' if one.is_text else ' (no text)'}" for one in event.options]
+        words += f" [{' | '.join(elide_list(shown, MAX_BRACKETED_OPTIONS))}]"
     if form == "past" and (answer is not None or is_question(event.kind)):
         return f"{words} → {NO_ANSWER if answer is None else answer}"
     return f"{words}: {result}" if (result := result_words(event)) else words
-
-
-def verb_phrase(kind: str, form: VerbForm, given: Sequence[str], quote: str = '"') -> str:
-    """Return the verb for a kind of event in the given form, followed by the arguments of the skill."""
-    is_bare = not given or (not given[0] and by_event(kind) is None) or has_no_text(kind)
-    return verb(kind).with_object(getattr(verb(kind), form), [] if is_bare else given, quote)
 
 
 def result_words(event: Event) -> str:
@@ -55,38 +54,30 @@ def result_words(event: Event) -> str:
     return "" if event.found is None else verb(event.kind).results[event.found]
 
 
-def bracket_options(options: Sequence[Option], show: Callable[[str], str] = brief) -> str:
-    """Write the options of a question in brackets, such as `[yes | no]`."""
-    shown = [f"{show(one.text)}{'' if one.is_text else ' (no text)'}" for one in options]
-    return f"[{' | '.join(elide_list(shown, MAX_BRACKETED_OPTIONS))}]"
-
-
 def verb(kind: str) -> Verb:
     """Return the verb for a kind of event, or a generic verb if no loaded skill records this kind."""
-    if (known := verb_for(kind)) is not None:
-        return known
+    row = by_event(kind)
+    if row is not None and row.verb is not None:
+        return row.verb
     shown = visible(kind)
     return Verb(f"do {shown}", f"does {shown}", f"did {shown}", f"doing {shown}", f"did {shown}")
 
 
 def has_no_text(kind: str) -> bool:
     """Whether events of a kind have no text because their skill has no parameters."""
-    recording = _recording(kind)
-    return recording is not None and not recording.text
+    return not _recording(kind).text
 
 
 def is_spoken(kind: str) -> bool:
     """Whether events of a kind are spoken."""
-    recording = _recording(kind)
-    return recording is not None and recording.is_spoken
+    return _recording(kind).is_spoken
 
 
 def is_question(kind: str) -> bool:
     """Whether events of a kind offer options."""
-    recording = _recording(kind)
-    return recording is not None and recording.options is not None
+    return _recording(kind).options is not None
 
 
-def _recording(kind: str) -> Recording | None:
+def _recording(kind: str) -> Recording:
     row = by_event(kind)
-    return None if row is None else row.recording
+    return UNKNOWN_RECORDING if row is None or row.recording is None else row.recording

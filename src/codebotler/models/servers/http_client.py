@@ -5,8 +5,8 @@ from __future__ import annotations
 import ipaddress
 import json
 import os
-from collections.abc import AsyncIterator, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
@@ -14,7 +14,7 @@ from urllib.request import getproxies, proxy_bypass
 
 from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError
-from codebotler.models.keys import redact
+from codebotler.models.keys import redact, unset
 from codebotler.models.servers.server_errors import FIRST_ERROR, error_in_reply, error_text, model_error
 
 HTTPClient = TypeVar("HTTPClient", bound=Any)  # of httpx or httpx2, which share no type
@@ -104,20 +104,10 @@ def _limit_stream(stream: Any, name: str, limit: int) -> Any:  # noqa: ANN401 - 
 # --- proxies
 
 
-@contextmanager
-def without_proxy(url: str | None) -> Iterator[None]:
-    """Ignore proxies for a local server while a client is created."""
-    host = urlsplit(url).hostname if url is not None else None
-    if host is None or not _is_loopback(host):
-        yield
-        return
-    proxies = {name: value for name, value in os.environ.items() if name.lower().endswith("_proxy")}
-    for name in proxies:
-        del os.environ[name]
-    try:
-        yield
-    finally:
-        os.environ.update(proxies)
+def without_proxy(url: str | None) -> AbstractContextManager[None]:
+    """Return a context in which a client is created that uses no proxies for a local server."""
+    is_local = url is not None and _is_loopback(urlsplit(url).hostname or "")
+    return unset([name for name in os.environ if is_local and name.lower().endswith("_proxy")])
 
 
 def mention_proxy(error: ModelError, url: str | None) -> ModelError:

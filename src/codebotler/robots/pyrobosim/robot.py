@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
 import logging
 from collections.abc import Sequence
 from copy import deepcopy
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Trace
-from codebotler.robots.base import (
-    ROS_PYTHON,
-    Feedback,
-    Options,
-    Readiness,
-    RobotArgument,
-    RobotResult,
-    ignore_feedback,
-)
+from codebotler.robots.base import Feedback, Options, RobotArgument, RobotResult, ignore_feedback
 from codebotler.robots.simulated import Simulated, perform_at_once
 
 if TYPE_CHECKING:
@@ -63,16 +53,8 @@ class Pyrobosim(Simulated):
         self._drivable.drive(room, feedback)
 
 
-def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
-    """Report pyrobosim as available, or raise ModuleNotFoundError if it is not installed."""
-    if importlib.util.find_spec("pyrobosim") is None:
-        raise ModuleNotFoundError("pyrobosim is not installed", name="pyrobosim")
-    return Readiness("pyrobosim", works=True, note="plans and drives through --world FILE, without a window")
-
-
 def robot(options: Options) -> Pyrobosim:
     """Create the robot, or raise UserError if the options contain no world."""
     if options.world is None:
         raise UserError("the robot in pyrobosim needs a world; name one with --world FILE")
-    readiness()
     return Pyrobosim(options.world, speed=options.speed, skills=options.skills)

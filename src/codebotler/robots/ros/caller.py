@@ -5,29 +5,24 @@ from __future__ import annotations
 import base64
 import re
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 from codebotler.core.errors import RobotError
 from codebotler.robots.base import (
-    ROS_PYTHON,
     STOP_BY_HAND,
     CameraPicture,
     CancelledError,
     Feedback,
     NotReadyError,
     Options,
-    Readiness,
     RobotLostError,
-    RobotResult,
 )
 from codebotler.robots.clock import Clock
 from codebotler.robots.reservation import robot_file
 from codebotler.robots.ros.connections.connection import Connection, SkillCall, Values, default_connection
-from codebotler.robots.ros.worker import RosWorker, WorkerMessage, find_missing
+from codebotler.robots.ros.worker import RosWorker, WorkerMessage
 
-USE_OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
 NOT_CANCELLED = f"its goals could not be cancelled: {STOP_BY_HAND}"
 CANCEL_SECONDS = 1.0  # the time limit for the worker to send a cancel
 NAMED_ERROR = re.compile(r"([A-Z][A-Za-z]+): (.+)", re.DOTALL)
@@ -97,29 +92,25 @@ class RosCaller:
         self._worker, self._stopped, self._in_doubt = worker, False, False
         self.clock.restart()
 
-    def _call(self, skill: str, values: Values, feedback: Feedback) -> RobotResult:
-        """Perform a skill through its ROS call, with values for the variables in the call.
+    def _request(self, call: SkillCall, request: WorkerMessage, feedback: Feedback) -> Values:
+        """Send a request to the worker and return the robot's answer.
+
+        The robot's reason for a failure may start with a kind of error, as in `PickInvalidObject: no mug`.
 
         Raises:
             RobotError: the server rejected or aborted the goal.
             CancelledError: this or another client cancelled the goal.
             RobotLostError: the server or the worker died, or does not respond.
         """
-        call = self.connection.calls.get(skill)
-        if call is None:
-            raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
-        request = {"do": "perform", "skill": skill, "fields": call.fields(values)}
-        result: RobotResult = call.answer(self._request(call, request, feedback))
-        return result
-
-    def _request(self, call: SkillCall, request: WorkerMessage, feedback: Feedback) -> Values:
-        """Send a request to the worker and return the robot's answer, or raise an error if it failed."""
         message = self._await_end(request, feedback)
         match message:
             case {"is": "result", "values": dict(values)}:
                 return values
             case {"is": "error", "text": str(text), "state": str(state)}:
-                raise to_robot_error(call, text or call.why(message.get("values", {})), state)
+                why = text or call.why(message.get("values", {}))
+                named = NAMED_ERROR.fullmatch(why)
+                kind, why = (named[1], named[2]) if named else (call.failure, why)
+                raise RobotError(kind, why or f"{call.name} {state} the goal without a reason")
             case {"is": "cancelled"}:
                 raise CancelledError
         self._in_doubt = self._in_doubt or message["is"] == "lost"
@@ -189,8 +180,9 @@ class RosCaller:
             "node": self._node,
             "calls": calls_data(self.connection),
             "packages": self.connection.packages,
-            "pose": self.connection.pose and vars(self.connection.pose),
-            "velocity": self.connection.velocity and vars(self.connection.velocity),
+            "pose": self.connection.pose,
+            "velocity": self.connection.velocity,
+            "frames": self.connection.frames,
             "keepout": self.connection.keepout or [],
             "cancel_all": cancel_all,
             "sign": str(robot_file(self.name, self.address, f"{self._node}.goal")),
@@ -216,33 +208,9 @@ class RosCaller:
             return "another worker has cancelled all goals"
 
 
-def ros_readiness(name: str, python: Path, needs: Sequence[str], mend: str, note: str) -> Readiness:
-    """Check whether an interpreter has a worker's modules. `mend` is the fix for missing ones."""
-    missing = find_missing(python, needs)
-    if missing is None:
-        return Readiness(
-            name, works=False, missing=f"{python} cannot be run", mend=USE_OTHER_PYTHON, note=note
-        )
-    if missing:
-        lacking = f"{python} lacks {', '.join(missing)}"
-        return Readiness(name, works=False, missing=lacking, mend=mend, note=note)
-    return Readiness(name, works=True, note=note)
-
-
 def calls_data(connection: Connection) -> WorkerMessage:
     """Return the calls of a connection by skill, as plain data for a worker."""
     return {
         skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
         for skill, call in connection.calls.items()
     }
-
-
-def to_robot_error(call: SkillCall, text: str, state: str) -> RobotError:
-    """Return the exception for a rejected or aborted goal (see `state`), with the server's message.
-
-    The message may start with a kind of error, as in `PickInvalidObject: there is no mug`.
-    """
-    named = NAMED_ERROR.fullmatch(text)
-    if named is not None:
-        return RobotError(named[1], named[2])
-    return RobotError(call.failure, text or f"{call.name} {state} the goal without a reason")

@@ -47,7 +47,7 @@ class RosRobot(RosCaller):
     @property
     def has_pose(self) -> bool:
         """Whether the connection names a topic with the robot's poses."""
-        return self.connection.pose is not None
+        return bool(self.connection.pose)
 
     def connect(self) -> None:
         """Open the detectors and connect. Raise NotReadyError if poses are missing or in the wrong frame."""
@@ -61,10 +61,10 @@ class RosRobot(RosCaller):
         places, pose = self.connection.places, self._pose() if self.has_pose else None
         sentence = ""
         if self.has_pose and pose is None:
-            sentence = f"no pose arrived on {self._topic}; start its publisher, or correct its name"
+            sentence = f"no pose arrived on {self.connection.pose}; start its publisher, or correct its name"
         elif places is not None and pose is not None and pose.frame not in {"", places.frame}:
             sentence = (
-                f'the poses on {self._topic} are in the frame "{pose.frame}", but the places are in '
+                f'the poses on {self.connection.pose} are in the frame "{pose.frame}", but the places are in '
                 f'"{places.frame}"; name another topic, or tf, under pose'
             )
         if sentence:
@@ -86,13 +86,18 @@ class RosRobot(RosCaller):
         values: dict[str, Any] = dict(zip(names, arguments, strict=True))
         if connection.places is not None and arguments and self.skills[skill].is_drive:
             values |= _place_values(connection.places, str(arguments[0]))
-        return self._call(skill, values, feedback)
+        call = connection.calls.get(skill)
+        if call is None:
+            raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
+        request = {"do": "perform", "skill": skill, "fields": call.fields(values)}
+        result: RobotResult = call.answer(self._request(call, request, feedback))
+        return result
 
     @property
     def failed_stop(self) -> str:
         """A message if the robot is known to move after a stop, otherwise ""."""
         worker, until = self._worker, time.monotonic() + self._waits.patience * 0.8
-        if worker is None or (self.connection.pose is None and self.connection.velocity is None):
+        if worker is None or not (self.connection.pose or self.connection.velocity):
             return ""
         motion = worker.motion
         while not motion.is_still and not motion.is_silent and time.monotonic() < until:
@@ -141,10 +146,6 @@ class RosRobot(RosCaller):
         for topic, message in zip(topics, messages, strict=True):
             self._send({"do": "publish", "topic": topic, "fields": message})
 
-    @property
-    def _topic(self) -> str:
-        return "" if self.connection.pose is None else self.connection.pose.topic
-
     def _pose(self) -> Pose | None:
         """Return the last pose, or wait for the first one. Return None if no pose arrives in time."""
         worker, until = self._worker, time.monotonic() + self._waits.patience
@@ -158,7 +159,9 @@ class RosRobot(RosCaller):
         """Return the place that the robot is in, or else the nearest place, whose distance is reported."""
         pose = self._pose()
         if pose is None or (self._worker is not None and self._worker.motion.is_unseen):
-            raise RobotError("UnknownPose", f"no pose has arrived on {self._topic} since the robot moved")
+            raise RobotError(
+                "UnknownPose", f"no pose has arrived on {self.connection.pose} since the robot moved"
+            )
         within = places.room_at(pose.x, pose.y)
         if within is not None:
             return within

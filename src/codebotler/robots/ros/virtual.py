@@ -16,8 +16,7 @@ from codebotler.core.world import World
 from codebotler.robots.base import ROS_PYTHON, CancelledError, RobotArgument, RobotLostError
 from codebotler.robots.ros.caller import calls_data
 from codebotler.robots.ros.connections.connection import default_connection
-from codebotler.robots.ros.ros1 import master_uri
-from codebotler.robots.ros.ros2 import choose_python, domain_of
+from codebotler.robots.ros.kinds import choose_python, domain_of, master_uri
 from codebotler.robots.ros.worker import RosWorker, WorkerMessage
 from codebotler.robots.simulated import Simulated
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.text.regex_flags import scope_flags
+from codebotler.core.text.labels import scope_flags
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
 from codebotler.rtl.text.clauses import clauses, complete_clauses, sentences
 from codebotler.rtl.text.matcher import Matcher

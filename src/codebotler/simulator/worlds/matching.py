@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Literal, NamedTuple, TypeAlias
 
-from codebotler.core.text.regex_flags import scope_flags
+from codebotler.core.text.labels import scope_flags
 from codebotler.core.world import Trait
 
 Matching: TypeAlias = Literal["label-in-request", "whole-words", "longest-name"]

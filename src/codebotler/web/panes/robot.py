@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from nicegui import ui
 
-from codebotler.core.skills.declaration import verb_for
+from codebotler.core.skills.declaration import by_event
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.display.progress import ANSWER, Moment, position_on_map
@@ -102,7 +102,8 @@ class RobotPane:
             for moment in moments[known:]:
                 with ui.element("li").classes(f"moment moment-{moment.kind}"):
                     PlainText("time", f"{moment.clock:.1f} s")
-                    verb = verb_for(moment.kind)
+                    row = by_event(moment.kind)
+                    verb = None if row is None else row.verb
                     if moment.kind == ANSWER or verb is not None:
                         PlainText("small", "heard" if verb is None else verb.past)
                     PlainText("span", moment.text, "text")

@@ -13,7 +13,7 @@ from starlette.types import Scope
 from codebotler.core.errors import UserError, elide_middle
 from codebotler.core.files import config_file
 from codebotler.core.yaml_files import YamlFile
-from codebotler.models.chosen import ConfigFile
+from codebotler.models.open import ConfigFile
 
 _ADDRESS = re.compile(
     r"(?P<scheme>https?)://(?P<host>[a-z0-9._-]+|\[[0-9a-f:.]+\])(?::0*(?P<port>[1-9]\d{0,4}))?"

@@ -96,8 +96,7 @@ def read_options(
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> GenerationRequest:
     """Convert the options that `generate` and `run` share to a request."""
-    from codebotler.models.chosen import choose_model
-    from codebotler.models.open import NOT_CALLING, kind_of
+    from codebotler.models.open import NOT_CALLING, choose_model, kind_of
     from roboeval.evaluation.agents.conversation import TurnLimits
     from roboeval.evaluation.agents.plan import DEFAULT_TURNS, AgentPlan
     from roboeval.evaluation.generating.generate import Pace

@@ -39,8 +39,7 @@ def recover(
 
     Each call of the first right program of each task fails once, in each world.
     """
-    from codebotler.models.chosen import choose_model
-    from codebotler.models.open import open_model
+    from codebotler.models.open import choose_model, open_model
     from codebotler.models.recorded import is_recorded
     from codebotler.simulator.worker import Worker
     from roboeval.evaluation.recovery import (

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from codebotler.core.errors import RobotError
-from codebotler.core.skills.table import Skill, SkillTable
+from codebotler.core.skills.table import SkillTable
 
 if TYPE_CHECKING:
     from codebotler.robots.places import Places
@@ -65,14 +65,6 @@ class SkillCall:
 
 
 @dataclass(frozen=True)
-class MotionTopic:
-    """A topic on which a robot publishes its poses or velocities."""
-
-    topic: str
-    frames: tuple[str, str] | None = None  # the frames of the map and of the robot, for poses from tf
-
-
-@dataclass(frozen=True)
 class Connection:
     """A robot's ROS interface.
 
@@ -80,8 +72,9 @@ class Connection:
         calls: the action, service or topic for each skill.
         robot: the kind of robot: ros1, rosbridge or ros2.
         places: the places that the robot can drive to, or None if unknown.
-        pose: the topic with the robot's poses.
-        velocity: the topic with the robot's velocities.
+        pose: the topic with the robot's poses, or an empty string.
+        velocity: the topic with the robot's velocities, or an empty string.
+        frames: the frames of the map and of the robot, for poses from tf.
         packages: folders of message packages to build if they are not installed.
         cameras: the camera topic and the detector model for each skill that looks at pictures.
         keepout: the topics of Nav2's keepout mask and its CostmapFilterInfo.
@@ -90,8 +83,9 @@ class Connection:
     calls: Mapping[str, SkillCall]
     robot: str = "ros2"
     places: Places | None = None
-    pose: MotionTopic | None = None
-    velocity: MotionTopic | None = None
+    pose: str = ""
+    velocity: str = ""
+    frames: tuple[str, str] | None = None
     packages: tuple[str, ...] = ()
     cameras: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     keepout: tuple[str, str] | None = None
@@ -106,18 +100,17 @@ class Connection:
 
 def default_connection(skills: SkillTable) -> Connection:
     """Return the connection that uses the actions from the skills' own declarations."""
-    return Connection({row.name: _action_of(row) for row in skills.rows if row.ros is not None})
-
-
-def _action_of(skill: Skill) -> SkillCall:
-    ros = skill.ros
-    assert ros is not None, "the caller selects skills with an action"
-    names = [line.split()[1] for line in ros.goal]
-    request = {name: f"${p.name}" for name, p in zip(names, skill.parameters, strict=True)}
-    result = "" if ros.result is None else "result"
-    failure = ros.failure or f"{ros.type}Failed"
-    type_name = f"{ros.package}/action/{ros.type}"
-    return SkillCall("action", ros.server, type_name, request, ros.definition, result, failure=failure)
+    calls = {}
+    for skill in skills.rows:
+        if (ros := skill.ros) is not None:
+            names = [line.split()[1] for line in ros.goal]
+            request = {name: f"${p.name}" for name, p in zip(names, skill.parameters, strict=True)}
+            type_name, failure = f"{ros.package}/action/{ros.type}", ros.failure or f"{ros.type}Failed"
+            result = "" if ros.result is None else "result"
+            calls[skill.name] = SkillCall(
+                "action", ros.server, type_name, request, ros.definition, result, failure=failure
+            )
+    return Connection(calls)
 
 
 def _fill(request: Any, values: Values) -> Any:  # noqa: ANN401 - a message
@@ -143,11 +136,6 @@ def _put(fields: dict[str, Any], path: str, value: Any) -> None:  # noqa: ANN401
         _put(fields.setdefault(first, {}), rest, value)
     else:
         fields[first] = value
-
-
-def find_variables(request: Values) -> set[str]:
-    """Return the names of the variables in a request."""
-    return set(CALL_VARIABLE.findall(str(request)))
 
 
 def _get(received: Any, path: str) -> Any:  # noqa: ANN401 - a message

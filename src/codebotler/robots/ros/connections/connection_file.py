@@ -12,11 +12,10 @@ from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.yaml_files import YamlFile
 from codebotler.robots.places import Places, read_places
 from codebotler.robots.ros.connections.connection import (
+    CALL_VARIABLE,
     PLACE_VARIABLES,
     Connection,
-    MotionTopic,
     SkillCall,
-    find_variables,
 )
 
 
@@ -40,30 +39,11 @@ class _ConnectionPart(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class FramesForm(_ConnectionPart):
-    """The coordinate frames for poses from tf."""
-
-    from_: Annotated[str, Field(alias="from")] = "map"
-    to: str = "base_link"
-
-
 class PoseForm(_ConnectionPart):
     """The topic or the transforms that give the robot's pose."""
 
     topic: Topic | None = None
-    tf: FramesForm | None = None
-
-    def motion_topic(self) -> MotionTopic:
-        """Return the topic with the poses, /amcl_pose by default."""
-        if self.tf is not None:
-            return MotionTopic(self.topic or "/tf", (self.tf.from_, self.tf.to))
-        return MotionTopic(self.topic or "/amcl_pose")
-
-
-class VelocityForm(_ConnectionPart):
-    """The topic with the robot's velocities."""
-
-    topic: Topic
+    tf: dict[Literal["from", "to"], str] | None = None
 
 
 class KeepoutForm(_ConnectionPart):
@@ -96,7 +76,7 @@ class ConnectionForm(_ConnectionPart):
     robot: Literal["ros1", "rosbridge", "ros2"] = "ros2"
     places: Any = None
     pose: PoseForm | None = None
-    velocity: VelocityForm | None = None
+    velocity: Annotated[dict[Literal["topic"], Topic], Field(min_length=1)] = {}
     packages: list[str] = []
     keepout: KeepoutForm | None = None
     skills: Annotated[dict[str, SkillForm], Field(min_length=1)]
@@ -127,12 +107,15 @@ def read_connection(path: Path, skills: SkillTable) -> Connection:
             raise file.wrong(f"there is no folder {folder}", "packages", number)
     if form.keepout is not None and (form.robot != "ros2" or places is None):
         raise file.wrong("keepout needs places and Nav2; add places, and use robot: ros2", "keepout")
+    tf = None if form.pose is None else form.pose.tf
+    usual_topic = "" if form.pose is None else "/amcl_pose" if tf is None else "/tf"
     return Connection(
         calls,
         form.robot,
         places,
-        None if form.pose is None else form.pose.motion_topic(),
-        None if form.velocity is None else MotionTopic(form.velocity.topic),
+        (form.pose and form.pose.topic) or usual_topic,
+        form.velocity.get("topic", ""),
+        None if tf is None else (tf.get("from", "map"), tf.get("to", "base_link")),
         folders,
         cameras,
         None if form.keepout is None else (form.keepout.mask, form.keepout.info),
@@ -163,7 +146,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     known |= {*PLACE_VARIABLES} if places and skill.is_drive else set()
     if known and not request:
         raise file.wrong(f'write the message in "{MESSAGE_KEYS[kind]}", such as {{data: ${min(known)}}}', *at)
-    for variable in find_variables(request):
+    for variable in CALL_VARIABLE.findall(str(request)):
         if variable not in known:
             lacks = "; name a file under places" if variable in PLACE_VARIABLES and skill.is_drive else ""
             given = ", ".join(f"${one}" for one in sorted(known)) or "none"

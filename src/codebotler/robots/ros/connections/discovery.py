@@ -9,8 +9,8 @@ from pathlib import Path
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import NotReadyError
-from codebotler.robots.ros import ros1, ros2
 from codebotler.robots.ros.connections.connection import default_connection
+from codebotler.robots.ros.kinds import choose_python, domain_of, master_uri
 from codebotler.robots.ros.worker import RosWorker
 
 
@@ -80,9 +80,9 @@ def discover_offers(robot: str, address: str, python: Path) -> list[str]:
     if robot not in {"ros1", "ros2"}:
         raise UserError(f'"{robot}" does not support discovery; use ros1 or ros2, on a machine with that ROS')
     if robot == "ros1":
-        environment = {"ROS_MASTER_URI": ros1.master_uri(address)}
+        environment = {"ROS_MASTER_URI": master_uri(address)}
     else:
-        environment, python = {"ROS_DOMAIN_ID": ros2.domain_of(address)}, ros2.choose_python(python)
+        environment, python = {"ROS_DOMAIN_ID": domain_of(address)}, choose_python(python)
     worker = RosWorker(python, "discovery_worker.py", {"robot": robot}, environment)
     worker.leave()
     if not worker.about["offers"]:

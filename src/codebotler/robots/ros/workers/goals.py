@@ -74,8 +74,9 @@ class SkillWorker:
     """Performs skills, one at a time. Subclasses implement at least `connect`, `send` and `listen`.
 
     The first message has the `address`, the `node` name, the `calls` by skill, folders of `packages`, topics
-    for `pose`, `velocity` and `keepout`, whether to `cancel_all` goals, the path `sign` of a file that names
-    the server of a running goal, and the time limits `patience`, `silence` and `longest`.
+    for `pose`, `velocity` and `keepout`, the `frames` of poses from tf, whether to `cancel_all` goals, the
+    path `sign` of a file that names the server of a running goal, and the time limits `patience`, `silence`
+    and `longest`.
     """
 
     graph: Any
@@ -279,14 +280,13 @@ class SkillWorker:
             self.end(goal, "error", state="aborted", text=text)
 
     def _listen(self, start: Fields) -> None:
-        pose, velocity = start["pose"], start["velocity"]
-        reports = MotionReports(self.channel, pose and pose["frames"])
-        if pose is not None:
-            self.listen(pose["topic"], reports.report_pose)
-            if pose["frames"]:
-                self.listen(pose["topic"] + "_static", reports.report_pose, is_needed=False)
-        if velocity is not None:
-            self.listen(velocity["topic"], reports.report_velocity)
+        reports = MotionReports(self.channel, start["frames"])
+        if start["pose"]:
+            self.listen(start["pose"], reports.report_pose)
+        if start["frames"]:
+            self.listen(start["pose"] + "_static", reports.report_pose, is_needed=False)
+        if start["velocity"]:
+            self.listen(start["velocity"], reports.report_velocity)
 
     def _wait_and_send(self, goal: Goal, fields: Fields) -> None:
         deadline = time.monotonic() + self.patience + self.settles

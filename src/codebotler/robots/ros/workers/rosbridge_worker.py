@@ -9,8 +9,13 @@ from collections.abc import Callable
 from channel import Fields, SetupError, serve
 from goals import Goal, Server, SkillWorker
 from message_types import parts_of
-from rosbridge_connection import CONNECTION_FAULTS, INSIST_SECONDS, SETTLE_SECONDS, RosbridgeConnection
-from rosbridge_protocol import GoalUpdate
+from rosbridge_connection import (
+    CONNECTION_FAULTS,
+    INSIST_SECONDS,
+    SETTLE_SECONDS,
+    GoalUpdate,
+    RosbridgeConnection,
+)
 
 RESEND_SECONDS = 0.5  # how long to wait before repeating a message that had no effect
 

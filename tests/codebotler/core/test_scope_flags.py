@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from codebotler.core.text.regex_flags import scope_flags
+from codebotler.core.text.labels import scope_flags
 
 PLAIN = ("yes", "(?:yes|no)", "(?i:yes)", r"a\(?i\)", "")
 
