@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.table import Recording
@@ -28,9 +29,8 @@ def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, 
         quote: the quotation mark around texts. Those within them become apostrophes, so that no text ends
             early.
     """
-    given = show
     if quote:
-        show = lambda text: given(text).replace(quote, "'")  # noqa: E731 - a def would be longer
+        show = partial(_without_quotes, show, quote)
     answer = None if event.answer is None else show(event.answer)
     if form == "ing" and answer is not None:
         return f"the answer {quote}{answer}{quote} to {quote}{show(event.text)}{quote}"
@@ -47,6 +47,10 @@ def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, 
     if form == "past" and (answer is not None or is_question(event.kind)):
         return f"{words} → {NO_ANSWER if answer is None else answer}"
     return f"{words}: {result}" if (result := result_words(event)) else words
+
+
+def _without_quotes(show: Callable[[str], str], quote: str, text: str) -> str:
+    return show(text).replace(quote, "'")
 
 
 def result_words(event: Event) -> str:
