@@ -16,7 +16,7 @@ from roboeval.web.heat_map import MAX_NAME, TaskCells, failure_rows, models_of, 
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import CompletionFilter, Snapshot
-from roboeval.web.widgets import REFRESH_SECONDS, HeatMap, completions_text, score_text, show_state
+from roboeval.web.widgets import REFRESH_SECONDS, HeatMap, score_text, show_state
 
 MAX_COMPARED_RUNS = 12
 DIFFERENT_SUITES = (
@@ -113,9 +113,8 @@ def _column(run: Snapshot) -> dict[str, Any]:
 
 
 def _draw_run(run: Snapshot) -> None:
-    data = run_data(run)
     with ui.element("li"):
         html.a(shortened(run.name, MAX_NAME), href=outside(run_address(run.name))).props("dir=auto")
-        show_state(data, PlainText("small"))
-        PlainText("b", score_text(data))
-        PlainText("span", f"{completions_text(data)}, {models_of(run)}", "quiet")
+        show_state(run_data(run), PlainText("small"))
+        PlainText("b", score_text(run.pass_at_1))
+        PlainText("span", f"{run.results.coverage}, {models_of(run)}", "quiet")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from urllib.parse import urlencode
 
 import polars as pl
@@ -14,6 +14,7 @@ from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
 from roboeval.analysis.comparisons.compare import (
     MISSIONS_COMPARED,
+    Comparison,
     compare_tables,
     comparison_sentence,
     pairs_to_compare,
@@ -30,17 +31,8 @@ DIFFERENCE_HEADS = ("95% confidence interval", "Different verdicts")
 INTERVAL_NOTE = "The interval for all tasks is over tasks; other intervals are over the prompts of a task."
 
 
-@dataclass(frozen=True)
-class TaskRow:
-    """The difference between two runs in one task, or in all tasks."""
-
-    task: str
-    shares: tuple[float, float]  # mean pass@1 over common prompts
-    difference: Estimate  # second minus first; interval over prompts, or over tasks for all tasks
-    differing: tuple[tuple[CompletionKey, bool], ...]  # pass in one run only, True for the second run
-
-
 def _find_differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[CompletionKey, bool]]]:
+    """Find the completions that pass in one run only, by task, with True for the second run."""
     judged = [run.completions.drop_nulls("passed").select(*KEY, "passed") for run in (first, second)]
     both = judged[0].join(judged[1], on=KEY, how="inner", suffix="_second", maintain_order="left")
     found: dict[str, list[tuple[CompletionKey, bool]]] = {}
@@ -57,8 +49,8 @@ class Difference:
 
     runs: tuple[Snapshot, Snapshot]
     sentence: str  # states which run is better, and how significant the difference is
-    overall: TaskRow | None = None  # over all tasks; None if they have no prompt in common
-    rows: tuple[TaskRow, ...] = ()  # by task, the largest differences first
+    comparison: Comparison | None = None  # None if it is not shown, or if they have no prompt in common
+    differing: Mapping[str, Sequence[tuple[CompletionKey, bool]]] = field(default_factory=dict)
 
 
 def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
@@ -79,14 +71,7 @@ def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Differen
         sentence += f" {MISSIONS_COMPARED[0].upper()}{MISSIONS_COMPARED[1:]}."
     if not by_task:
         return Difference((first, second), sentence)
-    overall = TaskRow("All tasks", (found.first, found.second), found.over_tasks, ())
-    differing = _find_differing(first, second)
-    rows = [
-        TaskRow(one.task, (one.first, one.second), one.difference, tuple(differing.get(one.task, ())))
-        for one in found.tasks
-    ]
-    rows.sort(key=lambda row: (-abs(row.difference.mean), row.task))
-    return Difference((first, second), sentence, overall, tuple(rows[:MAX_PAIR_TASKS]))
+    return Difference((first, second), sentence, found, _find_differing(first, second))
 
 
 def draw_differences(found: Sequence[Difference]) -> None:
@@ -103,45 +88,47 @@ def draw_differences(found: Sequence[Difference]) -> None:
 
 
 def _draw_difference(difference: Difference) -> None:
-    runs, rows, overall = difference.runs, difference.rows, difference.overall
-    names = [shortened(run.name, MAX_NAME) for run in runs]
+    names, found = [shortened(run.name, MAX_NAME) for run in difference.runs], difference.comparison
     PlainText("p", difference.sentence)
-    if overall is None:
+    if found is None:
         return
+    largest = sorted(found.tasks, key=lambda one: (-abs(one.difference.mean), one.task))[:MAX_PAIR_TASKS]
     region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Differences"')
     with region, html.table().classes("differences"):
         with html.thead(), html.tr():
             for head in ("Task", *names, f"{names[1]} \N{MINUS SIGN} {names[0]}", *DIFFERENCE_HEADS):
                 PlainText("th", head).props("scope=col")
         with html.tbody():
-            for row in (overall, *rows):
-                _draw_row(row, runs)
+            _draw_row("All tasks", found.first, found.second, found.over_tasks)
+            for one in largest:
+                with _draw_row(one.task, one.first, one.second, one.difference):
+                    _draw_differing(difference.differing.get(one.task, ()), difference.runs)
     PlainText("p", INTERVAL_NOTE, "quiet")
 
 
-def _draw_row(row: TaskRow, runs: Sequence[Snapshot]) -> None:
-    estimate = row.difference
+def _draw_row(task: str, first: float, second: float, difference: Estimate) -> html.td:
+    """Draw a row of the table, and return its last cell, which is empty."""
     with html.tr():
-        PlainText("th", shortened(row.task, MAX_NAME)).props("scope=row")
-        for share in row.shares:
+        PlainText("th", shortened(task, MAX_NAME)).props("scope=row")
+        for share in (first, second):
             PlainText("td", f"{share:.2f}", "number")
-        PlainText("td", f"{estimate.mean:+.2f}", "number strong")
-        PlainText("td", estimate.ends("+.2f"), "number")
-        with html.td():
-            if row.differing:
-                _draw_differing(row, runs)
+        PlainText("td", f"{difference.mean:+.2f}", "number strong")
+        PlainText("td", difference.ends("+.2f"), "number")
+        return html.td()
 
 
-def _draw_differing(row: TaskRow, runs: Sequence[Snapshot]) -> None:
+def _draw_differing(differing: Sequence[tuple[CompletionKey, bool]], runs: Sequence[Snapshot]) -> None:
+    if not differing:
+        return
     with html.details():
-        PlainText("summary", f"{len(row.differing):,}")
+        PlainText("summary", f"{len(differing):,}")
         with ui.element("ul"):
-            for key, is_second in row.differing[:MAX_DIFFERING]:
+            for key, is_second in differing[:MAX_DIFFERING]:
                 with ui.element("li"):
                     PlainText("span", f"{name_of(key)}: ")
                     verdicts = ("failed", "passed") if is_second else ("passed", "failed")
                     for run, text in zip(runs, verdicts, strict=True):
                         link = html.a(f"{shortened(run.name, MAX_NAME)} {text}")
                         link.props["href"] = outside(f"{run_address(run.name)}/{name_of(key)}")
-            if (left := len(row.differing) - MAX_DIFFERING) > 0:
+            if (left := len(differing) - MAX_DIFFERING) > 0:
                 PlainText("li", f"and {left:,} more")

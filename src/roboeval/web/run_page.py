@@ -21,7 +21,6 @@ from roboeval.web.widgets import (
     REFRESH_SECONDS,
     CompletionList,
     HeatMap,
-    completions_text,
     date_text,
     score_text,
     show_state,
@@ -157,8 +156,8 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
     with ui.element("p").classes("facts"):
         state = PlainText("small")
         PlainText("span", models_of(run) + (f", judged by {shortened(key, MAX_NAME)}" if key else ""))
-        PlainText("b", score_text(data))
-        PlainText("span", f"{completions_text(data)}, {tasks_text(data)} tasks")
+        PlainText("b", score_text(run.pass_at_1))
+        PlainText("span", f"{run.results.coverage}, {tasks_text(data)} tasks")
         if data["date"] is not None:
             PlainText("span", f"started {date_text(data)} UTC", "quiet")
         if data["settings"]:

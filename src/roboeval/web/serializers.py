@@ -17,7 +17,6 @@ from roboeval.analysis.metrics import pass_at_1
 from roboeval.evaluation.generating.requests import batches
 from roboeval.evaluation.judging.explanation import PROGRAM_GONE, completion_data, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, how_many, name_of, recorded_suffix
-from roboeval.evaluation.runs.replies import reply_data
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
 from roboeval.web.snapshot import CompletionFilter, Snapshot
@@ -201,14 +200,7 @@ def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
     key: CompletionKey = row["task"], row["prompt"], row["index"]
     completion = results.completions.get(key)
     more = {"evaluation": results.key, "stale": row["stale"], "note": PROGRAM_GONE if row["stale"] else None}
-    if row["passed"] is None:
-        known: dict[str, Any] = {
-            name: getattr(completion, name, None) for name in ("model", "instruction", "program")
-        }
-        known["reply"] = reply_data(completion)
-        known["suite_instruction"] = suite_instruction(run.suite, row["task"], row["prompt"])
-        return {**entry_data(row), **known, **more, "worlds": []}
-    judged = results.row(key)
+    judged = {**entry_data(row), "verdicts": []} if row["passed"] is None else results.row(key)
     try:
         data = completion_data(judged, completion, run.suite, ablated=results.is_ablated)
     except (UserError, KeyError, TypeError, IndexError, AttributeError, ValueError):
