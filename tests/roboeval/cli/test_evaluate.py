@@ -18,7 +18,7 @@ from codebotler.simulator.worker import Worker
 from command_line import ENVIRONMENT, Ended, refused, roboeval
 from forked import Forked
 from roboeval import load_results
-from roboeval.analysis.counting.tally import Tally
+from roboeval.analysis.counting.counts import Tally
 from roboeval.cli.output import show_progress
 from roboeval.evaluation.runs.rows import Row
 from seals import unseal

@@ -9,7 +9,7 @@ from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from roboeval.analysis.counting.tally import Tally
+from roboeval.analysis.counting.counts import Tally
 from roboeval.analysis.metrics import Estimate, PromptScore, TaskScore, overall, prompts_of
 from roboeval.evaluation.judging.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES
 from roboeval.evaluation.runs.completions import how_many

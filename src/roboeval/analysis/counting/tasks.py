@@ -8,7 +8,7 @@ from typing import Any
 
 import polars as pl
 
-from roboeval.analysis.counting.counts import completions_of, prompt_scores
+from roboeval.analysis.counting.counts import completions_of, task_scores
 from roboeval.evaluation.judging.explanation import reason, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, Completion, CompletionKey
 from roboeval.evaluation.runs.results import Results
@@ -60,7 +60,9 @@ def _reason(results: Results, key: CompletionKey) -> dict[str, Any]:
 def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
     keys = [*of_prompt.filter(~pl.col("stale")).select(KEY).iter_rows()]
     written = [results.completions[key] for key in keys]
-    ((task, prompt, n, c, share),) = prompt_scores(of_prompt).iter_rows()
+    (of_task,) = task_scores(of_prompt)
+    (score,) = of_task.prompts
+    task, prompt = score.task, score.prompt
     requested = results.scope.requested
     prompts = () if results.suite is None else results.suite.task(task).prompts
     return {
@@ -68,11 +70,11 @@ def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
         "instructions": _distinct(written, "instruction"),
         "suite_instruction": suite_instruction(results.suite, task, prompt),
         "models": _distinct(written, "model"),
-        "completions": n,
+        "completions": score.n,
         "requested": None if requested is None else requested.get(task, 0) // len(prompts),
-        "gone": n - len(written),
-        "passed": c,
-        "pass@1": share,
+        "gone": score.n - len(written),
+        "passed": score.c,
+        "pass@1": score.pass_at(1),
     }
 
 
