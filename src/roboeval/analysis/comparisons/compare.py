@@ -20,7 +20,6 @@ from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_f
 from roboeval.analysis.statistics import SampleSizes, by_bootstrap, p_by_signs, sample_sizes
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.scope import Coverage, JudgingScope
 
 SIGNIFICANCE = 0.05
 MIN_SHOWN_P = 0.001  # smaller values are shown as "p < 0.001"
@@ -180,26 +179,9 @@ def _short(value: object) -> str:
     return "none" if value is None else visible(str(value))[:12]
 
 
-@dataclass(frozen=True)
-class ComparedRun:
-    """The results of a compared run other than its pass@1."""
-
-    name: str
-    coverage: Coverage
-    scope: JudgingScope
-    classes: Mapping[str, float]  # shares of judged completions, by class of failure
-
-    @classmethod
-    def of(cls, name: str, results: Results, table: pl.DataFrame | None = None) -> ComparedRun:
-        """Collect the coverage, the scope and the failure classes of a run, by default of its own table."""
-        found = failures(tally_of(results.table if table is None else table))
-        shares = {one.name: one.share for one in found}
-        return cls(name, results.coverage, results.scope, shares)
-
-    @property
-    def data(self) -> dict[str, Any]:
-        """Convert the run to plain data, without its name."""
-        return {**asdict(self.coverage), "cut_off": self.scope.cut_off, "failures": dict(self.classes)}
+def failure_shares(table: pl.DataFrame) -> dict[str, float]:
+    """Return the shares of judged completions, by class of failure."""
+    return {one.name: one.share for one in failures(tally_of(table))}
 
 
 def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:

@@ -65,9 +65,9 @@ _PAIR = 2
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
     """Print how much better the second of two runs is."""
     from roboeval.analysis.comparisons.compare import (
-        ComparedRun,
         compare_tables,
         comparison_data,
+        failure_shares,
         other_differences,
     )
     from roboeval.analysis.comparisons.missions import comparable_tables
@@ -80,15 +80,14 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
     warnings = other_differences(*opened)
     for warning in warnings:
         note(f"warning: {warning}")
-    first, second = (
-        ComparedRun.of(str(path), one, table) for path, one, table in zip(paths, opened, tables, strict=True)
-    )
+    names, failing = (str(paths[0]), str(paths[1])), [failure_shares(table) for table in tables]
     if as_json:
-        data = comparison_data(result, (first.name, second.name))
-        both = {side: data[side] | run.data for side, run in (("first", first), ("second", second))}
-        print_json({**data, **both, "warnings": warnings})
+        data = comparison_data(result, names)
+        for side, one, shares in zip(("first", "second"), opened, failing, strict=True):
+            data[side] |= {**asdict(one.coverage), "cut_off": one.scope.cut_off, "failures": shares}
+        print_json({**data, "warnings": warnings})
     else:
-        print_rich(comparison_view(result, (first, second)))
+        print_rich(comparison_view(result, names, opened, failing))
 
 
 def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bool, as_json: bool) -> None:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from codebotler.core.errors import UserError
 from roboeval.analysis.cost import budgets, cost_of
 from roboeval.analysis.metrics import threshold_curve
 from roboeval.analysis.resample import LIMITS, CheckedPrompt, accepted_after, resample
-from roboeval.evaluation.runs.table import Price
 from roboeval.report.figures.curves import draw_accepted, draw_limits, most_completions
 from roboeval.report.runs import JudgedRun, runs_to_draw
 from roboeval.report.sheets import Cell, ReportFigure, Section, Sheet, section, sheet
@@ -53,21 +51,21 @@ def retry_curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float
 # --- tokens, time and money
 
 
-def costs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
+def costs(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on the cost of programs, for runs that recorded it."""
-    return section("cost", cost_sheet(runs, prices), budget_sheet(runs, prices))
+    return section("cost", cost_sheet(runs), budget_sheet(runs))
 
 
-def cost_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
+def cost_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """Build the table of each run's cost, in total and per passing program."""
-    found = [(run.name, cost_of(run.table, price_of(run, prices))) for run in runs]
+    found = [(run.name, cost_of(run.table, run.price)) for run in runs]
     known = [one for one in found if one[1].input_tokens is not None or one[1].seconds is not None]
     return sheet("cost", [[name, *one] for name, one in known])
 
 
-def cost_sentence(run: JudgedRun, prices: Mapping[str, Price]) -> str:
+def cost_sentence(run: JudgedRun) -> str:
     """Describe the cost per passing program. Return an empty string if no cost was recorded."""
-    cost = cost_of(run.table, price_of(run, prices))
+    cost = cost_of(run.table, run.price)
     parts = (
         (cost.money_per_pass, "${:.3g}"),
         (cost.tokens_per_pass, "{:,.0f} tokens"),
@@ -77,36 +75,8 @@ def cost_sentence(run: JudgedRun, prices: Mapping[str, Price]) -> str:
     return f"Cost per pass: {', '.join(each)}" if each else ""
 
 
-def budget_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
+def budget_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """Build a table that shows how many passing programs a budget buys, for runs with checked programs."""
     checked = [run for run in runs if run.trials]
-    rows = [[run.name, *one] for run in checked for one in budgets(run.table, price_of(run, prices))]
+    rows = [[run.name, *one] for run in checked for one in budgets(run.table, run.price)]
     return sheet("budget", rows)
-
-
-def read_prices(texts: Sequence[str]) -> dict[str, Price]:
-    """Parse prices of the form `MODEL=INPUT/OUTPUT`, and return them by model."""
-    prices: dict[str, Price] = {}
-    for text in texts:
-        model, _, numbers = text.rpartition("=")
-        try:
-            price = Price.read(numbers)
-        except ValueError:
-            price = None
-        if price is None or not model:
-            raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, per million tokens')
-        prices[model] = price
-    return prices
-
-
-def price_of(run: JudgedRun, prices: Mapping[str, Price]) -> Price | None:
-    """Return the price that was given for a run's folder, name or model, or None if none was given."""
-    return next((prices[name] for name in (run.folder, run.name, run.model or "") if name in prices), None)
-
-
-def expect_known(prices: Mapping[str, Price], runs: Sequence[JudgedRun]) -> None:
-    """Raise UserError if a price is given for a model that no run used."""
-    for model, price in prices.items():
-        if not any(price_of(run, {model: price}) for run in runs):
-            names = ", ".join(run.name for run in runs)
-            raise UserError(f'--price is given for "{model}", but the runs are {names}')

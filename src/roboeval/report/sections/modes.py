@@ -6,8 +6,11 @@ from collections.abc import Sequence
 
 import polars as pl
 
-from roboeval.analysis.comparisons.missions import has_missions, mission_costs
-from roboeval.analysis.counting.counts import completions_of
+from codebotler.core.errors import VIOLATION
+from roboeval.analysis.comparisons.missions import has_missions, per_mission
+from roboeval.analysis.counting.counts import task_scores
+from roboeval.analysis.metrics import overall
+from roboeval.evaluation.runs.endings import OUTSIDE_CONTRACT
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import Cell, Section, Sheet, section, sheet
 
@@ -19,14 +22,33 @@ def modes(runs: Sequence[JudgedRun]) -> Section:
 
 
 def mode_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of missions by run."""
+    """Build the table of the success rate and the costs of missions by run."""
     rows: list[list[Cell]] = []
     for run in runs:
-        one = mission_costs(run.table)
-        share = one.satisfied.mean, one.satisfied.low, one.satisfied.high, one.forbidden
-        means = one.turns, one.tool_errors, one.tokens, one.tokens_per_success
-        rows.append([run.name, one.mode, one.missions, *share, *means])
+        completions, missions = run.completions, per_mission(run.table)
+        success = overall(task_scores(missions), 1)
+        tokens = _mean(completions["input_tokens"] + completions["output_tokens"])
+        passed = int(missions["satisfied"].sum()) / missions.height
+        ended = missions["error_kind"].is_in([VIOLATION, OUTSIDE_CONTRACT]).fill_null(value=False)
+        rows.append(
+            [
+                run.name,
+                str(completions["mode"].drop_nulls().first() or "program"),
+                missions.height,
+                *(success.mean, success.low, success.high),
+                _mean(ended) or 0.0,
+                _mean(completions["turns"]),
+                _mean(completions["tool_errors"]),
+                tokens,
+                tokens / passed if tokens and passed else None,
+            ]
+        )
     return sheet("modes", rows)
+
+
+def _mean(values: pl.Series) -> float | None:
+    known = values.drop_nulls()
+    return float(known.sum()) / len(known) if len(known) else None
 
 
 def ending_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -42,8 +64,7 @@ def ending_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     rows = [
         [run.name, *ended]
         for run in runs
-        for ended in completions_of(run.table)
-        .group_by("ending")
+        for ended in run.completions.group_by("ending")
         .agg(*columns)
         .sort(["len", "ending"], descending=[True, False])
         .rows()
