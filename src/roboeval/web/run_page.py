@@ -116,13 +116,9 @@ class _RunPage:
             CompletionFilter(): ("all judged", run.judged),
             CompletionFilter(passed=True): ("passed", run.passed),
         }
-        for cause in run.failures:
-            counts[CompletionFilter(failure_class=cause.name)] = plural_of(cause.name), cause.count
-            for one in cause.kinds:
-                counts[CompletionFilter(failure_class=cause.name, failure_kind=one.name)] = (
-                    one.name,
-                    one.count,
-                )
+        for (cause, name), one in run.failures.items():
+            chosen = CompletionFilter(failure_class=cause, failure_kind=name)
+            counts[chosen] = name or plural_of(cause), one.count
         if list(self._kinds) != list(counts):
             self._ends.clear()
             with self._ends:

@@ -157,7 +157,7 @@ def run_details(run: Snapshot) -> dict[str, Any]:
     tasks: dict[str, list[dict[str, Any]]] = {}
     for prompt in run.prompts(CompletionFilter(passed=True)):
         tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite, shares))
-    kinds = [(cause.name, kind) for cause in run.failures for kind in cause.kinds]
+    kinds = [(name, one) for (name, kind), one in run.failures.items() if kind is not None]
     kinds.sort(key=lambda each: (-each[1].count, each[0], each[1].name))
     return {
         **run_data(run),
