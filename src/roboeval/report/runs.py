@@ -14,7 +14,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.text.words import counted
 from roboeval.analysis.counting.counts import completions_of, task_scores
 from roboeval.analysis.metrics import TaskScore, overall, pass_at_1
-from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
+from roboeval.analysis.resample import CheckedPrompt, count_by_prompt
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.table import Price
 from roboeval.report.figures.drawing import short_name
@@ -94,9 +94,9 @@ class JudgedRun:
         return {key[:2]: one.instruction for key, one in completions if one.instruction is not None}
 
     @cached_property
-    def trials(self) -> tuple[CheckedPrompt, ...]:
-        """The checked completions of each prompt. Empty unless all completions were checked."""
-        return () if self.table["accepted"].null_count() else trials_by_prompt(self.table)
+    def checked(self) -> tuple[CheckedPrompt, ...]:
+        """Counts of the completions of each prompt. Empty unless all completions were checked."""
+        return () if self.table["accepted"].null_count() else count_by_prompt(self.table)
 
 
 def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:

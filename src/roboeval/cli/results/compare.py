@@ -137,7 +137,7 @@ def resample(
     maximum number of retries, without querying a model.
     """
     from roboeval.analysis.comparisons.missions import has_missions
-    from roboeval.analysis.resample import LIMITS, curve_data, trials_by_prompt
+    from roboeval.analysis.resample import LIMITS, count_by_prompt, curve_data
     from roboeval.cli.views.groups import resample_view
 
     with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
@@ -145,7 +145,7 @@ def resample(
         if has_missions(results.table):
             fail(f"{run}: holds missions of an agent, which cannot be checked; name a run of programs")
         checker = engine_for(len(results.places))
-        prompts = trials_by_prompt(check_run(results, samples=samples, seed=seed, engine=checker))
+        prompts = count_by_prompt(check_run(results, samples=samples, seed=seed, engine=checker))
     coverage = results.coverage
     limits = sorted(set(retries)) if retries else LIMITS
     if json:
