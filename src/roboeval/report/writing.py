@@ -14,6 +14,7 @@ from roboeval.evaluation.generating.requests import batches
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.report.figures.drawing import render, use_style
 from roboeval.report.page import GENERATOR, page
+from roboeval.report.paper import published_sheet
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sections import breakdown, cost, failures, house, modes, question, scores
 from roboeval.report.sheets import (
@@ -65,20 +66,20 @@ def sections(
         scores.results(runs),
         scores.differences(runs),
         failures.other_suite(runs),
-        modes.modes(runs),
+        section("modes", modes.mode_sheet(runs), modes.ending_sheet(runs)),
         house.house(runs),
         scores.thresholds(runs),
         failures.causes_section(runs, with_published=with_published),
         failures.failures_section(runs),
-        breakdown.abilities(runs),
-        breakdown.phrasings(runs),
+        section("abilities", breakdown.ability_sheet(runs), breakdown.report_back_sheet(runs)),
+        section("phrasing", breakdown.spread_sheet(runs), breakdown.phrasing_sheet(runs)),
         cost.rejection_sampling(runs),
         question.question(runs),
-        cost.costs(runs),
-        scores.prompts(runs),
+        section("cost", cost.cost_sheet(runs), cost.budget_sheet(runs)),
+        section("prompts", scores.prompt_sheet(runs), published_sheet(runs)),
         origin(runs, command),
     ]
-    return [section for section in found if section.parts]
+    return [one for one in found if one.parts]
 
 
 def glance(runs: Sequence[JudgedRun]) -> Section:

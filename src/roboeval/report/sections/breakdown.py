@@ -15,18 +15,13 @@ from roboeval.evaluation.judging.failures import AGENT_ERROR_CLASS, FAILURE_CLAS
 from roboeval.evaluation.runs.rows import Row, failure_of
 from roboeval.evaluation.runs.traces import trace_of
 from roboeval.report.runs import JudgedRun, tasks_of
-from roboeval.report.sheets import Cell, Section, Sheet, section, sheet
+from roboeval.report.sheets import Cell, Sheet, sheet
 
 REPORT_ABILITY = "report-back"
 NO_SUCH_ROOM_ERROR = "GoToInvalidLocation"
 NO_INSTRUCTION = "instruction not recorded"
 REPORTING_TASKS = "come back and report"
 MAX_DISTINCT_WORDS = 12
-
-
-def abilities(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on failures by required ability (paper, section V.B)."""
-    return section("abilities", ability_sheet(runs), report_back_sheet(runs))
 
 
 def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -87,11 +82,6 @@ def never_returned(row: Row) -> bool:
 
 
 # --- phrasing
-
-
-def phrasings(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on the effect of an instruction's phrasing (paper, section V.A)."""
-    return section("phrasing", spread_sheet(runs), phrasing_sheet(runs))
 
 
 def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:

@@ -62,11 +62,6 @@ def retry_curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float
 # --- tokens, time and money
 
 
-def costs(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on the cost of programs, for runs that recorded it."""
-    return section("cost", cost_sheet(runs), budget_sheet(runs))
-
-
 class RunCost(NamedTuple):
     """The cost of completions in total and per passing program. Values that were not recorded are None."""
 

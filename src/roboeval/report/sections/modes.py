@@ -12,19 +12,13 @@ from roboeval.analysis.counting.counts import task_scores
 from roboeval.analysis.metrics import overall
 from roboeval.evaluation.runs.endings import OUTSIDE_CONTRACT
 from roboeval.report.runs import JudgedRun
-from roboeval.report.sheets import Cell, Section, Sheet, section, sheet
-
-
-def modes(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on the missions of each run."""
-    acted = [run for run in runs if has_missions(run.table)]
-    return section("modes", mode_sheet(runs if acted else []), ending_sheet(acted))
+from roboeval.report.sheets import Cell, Sheet, sheet
 
 
 def mode_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of the success rate and the costs of missions by run."""
+    """Build the table of the success rate and the costs of missions by run, if any run is of an agent."""
     rows: list[list[Cell]] = []
-    for run in runs:
+    for run in runs if any(has_missions(run.table) for run in runs) else ():
         completions, missions = run.completions, per_mission(run.table)
         success = overall(task_scores(missions), 1)
         tokens = _mean(completions["input_tokens"] + completions["output_tokens"])
@@ -64,6 +58,7 @@ def ending_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     rows = [
         [run.name, *ended]
         for run in runs
+        if has_missions(run.table)
         for ended in run.completions.group_by("ending")
         .agg(*columns)
         .sort(["len", "ending"], descending=[True, False])

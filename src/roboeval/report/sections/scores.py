@@ -147,11 +147,6 @@ def leader(runs: Sequence[JudgedRun]) -> list[str]:
         return []
 
 
-def prompts(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on pass@1 by prompt, with the published results."""
-    return section("prompts", prompt_sheet(runs), paper.published_sheet(runs))
-
-
 def prompt_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """Build the table of pass@1 by task and prompt, with published values for the same prompts."""
     imported = [run for run in runs if paper.uses_authors_prompts(run)]
