@@ -17,9 +17,9 @@ from roboeval.analysis.comparisons.compare import (
     Comparison,
     compare_tables,
     comparison_sentence,
+    has_missions,
     pairs_to_compare,
 )
-from roboeval.analysis.comparisons.missions import has_missions
 from roboeval.analysis.metrics import Estimate
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of
 from roboeval.web.heat_map import MAX_NAME, run_address

@@ -11,8 +11,7 @@ import pytest
 from codebotler.core.files import to_line
 from command_line import refused, roboeval
 from made_results import results_of
-from roboeval.analysis.comparisons.compare import compare_tables
-from roboeval.analysis.comparisons.missions import has_missions
+from roboeval.analysis.comparisons.compare import compare_tables, has_missions
 from roboeval.evaluation.runs.results import load_results
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sections.modes import mode_sheet

@@ -13,11 +13,18 @@ import polars as pl
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.core.text.words import counted
-from roboeval.analysis.comparisons.missions import comparable_tables
+from codebotler.core.trace import Status
 from roboeval.analysis.counting.counts import tally_of, task_scores
 from roboeval.analysis.counting.summary import failures
 from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of, pass_at_1
 from roboeval.analysis.statistics import SampleSizes, by_bootstrap, p_by_signs, sample_sizes
+from roboeval.evaluation.judging.failures import (
+    AGENT_ERROR_CLASS,
+    NO_PROGRAM_CLASS,
+    PYTHON_ERROR_CLASS,
+    ROBOT_ERROR_CLASS,
+    TASK_ERROR_CLASS,
+)
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.results import Results
 
@@ -81,6 +88,39 @@ def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
         sample_sizes=sample_sizes(pairs),
         tasks=tuple(sorted(_by_task(by_task), key=lambda one: (-abs(one.share), one.task))),
     )
+
+
+# --- missions: a program in a world counts as one, like a mission of an agent
+
+
+def has_missions(table: pl.DataFrame) -> bool:
+    """Whether the completions in a table are missions of an agent, each in one world."""
+    return table["ending"].null_count() < table.height
+
+
+def per_mission(table: pl.DataFrame) -> pl.DataFrame:
+    """Return a table of a run in which each completion in each world counts as one, with its own failure."""
+    kept = pl.col("failure_class").is_in([NO_PROGRAM_CLASS, AGENT_ERROR_CLASS])
+    is_check = pl.col("failed_checks").is_not_null()
+    is_robots = pl.col("status") == Status.ROBOT_ERROR.value
+    of_world = (
+        pl.when(is_check).then(pl.lit(TASK_ERROR_CLASS)).when(is_robots).then(pl.lit(ROBOT_ERROR_CLASS))
+    )
+    kind = pl.when(is_check).then("category").otherwise("error_kind")
+    failed = pl.when(~pl.col("satisfied"))
+    return table.with_columns(
+        passed=pl.col("satisfied"),
+        world_number=pl.lit(0),
+        failure_class=failed.then(
+            pl.when(kept).then("failure_class").otherwise(of_world.otherwise(pl.lit(PYTHON_ERROR_CLASS)))
+        ),
+        failure_kind=failed.then(pl.when(kept).then("failure_kind").otherwise(kind)),
+    )
+
+
+def comparable_tables(*tables: pl.DataFrame) -> Sequence[pl.DataFrame]:
+    """Return the tables of runs: of missions, if an agent carried out those of any run."""
+    return [*map(per_mission, tables)] if any(map(has_missions, tables)) else tables
 
 
 def compare_tables(first: pl.DataFrame, second: pl.DataFrame) -> Comparison:

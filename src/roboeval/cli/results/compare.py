@@ -65,12 +65,12 @@ _PAIR = 2
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
     """Print how much better the second of two runs is."""
     from roboeval.analysis.comparisons.compare import (
+        comparable_tables,
         compare_tables,
         comparison_data,
         failure_shares,
         other_differences,
     )
-    from roboeval.analysis.comparisons.missions import comparable_tables
     from roboeval.cli.views.comparison import comparison_view
 
     opened = [open_current(path, suite, ablated=ablated) for path in paths]
@@ -136,7 +136,7 @@ def resample(
     The programs of a judged run are checked, also against its house rules. The result is computed for each
     maximum number of retries, without querying a model.
     """
-    from roboeval.analysis.comparisons.missions import has_missions
+    from roboeval.analysis.comparisons.compare import has_missions
     from roboeval.analysis.resample import LIMITS, count_by_prompt, curve_data
     from roboeval.cli.views.groups import resample_view
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from codebotler.core.errors import UserError
 from roboeval.cli.inputs import load, open_current
 from roboeval.cli.options import (
     AblationOption,
@@ -88,7 +89,6 @@ def find(
 
 def parse_formula(text: str) -> Formula:
     """Parse an RTL formula. Raise UserError if it is invalid."""
-    from codebotler.core.errors import UserError
     from codebotler.rtl import RtlSyntaxError, parse
 
     try:

@@ -16,12 +16,16 @@ from codebotler.cli.options import (
     PortOption,
     TokenOption,
 )
+from codebotler.core.errors import UserError
 from roboeval.cli.inputs import (
     command,
     evaluate_again,
+    expect_judged,
     load,
+    names_completion,
     open_current,
     open_run,
+    parse_selection,
     stale_sentence,
     unfinished_sentence,
 )
@@ -65,8 +69,6 @@ def show(
     json: JsonOption = False,
 ) -> None:
     """Print a run's tables, or show why a completion fails."""
-    from roboeval.evaluation.runs.selection import expect_judged, names_completion, parse_selection
-
     if what and k:
         fail(f"--k applies to a whole run; leave out {what} or --k")
     if what and ablation:
@@ -233,7 +235,6 @@ def serve(
 
     You can compare runs and inspect each completion, without a robot. Ctrl-C stops the server.
     """
-    from codebotler.core.errors import UserError
     from codebotler.web import server
     from codebotler.web.security.access import Access, PageAddress
     from codebotler.web.security.proxy import proxies_in_front

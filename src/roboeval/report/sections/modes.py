@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import polars as pl
 
 from codebotler.core.errors import VIOLATION
-from roboeval.analysis.comparisons.missions import has_missions, per_mission
+from roboeval.analysis.comparisons.compare import has_missions, per_mission
 from roboeval.analysis.counting.counts import task_scores
 from roboeval.analysis.metrics import overall
 from roboeval.evaluation.runs.endings import OUTSIDE_CONTRACT

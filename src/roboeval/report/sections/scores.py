@@ -10,10 +10,10 @@ from roboeval.analysis.comparisons.compare import (
     MAX_PAIRS,
     compare_tables,
     comparison_sentence,
+    has_missions,
     other_differences,
     pairs_to_compare,
 )
-from roboeval.analysis.comparisons.missions import has_missions
 from roboeval.analysis.metrics import (
     TaskScore,
     by_formula,
