@@ -13,7 +13,6 @@ from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from roboeval.analysis.metrics import pass_at_1
 from roboeval.evaluation.generating.requests import batches
 from roboeval.evaluation.judging.explanation import PROGRAM_GONE, completion_data, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, how_many, name_of, recorded_suffix
@@ -153,10 +152,9 @@ class RunList:
 def run_details(run: Snapshot) -> dict[str, Any]:
     """Return a run with its tasks, prompts and kinds of failure."""
     means = {score.task: score.pass_at(1).mean for score in run.scores}
-    shares = pass_at_1(run.scores)
     tasks: dict[str, list[dict[str, Any]]] = {}
     for prompt in run.prompts(CompletionFilter(passed=True)):
-        tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite, shares))
+        tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite))
     kinds = [(name, one) for (name, kind), one in run.failures.items() if kind is not None]
     kinds.sort(key=lambda each: (-each[1].count, each[0], each[1].name))
     return {
@@ -169,16 +167,14 @@ def run_details(run: Snapshot) -> dict[str, Any]:
     }
 
 
-def _prompt_data(
-    prompt: Mapping[str, Any], suite: Suite | None, shares: Mapping[tuple[str, int], float]
-) -> dict[str, Any]:
+def _prompt_data(prompt: Mapping[str, Any], suite: Suite | None) -> dict[str, Any]:
     return {
         "prompt": prompt["prompt"],
         "instruction": suite_instruction(suite, prompt["task"], prompt["prompt"]),
         "completions": prompt["written"],
         "judged": prompt["judged"],
         "passed": prompt["counted"],
-        "pass@1": shares.get((prompt["task"], prompt["prompt"])),
+        "pass@1": prompt["share"],
     }
 
 

@@ -84,13 +84,12 @@ def _distinct(written: Sequence[Completion], name: str) -> list[str]:
 
 
 def _failure_kinds(of_prompt: pl.DataFrame) -> list[dict[str, Any]]:
-    counted = (
-        of_prompt.drop_nulls("failure_class")
-        .group_by("failure_class", "failure_kind", maintain_order=True)
-        .agg(count=pl.len(), example=pl.col("index").first())
-        .sort("count", descending=True, maintain_order=True)
-    )
+    """Count the kinds of failure, the most frequent first, each with the index of its first completion."""
+    failed = of_prompt.drop_nulls("failure_class").select("failure_class", "failure_kind", "index")
+    indices: dict[tuple[str, str], list[int]] = defaultdict(list)
+    for name, kind, index in failed.iter_rows():
+        indices[name, kind].append(index)
     return [
-        {"class": name, "kind": kind, "count": count, "example": example}
-        for name, kind, count, example in counted.iter_rows()
+        {"class": name, "kind": kind, "count": len(those), "example": those[0]}
+        for (name, kind), those in sorted(indices.items(), key=lambda one: -len(one[1]))
     ]

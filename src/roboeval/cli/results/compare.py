@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,7 +28,10 @@ if TYPE_CHECKING:
     import polars as pl
 
     from roboeval.evaluation.engines.engine import OpenEngine
+    from roboeval.evaluation.runs.completions import Completion
+    from roboeval.evaluation.runs.folder import RunFolder
     from roboeval.evaluation.runs.results import Results
+    from roboeval.suites.load import Suite
 
 
 def compare(
@@ -157,11 +160,27 @@ def resample(
 
 def check_run(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
     """Check the programs of a run, save the results, and return the run's table with these results."""
-    from roboeval.evaluation.generating.checks import check_programs
     from roboeval.evaluation.runs.table import with_answers
 
     completions = [results.completions[key] for key in results.places]
     judged = [one for one in completions if one.acted is None]  # an agent's mission holds in one world only
-    different = {(completion.task, completion.program) for completion in judged}
-    checking = check_programs(results.run, results.known_suite, judged, engine, samples=samples, seed=seed)
-    return with_answers(results.table, dict(show_progress(checking, "checking", len(different))))
+    suite = results.known_suite
+    problems = check_completions(results.run, suite, judged, engine, samples=samples, seed=seed)
+    return with_answers(results.table, problems)
+
+
+def check_completions(
+    run: RunFolder,
+    suite: Suite,
+    completions: Collection[Completion],
+    engine: OpenEngine,
+    *,
+    samples: int = 5,
+    seed: int = 0,
+) -> dict[tuple[str, str], list[str]]:
+    """Check programs, save the results in their run, and return the problems by task and program hash."""
+    from roboeval.evaluation.generating.checks import check_programs
+
+    different = {(one.task, one.program_sha256) for one in completions}
+    checking = check_programs(run, suite, completions, engine, samples=samples, seed=seed)
+    return dict(show_progress(checking, "checking", len(different)))

@@ -46,8 +46,6 @@ def find(
     A completion is found if its trace satisfies the formula in some world. Failed completions are grouped by
     the reason.
     """
-    from json import loads
-
     from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures
     from roboeval.analysis.search import TraceQuery, match_row
     from roboeval.cli.views.groups import found_view
@@ -62,9 +60,8 @@ def find(
     if world is not None:
         expect_world(world, known, task, ablated=ablation)
     results = open_current(run, suite, ablated=ablation)
-    lines = results.lines
-    matches = (match_row(loads(line), query) for line in lines)
-    every = list(show_progress(matches, "searching", len(lines)))
+    matches = (match_row(results.row(key), query) for key in results.places)
+    every = list(show_progress(matches, "searching", len(results.places)))
     found = [one for one in every if one.worlds]
     passed = {*results.passed}
     failed = [results.row(one.key) for one in found if one.key not in passed]
