@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from roboeval.analysis.metrics import PromptScore, TaskScore
 from roboeval.evaluation.runs.rows import Row
@@ -12,33 +12,15 @@ from roboeval.evaluation.runs.rows import Row
 if TYPE_CHECKING:
     import polars as pl  # loads slowly, and counting while completions are judged does not need it
 
+Tally: TypeAlias = Counter[tuple[str, int, bool, str | None, str | None]]
+"""Numbers of completions by task, prompt, whether they passed, and class and kind of the failure."""
 
-class Tally:
-    """Counts judged, passed and failed completions."""
 
-    def __init__(self) -> None:
-        self.judged: Counter[tuple[str, int]] = Counter()  # by task and prompt
-        self.passed: Counter[tuple[str, int]] = Counter()  # by task and prompt
-        self.failed: Counter[tuple[str, str]] = Counter()  # by class and kind of the failure
-
-    def add(self, row: Row) -> None:
-        """Count a judged completion."""
-        prompt, why = (row["task"], row["prompt"]), row["failure"]
-        self.judged[prompt] += 1
-        self.passed[prompt] += why is None
-        if why is not None:
-            self.failed[why["class"], why["kind"]] += 1
-
-    def scores(self, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-        """Compute the scores of tasks and prompts (paper, section IV.C). Tasks not in `order` come last."""
-        prompts: dict[str, list[PromptScore]] = {task: [] for task in order}
-        for (task, prompt), n in self.judged.items():
-            prompts.setdefault(task, []).append(PromptScore(task, prompt, n, self.passed[task, prompt]))
-        return tuple(
-            TaskScore(task, tuple(sorted(scores, key=lambda score: score.prompt)))
-            for task, scores in prompts.items()
-            if scores
-        )
+def outcome_of(row: Row) -> tuple[str, int, bool, str | None, str | None]:
+    """Return the entry of a tally that counts a judged completion."""
+    why = row["failure"]
+    failed = (None, None) if why is None else (why["class"], why["kind"])
+    return row["task"], row["prompt"], why is None, *failed
 
 
 def completions_of(table: pl.DataFrame) -> pl.DataFrame:
@@ -47,18 +29,29 @@ def completions_of(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def tally_of(table: pl.DataFrame) -> Tally:
-    """Count the judged, passed and failed completions in a table."""
-    tally = Tally()
-    counted = ("task", "prompt", "passed", "failure_class", "failure_kind")
-    groups = completions_of(table).group_by(counted, maintain_order=True).len()
-    for task, prompt, passed, name, kind, count in groups.iter_rows():
-        tally.judged[task, prompt] += count
-        tally.passed[task, prompt] += count * passed
-        if name is not None:
-            tally.failed[name, kind] += count
-    return tally
+    """Count the judged completions in a table."""
+    columns = "task", "prompt", "passed", "failure_class", "failure_kind"
+    counted = completions_of(table).group_by(columns, maintain_order=True).len()
+    return Counter({tuple(outcome): count for *outcome, count in counted.iter_rows()})
+
+
+def scores_of(tally: Tally, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
+    """Compute the scores of tasks and prompts (paper, section IV.C). Tasks not in `order` come last."""
+    judged: Counter[tuple[str, int]] = Counter()
+    passed: Counter[tuple[str, int]] = Counter()
+    for (task, prompt, has_passed, *_), count in tally.items():
+        judged[task, prompt] += count
+        passed[task, prompt] += count * has_passed
+    prompts: dict[str, list[PromptScore]] = {task: [] for task in order}
+    for key, n in judged.items():
+        prompts.setdefault(key[0], []).append(PromptScore(*key, n, passed[key]))
+    return tuple(
+        TaskScore(task, tuple(sorted(scores, key=lambda score: score.prompt)))
+        for task, scores in prompts.items()
+        if scores
+    )
 
 
 def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-    """Compute the scores of tasks and prompts (paper, section IV.C). Tasks not in `order` come last."""
-    return tally_of(table).scores(order)
+    """Compute the scores of tasks and prompts in a table, see `scores_of`."""
+    return scores_of(tally_of(table), order)

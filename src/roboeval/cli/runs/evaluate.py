@@ -64,7 +64,7 @@ def evaluate(
     """Judge whether each completion does what its prompt asks."""
     isolation = {"require_isolation": require_isolation, "one_process_per_run": one_process_per_run}
     with engine_named(engine, workers, **isolation) as engine_for:
-        from roboeval.analysis.counting.counts import Tally
+        from roboeval.analysis.counting.counts import Tally, outcome_of
         from roboeval.analysis.counting.summary import summarise
         from roboeval.evaluation.runs.folder import RunFolder, about_of, tasks_to_judge
         from roboeval.evaluation.runs.rows import key_of
@@ -95,7 +95,7 @@ def evaluate(
             running = engine_for(scope.total)
             rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
             for row in show_progress(rows, "judging", scope.total):
-                tally.add(row)
+                tally[outcome_of(row)] += 1
                 failed = failed or (None if row["passed"] else key_of(row))
                 if table is not None:
                     table.add(row)
