@@ -16,7 +16,7 @@ from roboeval.report.figures.drawing import render, use_style
 from roboeval.report.page import GENERATOR, page
 from roboeval.report.paper import published_sheet
 from roboeval.report.runs import JudgedRun
-from roboeval.report.sections import breakdown, cost, failures, house, modes, question, scores
+from roboeval.report.sections import breakdown, cost, failures, modes, question, scores
 from roboeval.report.sheets import (
     Card,
     Cards,
@@ -67,7 +67,7 @@ def sections(
         scores.differences(runs),
         failures.other_suite(runs),
         section("modes", modes.mode_sheet(runs), modes.ending_sheet(runs)),
-        house.house(runs),
+        failures.house(runs),
         scores.thresholds(runs),
         failures.causes_section(runs, with_published=with_published),
         failures.failures_section(runs),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from command_line import roboeval
-from roboeval.web.difference import differences_of
+from roboeval.web.comparison_page import differences_of
 from roboeval.web.run_store import RunStore
 
 
