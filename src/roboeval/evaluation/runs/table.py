@@ -129,12 +129,15 @@ class TableBuilder:
         """Add a completion with its verdict in each world."""
         if len(self._worlds) >= CHUNK_ROWS:
             self._store()
-        written = self._completions.get(key_of(row))
-        is_stale = written is None or written.program_sha256 != row["program_sha256"]
-        judged = {name: row[name] for name in (*KEY, "program_sha256", "passed")}  # type: ignore[literal-required]
-        judged |= {f"failure_{name}": value for name, value in (row["failure"] or {}).items()}
+        key, program = key_of(row), row["program_sha256"]
+        written = self._completions.get(key)
+        is_stale = written is None or written.program_sha256 != program
+        judged = {"program_sha256": program, "passed": row["passed"], "stale": is_stale}
+        failure = {f"failure_{name}": value for name, value in (row["failure"] or {}).items()}
         known = {} if written is None else _reply(written) | ({} if is_stale else _texts(written))
-        self._rows.append({**judged, "stale": is_stale, **known})  # other columns are null
+        self._rows.append(
+            {**dict(zip(KEY, key, strict=True)), **judged, **failure, **known}
+        )  # others are null
         self._counts.append(len(row["verdicts"]))
         for number, verdict in enumerate(row["verdicts"]):
             checks, error = verdict["failed_checks"], verdict["error"]
