@@ -142,33 +142,28 @@ def open_current(
 ) -> Results:
     """Read a judged run with `open_run`. Raise UserError if verdicts are absent or outdated."""
     results = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from)
-    again = evaluate_again(results, suite_name, rules)
-    if (complaint := stale_sentence(results)) is not None:
-        raise UserError(f"{complaint}; `{again} --redo` judges the current programs")
+    outdated, unjudged = find_gaps(results, suite_name, rules)
+    if outdated:
+        raise UserError(outdated)
     if results.table.is_empty():
-        raise UserError(f"no completion has been judged; `{again}` continues", file=run)
-    if (unfinished := unfinished_sentence(results)) is not None:
-        note(f"{unfinished}, and only these are counted; `{again}` continues")
+        raise UserError(unjudged or "no completion has been judged", file=run)
+    if unjudged:
+        note(unjudged)
     return results
 
 
-def stale_sentence(results: Results) -> str | None:
-    """Return a sentence about rows whose programs are no longer in the run, or None."""
-    from roboeval.evaluation.runs.completions import name_of
+def find_gaps(results: Results, suite_name: str, rules: Path | None) -> tuple[str | None, str | None]:
+    """Return sentences about rows whose programs have changed, and about completions not judged yet."""
+    from roboeval.evaluation.runs.completions import how_many, name_of
 
-    if not (stale := results.stale):
-        return None
-    others = len(stale) - 1
-    judge = f"and {counted(others, 'other row')} judge" if others else "judges"
-    return f"{name_of(stale[0])} {judge} a program that is no longer in {results.run.completions}"
-
-
-def unfinished_sentence(results: Results) -> str | None:
-    """Return a clause about the completions not judged yet, or None if all are judged."""
-    from roboeval.evaluation.runs.completions import how_many
-
-    count, total = len(results.places), results.scope.total
-    return None if count >= total else f"{count:,} of {how_many(total)} judged"
+    again = evaluate_again(results, suite_name, rules)
+    stale, count, total = results.stale, len(results.places), results.scope.total
+    outdated = None
+    if stale:
+        judge = f"and {counted(len(stale) - 1, 'other row')} judge" if len(stale) > 1 else "judges"
+        outdated = f"{name_of(stale[0])} {judge} a program that is no longer in {results.run.completions}"
+        outdated += f"; `{again} --redo` judges the current programs"
+    return outdated, f"{count:,} of {how_many(total)} judged; `{again}` continues" if count < total else None
 
 
 def evaluate_again(results: Results, suite_name: str, rules: Path | None = None) -> str:

@@ -19,15 +19,13 @@ from codebotler.cli.options import (
 from codebotler.core.errors import UserError
 from roboeval.cli.inputs import (
     command,
-    evaluate_again,
     expect_judged,
+    find_gaps,
     load,
     names_completion,
     open_current,
     open_run,
     parse_selection,
-    stale_sentence,
-    unfinished_sentence,
 )
 from roboeval.cli.options import (
     AblationOption,
@@ -88,11 +86,10 @@ def show(
             show_completion(judged, key, suite, in_full=in_full, with_reply=with_reply, as_json=json)
         else:
             show_part(judged, task, numbers[0] if numbers else None, as_json=json)
-    again = evaluate_again(judged, suite, rules)
-    if (complaint := stale_sentence(judged)) is not None:
-        note(f"{complaint}; `{again} --redo` judges the current programs")
-    if not is_one and (unfinished := unfinished_sentence(judged)) is not None:
-        note(f"{unfinished}; `{again}` continues")
+    outdated, unjudged = find_gaps(judged, suite, rules)
+    for sentence in (outdated, None if is_one else unjudged):
+        if sentence is not None:
+            note(sentence)
 
 
 def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
