@@ -17,7 +17,7 @@ from roboeval.evaluation.generating.requests import batches
 from roboeval.evaluation.judging.explanation import PROGRAM_GONE, completion_data, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, how_many, name_of, recorded_suffix
 from roboeval.suites.load import Suite
-from roboeval.web.run_store import RunStore
+from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 
 MAX_FAULTS_SHOWN, MAX_SUITE_NAME, MAX_FAILURE_REASON = 5, 120, 300
@@ -190,9 +190,11 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
+def completion_details(run: Snapshot, name: str) -> dict[str, Any]:
     """Return a completion with its program, and the steps, failed checks and explanations of each world."""
-    results = run.results
+    row, results = run.row(name), run.results
+    if row is None:
+        raise MissingError(f'this run has no completion "{shortened(name, MAX_SUITE_NAME)}"')
     key: CompletionKey = row["task"], row["prompt"], row["index"]
     completion = results.completions.get(key)
     more = {"evaluation": results.key, "stale": row["stale"], "note": PROGRAM_GONE if row["stale"] else None}

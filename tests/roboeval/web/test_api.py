@@ -176,7 +176,7 @@ def test_what_is_not_there_is_said_in_a_sentence(server: PageServer) -> None:
     for path, sentence in (
         ("/api/runs/none", 'this folder has no run "none"; it may have been deleted'),
         ("/api/runs/hasty?evaluation=none", '"hasty" has no evaluation "none"'),
-        ("/api/runs/hasty/completions/LunchBreak/0/99", "this run has no such completion"),
+        ("/api/runs/hasty/completions/LunchBreak/0/99", 'this run has no completion "LunchBreak/0/99"'),
     ):
         answer = server.call("GET", path)
         assert answer.status in {404, 422}
