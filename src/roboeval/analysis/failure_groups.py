@@ -91,9 +91,8 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
     candidates = cache(partial(_passing_in, results))
     for rows in groups:
         often = Counter(programs.get(key_of(row)) for row in rows)
-        most = max(often.values())
-        row = next(row for row in rows if often[programs.get(key_of(row))] == most)
-        program = programs.get(key_of(row))
+        program = often.most_common(1)[0][0]
+        row = next(row for row in rows if programs.get(key_of(row)) == program)
         has_none = program is None or failure_of(row)["class"] == NO_PROGRAM_CLASS
         yield FailureGroup(
             task=row["task"],
@@ -116,7 +115,7 @@ def nearest_fix(results: Results, key: CompletionKey) -> Fix | None:
     return shortest_fix(program, _passing_in(results, key[0], results.completions[key].more.get("world")))
 
 
-def _passing_in(results: Results, task: str, world: int | None) -> list[PassingProgram]:
+def _passing_in(results: Results, task: str, world: int | None) -> dict[ProgramLines, str]:
     """Return the passing programs of a task or, for missions of an agent, those in one world."""
     programs = results.programs
     of_task = [key for key in results.passed if key[0] == task and key in programs]
@@ -211,48 +210,36 @@ def similarity(one: Counter[str], other: Counter[str]) -> float:
     return 2 * (one & other).total() / total if total else 1.0
 
 
-@dataclass(frozen=True)
-class PassingProgram:
-    """A passing program that failing programs are compared with."""
-
-    name: str
-    lines: ProgramLines
-    counts: Counter[str]  # number of occurrences of each line
-
-
-def passing_programs(named: Iterable[tuple[str, str]]) -> list[PassingProgram]:
-    """Return the distinct programs. A program with several names keeps the first."""
+def passing_programs(named: Iterable[tuple[str, str]]) -> dict[ProgramLines, str]:
+    """Return the names of distinct programs by their lines. A program with several names keeps the first."""
     first: dict[ProgramLines, str] = {}
     for name, program in named:
         first.setdefault(_split(program), name)
-    return [PassingProgram(name, lines, Counter(lines)) for lines, name in first.items()]
+    return first
 
 
 def _split(program: str) -> ProgramLines:
     return tuple(line.rstrip() for line in program[:MAX_COMPARED_CHARACTERS].strip("\n").splitlines())
 
 
-def shortest_fix(program: str, candidates: Sequence[PassingProgram]) -> Fix | None:
+def shortest_fix(program: str, candidates: Mapping[ProgramLines, str]) -> Fix | None:
     """Return the fix that changes the fewest lines, or None if there are no candidates."""
     lines = _split(program)
     counts = Counter(lines)
-    best: tuple[int, int] | None = None
-    at_least = sorted((_least_changes(counts, one.counts), number) for number, one in enumerate(candidates))
-    for bound, number in at_least:
+
+    def least_changes(other: ProgramLines) -> int:
+        """Return a lower bound on the number of differing lines, ignoring their order."""
+        theirs = Counter(other)
+        return ((counts - theirs) + (theirs - counts)).total()
+
+    best: tuple[int, ProgramLines] | None = None
+    for bound, other in sorted(((least_changes(one), one) for one in candidates), key=lambda pair: pair[0]):
         if best is not None and bound >= best[0]:
             break
-        changed = _count_changes(lines, candidates[number].lines)
+        changed = _count_changes(lines, other)
         if best is None or changed < best[0]:
-            best = changed, number
-    if best is None:
-        return None
-    chosen = candidates[best[1]]
-    return Fix(chosen.name, best[0], tuple(_changes(lines, chosen.lines)))
-
-
-def _least_changes(one: Counter[str], other: Counter[str]) -> int:
-    """Return a lower bound on the number of differing lines, ignoring their order."""
-    return ((one - other) + (other - one)).total()
+            best = changed, other
+    return best and Fix(candidates[best[1]], best[0], tuple(_changes(lines, best[1])))
 
 
 def _count_changes(one: ProgramLines, other: ProgramLines) -> int:

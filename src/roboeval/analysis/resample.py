@@ -6,8 +6,7 @@ limit on retries is reached. If all completions of a run were checked and judged
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -21,12 +20,22 @@ THRESHOLDS = (0.25, 0.5, 0.75, 1.0)
 
 
 @dataclass(frozen=True)
-class CheckedCompletion:
-    """The results of checking and judging a completion."""
+class CheckedPrompt:
+    """Counts the checked and judged completions of one prompt."""
 
-    accepted: bool  # whether the check found no problem
-    ran: bool  # whether it ran without an error in every world of its task
-    passed: bool
+    task: str
+    prompt: int
+    completions: int
+    accepted: int  # the check found no problem
+    ran: int  # without an error in every world of the task
+    passed: int
+    accepted_and_ran: int
+    accepted_and_passed: int
+
+    @property
+    def rejected(self) -> float:
+        """The share of completions that the check rejects."""
+        return (self.completions - self.accepted) / self.completions
 
 
 @dataclass(frozen=True)
@@ -38,30 +47,22 @@ class Chances:
     passed: float
 
 
-def final_chances(trials: Sequence[CheckedCompletion], retries: int) -> Chances:
+def final_chances(prompt: CheckedPrompt, retries: int) -> Chances:
     """Compute the exact probabilities for a prompt, assuming that all completions are equally likely.
 
     A completion is final if it is accepted or if no retry is left. Without retries, the probability of
     passing equals the prompt's pass@1.
     """
-    rejected = rejected_share(trials)
-    asked, is_last = mean_requests(rejected, retries), rejected**retries
+    asked, is_last = mean_requests(prompt.rejected, retries), prompt.rejected**retries
 
-    def chance(end: Callable[[CheckedCompletion], bool]) -> float:
-        accepted = sum(trial.accepted and end(trial) for trial in trials)
-        others = sum(end(trial) for trial in trials) - accepted
-        return min(1.0, (asked * accepted + is_last * others) / len(trials))
+    def chance(accepted: int, every: int) -> float:
+        return min(1.0, (asked * accepted + is_last * (every - accepted)) / prompt.completions)
 
     return Chances(
-        min(1.0, asked * sum(trial.accepted for trial in trials) / len(trials)),
-        chance(lambda trial: trial.ran),
-        chance(lambda trial: trial.passed),
+        chance(prompt.accepted, prompt.accepted),
+        chance(prompt.accepted_and_ran, prompt.ran),
+        chance(prompt.accepted_and_passed, prompt.passed),
     )
-
-
-def rejected_share(trials: Sequence[CheckedCompletion]) -> float:
-    """Return the share of completions that the check rejects."""
-    return sum(not trial.accepted for trial in trials) / len(trials)
 
 
 def mean_requests(rejected: float, retries: int) -> float:
@@ -69,28 +70,22 @@ def mean_requests(rejected: float, retries: int) -> float:
     return sum(rejected**number for number in range(retries + 1))
 
 
-@dataclass(frozen=True)
-class CheckedPrompt:
-    """Groups the checked completions of one prompt."""
-
-    task: str
-    prompt: int
-    trials: tuple[CheckedCompletion, ...]
-
-
-def trials_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
-    """Group completions by prompt, sorted by task and prompt. All of them must have been checked."""
+def count_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
+    """Count completions by prompt, sorted by task and prompt. All of them must have been checked."""
     # A timeout that was judged like a normal end, because programs may wait forever, is not an error.
     judged = pl.col("satisfied") | pl.col("failed_checks").is_not_null()
-    completions = table.group_by(KEY, maintain_order=True).agg(
-        pl.col("accepted").first(),
-        ((pl.col("status") == "finished") | ((pl.col("status") == "timeout") & judged)).all().alias("ran"),
-        pl.col("passed").first(),
+    has_ended = (pl.col("status") == "finished") | ((pl.col("status") == "timeout") & judged)
+    accepted, ran, passed = pl.col("accepted"), pl.col("ran"), pl.col("passed")
+    completions = table.group_by(KEY).agg(accepted.first(), has_ended.all().alias("ran"), passed.first())
+    counted = completions.group_by("task", "prompt").agg(
+        completions=pl.len(),
+        accepted=accepted.sum(),
+        ran=ran.sum(),
+        passed=passed.sum(),
+        accepted_and_ran=(accepted & ran).sum(),
+        accepted_and_passed=(accepted & passed).sum(),
     )
-    together: defaultdict[tuple[str, int], list[CheckedCompletion]] = defaultdict(list)
-    for task, prompt, _, accepted, ran, passed in completions.iter_rows():
-        together[task, prompt].append(CheckedCompletion(accepted, ran, passed))
-    return tuple(CheckedPrompt(*key, tuple(those)) for key, those in sorted(together.items()))
+    return tuple(CheckedPrompt(**row) for row in counted.sort("task", "prompt").iter_rows(named=True))
 
 
 @dataclass(frozen=True)
@@ -107,7 +102,7 @@ class RetryResult:
 
 def resample(prompts: Sequence[CheckedPrompt], retries: int) -> RetryResult:
     """Compute the result of rejection sampling for one limit on retries."""
-    each = tuple(final_chances(prompt.trials, retries) for prompt in prompts)
+    each = tuple(final_chances(prompt, retries) for prompt in prompts)
     return RetryResult(
         retries=retries,
         passed=over_tasks((prompt.task, one.passed) for prompt, one in zip(prompts, each, strict=True)),
@@ -120,8 +115,7 @@ def resample(prompts: Sequence[CheckedPrompt], retries: int) -> RetryResult:
 
 def accepted_after(prompts: Sequence[CheckedPrompt], most: int) -> list[float]:
     """Return the share of programs that the check accepts after 0, 1, ... `most` retries."""
-    rejected = [rejected_share(prompt.trials) for prompt in prompts]
-    return [mean_of([[1 - share ** (n + 1) for share in rejected]]) for n in range(most + 1)]
+    return [mean_of([[1 - prompt.rejected ** (n + 1) for prompt in prompts]]) for n in range(most + 1)]
 
 
 def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[str, Any]:
@@ -142,9 +136,9 @@ def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[
             {
                 "task": prompt.task,
                 "prompt": prompt.prompt,
-                "completions": len(prompt.trials),
-                "accepted": sum(trial.accepted for trial in prompt.trials),
-                "passed": sum(trial.passed for trial in prompt.trials),
+                "completions": prompt.completions,
+                "accepted": prompt.accepted,
+                "passed": prompt.passed,
                 "pass@1": {str(limit.retries): limit.by_prompt[i].passed for limit in of_limits},
             }
             for i, prompt in enumerate(prompts)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from codebotler.rtl import Formula, Inconclusive, holds, parse
+from codebotler.rtl import Formula, Inconclusive, holds
 from roboeval.evaluation.runs.completions import CompletionKey
 from roboeval.evaluation.runs.rows import key_of
 from roboeval.evaluation.runs.traces import trace_of
@@ -17,7 +16,7 @@ from roboeval.evaluation.runs.traces import trace_of
 class TraceQuery:
     """Describes which traces to search for."""
 
-    formula: str | None = None  # an RTL formula; None matches every trace
+    formula: Formula | None = None  # None matches every trace
     negated: bool = False  # whether to find traces that do not satisfy the formula
     task: str | None = None  # None matches any task
     world: str | None = None  # number (from 1) or `about` of a world; None matches any world
@@ -33,14 +32,9 @@ class TraceMatch:
     is_in_scope: bool = True  # whether it was judged in a world of the query
 
 
-def search(lines: Iterable[bytes], query: TraceQuery) -> Iterator[TraceMatch]:
-    """Match rows against a query, and yield the matches in order."""
-    formula = None if query.formula is None else parse(query.formula)
-    return (match_row(json.loads(line), query, formula) for line in lines)
-
-
-def match_row(row: Mapping[str, Any], query: TraceQuery, formula: Formula | None) -> TraceMatch:
-    """Match the traces of one completion."""
+def match_row(row: Mapping[str, Any], query: TraceQuery) -> TraceMatch:
+    """Match the traces of one completion, given its row."""
+    formula = query.formula
     worlds, cut = [], []
     verdicts = [*_verdicts_in_scope(row, query)]
     for number, verdict in verdicts:

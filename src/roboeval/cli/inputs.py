@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import visible
 from codebotler.core.text.words import counted
 from roboeval.cli.output import note, show_progress
 
 if TYPE_CHECKING:
+    from roboeval.evaluation.runs.completions import CompletionKey
     from roboeval.evaluation.runs.results import Results
     from roboeval.suites.load import Suite
+
+Selection: TypeAlias = tuple[str, *tuple[int, ...]]
+"""The first parts of keys: a task, a prompt of it, or the key of a completion."""
 
 
 def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
     """Read a suite by name or folder, with optional files of house rules and additional skills."""
     from codebotler.checking.house_rules.evasions import find_evasions
-    from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.paper import SKILLS
     from roboeval.suites.house import HouseRules
@@ -36,6 +41,35 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
     return read.with_house_rules(house)
 
 
+def parse_selection(text: str, suite: Suite) -> Selection:
+    """Parse TASK, TASK/PROMPT or TASK/PROMPT/INDEX."""
+    name, *numbers = text.removesuffix("/").split("/")
+    if len(numbers) > 2 or not all(n.isascii() and n.isdecimal() and len(n) < 10 for n in numbers):  # noqa: PLR2004 - parts
+        raise UserError(
+            f'"{visible(text)}" is not a valid selection; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX'
+        )
+    if name not in suite.tasks:
+        name = next((task for task in suite.tasks if task.lower() == name.lower()), name)
+    task = suite.task(name)
+    selection: Selection = (name, *map(int, numbers))
+    if numbers and int(numbers[0]) >= len(task.prompts):
+        known = f"{name} has prompts 0 to {len(task.prompts) - 1}"
+        raise UserError(f"{name}/{'/'.join(numbers)} does not exist, because {known}")
+    return selection
+
+
+def expect_judged(selection: Selection, judged: Iterable[CompletionKey]) -> None:
+    """Raise UserError if no completion in this part of a run was judged."""
+    if not any(key[: len(selection)] == selection for key in judged):
+        part = "/".join(map(str, selection))
+        raise UserError(f"no completion of {part} has been judged in this run")
+
+
+def names_completion(text: str) -> bool:
+    """Whether a selection names one completion, because it has all three parts."""
+    return text.removesuffix("/").count("/") == 2  # noqa: PLR2004 - two slashes separate three parts
+
+
 def command(
     verb: str, *arguments: object, suite: str, ablated: bool = False, rules: Path | None = None
 ) -> str:
@@ -49,8 +83,6 @@ def command(
 
 def expect_same_suite(opened: Sequence[Results], suite: str) -> None:
     """Raise UserError if runs were judged by suites with different content."""
-    from codebotler.core.errors import UserError
-
     digests = [one.manifest.get("digest") for one in opened]
     if len({*digests}) > 1:
         now = opened[0].known_suite.digest
@@ -75,10 +107,8 @@ def open_run(
 
     `reuse_from` is another evaluation of the same run.
     """
-    from codebotler.core.errors import UserError
     from roboeval.evaluation.runs.folder import evaluation_of
     from roboeval.evaluation.runs.results import read_results
-    from roboeval.evaluation.runs.selection import parse_selection
 
     again = command("evaluate", run, suite=suite_name, ablated=ablated, rules=rules)
     folder, key, suite = evaluation_of(run, load(suite_name, rules), ablated=ablated, again=again)
@@ -111,36 +141,29 @@ def open_current(
     reuse_from: Results | None = None,
 ) -> Results:
     """Read a judged run with `open_run`. Raise UserError if verdicts are absent or outdated."""
-    from codebotler.core.errors import UserError
-
     results = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from)
-    again = evaluate_again(results, suite_name, rules)
-    if (complaint := stale_sentence(results)) is not None:
-        raise UserError(f"{complaint}; `{again} --redo` judges the current programs")
+    outdated, unjudged = find_gaps(results, suite_name, rules)
+    if outdated:
+        raise UserError(outdated)
     if results.table.is_empty():
-        raise UserError(f"no completion has been judged; `{again}` continues", file=run)
-    if (unfinished := unfinished_sentence(results)) is not None:
-        note(f"{unfinished}, and only these are counted; `{again}` continues")
+        raise UserError(unjudged or "no completion has been judged", file=run)
+    if unjudged:
+        note(unjudged)
     return results
 
 
-def stale_sentence(results: Results) -> str | None:
-    """Return a sentence about rows whose programs are no longer in the run, or None."""
-    from roboeval.evaluation.runs.completions import name_of
+def find_gaps(results: Results, suite_name: str, rules: Path | None) -> tuple[str | None, str | None]:
+    """Return sentences about rows whose programs have changed, and about completions not judged yet."""
+    from roboeval.evaluation.runs.completions import how_many, name_of
 
-    if not (stale := results.stale):
-        return None
-    others = len(stale) - 1
-    judge = f"and {counted(others, 'other row')} judge" if others else "judges"
-    return f"{name_of(stale[0])} {judge} a program that is no longer in {results.run.completions}"
-
-
-def unfinished_sentence(results: Results) -> str | None:
-    """Return a clause about the completions not judged yet, or None if all are judged."""
-    from roboeval.evaluation.runs.completions import how_many
-
-    count, total = len(results.places), results.scope.total
-    return None if count >= total else f"{count:,} of {how_many(total)} judged"
+    again = evaluate_again(results, suite_name, rules)
+    stale, count, total = results.stale, len(results.places), results.scope.total
+    outdated = None
+    if stale:
+        judge = f"and {counted(len(stale) - 1, 'other row')} judge" if len(stale) > 1 else "judges"
+        outdated = f"{name_of(stale[0])} {judge} a program that is no longer in {results.run.completions}"
+        outdated += f"; `{again} --redo` judges the current programs"
+    return outdated, f"{count:,} of {how_many(total)} judged; `{again}` continues" if count < total else None
 
 
 def evaluate_again(results: Results, suite_name: str, rules: Path | None = None) -> str:

@@ -14,8 +14,9 @@ from codebotler.core.errors import UserError
 from codebotler.core.text.words import counted
 from roboeval.analysis.counting.counts import completions_of, task_scores
 from roboeval.analysis.metrics import TaskScore, overall, pass_at_1
-from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
+from roboeval.analysis.resample import CheckedPrompt, count_by_prompt
 from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.table import Price
 from roboeval.report.figures.drawing import short_name
 from roboeval.suites.load import Suite
 
@@ -33,6 +34,7 @@ class JudgedRun:
     other_suite: Results | None = None  # judged with another suite
     house: Results | None = None  # judged with the same suite and house rules
     name: str = ""  # unique within a report
+    price: Price | None = None
 
     @property
     def suite(self) -> Suite:
@@ -92,9 +94,9 @@ class JudgedRun:
         return {key[:2]: one.instruction for key, one in completions if one.instruction is not None}
 
     @cached_property
-    def trials(self) -> tuple[CheckedPrompt, ...]:
-        """The checked completions of each prompt. Empty unless all completions were checked."""
-        return () if self.table["accepted"].null_count() else trials_by_prompt(self.table)
+    def checked(self) -> tuple[CheckedPrompt, ...]:
+        """Counts of the completions of each prompt. Empty unless all completions were checked."""
+        return () if self.table["accepted"].null_count() else count_by_prompt(self.table)
 
 
 def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
@@ -137,6 +139,21 @@ def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
     return labels
 
 
+def read_prices(texts: Sequence[str]) -> dict[str, Price]:
+    """Parse prices of the form `MODEL=INPUT/OUTPUT`, and return them by model."""
+    prices: dict[str, Price] = {}
+    for text in texts:
+        model, _, numbers = text.rpartition("=")
+        try:
+            price = Price.read(numbers)
+        except ValueError:
+            price = None
+        if price is None or not model:
+            raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, per million tokens')
+        prices[model] = price
+    return prices
+
+
 def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
     """Name each run after its label or model. Add the folder or a number to names that would be equal."""
     given = {at: short_name(label, MAX_RUN_NAME) for at, label in labels.items()}
@@ -154,3 +171,18 @@ def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list
 def _extend_duplicates(names: Sequence[str], longer: Sequence[str]) -> list[str]:
     counts = Counter(names)
     return [long if counts[name] > 1 else name for name, long in zip(names, longer, strict=True)]
+
+
+def price_runs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> list[JudgedRun]:
+    """Return the runs with the price given for the folder, name or model of each.
+
+    Raises UserError if a price is for none of the runs.
+    """
+    names = [(run.folder, run.name, run.model or "") for run in runs]
+    for model in prices:
+        if not any(model in those for those in names):
+            raise UserError(
+                f'--price is given for "{model}", but the runs are {", ".join(run.name for run in runs)}'
+            )
+    found = (next((prices[name] for name in those if name in prices), None) for those in names)
+    return [replace(run, price=price) for run, price in zip(runs, found, strict=True)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from pathlib import Path
 
@@ -12,11 +12,11 @@ from codebotler.core.files import write_whole
 from roboeval.analysis.metrics import overall
 from roboeval.evaluation.generating.requests import batches
 from roboeval.evaluation.runs.scope import Coverage
-from roboeval.evaluation.runs.table import Price
 from roboeval.report.figures.drawing import render, use_style
 from roboeval.report.page import GENERATOR, page
+from roboeval.report.paper import published_sheet
 from roboeval.report.runs import JudgedRun
-from roboeval.report.sections import breakdown, cost, failures, house, modes, question, scores
+from roboeval.report.sections import breakdown, cost, failures, modes, question, scores
 from roboeval.report.sheets import (
     Card,
     Cards,
@@ -58,32 +58,31 @@ def sections(
     runs: Sequence[JudgedRun],
     *,
     with_published: bool = False,
-    prices: Mapping[str, Price] = {},
     command: str = "",
 ) -> list[Section]:
     """Build all sections of a report on runs judged with the same suite."""
     found = [
-        glance(runs, prices),
+        glance(runs),
         scores.results(runs),
         scores.differences(runs),
         failures.other_suite(runs),
-        modes.modes(runs),
-        house.house(runs),
+        section("modes", modes.mode_sheet(runs), modes.ending_sheet(runs)),
+        failures.house(runs),
         scores.thresholds(runs),
         failures.causes_section(runs, with_published=with_published),
         failures.failures_section(runs),
-        breakdown.abilities(runs),
-        breakdown.phrasings(runs),
+        section("abilities", breakdown.ability_sheet(runs), breakdown.report_back_sheet(runs)),
+        section("phrasing", breakdown.spread_sheet(runs), breakdown.phrasing_sheet(runs)),
         cost.rejection_sampling(runs),
         question.question(runs),
-        cost.costs(runs, prices),
-        scores.prompts(runs),
+        section("cost", cost.cost_sheet(runs), cost.budget_sheet(runs)),
+        section("prompts", scores.prompt_sheet(runs), published_sheet(runs)),
         origin(runs, command),
     ]
-    return [section for section in found if section.parts]
+    return [one for one in found if one.parts]
 
 
-def glance(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
+def glance(runs: Sequence[JudgedRun]) -> Section:
     """Build the section with a card for each run and a comparison of the two best runs."""
     cards = [
         Card(
@@ -91,7 +90,7 @@ def glance(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
             passed=overall(run.scores, 1),
             coverage=run.coverage_sentence,
             failure=failures.most_frequent(run),
-            cost=cost.cost_sentence(run, prices),
+            cost=cost.cost_sentence(run),
             warnings=failures.cut_off_warnings(run),
         )
         for run in runs

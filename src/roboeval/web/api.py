@@ -72,11 +72,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         run: str, task: str, prompt: int, index: int, evaluation: EvaluationQuery = None
     ) -> Response:
         """Show one completion with its program, and the robot's actions and failed checks in each world."""
-        snapshot = store.open(run, evaluation)
-        row = snapshot.row(name_of((task, prompt, index)))
-        if row is None:
-            raise HTTPException(404, "this run has no such completion")
-        return _json(completion_details(snapshot, row))
+        return _json(completion_details(store.open(run, evaluation), name_of((task, prompt, index))))
 
     return api
 
@@ -85,20 +81,16 @@ def _add_report(api: APIRouter, store: RunStore) -> None:
     @api.get("/{run}/report")
     def show_report(run: str) -> Response:
         """Show the report in the folder of a run, created by `roboeval run` or `roboeval report`."""
-        text = store.report(run)
-        if text is None:
-            raise HTTPException(404, "this run has no report")
         # Forbid scripts, because the folder may contain any page instead of a report.
         headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
-        return HTMLResponse(text, headers=headers)
+        return HTMLResponse(store.report(run), headers=headers)
 
     @api.get("/{run}/tables/{table}.csv")
     def show_table(run: str, table: str) -> Response:
         """Show a table of a run's report as CSV."""
-        text = store.report(run, f"tables/{table}.csv") if TABLE_NAME.fullmatch(table) else None
-        if text is None:
+        if not TABLE_NAME.fullmatch(table):
             raise HTTPException(404, "this run has no such table")
-        return Response(text, media_type="text/csv")
+        return Response(store.report(run, f"tables/{table}.csv"), media_type="text/csv")
 
 
 def _json(data: object) -> Response:

@@ -3,22 +3,38 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
+from urllib.parse import urlencode
 
+import polars as pl
 from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import PlainText, outside
-from roboeval.web.difference import RUNS_IN_PAIR, Difference, differences_of, draw_differences
+from roboeval.analysis.comparisons.compare import (
+    MISSIONS_COMPARED,
+    Comparison,
+    compare_tables,
+    comparison_sentence,
+    has_missions,
+    pairs_to_compare,
+)
+from roboeval.analysis.metrics import Estimate
+from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of
 from roboeval.web.heat_map import MAX_NAME, TaskCells, failure_rows, models_of, run_address
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import CompletionFilter, Snapshot
-from roboeval.web.widgets import REFRESH_SECONDS, HeatMap, completions_text, score_text, show_state
+from roboeval.web.widgets import REFRESH_SECONDS, HeatMap, score_text, show_state
 
 MAX_COMPARED_RUNS = 12
+MAX_PAIR_TASKS, MAX_DIFFERING = 100, 30
+RUNS_IN_PAIR = 2
+DIFFERENCE_HEADS = ("95% confidence interval", "Different verdicts")
+INTERVAL_NOTE = "The interval for all tasks is over tasks; other intervals are over the prompts of a task."
 DIFFERENT_SUITES = (
     "These runs were judged with different suites or versions of a suite. Compare them with care."
 )
@@ -113,9 +129,114 @@ def _column(run: Snapshot) -> dict[str, Any]:
 
 
 def _draw_run(run: Snapshot) -> None:
-    data = run_data(run)
     with ui.element("li"):
         html.a(shortened(run.name, MAX_NAME), href=outside(run_address(run.name))).props("dir=auto")
-        show_state(data, PlainText("small"))
-        PlainText("b", score_text(data))
-        PlainText("span", f"{completions_text(data)}, {models_of(run)}", "quiet")
+        show_state(run_data(run), PlainText("small"))
+        PlainText("b", score_text(run.pass_at_1))
+        PlainText("span", f"{run.results.coverage}, {models_of(run)}", "quiet")
+
+
+# --- which of two runs is better
+
+
+def _find_differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[CompletionKey, bool]]]:
+    """Find the completions that pass in one run only, by task, with True for the second run."""
+    judged = [run.completions.drop_nulls("passed").select(*KEY, "passed") for run in (first, second)]
+    both = judged[0].join(judged[1], on=KEY, how="inner", suffix="_second", maintain_order="left")
+    found: dict[str, list[tuple[CompletionKey, bool]]] = {}
+    for task, prompt, index, _, passed in both.filter(
+        pl.col("passed") != pl.col("passed_second")
+    ).iter_rows():
+        found.setdefault(task, []).append(((task, prompt, index), passed))
+    return found
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The difference between two judged runs."""
+
+    runs: tuple[Snapshot, Snapshot]
+    sentence: str  # states which run is better, and how significant the difference is
+    comparison: Comparison | None = None  # None if it is not shown, or if they have no prompt in common
+    differing: Mapping[str, Sequence[tuple[CompletionKey, bool]]] = field(default_factory=dict)
+
+
+def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
+    """Compare pairs of judged runs, and a single pair also by task. For large runs, this may take seconds."""
+    pairs = pairs_to_compare(runs, lambda run: 0.0 if run.pass_at_1 is None else run.pass_at_1.mean)
+    return [_difference(*pair, by_task=len(runs) == RUNS_IN_PAIR) for pair in pairs]
+
+
+def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Difference:
+    names = shortened(first.name, MAX_NAME), shortened(second.name, MAX_NAME)
+    try:
+        tables = first.results.table, second.results.table
+        found = compare_tables(*tables)
+    except UserError:
+        return Difference((first, second), f"{names[0]} and {names[1]} have no prompt in common.")
+    sentence = comparison_sentence(found, names)
+    if len({has_missions(table) for table in tables}) > 1:
+        sentence += f" {MISSIONS_COMPARED[0].upper()}{MISSIONS_COMPARED[1:]}."
+    if not by_task:
+        return Difference((first, second), sentence)
+    return Difference((first, second), sentence, found, _find_differing(first, second))
+
+
+def draw_differences(found: Sequence[Difference]) -> None:
+    """Draw the comparison of each pair of runs, and of a single pair also by task."""
+    if len(found) == 1:
+        _draw_difference(found[0])
+        return
+    with ui.element("ul").classes("pairs"):
+        for one in found:
+            with ui.element("li"):
+                PlainText("span", one.sentence)
+                query = urlencode([("run", run.name) for run in one.runs], errors="replace")
+                html.a("By task", href=outside(f"/side-by-side?{query}"))
+
+
+def _draw_difference(difference: Difference) -> None:
+    names, found = [shortened(run.name, MAX_NAME) for run in difference.runs], difference.comparison
+    PlainText("p", difference.sentence)
+    if found is None:
+        return
+    largest = sorted(found.tasks, key=lambda one: (-abs(one.difference.mean), one.task))[:MAX_PAIR_TASKS]
+    region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Differences"')
+    with region, html.table().classes("differences"):
+        with html.thead(), html.tr():
+            for head in ("Task", *names, f"{names[1]} \N{MINUS SIGN} {names[0]}", *DIFFERENCE_HEADS):
+                PlainText("th", head).props("scope=col")
+        with html.tbody():
+            _draw_row("All tasks", found.first, found.second, found.over_tasks)
+            for one in largest:
+                with _draw_row(one.task, one.first, one.second, one.difference):
+                    _draw_differing(difference.differing.get(one.task, ()), difference.runs)
+    PlainText("p", INTERVAL_NOTE, "quiet")
+
+
+def _draw_row(task: str, first: float, second: float, difference: Estimate) -> html.td:
+    """Draw a row of the table, and return its last cell, which is empty."""
+    with html.tr():
+        PlainText("th", shortened(task, MAX_NAME)).props("scope=row")
+        for share in (first, second):
+            PlainText("td", f"{share:.2f}", "number")
+        PlainText("td", f"{difference.mean:+.2f}", "number strong")
+        PlainText("td", difference.ends("+.2f"), "number")
+        return html.td()
+
+
+def _draw_differing(differing: Sequence[tuple[CompletionKey, bool]], runs: Sequence[Snapshot]) -> None:
+    if not differing:
+        return
+    with html.details():
+        PlainText("summary", f"{len(differing):,}")
+        with ui.element("ul"):
+            for key, is_second in differing[:MAX_DIFFERING]:
+                with ui.element("li"):
+                    PlainText("span", f"{name_of(key)}: ")
+                    verdicts = ("failed", "passed") if is_second else ("passed", "failed")
+                    for run, text in zip(runs, verdicts, strict=True):
+                        link = html.a(f"{shortened(run.name, MAX_NAME)} {text}")
+                        link.props["href"] = outside(f"{run_address(run.name)}/{name_of(key)}")
+            if (left := len(differing) - MAX_DIFFERING) > 0:
+                PlainText("li", f"and {left:,} more")

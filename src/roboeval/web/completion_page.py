@@ -30,7 +30,7 @@ from roboeval.evaluation.runs.completions import CompletionKey, name_of, recorde
 from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, describe_contents, world_title
 from roboeval.web.heat_map import MAX_NAME, run_address
-from roboeval.web.run_store import MissingError, RunStore
+from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import completion_details
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 from roboeval.web.widgets import ProgramView
@@ -59,10 +59,7 @@ def _read(
 ) -> tuple[Snapshot, dict[str, Any], Fix | None]:
     """Read a run and one of its completions, and find the smallest fix if the completion failed."""
     snapshot = store.open(run, evaluation)
-    row = snapshot.row(name)
-    if row is None:
-        raise MissingError(f'this run has no completion "{shortened(name, MAX_NAME)}"')
-    data = completion_details(snapshot, row)
+    data = completion_details(snapshot, name)
     key: CompletionKey = data["task"], data["prompt"], data["index"]
     has_failed = data["passed"] is False and _no_program_sentence(data) is None
     fix = nearest_fix(snapshot.results, key) if has_failed else None

@@ -117,22 +117,16 @@ class TaskCells:
 
 def failure_rows(runs: Sequence[Snapshot]) -> list[dict[str, Any]]:
     """Return the rows of failures by run: each class followed by its kinds, most frequent first."""
-    by_run: list[dict[tuple[str, str | None], Failures]] = []
     largest: dict[tuple[str, str | None], float] = {}
     for run in runs:
-        by_run.append({(cause.name, None): cause for cause in run.failures})
-        by_run[-1] |= {(cause.name, kind.name): kind for cause in run.failures for kind in cause.kinds}
-        largest |= {key: max(one.share, largest.get(key, 0.0)) for key, one in by_run[-1].items()}
+        largest |= {key: max(one.share, largest.get(key, 0.0)) for key, one in run.failures.items()}
     order = sorted(
         largest, key=lambda key: (-largest[key[0], None], key[0], key[1] is not None, -largest[key])
     )
     rows = []
     for name, kind in order:
         chosen = CompletionFilter(failure_class=name, failure_kind=kind)
-        cells = [
-            _failure_cell(run, chosen, found.get((name, kind)))
-            for run, found in zip(runs, by_run, strict=True)
-        ]
+        cells = [_failure_cell(run, chosen, run.failures.get((name, kind))) for run in runs]
         title, look = (plural_of(name), "of-all") if kind is None else (kind, "of-class")
         rows.append({"name": shortened(title, MAX_NAME), "look": look, "cells": cells})
     return rows

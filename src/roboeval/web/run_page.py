@@ -21,7 +21,6 @@ from roboeval.web.widgets import (
     REFRESH_SECONDS,
     CompletionList,
     HeatMap,
-    completions_text,
     date_text,
     score_text,
     show_state,
@@ -117,13 +116,9 @@ class _RunPage:
             CompletionFilter(): ("all judged", run.judged),
             CompletionFilter(passed=True): ("passed", run.passed),
         }
-        for cause in run.failures:
-            counts[CompletionFilter(failure_class=cause.name)] = plural_of(cause.name), cause.count
-            for one in cause.kinds:
-                counts[CompletionFilter(failure_class=cause.name, failure_kind=one.name)] = (
-                    one.name,
-                    one.count,
-                )
+        for (cause, name), one in run.failures.items():
+            chosen = CompletionFilter(failure_class=cause, failure_kind=name)
+            counts[chosen] = name or plural_of(cause), one.count
         if list(self._kinds) != list(counts):
             self._ends.clear()
             with self._ends:
@@ -157,8 +152,8 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
     with ui.element("p").classes("facts"):
         state = PlainText("small")
         PlainText("span", models_of(run) + (f", judged by {shortened(key, MAX_NAME)}" if key else ""))
-        PlainText("b", score_text(data))
-        PlainText("span", f"{completions_text(data)}, {tasks_text(data)} tasks")
+        PlainText("b", score_text(run.pass_at_1))
+        PlainText("span", f"{run.results.coverage}, {tasks_text(data)} tasks")
         if data["date"] is not None:
             PlainText("span", f"started {date_text(data)} UTC", "quiet")
         if data["settings"]:

@@ -53,25 +53,25 @@ class RunStore:
         """Return the version of a run without reading the run."""
         return self._reader(name, None).version()
 
-    def report(self, name: str, part: str = REPORT_PAGE) -> bytes | None:
-        """Read the page or another part of a run's report. Return None if it cannot be read."""
+    def report(self, name: str, part: str = REPORT_PAGE) -> bytes:
+        """Read the page or another part of a run's report. Raise UserError if it is absent or too large."""
         path = self._reader(name, None).folder / "report" / part
-        if _stamp(path, self.folder.resolve()) is None:
-            return None
         try:
-            size = path.stat().st_size
-            if size > MAX_REPORT_BYTES:
-                raise UserError(f"is too large to show ({size:,} bytes); open the file", file=path.name)
-            return path.read_bytes()
+            if _stamp(path, self.folder.resolve()) is not None:
+                if (size := path.stat().st_size) > MAX_REPORT_BYTES:
+                    raise UserError(f"is too large to show ({size:,} bytes); open the file", file=path.name)
+                return path.read_bytes()
         except OSError:
-            return None
+            pass
+        raise MissingError("this run has no such report or table")
 
     def has_report(self, name: str) -> bool:
         """Whether the folder of a run contains a report."""
         try:
-            return self.report(name) is not None
+            self.report(name)
         except UserError:
             return False
+        return True
 
     def suite(self, name: str) -> Suite | None:
         """Load a built-in, installed or given suite. Return None if it is unavailable."""

@@ -13,13 +13,11 @@ from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from roboeval.analysis.metrics import pass_at_1
 from roboeval.evaluation.generating.requests import batches
 from roboeval.evaluation.judging.explanation import PROGRAM_GONE, completion_data, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, how_many, name_of, recorded_suffix
-from roboeval.evaluation.runs.replies import reply_data
 from roboeval.suites.load import Suite
-from roboeval.web.run_store import RunStore
+from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 
 MAX_FAULTS_SHOWN, MAX_SUITE_NAME, MAX_FAILURE_REASON = 5, 120, 300
@@ -154,11 +152,10 @@ class RunList:
 def run_details(run: Snapshot) -> dict[str, Any]:
     """Return a run with its tasks, prompts and kinds of failure."""
     means = {score.task: score.pass_at(1).mean for score in run.scores}
-    shares = pass_at_1(run.scores)
     tasks: dict[str, list[dict[str, Any]]] = {}
     for prompt in run.prompts(CompletionFilter(passed=True)):
-        tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite, shares))
-    kinds = [(cause.name, kind) for cause in run.failures for kind in cause.kinds]
+        tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite))
+    kinds = [(name, one) for (name, kind), one in run.failures.items() if kind is not None]
     kinds.sort(key=lambda each: (-each[1].count, each[0], each[1].name))
     return {
         **run_data(run),
@@ -170,16 +167,14 @@ def run_details(run: Snapshot) -> dict[str, Any]:
     }
 
 
-def _prompt_data(
-    prompt: Mapping[str, Any], suite: Suite | None, shares: Mapping[tuple[str, int], float]
-) -> dict[str, Any]:
+def _prompt_data(prompt: Mapping[str, Any], suite: Suite | None) -> dict[str, Any]:
     return {
         "prompt": prompt["prompt"],
         "instruction": suite_instruction(suite, prompt["task"], prompt["prompt"]),
         "completions": prompt["written"],
         "judged": prompt["judged"],
         "passed": prompt["counted"],
-        "pass@1": shares.get((prompt["task"], prompt["prompt"])),
+        "pass@1": prompt["share"],
     }
 
 
@@ -195,20 +190,15 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
+def completion_details(run: Snapshot, name: str) -> dict[str, Any]:
     """Return a completion with its program, and the steps, failed checks and explanations of each world."""
-    results = run.results
+    row, results = run.row(name), run.results
+    if row is None:
+        raise MissingError(f'this run has no completion "{shortened(name, MAX_SUITE_NAME)}"')
     key: CompletionKey = row["task"], row["prompt"], row["index"]
     completion = results.completions.get(key)
     more = {"evaluation": results.key, "stale": row["stale"], "note": PROGRAM_GONE if row["stale"] else None}
-    if row["passed"] is None:
-        known: dict[str, Any] = {
-            name: getattr(completion, name, None) for name in ("model", "instruction", "program")
-        }
-        known["reply"] = reply_data(completion)
-        known["suite_instruction"] = suite_instruction(run.suite, row["task"], row["prompt"])
-        return {**entry_data(row), **known, **more, "worlds": []}
-    judged = results.row(key)
+    judged = {**entry_data(row), "verdicts": []} if row["passed"] is None else results.row(key)
     try:
         data = completion_data(judged, completion, run.suite, ablated=results.is_ablated)
     except (UserError, KeyError, TypeError, IndexError, AttributeError, ValueError):

@@ -178,15 +178,16 @@ class Snapshot:
         return overall(self.scores, 1) if self.scores else None
 
     @cached_property
-    def failures(self) -> list[Failures]:
-        """The classes of failures that occur, each with its kinds, most frequent first."""
-        if not self.judged:
-            return []
-        return [
-            replace(
-                cause,
-                kinds=tuple(sorted((k for k in cause.kinds if k.count), key=lambda k: (-k.count, k.name))),
-            )
-            for cause in failures(tally_of(self.results.table))
-            if cause.count
-        ]
+    def failures(self) -> dict[tuple[str, str | None], Failures]:
+        """The classes of failures that occur, each followed by its kinds, most frequent first.
+
+        A key is a class and a kind, or None for the whole class.
+        """
+        found: dict[tuple[str, str | None], Failures] = {}
+        for cause in failures(tally_of(self.results.table)) if self.judged else ():
+            if cause.count:
+                found[cause.name, None] = cause
+                for kind in sorted(cause.kinds, key=lambda kind: (-kind.count, kind.name)):
+                    if kind.count:
+                        found[cause.name, kind.name] = kind
+        return found

@@ -103,18 +103,9 @@ def count_text(data: Mapping[str, Any]) -> str:
     """Format the coverage of a run briefly, for a table."""
     if "completions" not in data:
         return MISSING
-    coverage = _coverage(data)
+    coverage = Coverage(data["judged"], data["to_judge"], data["requested"])
     done, what = (coverage.judged, "judged") if coverage.judged else (coverage.there, "written")
     return f"{done:,} of {coverage.total:,} {what}"
-
-
-def completions_text(data: Mapping[str, Any]) -> str:
-    """Format the coverage of a run."""
-    return str(_coverage(data)) if "completions" in data else MISSING
-
-
-def _coverage(data: Mapping[str, Any]) -> Coverage:
-    return Coverage(data["judged"], data["to_judge"], data["requested"])
 
 
 def tasks_text(data: Mapping[str, Any]) -> str:
@@ -130,10 +121,6 @@ def date_text(data: Mapping[str, Any]) -> str:
     return (data.get("date") or MISSING)[:16].replace("T", " ")
 
 
-def score_text(data: Mapping[str, Any]) -> str:
+def score_text(mean: Estimate | None) -> str:
     """Format pass@1 of a run. Return an empty string if nothing was judged."""
-    mean = data.get("pass@1")
-    if mean is None:
-        return ""
-    estimate = Estimate(**mean)
-    return f"pass@1 {estimate.mean:.3f} ({estimate.interval})"
+    return "" if mean is None else f"pass@1 {mean.mean:.3f} ({mean.interval})"

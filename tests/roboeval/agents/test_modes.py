@@ -3,20 +3,23 @@
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 import pytest
 
 from codebotler.core.files import to_line
 from command_line import refused, roboeval
-from roboeval.analysis.comparisons.compare import compare_tables, sample_size_sentences
-from roboeval.analysis.comparisons.missions import has_missions, mission_costs
+from made_results import results_of
+from roboeval.analysis.comparisons.compare import compare_tables, has_missions, sample_size_sentences
 from roboeval.analysis.failure_groups import nearest_fix
 from roboeval.analysis.statistics import SampleSizes
 from roboeval.cli.inputs import open_current
 from roboeval.cli.results.report import judged_run
 from roboeval.evaluation.runs.results import load_results
+from roboeval.report.runs import JudgedRun
 from roboeval.report.sections.modes import ending_sheet, mode_sheet
+from small_run import SUITE
 from small_suite import a_suite
 
 WORLDS = """\
@@ -87,20 +90,24 @@ def test_two_runs_of_programs_are_counted_by_programs(runs: tuple[Path, Path, st
     assert sample_size_sentences(found)
 
 
+def costs(*tables: pl.DataFrame) -> list[list[Any]]:
+    results = results_of([], SUITE)
+    return [[*row] for row in mode_sheet([JudgedRun(results, table, name="m") for table in tables]).rows]
+
+
 def test_costs_are_those_of_a_mission(runs: tuple[Path, Path, str]) -> None:
-    programs, agents = tables(runs)
-    one, other = mission_costs(programs), mission_costs(agents)
-    assert (one.mode, one.missions, one.satisfied.mean, one.turns) == ("program", 2, 0.5, 1)
-    assert (one.tokens, one.tokens_per_success, one.tool_errors) == (100, 200, None)
-    assert (other.mode, other.missions, other.satisfied.mean, other.turns) == ("agent", 4, 0.75, 3)
-    assert other.tokens_per_success == pytest.approx(100 / 0.75)
-    assert (other.tool_errors, other.forbidden) == (0.5, 0)
+    (one, other) = costs(*tables(runs))
+    assert one[:4] == ["m", "program", 2, 0.5]
+    assert one[6:] == [0, 1, None, 100, 200]
+    assert other[:4] == ["m", "agent", 4, 0.75]
+    assert other[6:] == [0, 3, 0.5, 100, pytest.approx(100 / 0.75)]
 
 
 def test_what_a_contract_or_a_rule_ended_is_forbidden(runs: tuple[Path, Path, str], tmp_path: Path) -> None:
     missions = [mission(0, SAY), mission(1, SAY), mission(0, SAY, "OutsideContract"), mission(1, SAY)]
     run = a_run(tmp_path / "bounded", runs[2], missions, "agent")
-    assert mission_costs(load_results(run, suite=runs[2])).forbidden == 0.25
+    (row,) = costs(load_results(run, suite=runs[2]))
+    assert row[6] == 0.25
 
 
 def test_the_command_compares_them_and_says_how(runs: tuple[Path, Path, str]) -> None:

@@ -13,10 +13,11 @@ from codebotler.core.errors import UserError
 from command_line import refused, roboeval
 from made_results import results_of
 from roboeval.analysis.comparisons.compare import (
-    ComparedRun,
+    Comparison,
     compare_scores,
     comparison_data,
     comparison_sentence,
+    failure_shares,
     other_differences,
     pairs_to_compare,
     sample_size_sentences,
@@ -95,29 +96,26 @@ def test_how_much_it_takes_is_said() -> None:
     assert re.search(r"\b8\b", told[1])
 
 
-def sides(*names: str, failures: str = "PythonError") -> tuple[ComparedRun, ComparedRun]:
-    rows = [row(0, 0), row(0, 1, (failures, "cut-off"))]
+def view(found: Comparison, first: str = "a", failure: str = "PythonError", width: int = 120) -> str:
+    rows = [row(0, 0), row(0, 1, (failure, "cut-off"))]
     programs = {("Visit", 0, index): "" for index in range(2)}
-    first, second = (ComparedRun.of(name, results_of(rows, SUITE, programs)) for name in names or ("a", "b"))
-    return first, second
+    one = results_of(rows, SUITE, programs)
+    shares = failure_shares(one.table)
+    assert shares[failure] == 0.5
+    return printed(comparison_view(found, (first, "b"), [one, one], [shares, shares]), width=width)
 
 
 def test_both_runs_say_of_how_many_completions_and_how_they_fail() -> None:
     found = compare_scores(FIRST, SECOND)
-    text = printed(comparison_view(found, sides(failures="NoProgram")), width=120)
+    text = view(found, failure="NoProgram")
     assert re.search(r"\npass@1 of a +\d\.\d{3}  2 of 2 completions *\n", text)
     assert re.search(r"\nwithout a program +50\.0% +50\.0%\n", text)
-    assert "without a program" not in printed(comparison_view(found, sides()), width=120)
-    data = sides()[0].data
-    assert (data["judged"], data["there"], data["requested"], data["cut_off"]) == (2, 2, None, 0)
-    assert data["failures"]["PythonError"] == 0.5
+    assert "without a program" not in view(found)
 
 
 def test_names_are_text() -> None:
     found = compare_scores(FIRST, SECOND)
-    assert SHOWN.split("\\n", maxsplit=1)[0][:10] in printed(
-        comparison_view(found, sides(HOSTILE, "b")), width=200
-    )
+    assert SHOWN.split("\\n", maxsplit=1)[0][:10] in view(found, HOSTILE, width=200)
     assert json.loads(json.dumps(comparison_data(found, (HOSTILE, "b"))))["prompts"] == 3
 
 
@@ -163,7 +161,7 @@ def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
     def shown(tasks: int) -> str:
         a = {(f"T{n}", 0): n / 10 for n in range(tasks)}
         found = compare_scores(a, {key: value / 2 for key, value in a.items()})
-        return printed(comparison_view(found, sides()), width=120)
+        return view(found)
 
     assert re.search(r"bootstrap.* too narrow", shown(7))
     assert "too narrow" not in shown(8)
@@ -172,13 +170,13 @@ def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
 
 
 def test_equal_differences_have_no_interval() -> None:
-    shown = printed(comparison_view(compare_scores(FIRST, FIRST), sides()), width=120)
+    shown = view(compare_scores(FIRST, FIRST))
     assert re.search(r"interval over prompts +unknown: no variation between prompts", shown)
     assert "+0.000 to" not in shown
 
 
 def test_one_prompt_is_not_many() -> None:
-    assert "over 1 prompt " in printed(comparison_view(compare_scores({("A", 0): 1}, {("A", 0): 0}), sides()))
+    assert "over 1 prompt " in view(compare_scores({("A", 0): 1}, {("A", 0): 0}))
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,9 @@
 """What asking again would have given: exact chances against draws, and the figures of a small run."""
 
 import random
-from typing import Any
+from typing import Any, NamedTuple
 
+import polars as pl
 import pytest
 
 from made_results import table_of
@@ -10,25 +11,38 @@ from roboeval.analysis.metrics import PromptScore, TaskScore, overall, pass_at_1
 from roboeval.analysis.resample import (
     LIMITS,
     Chances,
-    CheckedCompletion,
     CheckedPrompt,
+    count_by_prompt,
     curve_data,
     final_chances,
     resample,
-    trials_by_prompt,
 )
 from roboeval.cli.views.groups import resample_view
 from roboeval.evaluation.runs.scope import Coverage
 from small_run import printed, row
 
-GOOD = CheckedCompletion(accepted=True, ran=True, passed=True)
-WRONG = CheckedCompletion(accepted=True, ran=True, passed=False)
-UNSEEN = CheckedCompletion(accepted=True, ran=False, passed=False)
-REJECTED = CheckedCompletion(accepted=False, ran=False, passed=False)
-UNJUST = CheckedCompletion(accepted=False, ran=True, passed=True)
+
+class Trial(NamedTuple):
+    accepted: bool
+    ran: bool
+    passed: bool
 
 
-def drawn(trials: list[CheckedCompletion], retries: int, chance: random.Random) -> CheckedCompletion:
+def checked(trials: list[Trial], number: int = 0) -> CheckedPrompt:
+    good = [trial for trial in trials if trial.accepted]
+    ran, passed = (sum(one.ran for one in trials), sum(one.passed for one in trials))
+    both = sum(one.ran for one in good), sum(one.passed for one in good)
+    return CheckedPrompt("Visit", number, len(trials), len(good), ran, passed, *both)
+
+
+GOOD = Trial(accepted=True, ran=True, passed=True)
+WRONG = Trial(accepted=True, ran=True, passed=False)
+UNSEEN = Trial(accepted=True, ran=False, passed=False)
+REJECTED = Trial(accepted=False, ran=False, passed=False)
+UNJUST = Trial(accepted=False, ran=True, passed=True)
+
+
+def drawn(trials: list[Trial], retries: int, chance: random.Random) -> Trial:
     trial = chance.choice(trials)
     while retries and not trial.accepted:
         trial, retries = chance.choice(trials), retries - 1
@@ -41,7 +55,7 @@ def test_chances_are_what_many_draws_come_to(retries: int) -> None:
     chance = random.Random(11)
     times = 20_000
     results = [drawn(trials, retries, chance) for _ in range(times)]
-    exact = final_chances(trials, retries)
+    exact = final_chances(checked(trials), retries)
     for name in ("accepted", "ran", "passed"):
         share = sum(getattr(trial, name) for trial in results) / times
         assert getattr(exact, name) == pytest.approx(share, abs=0.012), name
@@ -49,7 +63,7 @@ def test_chances_are_what_many_draws_come_to(retries: int) -> None:
 
 def test_without_retries_it_is_the_plain_share() -> None:
     trials = [GOOD, WRONG, REJECTED, UNJUST]
-    exact = final_chances(trials, 0)
+    exact = final_chances(checked(trials), 0)
     assert (exact.accepted, exact.ran, exact.passed) == pytest.approx((2 / 4, 3 / 4, 2 / 4))
 
 
@@ -58,10 +72,10 @@ def test_without_retries_the_mean_is_pass_at_1_to_the_last_digit(seed: int) -> N
     chance = random.Random(seed)
     kinds = [GOOD, WRONG, UNSEEN, REJECTED, UNJUST]
     prompts = [
-        CheckedPrompt("Visit", number, tuple(chance.choices(kinds, k=chance.randint(1, 20))))
+        checked(chance.choices(kinds, k=chance.randint(1, 20)), number)
         for number in range(chance.randint(1, 80))
     ]
-    scores = [PromptScore("Visit", p.prompt, len(p.trials), sum(t.passed for t in p.trials)) for p in prompts]
+    scores = [PromptScore("Visit", p.prompt, p.completions, p.passed) for p in prompts]
     score = TaskScore("Visit", tuple(scores))
     found = resample(prompts, 0)
     assert found.passed == overall([score], 1)
@@ -72,20 +86,22 @@ def test_without_retries_the_mean_is_pass_at_1_to_the_last_digit(seed: int) -> N
 def test_no_chance_is_above_one(retries: int) -> None:
     for accepted in range(1, 30):
         trials = [GOOD] * accepted + [UNJUST] * (30 - accepted)
-        exact = final_chances(trials, retries)
+        exact = final_chances(checked(trials), retries)
         assert max(exact.accepted, exact.ran, exact.passed) <= 1
         assert exact.passed == pytest.approx(1)
 
 
 def test_one_retry_by_hand() -> None:
     # One of two is accepted, and passes: it is drawn at once, or in the second of two draws.
-    assert final_chances([GOOD, REJECTED], 1) == Chances(accepted=3 / 4, ran=3 / 4, passed=3 / 4)
+    assert final_chances(checked([GOOD, REJECTED]), 1) == Chances(accepted=3 / 4, ran=3 / 4, passed=3 / 4)
 
 
 def test_where_none_or_all_are_accepted_retries_change_nothing() -> None:
     for retries in LIMITS:
-        assert final_chances([REJECTED, UNJUST], retries) == Chances(accepted=0, ran=1 / 2, passed=1 / 2)
-        assert final_chances([GOOD, WRONG], retries) == Chances(accepted=1, ran=1, passed=1 / 2)
+        assert final_chances(checked([REJECTED, UNJUST]), retries) == Chances(
+            accepted=0, ran=1 / 2, passed=1 / 2
+        )
+        assert final_chances(checked([GOOD, WRONG]), retries) == Chances(accepted=1, ran=1, passed=1 / 2)
 
 
 def verdict(status: str, *, satisfied: bool = False, failed: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -107,13 +123,13 @@ def verdict(status: str, *, satisfied: bool = False, failed: tuple[str, ...] = (
 def test_what_runs_at_all(verdicts: list[dict[str, Any]], expected: bool) -> None:  # noqa: FBT001 - a table
     why = {"class": "TaskCompletionError", "kind": "Location", "world": 0, "check": "greets"}
     one = {**row(0, 0), "passed": False, "failure": why, "verdicts": verdicts}
-    ((trial,),) = (prompt.trials for prompt in trials_by_prompt(table_of([one])))
-    assert trial.ran is expected
+    (prompt,) = count_by_prompt(table_of([one]).with_columns(accepted=pl.lit(value=True)))
+    assert (prompt.ran, prompt.accepted_and_ran) == (expected, expected)
 
 
 PROMPTS = (
-    CheckedPrompt("Visit", 0, (GOOD, REJECTED, REJECTED, REJECTED)),
-    CheckedPrompt("Visit", 1, (REJECTED,) * 4),
+    checked([GOOD, REJECTED, REJECTED, REJECTED]),
+    checked([REJECTED] * 4, 1),
 )
 
 

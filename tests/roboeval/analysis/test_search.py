@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from codebotler.core.files import to_line
+from codebotler.rtl import parse
 from command_line import refused, roboeval
-from roboeval.analysis import search as searching
-from roboeval.analysis.search import TraceMatch, TraceQuery
+from roboeval.analysis.search import TraceMatch, TraceQuery, match_row
 
 
 def row(index: int, *traces: list[list[object]], passed: bool = False, task: str = "Visit") -> dict[str, Any]:
@@ -35,10 +35,10 @@ def found(question: TraceQuery, rows: list[dict[str, Any]] | None = None) -> lis
 
 
 def search(rows: list[dict[str, Any]], question: TraceQuery) -> list[TraceMatch]:
-    return [*searching.search(map(to_line, rows), question)]
+    return [match_row(json.loads(to_line(row)), question) for row in rows]
 
 
-HALL = 'tr.Exists(goto("hall"))'
+HALL = parse('tr.Exists(goto("hall"))')
 
 
 def test_a_formula_is_tried_in_every_world() -> None:
@@ -60,14 +60,14 @@ def test_narrowed_to_a_task_or_a_world() -> None:
 
 def test_what_cannot_be_judged_does_not_match() -> None:
     asks = row(0, [["ask", "tea?", [{"no text": "1"}], None]])
-    formula = 'tr.Exists(ask("tea", "yes"))'
+    formula = parse('tr.Exists(ask("tea", "yes"))')
     assert found(TraceQuery(formula), [asks]) == []
     assert len(found(TraceQuery(formula, negated=True), [asks])) == 1
 
 
 @pytest.mark.slow
 def test_places_are_those_of_the_row_and_not_of_requests() -> None:
-    formula = 'tr.Exists(at("hall", say("x")))'
+    formula = parse('tr.Exists(at("hall", say("x")))')
     old = row(0, [["goto", "hall"], ["say", "x"]])
     new = {**old, "verdicts": [{**old["verdicts"][0], "places": [[1, "hall"], [2, "the hall"], [3, "lab"]]}]}
     other = {**old, "verdicts": [{**old["verdicts"][0], "places": [[1, "hall"], [2, "lab"]]}]}

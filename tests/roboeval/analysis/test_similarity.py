@@ -89,7 +89,7 @@ def test_the_shortest_fix() -> None:
     assert fix is not None
     assert (fix.name, fix.changed) == ("near", 2)
     assert fix.changes[-2:] == (("-", "    say('x')"), ("+", "    say('y')"))
-    assert shortest_fix(wrong, []) is None
+    assert shortest_fix(wrong, {}) is None
 
 
 def test_of_equally_near_programs_the_first() -> None:

@@ -13,7 +13,7 @@ from command_line import refused, roboeval
 from roboeval.cli.inputs import open_current
 from roboeval.cli.results.report import judged_run
 from roboeval.report.page import page
-from roboeval.report.sections.house import house
+from roboeval.report.sections.failures import house
 
 RULES = """
 rules:

@@ -73,7 +73,7 @@ def explained(row: dict[str, Any], suite: Suite) -> list[str]:
 
 
 def find(row: dict[str, Any], formula: str) -> TraceMatch:
-    return match_row(row, TraceQuery(formula), parse(formula))
+    return match_row(row, TraceQuery(parse(formula)))
 
 
 def expect_agreement(worker: Worker, suite: Suite, program: str) -> list[bool]:

@@ -46,10 +46,10 @@ DRAWINGS: dict[str, Callable[[list[JudgedRun]], Figure]] = {
     "thresholds": draw_thresholds,
     "causes": lambda runs: draw_causes(all_causes(runs, with_published=True)),
     "rejection-sampling": lambda runs: draw_limits(
-        {run.name: retry_curves(run.trials) for run in runs}, most_completions(runs)
+        {run.name: retry_curves(run.checked) for run in runs}, most_completions(runs)
     ),
     "accepted": lambda runs: draw_accepted(
-        {run.name: accepted_after(run.trials, LIMITS[-1]) for run in runs}
+        {run.name: accepted_after(run.checked, LIMITS[-1]) for run in runs}
     ),
 }
 KEPT: list[Any] = [*(("usual", name) for name in DRAWINGS)]
@@ -85,7 +85,7 @@ def drawn_anew(case: str, name: str) -> Image.Image:
         pytest.param(case, name, marks=[pytest.mark.slow] * (case != "usual"))
         for case, runs in cases().items()
         for name in DRAWINGS
-        if runs[0].trials or name not in {"accepted", "rejection-sampling"}
+        if runs[0].checked or name not in {"accepted", "rejection-sampling"}
     ],
 )
 def test_nothing_breaks_a_figure(case: str, name: str) -> None:
@@ -199,7 +199,7 @@ def test_lines_end_where_the_axis_ends() -> None:
     run = made_up("a", {"Visit": (1,), "Wait": (0,)}, of=50)
     other = made_up("b", {"Visit": (5,)}, accepted=~pl.col("passed"))  # after 100 retries nearly none passes
     with use_style():
-        drawn = {1 / 50: draw_thresholds([run]), 1 / 10: draw_limits({"b": retry_curves(other.trials)}, 10)}
+        drawn = {1 / 50: draw_thresholds([run]), 1 / 10: draw_limits({"b": retry_curves(other.checked)}, 10)}
     for end, figure in drawn.items():
         ticks = [text.get_text() for text in figure.axes[0].get_xticklabels()]
         assert (ticks[0], ticks[-1]) == ("1", f"1/{1 / end:.0f}")

@@ -17,7 +17,7 @@ from roboeval.evaluation.clarify import (
     store_measurement,
 )
 from roboeval.evaluation.runs.table import Price
-from roboeval.report.runs import JudgedRun
+from roboeval.report.runs import JudgedRun, price_runs, read_prices
 from roboeval.report.sections.breakdown import (
     ability_sheet,
     distinct_words,
@@ -25,7 +25,7 @@ from roboeval.report.sections.breakdown import (
     report_back_sheet,
     spread_sheet,
 )
-from roboeval.report.sections.cost import budget_sheet, cost_sheet, expect_known, price_of, read_prices
+from roboeval.report.sections.cost import budget_sheet, cost_sheet
 from roboeval.report.sections.failures import failures_section
 from roboeval.report.sections.question import question
 from roboeval.report.sections.scores import differences
@@ -113,17 +113,17 @@ def test_which_phrasing_hurts() -> None:
 def test_costs_of_those_who_count_them() -> None:
     usage = {"usage": {"input_tokens": 1_000, "output_tokens": 500}}
     runs = [made_up("a", {"Visit": (4,)}, written=lambda *_: usage), made_up("b", {"Visit": (4,)})]
-    prices = {"a": Price(10.0, 20.0)}
-    (found,) = as_dicts(cost_sheet(runs, prices))
+    runs = price_runs(runs, {"a": Price(10.0, 20.0)})
+    (found,) = as_dicts(cost_sheet(runs))
     assert (found["model"], found["input tokens"], found["seconds"]) == ("a", 10_000, None)
     assert found["money per pass"] == pytest.approx(0.05)
-    budget = as_dicts(budget_sheet(runs, prices))
+    budget = as_dicts(budget_sheet(runs))
     assert [(row["model"], row["retries"]) for row in budget[::5]] == [("a", 0), ("b", 0)]
     assert (budget[0]["passes per unit of money"], budget[5]["passes per unit of money"]) == (
         pytest.approx(0.4 / 0.02),
         None,
     )
-    assert cost_sheet(runs[1:], {}).rows == []
+    assert cost_sheet(runs[1:]).rows == []
 
 
 def test_prices() -> None:
@@ -133,13 +133,17 @@ def test_prices() -> None:
         with pytest.raises(UserError, match="MODEL=INPUT/OUTPUT"):
             read_prices([wrong])
     with pytest.raises(UserError, match=r'--price .*"x".*\ba$'):
-        expect_known({"x": Price(1, 1)}, [made_up("a", {"Visit": (1,)})])
+        price_runs([made_up("a", {"Visit": (1,)})], {"x": Price(1, 1)})
 
 
 def test_a_price_for_a_folder_goes_before_that_for_its_model() -> None:
     run = made_up("a", {"Visit": (1,)}, folder="cheap")
-    assert price_of(run, {"a": Price(2, 2), "cheap": Price(1, 1)}) == Price(1, 1)
-    assert price_of(run, {"a": Price(2, 2)}) == Price(2, 2)
+    for prices, of_run in (
+        ({"a": Price(2, 2), "cheap": Price(1, 1)}, Price(1, 1)),
+        ({"a": Price(2, 2)}, Price(2, 2)),
+        ({}, None),
+    ):
+        assert [one.price for one in price_runs([run], prices)] == [of_run]
 
 
 # --- differences, groups, and where it comes from

@@ -77,7 +77,7 @@ def test_an_interval_without_width_is_in_the_table() -> None:
 
 def test_retries_as_they_are_elsewhere() -> None:
     run, other = made_up("a", {"Visit": (5,)}), made_up("b", {"Visit": (5,)}, accepted=UNCHECKED)
-    share = accepted_after(run.trials, 100)
+    share = accepted_after(run.checked, 100)
     found = [part for part in rejection_sampling([run, other]).parts if isinstance(part, Sheet)]
     assert column(found[0], "at the limit") == pytest.approx([1 - share[n] for n in (0, 2, 4, 8, 100)])
     assert [part.name for part in found] == ["rejection-sampling", "rejection-sampling-curves", "accepted"]

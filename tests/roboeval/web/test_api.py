@@ -17,12 +17,13 @@ from urllib.parse import quote
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
-from codebotler.core.files import to_line
+from codebotler.core.files import read_rows, to_line
 from codebotler.web.security.access import Access, PageAddress
 from codebotler.web.security.guard import Guard
 from command_line import refused, roboeval
 from made_up_runs import made_up
 from pageserver import PageServer
+from roboeval.evaluation.runs.completions import KEY
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.report.sections.scores import results
 from roboeval.report.sheets import Section, Sheet
@@ -175,7 +176,7 @@ def test_what_is_not_there_is_said_in_a_sentence(server: PageServer) -> None:
     for path, sentence in (
         ("/api/runs/none", 'this folder has no run "none"; it may have been deleted'),
         ("/api/runs/hasty?evaluation=none", '"hasty" has no evaluation "none"'),
-        ("/api/runs/hasty/completions/LunchBreak/0/99", "this run has no such completion"),
+        ("/api/runs/hasty/completions/LunchBreak/0/99", 'this run has no completion "LunchBreak/0/99"'),
     ):
         answer = server.call("GET", path)
         assert answer.status in {404, 422}
@@ -200,6 +201,17 @@ def test_a_run_that_is_deleted_is_not_found_any_more(runs: Path) -> None:
         shutil.rmtree(runs / "hasty")
         assert server.call("GET", "/api/runs/hasty").status == 404
         assert told(server, "/api/runs") == []
+
+
+def test_a_completion_without_a_verdict_has_the_entries_of_a_judged_one(runs: Path) -> None:
+    run = RunFolder(runs / "hasty")
+    places = ["/".join(str(row[part]) for part in KEY) for _, row in read_rows(run.completions)]
+    rows = run.rows("paper")
+    rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:9]))
+    with serving(runs) as server:
+        judged, waits = (told(server, f"/api/runs/hasty/completions/{places[at]}") for at in (0, -1))
+        assert (waits["passed"], waits["worlds"], waits.keys()) == (None, [], judged.keys())
+        assert server.call("GET", f"/runs/hasty/{places[-1]}").status == 200
 
 
 def test_damaged_rows_are_said_and_the_others_are_there(runs: Path) -> None:

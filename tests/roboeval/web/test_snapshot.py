@@ -49,7 +49,9 @@ def test_a_row_for_each_completion(runs: Path) -> None:
             )
             error = row["verdicts"][row["failure"]["world"]]["error"]
             assert (row["failure"]["check"] or error["message"]) in shown["why"]
-    assert sum(each.count for each in run.failures) == sum(not row["passed"] for row in rows)
+    assert sum(one.count for (_, kind), one in run.failures.items() if kind is None) == sum(
+        not row["passed"] for row in rows
+    )
     assert run.row("LunchBreak/0/99") is None
 
 
@@ -110,7 +112,7 @@ def test_filters_prompts_and_neighbours(runs: Path) -> None:
     assert sum(cell["counted"] for cell in cells) == run.passed
     assert keys(run.select(CompletionFilter())) == keys(run.completions)
     assert {task for task, _, _ in keys(run.select(CompletionFilter("LunchBreak")))} == {"LunchBreak"}
-    kinds = [(of.name, kind) for of in run.failures for kind in of.kinds]
+    kinds = [(name, one) for (name, kind), one in run.failures.items() if kind is not None]
     for chosen, count in (
         (CompletionFilter("LunchBreak", 2), 3),
         (CompletionFilter(passed=False), 45 - run.passed),
@@ -133,7 +135,7 @@ def test_reply_without_a_program_is_said_in_words(runs: Path) -> None:
     shown = run.row(f"{first['task']}/{first['prompt']}/{first['index']}")
     assert shown is not None
     assert (shown["why"], shown["worlds"]) == (NO_PROGRAM_SENTENCES["empty"], "")
-    assert run.failures[0].name == "NoProgram"
+    assert next(iter(run.failures)) == ("NoProgram", None)
 
 
 def test_how_far_a_run_has_come(runs: Path) -> None:

@@ -13,14 +13,20 @@ import polars as pl
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.core.text.words import counted
-from roboeval.analysis.comparisons.missions import comparable_tables, has_missions
+from codebotler.core.trace import Status
 from roboeval.analysis.counting.counts import tally_of, task_scores
 from roboeval.analysis.counting.summary import failures
 from roboeval.analysis.metrics import DIFFERENCE, ROUNDING_ERROR, Estimate, by_formula, mean_of, pass_at_1
 from roboeval.analysis.statistics import SampleSizes, by_bootstrap, p_by_signs, sample_sizes
+from roboeval.evaluation.judging.failures import (
+    AGENT_ERROR_CLASS,
+    NO_PROGRAM_CLASS,
+    PYTHON_ERROR_CLASS,
+    ROBOT_ERROR_CLASS,
+    TASK_ERROR_CLASS,
+)
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.results import Results
-from roboeval.evaluation.runs.scope import Coverage, JudgingScope
 
 SIGNIFICANCE = 0.05
 MIN_SHOWN_P = 0.001  # smaller values are shown as "p < 0.001"
@@ -83,6 +89,39 @@ def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
         sample_sizes=sample_sizes(pairs),
         tasks=tuple(sorted(_by_task(by_task), key=lambda one: (-abs(one.share), one.task))),
     )
+
+
+# --- missions: a program in a world counts as one, like a mission of an agent
+
+
+def has_missions(table: pl.DataFrame) -> bool:
+    """Whether the completions in a table are missions of an agent, each in one world."""
+    return table["ending"].null_count() < table.height
+
+
+def per_mission(table: pl.DataFrame) -> pl.DataFrame:
+    """Return a table of a run in which each completion in each world counts as one, with its own failure."""
+    kept = pl.col("failure_class").is_in([NO_PROGRAM_CLASS, AGENT_ERROR_CLASS])
+    is_check = pl.col("failed_checks").is_not_null()
+    is_robots = pl.col("status") == Status.ROBOT_ERROR.value
+    of_world = (
+        pl.when(is_check).then(pl.lit(TASK_ERROR_CLASS)).when(is_robots).then(pl.lit(ROBOT_ERROR_CLASS))
+    )
+    kind = pl.when(is_check).then("category").otherwise("error_kind")
+    failed = pl.when(~pl.col("satisfied"))
+    return table.with_columns(
+        passed=pl.col("satisfied"),
+        world_number=pl.lit(0),
+        failure_class=failed.then(
+            pl.when(kept).then("failure_class").otherwise(of_world.otherwise(pl.lit(PYTHON_ERROR_CLASS)))
+        ),
+        failure_kind=failed.then(pl.when(kept).then("failure_kind").otherwise(kind)),
+    )
+
+
+def comparable_tables(*tables: pl.DataFrame) -> Sequence[pl.DataFrame]:
+    """Return the tables of runs: of missions, if an agent carried out those of any run."""
+    return [*map(per_mission, tables)] if any(map(has_missions, tables)) else tables
 
 
 def compare_tables(first: pl.DataFrame, second: pl.DataFrame) -> Comparison:
@@ -184,26 +223,9 @@ def _short(value: object) -> str:
     return "none" if value is None else visible(str(value))[:12]
 
 
-@dataclass(frozen=True)
-class ComparedRun:
-    """The results of a compared run other than its pass@1."""
-
-    name: str
-    coverage: Coverage
-    scope: JudgingScope
-    classes: Mapping[str, float]  # shares of judged completions, by class of failure
-
-    @classmethod
-    def of(cls, name: str, results: Results, table: pl.DataFrame | None = None) -> ComparedRun:
-        """Collect the coverage, the scope and the failure classes of a run, by default of its own table."""
-        found = failures(tally_of(results.table if table is None else table))
-        shares = {one.name: one.share for one in found}
-        return cls(name, results.coverage, results.scope, shares)
-
-    @property
-    def data(self) -> dict[str, Any]:
-        """Convert the run to plain data, without its name."""
-        return {**asdict(self.coverage), "cut_off": self.scope.cut_off, "failures": dict(self.classes)}
+def failure_shares(table: pl.DataFrame) -> dict[str, float]:
+    """Return the shares of judged completions, by class of failure."""
+    return {one.name: one.share for one in failures(tally_of(table))}
 
 
 def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:

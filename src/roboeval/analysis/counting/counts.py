@@ -1,44 +1,57 @@
-"""Counts passed and failed completions in the table of a run."""
+"""Counts judged, passed and failed completions, while they are judged or in the table of a run."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, TypeAlias
 
-import polars as pl
+from roboeval.analysis.metrics import PromptScore, TaskScore
+from roboeval.evaluation.runs.rows import Row
 
-from roboeval.analysis.counting.tally import Tally
-from roboeval.analysis.metrics import TaskScore, pass_at_k
-from roboeval.evaluation.runs.completions import KEY
+if TYPE_CHECKING:
+    import polars as pl  # loads slowly, and counting while completions are judged does not need it
+
+Tally: TypeAlias = Counter[tuple[str, int, bool, str | None, str | None]]
+"""Numbers of completions by task, prompt, whether they passed, and class and kind of the failure."""
+
+
+def outcome_of(row: Row) -> tuple[str, int, bool, str | None, str | None]:
+    """Return the entry of a tally that counts a judged completion."""
+    why = row["failure"]
+    failed = (None, None) if why is None else (why["class"], why["kind"])
+    return row["task"], row["prompt"], why is None, *failed
 
 
 def completions_of(table: pl.DataFrame) -> pl.DataFrame:
     """Reduce a table from `load_results` to one row for each judged completion."""
-    return table.filter(pl.col("world_number") == 0)
+    return table.filter(table["world_number"] == 0)
 
 
-def prompt_scores(table: pl.DataFrame) -> pl.DataFrame:
-    """Count the judged (`n`) and passed (`c`) completions of each prompt, and compute its `pass@1`."""
-    counted = completions_of(table).group_by("task", "prompt", maintain_order=True)
-    return counted.agg(n=pl.len(), c=pl.col("passed").sum()).with_columns(
-        pl.struct("n", "c")
-        .map_elements(lambda one: pass_at_k(one["n"], one["c"], 1), return_dtype=pl.Float64)
-        .alias("pass@1")
+def tally_of(table: pl.DataFrame) -> Tally:
+    """Count the judged completions in a table."""
+    columns = "task", "prompt", "passed", "failure_class", "failure_kind"
+    counted = completions_of(table).group_by(columns, maintain_order=True).len()
+    return Counter({tuple(outcome): count for *outcome, count in counted.iter_rows()})
+
+
+def scores_of(tally: Tally, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
+    """Compute the scores of tasks and prompts (paper, section IV.C). Tasks not in `order` come last."""
+    judged: Counter[tuple[str, int]] = Counter()
+    passed: Counter[tuple[str, int]] = Counter()
+    for (task, prompt, has_passed, *_), count in tally.items():
+        judged[task, prompt] += count
+        passed[task, prompt] += count * has_passed
+    prompts: dict[str, list[PromptScore]] = {task: [] for task in order}
+    for key, n in judged.items():
+        prompts.setdefault(key[0], []).append(PromptScore(*key, n, passed[key]))
+    return tuple(
+        TaskScore(task, tuple(sorted(scores, key=lambda score: score.prompt)))
+        for task, scores in prompts.items()
+        if scores
     )
 
 
 def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-    """Compute the scores of tasks and prompts (paper, section IV.C). Tasks not in `order` come last."""
-    return tally_of(table).scores(order)
-
-
-def tally_of(table: pl.DataFrame) -> Tally:
-    """Count the judged, passed and failed completions in a table."""
-    tally = Tally()
-    completions = completions_of(table)
-    for task, prompt, n, c, _ in prompt_scores(table).iter_rows():
-        tally.judged[task, prompt], tally.passed[task, prompt] = n, c
-    failed = completions.drop_nulls("failure_class")
-    for name, kind, count in failed.group_by("failure_class", "failure_kind").len().iter_rows():
-        tally.failed[name, kind] = count
-    tally.first_failed = next(completions.filter(~pl.col("passed")).select(KEY).iter_rows(), None)
-    return tally
+    """Compute the scores of tasks and prompts in a table, see `scores_of`."""
+    return scores_of(tally_of(table), order)

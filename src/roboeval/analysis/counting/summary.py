@@ -9,7 +9,7 @@ from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from roboeval.analysis.counting.tally import Tally
+from roboeval.analysis.counting.counts import Tally, scores_of
 from roboeval.analysis.metrics import Estimate, PromptScore, TaskScore, overall, prompts_of
 from roboeval.evaluation.judging.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES
 from roboeval.evaluation.runs.completions import how_many
@@ -59,7 +59,7 @@ def summarise(
     tally: Tally, suite: Suite, scope: JudgingScope, *, k: Sequence[int] = (1,), ablated: bool = False
 ) -> EvaluationSummary:
     """Summarise an evaluation. Raise UserError if nothing was judged or if k is too large for a prompt."""
-    tasks = tally.scores(suite.tasks)
+    tasks = scores_of(tally, suite.tasks)
     if not tasks:
         raise UserError(f"0 of {how_many(scope.total)} judged; there are no results yet")
     try:
@@ -85,9 +85,10 @@ def _missing(tasks: Sequence[str], scope: JudgingScope) -> dict[str, list[str]]:
 def failures(tally: Tally) -> tuple[Failures, ...]:
     """Count failures by class and kind (paper, section V.B). At least one completion must be judged."""
     failed: dict[str, Counter[str]] = defaultdict(Counter)
-    for (name, kind), count in tally.failed.items():
-        failed[name][kind] = count
-    n = tally.judged.total()
+    for (*_, name, kind), count in tally.items():
+        if name is not None:
+            failed[name][str(kind)] += count
+    n = tally.total()
 
     def of_class(name: str) -> Failures:
         counts = failed.get(name, Counter())
@@ -114,12 +115,12 @@ class Causes:
 
 def causes(tally: Tally) -> Causes:
     """Compute the shares of outcomes (paper, section V.B). At least one completion must be judged."""
-    found = failures(tally)
+    found, passed = failures(tally), sum(n for (_, _, has_passed, *_), n in tally.items() if has_passed)
     kinds = {one.name: sorted((k.name, k.count) for k in one.kinds if k.count) for one in found}
     return Causes(
-        {PASSED: tally.passed.total() / tally.judged.total(), **{one.name: one.share for one in found}},
+        {PASSED: passed / tally.total(), **{one.name: one.share for one in found}},
         {one.name: {kind: count / one.count for kind, count in kinds[one.name]} for one in found},
-        {(PASSED, ALL): tally.passed.total()}
+        {(PASSED, ALL): passed}
         | {(one.name, kind): n for one in found for kind, n in [(ALL, one.count), *kinds[one.name]]},
     )
 

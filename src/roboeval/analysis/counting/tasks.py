@@ -8,7 +8,7 @@ from typing import Any
 
 import polars as pl
 
-from roboeval.analysis.counting.counts import completions_of, prompt_scores
+from roboeval.analysis.counting.counts import completions_of, task_scores
 from roboeval.evaluation.judging.explanation import reason, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, Completion, CompletionKey
 from roboeval.evaluation.runs.results import Results
@@ -60,7 +60,9 @@ def _reason(results: Results, key: CompletionKey) -> dict[str, Any]:
 def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
     keys = [*of_prompt.filter(~pl.col("stale")).select(KEY).iter_rows()]
     written = [results.completions[key] for key in keys]
-    ((task, prompt, n, c, share),) = prompt_scores(of_prompt).iter_rows()
+    (of_task,) = task_scores(of_prompt)
+    (score,) = of_task.prompts
+    task, prompt = score.task, score.prompt
     requested = results.scope.requested
     prompts = () if results.suite is None else results.suite.task(task).prompts
     return {
@@ -68,11 +70,11 @@ def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
         "instructions": _distinct(written, "instruction"),
         "suite_instruction": suite_instruction(results.suite, task, prompt),
         "models": _distinct(written, "model"),
-        "completions": n,
+        "completions": score.n,
         "requested": None if requested is None else requested.get(task, 0) // len(prompts),
-        "gone": n - len(written),
-        "passed": c,
-        "pass@1": share,
+        "gone": score.n - len(written),
+        "passed": score.c,
+        "pass@1": score.pass_at(1),
     }
 
 
@@ -82,13 +84,12 @@ def _distinct(written: Sequence[Completion], name: str) -> list[str]:
 
 
 def _failure_kinds(of_prompt: pl.DataFrame) -> list[dict[str, Any]]:
-    counted = (
-        of_prompt.drop_nulls("failure_class")
-        .group_by("failure_class", "failure_kind", maintain_order=True)
-        .agg(count=pl.len(), example=pl.col("index").first())
-        .sort("count", descending=True, maintain_order=True)
-    )
+    """Count the kinds of failure, the most frequent first, each with the index of its first completion."""
+    failed = of_prompt.drop_nulls("failure_class").select("failure_class", "failure_kind", "index")
+    indices: dict[tuple[str, str], list[int]] = defaultdict(list)
+    for name, kind, index in failed.iter_rows():
+        indices[name, kind].append(index)
     return [
-        {"class": name, "kind": kind, "count": count, "example": example}
-        for name, kind, count, example in counted.iter_rows()
+        {"class": name, "kind": kind, "count": len(those), "example": those[0]}
+        for (name, kind), those in sorted(indices.items(), key=lambda one: -len(one[1]))
     ]

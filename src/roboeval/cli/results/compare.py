@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,7 +28,10 @@ if TYPE_CHECKING:
     import polars as pl
 
     from roboeval.evaluation.engines.engine import OpenEngine
+    from roboeval.evaluation.runs.completions import Completion
+    from roboeval.evaluation.runs.folder import RunFolder
     from roboeval.evaluation.runs.results import Results
+    from roboeval.suites.load import Suite
 
 
 def compare(
@@ -65,12 +68,12 @@ _PAIR = 2
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
     """Print how much better the second of two runs is."""
     from roboeval.analysis.comparisons.compare import (
-        ComparedRun,
+        comparable_tables,
         compare_tables,
         comparison_data,
+        failure_shares,
         other_differences,
     )
-    from roboeval.analysis.comparisons.missions import comparable_tables
     from roboeval.cli.views.comparison import comparison_view
 
     opened = [open_current(path, suite, ablated=ablated) for path in paths]
@@ -80,15 +83,14 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
     warnings = other_differences(*opened)
     for warning in warnings:
         note(f"warning: {warning}")
-    first, second = (
-        ComparedRun.of(str(path), one, table) for path, one, table in zip(paths, opened, tables, strict=True)
-    )
+    names, failing = (str(paths[0]), str(paths[1])), [failure_shares(table) for table in tables]
     if as_json:
-        data = comparison_data(result, (first.name, second.name))
-        both = {side: data[side] | run.data for side, run in (("first", first), ("second", second))}
-        print_json({**data, **both, "warnings": warnings})
+        data = comparison_data(result, names)
+        for side, one, shares in zip(("first", "second"), opened, failing, strict=True):
+            data[side] |= {**asdict(one.coverage), "cut_off": one.scope.cut_off, "failures": shares}
+        print_json({**data, "warnings": warnings})
     else:
-        print_rich(comparison_view(result, (first, second)))
+        print_rich(comparison_view(result, names, opened, failing))
 
 
 def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bool, as_json: bool) -> None:
@@ -137,8 +139,8 @@ def resample(
     The programs of a judged run are checked, also against its house rules. The result is computed for each
     maximum number of retries, without querying a model.
     """
-    from roboeval.analysis.comparisons.missions import has_missions
-    from roboeval.analysis.resample import LIMITS, curve_data, trials_by_prompt
+    from roboeval.analysis.comparisons.compare import has_missions
+    from roboeval.analysis.resample import LIMITS, count_by_prompt, curve_data
     from roboeval.cli.views.groups import resample_view
 
     with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
@@ -146,7 +148,7 @@ def resample(
         if has_missions(results.table):
             fail(f"{run}: holds missions of an agent, which cannot be checked; name a run of programs")
         checker = engine_for(len(results.places))
-        prompts = trials_by_prompt(check_run(results, samples=samples, seed=seed, engine=checker))
+        prompts = count_by_prompt(check_run(results, samples=samples, seed=seed, engine=checker))
     coverage = results.coverage
     limits = sorted(set(retries)) if retries else LIMITS
     if json:
@@ -158,11 +160,27 @@ def resample(
 
 def check_run(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
     """Check the programs of a run, save the results, and return the run's table with these results."""
-    from roboeval.evaluation.generating.checks import check_programs
     from roboeval.evaluation.runs.table import with_answers
 
     completions = [results.completions[key] for key in results.places]
     judged = [one for one in completions if one.acted is None]  # an agent's mission holds in one world only
-    different = {(completion.task, completion.program) for completion in judged}
-    checking = check_programs(results.run, results.known_suite, judged, engine, samples=samples, seed=seed)
-    return with_answers(results.table, dict(show_progress(checking, "checking", len(different))))
+    suite = results.known_suite
+    problems = check_completions(results.run, suite, judged, engine, samples=samples, seed=seed)
+    return with_answers(results.table, problems)
+
+
+def check_completions(
+    run: RunFolder,
+    suite: Suite,
+    completions: Collection[Completion],
+    engine: OpenEngine,
+    *,
+    samples: int = 5,
+    seed: int = 0,
+) -> dict[tuple[str, str], list[str]]:
+    """Check programs, save the results in their run, and return the problems by task and program hash."""
+    from roboeval.evaluation.generating.checks import check_programs
+
+    different = {(one.task, one.program_sha256) for one in completions}
+    checking = check_programs(run, suite, completions, engine, samples=samples, seed=seed)
+    return dict(show_progress(checking, "checking", len(different)))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from codebotler.core.errors import UserError
 from roboeval.cli.inputs import load, open_current
 from roboeval.cli.options import (
     AblationOption,
@@ -19,7 +20,8 @@ from roboeval.cli.options import (
 from roboeval.cli.output import fail, note, print_json, print_rich, show_progress
 
 if TYPE_CHECKING:
-    from roboeval.analysis.search import TraceMatch, TraceQuery
+    from codebotler.rtl import Formula
+    from roboeval.analysis.search import TraceMatch
     from roboeval.evaluation.runs.completions import CompletionKey
     from roboeval.suites.load import Suite
 
@@ -45,7 +47,7 @@ def find(
     the reason.
     """
     from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures
-    from roboeval.analysis.search import TraceQuery, search
+    from roboeval.analysis.search import TraceQuery, match_row
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import RunFolder, with_judged_worlds
@@ -54,11 +56,12 @@ def find(
         fail("--not needs a formula; add one, or leave out --not")
     known = with_judged_worlds(RunFolder(run), load(suite), ablated=ablation)
     task = None if task is None else known.task(task).name
-    query = TraceQuery(formula, negated, task, world)
-    expect_query(query, known, ablated=ablation)
+    query = TraceQuery(None if formula is None else parse_formula(formula), negated, task, world)
+    if world is not None:
+        expect_world(world, known, task, ablated=ablation)
     results = open_current(run, suite, ablated=ablation)
-    lines = results.lines
-    every = list(show_progress(search(lines, query), "searching", len(lines)))
+    matches = (match_row(results.row(key), query) for key in results.places)
+    every = list(show_progress(matches, "searching", len(results.places)))
     found = [one for one in every if one.worlds]
     passed = {*results.passed}
     failed = [results.row(one.key) for one in found if one.key not in passed]
@@ -81,25 +84,25 @@ def find(
         print_rich(found_view(found, passed, total, described, groups=len(together), is_search=is_search))
 
 
-def expect_query(query: TraceQuery, suite: Suite, *, ablated: bool) -> None:
-    """Raise UserError if the formula is invalid or no task has the world."""
-    from codebotler.core.errors import UserError
+def parse_formula(text: str) -> Formula:
+    """Parse an RTL formula. Raise UserError if it is invalid."""
     from codebotler.rtl import RtlSyntaxError, parse
 
-    if query.formula is not None:
-        try:
-            parse(query.formula)
-        except RtlSyntaxError as error:
-            raise UserError(f"the formula is not valid: {error}") from None
-    if query.world is None:
-        return
-    tasks = [suite.tasks[query.task]] if query.task else list(suite.tasks.values())
-    scenarios = [task.judged_in(ablated=ablated) for task in tasks]
+    try:
+        return parse(text)
+    except RtlSyntaxError as error:
+        raise UserError(f"the formula is not valid: {error}") from None
+
+
+def expect_world(world: str, suite: Suite, task: str | None, *, ablated: bool) -> None:
+    """Exit with status 2 if no task, or not the given task, has a world with this number or description."""
+    tasks = [suite.tasks[task]] if task else list(suite.tasks.values())
+    scenarios = [one.judged_in(ablated=ablated) for one in tasks]
     abouts = {scenario.world.about.lower() for those in scenarios for scenario in those}
     numbers = {str(n) for n in range(1, max(map(len, scenarios)) + 1)}
-    if query.world.lower() not in abouts | numbers:
-        where = query.task or f'the suite "{suite.name}"'
-        fail(f'{where} has no world "{query.world}"; `roboeval tasks TASK` lists the worlds of a task')
+    if world.lower() not in abouts | numbers:
+        where = task or f'the suite "{suite.name}"'
+        fail(f'{where} has no world "{world}"; `roboeval tasks TASK` lists the worlds of a task')
 
 
 def found_data(

@@ -52,8 +52,7 @@ def report(
     from codebotler.core.terminal import busy
     from codebotler.simulator.pool import cores
     from roboeval.evaluation.engines.engine import Local
-    from roboeval.report.runs import name_runs, read_labels
-    from roboeval.report.sections.cost import expect_known, read_prices
+    from roboeval.report.runs import name_runs, price_runs, read_labels, read_prices
     from roboeval.report.writing import expect_no_others, headline, pieces, sections, write_report
 
     expect_no_others(out)
@@ -67,7 +66,7 @@ def report(
         [judged_run(one, suite, beside=beside, rules=rules, engine=engine) for one in opened],
         labels,
     )
-    expect_known(prices, read)
+    read = price_runs(read, prices)
     options: list[object] = ["--out", out, *["--published"] * published]
     options += [] if beside is None else ["--beside", beside]
     options += [] if rules is None else ["--rules", rules]
@@ -76,7 +75,7 @@ def report(
     options += [word for text in label or () for word in ("--label", text)]
     again = command("report", *runs, *options, suite=suite)
     with busy("assembling the report"):
-        parts = sections(read, with_published=published, prices=prices, command=again)
+        parts = sections(read, with_published=published, command=again)
     written = write_report(*headline(read), parts, out)
     for _ in show_progress(written, "writing", pieces(parts)):
         pass

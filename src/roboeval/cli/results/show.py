@@ -16,14 +16,16 @@ from codebotler.cli.options import (
     PortOption,
     TokenOption,
 )
+from codebotler.core.errors import UserError
 from roboeval.cli.inputs import (
     command,
-    evaluate_again,
+    expect_judged,
+    find_gaps,
     load,
+    names_completion,
     open_current,
     open_run,
-    stale_sentence,
-    unfinished_sentence,
+    parse_selection,
 )
 from roboeval.cli.options import (
     AblationOption,
@@ -65,8 +67,6 @@ def show(
     json: JsonOption = False,
 ) -> None:
     """Print a run's tables, or show why a completion fails."""
-    from roboeval.evaluation.runs.selection import expect_judged, names_completion, parse_selection
-
     if what and k:
         fail(f"--k applies to a whole run; leave out {what} or --k")
     if what and ablation:
@@ -86,11 +86,10 @@ def show(
             show_completion(judged, key, suite, in_full=in_full, with_reply=with_reply, as_json=json)
         else:
             show_part(judged, task, numbers[0] if numbers else None, as_json=json)
-    again = evaluate_again(judged, suite, rules)
-    if (complaint := stale_sentence(judged)) is not None:
-        note(f"{complaint}; `{again} --redo` judges the current programs")
-    if not is_one and (unfinished := unfinished_sentence(judged)) is not None:
-        note(f"{unfinished}; `{again}` continues")
+    outdated, unjudged = find_gaps(judged, suite, rules)
+    for sentence in (outdated, None if is_one else unjudged):
+        if sentence is not None:
+            note(sentence)
 
 
 def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
@@ -233,7 +232,6 @@ def serve(
 
     You can compare runs and inspect each completion, without a robot. Ctrl-C stops the server.
     """
-    from codebotler.core.errors import UserError
     from codebotler.web import server
     from codebotler.web.security.access import Access, PageAddress
     from codebotler.web.security.proxy import proxies_in_front

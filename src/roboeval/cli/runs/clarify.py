@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from statistics import median_high
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -18,6 +19,9 @@ from roboeval.cli.options import (
     WorkersOption,
 )
 from roboeval.cli.output import note, print_json, print_rich, show_progress
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
 
 
 def clarify(
@@ -47,7 +51,6 @@ def clarify(
     result for `roboeval report`, unless there are --rules.
     """
     from codebotler.simulator.pool import WorkerPool, cores
-    from roboeval.cli.views.clarify import clarify_view
     from roboeval.evaluation.clarify import ClarifySettings, clarify, measurement_data, store_measurement
     from roboeval.evaluation.runs.folder import with_judged_worlds
     from roboeval.evaluation.runs.source import open_source
@@ -72,3 +75,37 @@ def clarify(
         note(f"left out, with fewer than {candidates} completions: {counted(left_out, 'prompt')} of {count}")
     if opened.run is not None and rules is None:
         note(f"the result is in {store_measurement(opened.run, known, data)}")
+
+
+COLUMNS = {"one": "one program", "majority": "majority", "question": "one question"}
+
+
+def clarify_view(data: Mapping[str, Any], title: str, candidates: int) -> RenderableType:
+    """Show pass@1 of one program, of the largest cluster and with a question, for each prompt and overall."""
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=f"{title}, {candidates} candidates", title_justify="left")
+    table.add_column("task")
+    for name in ("prompt", *COLUMNS.values(), "asked", "mattered"):
+        table.add_column(name, justify="right")
+    for one in data["prompts"]:
+        table.add_row(one["task"], str(one["prompt"]), *_cells(one))
+    table.add_section()
+    table.add_row("all", "", *_cells(data), style="bold")
+    lines = [
+        "pass@1 of one program, of the largest group with one behaviour, and of what a person chooses",
+        "asked: share of the trials in which the programs differed enough for a question",
+        "mattered: questions whose answer changed the verdict on the largest group of programs",
+    ]
+    if data["tokens"] is not None:
+        lines.append(f"{data['tokens']:,.0f} tokens for {candidates} candidates, on average")
+    return Group(table, *(Text(line, "dim") for line in lines))
+
+
+def _cells(of: Mapping[str, Any]) -> list[str]:
+    from roboeval.analysis.metrics import percent
+
+    mattered = "-" if of["mattered"] is None else f"{percent(of['mattered'])} %"
+    return [*(f"{of[name]:.3f}" for name in COLUMNS), f"{percent(of['asked'])} %", mattered]

@@ -64,9 +64,10 @@ def evaluate(
     """Judge whether each completion does what its prompt asks."""
     isolation = {"require_isolation": require_isolation, "one_process_per_run": one_process_per_run}
     with engine_named(engine, workers, **isolation) as engine_for:
+        from roboeval.analysis.counting.counts import Tally, outcome_of
         from roboeval.analysis.counting.summary import summarise
-        from roboeval.analysis.counting.tally import Tally
         from roboeval.evaluation.runs.folder import RunFolder, about_of, tasks_to_judge
+        from roboeval.evaluation.runs.rows import key_of
         from roboeval.evaluation.runs.scope import JudgingScope
         from roboeval.evaluation.runs.source import open_source
 
@@ -76,7 +77,7 @@ def evaluate(
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
         if left:
             note(f"not judged because they have no ablation: {', '.join(left)}")
-        tally, table = Tally(), None
+        tally, failed, table = Tally(), None, None
         if rules is not None:
             from roboeval.evaluation.runs.table import TableBuilder  # imports polars, which loads slowly
 
@@ -94,13 +95,14 @@ def evaluate(
             running = engine_for(scope.total)
             rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
             for row in show_progress(rows, "judging", scope.total):
-                tally.add(row)
+                tally[outcome_of(row)] += 1
+                failed = failed or (None if row["passed"] else key_of(row))
                 if table is not None:
                     table.add(row)
             counted = summarise(tally, judged_by, scope, ablated=ablation)
             house = None if table is None else house_of(run, judged_by, table.table(), ablated=ablation)
             print_summary(counted, title=source, as_json=json, house=house)
-        _name_next_command(run, tally.first_failed, suite=suite, ablated=ablation, rules=rules)
+        _name_next_command(run, failed, suite=suite, ablated=ablation, rules=rules)
         _expect_all_judged(counted, scope.total)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -15,6 +16,7 @@ from codebotler.cli.model_options import inherit_options, model_settings, note_u
 from codebotler.cli.options import BaseUrlOption, ModelOption, WithinOption, read_within
 from codebotler.core.errors import install_command, installed
 from codebotler.core.text.words import counted
+from roboeval.cli.engine_choice import engine_named
 from roboeval.cli.inputs import command, load
 from roboeval.cli.options import (
     BudgetOption,
@@ -34,9 +36,9 @@ from roboeval.cli.options import (
     WorkersOption,
 )
 from roboeval.cli.output import fail, note, progress_meter, stoppable
+from roboeval.cli.results.compare import check_completions
 from roboeval.cli.results.report import report
 from roboeval.cli.runs.evaluate import evaluate
-from roboeval.cli.runs.rounds import further_rounds
 
 if TYPE_CHECKING:
     from codebotler.models.base import Model
@@ -224,18 +226,57 @@ def run(
 
     path = judge(complete_run(first, plan, model, what.pace))
     rounds = further_rounds(
+        what,
         first,
-        plan,
         repair or retries,
         repairs=bool(repair),
         workers=workers,
         require_isolation=require_isolation,
-        complete=lambda run, plan: complete_run(run, plan, what.open(), what.pace),
     )
     paths = [path, *map(judge, rounds)]
     if with_report:
         with stoppable():
             report(paths, path / "report", suite=suite, workers=workers)
+
+
+def further_rounds(
+    what: GenerationRequest,
+    run: RunFolder,
+    most: int,
+    *,
+    repairs: bool,
+    workers: int | None,
+    require_isolation: bool,
+) -> Iterator[Path]:
+    """Regenerate or repair rejected programs in up to `most` rounds, and yield the folder of each round.
+
+    There are no more rounds once the check accepts all programs.
+    """
+    from roboeval.evaluation.generating.rounds import RoundPlan
+
+    plan, latest = what.plan, run
+    planned = {*plan.keys()}
+    for number in range(1, most + 1):
+        completions = {one.key: one for one in latest.read(plan.suite) if one.key in planned}
+        with engine_named("local", workers, require_isolation=require_isolation) as engine_for:
+            found = check_completions(latest, plan.suite, completions.values(), engine_for(0))
+        each = {key: found[one.task, one.program_sha256] for key, one in completions.items()}
+        problems = {key: listed for key, listed in each.items() if listed}
+        if not problems:
+            return
+        rejected = counted(len(problems), "completion")
+        note(f"round {number}: the check rejects {rejected} of {len(planned):,}")
+        following = RoundPlan(
+            plan.suite,
+            plan.tasks,
+            plan.num_completions,
+            number=number,
+            repairs=repairs,
+            earlier=completions,
+            problems=problems,
+        )
+        latest = following.folder(run)
+        yield complete_run(latest, following, what.open(), what.pace)
 
 
 def expect_rounds_fit(plan: GenerationPlan, repair: int, retries: int, *, as_json: bool) -> None:

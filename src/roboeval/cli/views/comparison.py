@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -12,7 +12,6 @@ from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
 from codebotler.core.text.words import counted
 from roboeval.analysis.comparisons.compare import (
-    ComparedRun,
     Comparison,
     comparison_sentence,
     p_text,
@@ -24,11 +23,16 @@ from roboeval.analysis.statistics import MIN_CLUSTERS
 from roboeval.cli.views.groups import failure_group_view
 from roboeval.cli.views.results import ruled
 from roboeval.evaluation.judging.failures import classes_to_show, plural_of
+from roboeval.evaluation.runs.results import Results
 
 
-def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun]) -> RenderableType:
-    """Show a comparison of two runs."""
-    names = runs[0].name, runs[1].name
+def comparison_view(
+    comparison: Comparison,
+    names: tuple[str, str],
+    runs: Sequence[Results],
+    failing: Sequence[Mapping[str, float]],
+) -> RenderableType:
+    """Show a comparison of two runs, given the shares of their completions that fail, by class."""
     a, b = map(visible, names)
     rows = grid("left", "right", "left")
     what = "missions that succeed, of" if comparison.counts_missions else "pass@1 of"
@@ -54,18 +58,19 @@ def comparison_view(comparison: Comparison, runs: tuple[ComparedRun, ComparedRun
         table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
     sentence = Text(comparison_sentence(comparison, (a, b)), "bold")
     warnings = [
-        Text(f"{visible(run.name)}: {warning}", "yellow")
-        for run in runs
+        Text(f"{name}: {warning}", "yellow")
+        for name, run in zip((a, b), runs, strict=True)
         if (warning := run.scope.cut_off_warning) is not None
     ]
     needed = map(Text, sample_size_sentences(comparison))
-    return Group(sentence, Text(), rows, Text(), *needed, *warnings, Text(), _ends(runs), Text(), table)
+    ends = _ends((a, b), failing)
+    return Group(sentence, Text(), rows, Text(), *needed, *warnings, Text(), ends, Text(), table)
 
 
-def _ends(runs: tuple[ComparedRun, ComparedRun]) -> Table:
-    table = ruled("share that fails", *(visible(run.name) for run in runs))
-    for name in classes_to_show([name for run in runs for name, share in run.classes.items() if share]):
-        table.add_row(plural_of(name), *(f"{run.classes.get(name, 0.0):.1%}" for run in runs))
+def _ends(names: tuple[str, str], failing: Sequence[Mapping[str, float]]) -> Table:
+    table = ruled("share that fails", *names)
+    for name in classes_to_show([name for shares in failing for name, share in shares.items() if share]):
+        table.add_row(plural_of(name), *(f"{shares.get(name, 0.0):.1%}" for shares in failing))
     return table
 
 

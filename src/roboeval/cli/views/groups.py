@@ -94,7 +94,7 @@ def resample_view(
     for limit in (resample(prompts, retries) for retries in limits):
         shares = (*limit.prompts.values(), limit.accepted, limit.ran)
         table.add_row(f"{limit.retries}", f"{limit.passed.mean:.3f}", *(f"{share:.1%}" for share in shares))
-    hopeless = sum(not any(trial.accepted for trial in prompt.trials) for prompt in prompts)
+    hopeless = sum(not prompt.accepted for prompt in prompts)
     of = "prompt" if hopeless == 1 else "prompts"
     return Group(
         Text(visible(title), style="bold"),

@@ -124,16 +124,6 @@ class Results:
         stale = set(self.stale)
         return {key: c.program for key, c in self.completions.items() if key not in stale}
 
-    @property
-    def lines(self) -> list[bytes]:
-        """Read the lines of all rows. Raise UserError if the file was replaced."""
-        path = self.run.rows(self.key or "")
-        content = path.read_bytes() if path.exists() else b""
-        lines = [content[at : at + size] for at, size in self.places.values()]
-        if not all(line.endswith(b"\n") for line in lines[:-1]) or not all(lines):
-            raise UserError(REPLACED, file=path)
-        return lines
-
     def row(self, key: CompletionKey) -> Row:
         """Read a row from the file, with all its traces. Raise UserError if the file was replaced."""
         at, size = self.places[key]

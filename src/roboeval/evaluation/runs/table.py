@@ -121,7 +121,7 @@ class TableBuilder:
         self._start()
 
     def _start(self) -> None:
-        self._rows: list[tuple[Any, ...]] = []
+        self._rows: list[dict[str, Any]] = []
         self._worlds: list[tuple[Any, ...]] = []
         self._counts: list[int] = []
 
@@ -129,26 +129,15 @@ class TableBuilder:
         """Add a completion with its verdict in each world."""
         if len(self._worlds) >= CHUNK_ROWS:
             self._store()
-        written = self._completions.get(key_of(row))
-        is_stale = written is None or written.program_sha256 != row["program_sha256"]
-        failure = row["failure"]
-        why: tuple[str | int | None, ...] = (None,) * 4
-        if failure is not None:
-            why = failure["class"], failure["kind"], failure["world"], failure["check"]
+        key, program = key_of(row), row["program_sha256"]
+        written = self._completions.get(key)
+        is_stale = written is None or written.program_sha256 != program
+        judged = {"program_sha256": program, "passed": row["passed"], "stale": is_stale}
+        failure = {f"failure_{name}": value for name, value in (row["failure"] or {}).items()}
+        known = {} if written is None else _reply(written) | ({} if is_stale else _texts(written))
         self._rows.append(
-            (
-                *key_of(row),
-                None if written is None or written.model is None else storable(written.model),
-                row["program_sha256"],
-                row["passed"],
-                *why,
-                is_stale,
-                *((None,) * 5 if written is None or is_stale else _texts(written)),
-                *reply_numbers(written).values(),
-                *_mission(written),
-                *(None,) * 2,  # the cost, and whether the check accepted the program
-            )
-        )
+            {**dict(zip(KEY, key, strict=True)), **judged, **failure, **known}
+        )  # others are null
         self._counts.append(len(row["verdicts"]))
         for number, verdict in enumerate(row["verdicts"]):
             checks, error = verdict["failed_checks"], verdict["error"]
@@ -173,29 +162,36 @@ class TableBuilder:
         return self._frame.rechunk()
 
     def _store(self) -> None:
-        completions = pl.DataFrame(self._rows, schema=dict(COMPLETION_COLUMNS), orient="row")
+        completions = pl.DataFrame(self._rows, schema=dict(COMPLETION_COLUMNS))
         worlds = pl.DataFrame(self._worlds, schema=dict(WORLD_COLUMNS), orient="row")
         each = [number for number, count in enumerate(self._counts) for _ in range(count)]
         self._frame.vstack(completions[each].hstack(worlds), in_place=True)
         self._start()
 
 
-def _texts(written: Completion) -> tuple[str | bool | None, ...]:
-    said = written.instruction, written.program, written.more.get(NO_PROGRAM_COLUMN), written.finish_reason
-    is_cut_off = None if written.finish_reason is None else written.is_cut_off
-    return *(None if text is None else storable(text) for text in said), is_cut_off
-
-
-def _mission(written: Completion | None) -> tuple[str | float | None, ...]:
-    """Return how a model was used, and how a mission of an agent ended, where, and what it took."""
-    if written is None:
-        return (None,) * 5
-    more, acted = written.more, written.acted
-    if acted is None:
-        return written.mode, None, None, 1, None
-    counts = more.get("tool_errors")
+def _reply(written: Completion) -> dict[str, Any]:
+    """Return how a model was used, and what it took; of an agent, also where and how its mission ended."""
+    used = {"mode": written.mode, "turns": 1, **reply_numbers(written)}
+    if written.model is not None:
+        used["model"] = storable(written.model)
+    if (acted := written.acted) is None:
+        return used
+    counts = written.more.get("tool_errors")
     errors = [number_or_none(one, int) or 0 for one in counts.values()] if isinstance(counts, dict) else []
-    return written.mode, acted.ending, acted.world, written.turns, sum(errors)
+    mission = {"ending": acted.ending, "mission_world": acted.world, "turns": written.turns}
+    return {**used, **mission, "tool_errors": sum(errors)}
+
+
+def _texts(written: Completion) -> dict[str, str | bool]:
+    """Return what is known of the program and of its reply."""
+    texts = {
+        "instruction": written.instruction,
+        "program": written.program,
+        NO_PROGRAM_COLUMN: written.more.get(NO_PROGRAM_COLUMN),
+        "finish_reason": written.finish_reason,
+    }
+    known: dict[str, str | bool] = {name: storable(text) for name, text in texts.items() if text is not None}
+    return known if written.finish_reason is None else {**known, "cut_off": written.is_cut_off}
 
 
 def storable(text: str) -> str:

@@ -3,73 +3,102 @@
 from __future__ import annotations
 
 import re
+from collections import Counter, defaultdict
 from collections.abc import Sequence
+from itertools import chain
 from typing import Any
 
 import polars as pl
 
-from roboeval.analysis.counting.breakdown import (
-    by_ability,
-    compare_phrasings,
-    compare_report_back,
-    spread_by_task,
-)
-from roboeval.analysis.counting.counts import prompt_scores
+from roboeval.analysis.metrics import by_formula, mean_of, prompts_of
 from roboeval.evaluation.judging.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES
+from roboeval.evaluation.runs.rows import Row, failure_of
+from roboeval.evaluation.runs.traces import trace_of
 from roboeval.report.runs import JudgedRun, tasks_of
-from roboeval.report.sheets import Cell, Section, Sheet, section, sheet
+from roboeval.report.sheets import Cell, Sheet, sheet
 
+REPORT_ABILITY = "report-back"
+NO_SUCH_ROOM_ERROR = "GoToInvalidLocation"
 NO_INSTRUCTION = "instruction not recorded"
 REPORTING_TASKS = "come back and report"
 MAX_DISTINCT_WORDS = 12
 
 
-def abilities(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on failures by required ability (paper, section V.B)."""
-    return section("abilities", ability_sheet(runs), report_back_sheet(runs))
-
-
 def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of pass@1 and causes of failures by ability."""
-    order: list[str] = [ability for task in runs[0].suite.tasks.values() for ability in task.abilities]
-    found = {(row[0], run.name): row[1:] for run in runs for row in by_ability(run.table, run.suite)}
-    agent_failed = any(row[-1][AGENT_ERROR_CLASS] for row in found.values())
+    """Build the table of pass@1, with its interval over tasks, and of causes of failures by ability."""
+    tasks = runs[0].suite.tasks
+    found: list[tuple[list[Cell], dict[str, float]]] = []
+    for ability in dict.fromkeys(ability for task in tasks.values() for ability in task.abilities):
+        for run in runs:
+            scores = [one for one in run.scores if one.task in tasks and ability in tasks[one.task].abilities]
+            if scores:
+                passed = by_formula([[p.pass_at(1) for p in one.prompts] for one in scores], over="tasks")
+                is_of_these = pl.col("task").is_in([one.task for one in scores])
+                failed = Counter(run.completions.filter(is_of_these)["failure_class"])
+                shares = {name: failed[name] / sum(failed.values()) for name in FAILURE_CLASSES}
+                estimate = passed.mean, passed.low, passed.high
+                found.append(([ability, run.name, len(scores), *estimate], shares))
+    agent_failed = any(shares[AGENT_ERROR_CLASS] for _, shares in found)
     shown = [name for name in FAILURE_CLASSES if name != AGENT_ERROR_CLASS or agent_failed]
-    rows: list[list[Cell]] = []
-    for ability, name in sorted(found, key=lambda key: order.index(key[0])):
-        tasks, at, failed = found[ability, name]
-        rows.append([ability, name, tasks, at.mean, at.low, at.high, *(failed[name] for name in shown)])
+    rows = [[*cells, *(shares[name] for name in shown)] for cells, shares in found]
     return sheet("abilities", rows, shares=[FAILURE_CLASSES[name].plural for name in shown])
 
 
 def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table that compares the tasks that end with a report to all other tasks."""
+    """Build the table that compares the tasks that end with a report to all others, if there are any."""
+    tasks = runs[0].suite.tasks.items()
+    reporting = {name for name, task in tasks if REPORT_ABILITY in task.abilities}
     rows: list[list[Cell]] = []
     for run in runs:
-        for reports, completions, failed, away, lost, passed in compare_report_back(run.results).iter_rows():
-            tasks = REPORTING_TASKS if reports else "others"
-            shares = [count / failed if failed and count is not None else None for count in (away, lost)]
-            rows.append([run.name, tasks, completions, passed, failed, away, shares[0], lost, shares[1]])
+        if not reporting & {score.task for score in run.scores}:
+            continue
+        failures = [run.results.row(key) for key in run.results.failed]
+        for name, is_reporting in ((REPORTING_TASKS, True), ("others", False)):
+            scores = [one for one in run.scores if (one.task in reporting) == is_reporting]
+            failed = [row for row in failures if (row["task"] in reporting) == is_reporting]
+            if scores:
+                away = sum(map(never_returned, failed))
+                lost = sum(failure_of(row)["kind"] == NO_SUCH_ROOM_ERROR for row in failed)
+                shares = [count / len(failed) if failed else None for count in (away, lost)]
+                passed = mean_of([[prompt.pass_at(1) for prompt in prompts_of(scores)]])
+                counts = sum(one.n for one in scores), passed, len(failed)
+                rows.append([run.name, name, *counts, away, shares[0], lost, shares[1]])
     return sheet("coming-back", rows)
+
+
+def never_returned(row: Row) -> bool:
+    """Whether the robot left its starting room for good in the world where the completion failed.
+
+    Returns False if the trace was too long to be stored.
+    """
+    verdict = row["verdicts"][failure_of(row)["world"]]
+    if "cut" in verdict:
+        return False
+    trace = trace_of(verdict)
+    start = trace[0].place if trace else ""
+    visited = [event.destination for event in trace if event.destination is not None]
+    left = next((at for at, room in enumerate(visited) if room != start), None)
+    return left is not None and start not in visited[left:]
 
 
 # --- phrasing
 
 
-def phrasings(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on the effect of an instruction's phrasing (paper, section V.A)."""
-    return section("phrasing", spread_sheet(runs), phrasing_sheet(runs))
-
-
 def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of the spread of pass@1 over the prompts of each task and run, widest spread first."""
+    """Build the table of the spread of pass@1 over the prompts of each task and run, widest spread first.
+
+    If several prompts are equally good or bad, the first of them is shown.
+    """
+    rows: list[list[Any]] = []
+    for run in runs:
+        for score in run.scores:
+            if len(score.prompts) > 1:
+                worst, best = (end(score.prompts, key=lambda one: one.pass_at(1)) for end in (min, max))
+                ends = worst.prompt, worst.pass_at(1), best.prompt, best.pass_at(1)
+                texts = [run.instructions.get((score.task, one.prompt)) for one in (worst, best)]
+                rows.append([score.task, run.name, ends[3] - ends[1], *ends, *distinct_words(*texts)])
     order = tasks_of(runs)
-    found = [(run, row) for run in runs for row in spread_by_task(run.table).iter_rows()]
-    rows = []
-    for run, (task, width, *ends) in sorted(found, key=lambda pair: (-pair[1][1], order.index(pair[1][0]))):
-        texts = [run.instructions.get((task, prompt)) for prompt in (ends[0], ends[2])]
-        rows.append([task, run.name, width, *ends, *distinct_words(*texts)])
-    return sheet("spread", rows)
+    return sheet("spread", sorted(rows, key=lambda row: (-row[2], order.index(row[0]))))
 
 
 def distinct_words(one: str | None, other: str | None) -> tuple[str, str]:
@@ -87,14 +116,25 @@ def _join(words: Sequence[str]) -> str:
 
 
 def phrasing_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table that compares each prompt with the mean of its task, most harmful prompts first."""
+    """Build the table that compares each prompt with the mean of its task, most harmful prompts first.
+
+    It covers tasks with several prompts. A prompt hurts a run if it is worse than the mean.
+    """
+    better: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
+    for score in chain.from_iterable(run.scores for run in runs):
+        mean = mean_of([[prompt.pass_at(1) for prompt in score.prompts]])
+        for prompt in score.prompts:
+            better[score.task, prompt.prompt].append(prompt.pass_at(1) - mean)
+    prompts = Counter(task for task, _ in better)
+    rows = [
+        [*key, mean_of([each]), sum(one < 0 for one in each), len(each), _instructions(runs, key)]
+        for key, each in better.items()
+        if prompts[key[0]] > 1
+    ]
     order = tasks_of(runs)
-    scores = [prompt_scores(run.table).with_columns(model=pl.lit(at)) for at, run in enumerate(runs)]
-    found = compare_phrasings(pl.concat(scores)).rows()
-    rows = sorted(found, key=lambda row: (row[2], order.index(row[0]), row[1]))
-    return sheet("phrasings", [[*row, _instructions(runs, row[:2])] for row in rows])
+    return sheet("phrasings", sorted(rows, key=lambda row: (row[2], order.index(row[0]), row[1])))
 
 
-def _instructions(runs: Sequence[JudgedRun], key: Any) -> str:  # noqa: ANN401 - table cells may have any type
+def _instructions(runs: Sequence[JudgedRun], key: tuple[str, int]) -> str:
     found = {run.instructions.get(key) for run in runs} - {None}
     return " / ".join(sorted(map(str, found))) or NO_INSTRUCTION

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
-from codebotler.core.errors import UserError
-from roboeval.analysis.cost import budgets, cost_of
+import polars as pl
+
 from roboeval.analysis.metrics import threshold_curve
-from roboeval.analysis.resample import LIMITS, CheckedPrompt, accepted_after, resample
-from roboeval.evaluation.runs.table import Price
+from roboeval.analysis.resample import (
+    LIMITS,
+    CheckedPrompt,
+    accepted_after,
+    final_chances,
+    mean_requests,
+    resample,
+)
+from roboeval.evaluation.runs.table import MILLION
 from roboeval.report.figures.curves import draw_accepted, draw_limits, most_completions
 from roboeval.report.runs import JudgedRun, runs_to_draw
 from roboeval.report.sheets import Cell, ReportFigure, Section, Sheet, section, sheet
@@ -16,11 +25,11 @@ from roboeval.report.sheets import Cell, ReportFigure, Section, Sheet, section, 
 
 def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on rejection sampling, for runs whose programs were checked."""
-    checked = {run.name: run.trials for run in runs if run.trials}
+    checked = {run.name: run.checked for run in runs if run.checked}
     points = {name: retry_curves(prompts) for name, prompts in checked.items()}
     shares = {name: accepted_after(prompts, LIMITS[-1]) for name, prompts in checked.items()}
     steps = [[retries, *those] for retries, those in enumerate(zip(*shares.values(), strict=True))]
-    drawn, left_out = runs_to_draw([run for run in runs if run.trials])
+    drawn, left_out = runs_to_draw([run for run in runs if run.checked])
     curves = {run.name: points[run.name] for run in drawn}
     lines = {run.name: shares[run.name] for run in drawn}
     retries: list[list[Cell]] = []
@@ -53,21 +62,53 @@ def retry_curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float
 # --- tokens, time and money
 
 
-def costs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
-    """Build the section on the cost of programs, for runs that recorded it."""
-    return section("cost", cost_sheet(runs, prices), budget_sheet(runs, prices))
+class RunCost(NamedTuple):
+    """The cost of completions in total and per passing program. Values that were not recorded are None."""
+
+    completions: int
+    passed: int
+    uncounted: int  # completions without token counts, such as refused requests
+    input_tokens: int | None
+    output_tokens: int | None
+    seconds: float | None
+    money: float | None
+    tokens_per_pass: float | None
+    seconds_per_pass: float | None
+    money_per_pass: float | None
 
 
-def cost_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
+def cost_of(run: JudgedRun) -> RunCost:
+    """Compute the cost of the completions of a run."""
+    completions, price = run.completions, run.price
+    passed = int(completions["passed"].sum())
+    sent, received = _tokens(completions)
+    seconds = math.fsum(completions["latency_s"].drop_nulls()) or None
+    tokens = None if sent is None or received is None else sent + received
+    money = None if price is None or sent is None or received is None else price.of(sent, received)
+    each = (_per(total, passed) for total in (tokens, seconds, money))
+    uncounted = completions.height - _counted(completions).height
+    return RunCost(completions.height, passed, uncounted, sent, received, seconds, money, *each)
+
+
+def _counted(completions: pl.DataFrame) -> pl.DataFrame:
+    return completions.select("input_tokens", "output_tokens").drop_nulls()
+
+
+def _tokens(completions: pl.DataFrame) -> tuple[int, int] | tuple[None, None]:
+    sent, received = map(int, _counted(completions).sum().row(0))
+    return (sent, received) if sent + received else (None, None)
+
+
+def cost_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """Build the table of each run's cost, in total and per passing program."""
-    found = [(run.name, cost_of(run.table, price_of(run, prices))) for run in runs]
+    found = [(run.name, cost_of(run)) for run in runs]
     known = [one for one in found if one[1].input_tokens is not None or one[1].seconds is not None]
     return sheet("cost", [[name, *one] for name, one in known])
 
 
-def cost_sentence(run: JudgedRun, prices: Mapping[str, Price]) -> str:
+def cost_sentence(run: JudgedRun) -> str:
     """Describe the cost per passing program. Return an empty string if no cost was recorded."""
-    cost = cost_of(run.table, price_of(run, prices))
+    cost = cost_of(run)
     parts = (
         (cost.money_per_pass, "${:.3g}"),
         (cost.tokens_per_pass, "{:,.0f} tokens"),
@@ -77,36 +118,41 @@ def cost_sentence(run: JudgedRun, prices: Mapping[str, Price]) -> str:
     return f"Cost per pass: {', '.join(each)}" if each else ""
 
 
-def budget_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
+class Budget(NamedTuple):
+    """The number of passing programs that a budget yields with rejection sampling."""
+
+    retries: int
+    requests: float  # mean number per program
+    per_thousand_requests: float  # number of passing programs
+    per_million_tokens: float | None  # number of passing programs, or None if tokens were not recorded
+    per_money: float | None  # number of passing programs per unit of money, or None if unknown
+
+
+def budgets(run: JudgedRun) -> Iterator[Budget]:
+    """Yield a budget for each limit on retries (paper, section VI). All programs must have been checked."""
+    completions, prompts, price = run.completions, run.checked, run.price
+    counts = pl.col("input_tokens", "output_tokens").fill_null(0)
+    means = completions.group_by("task", "prompt").agg(counts.mean())
+    tokens = {} if None in _tokens(completions) else {row[:2]: row[2:] for row in means.iter_rows()}
+    each = [tokens.get((prompt.task, prompt.prompt), (0.0, 0.0)) for prompt in prompts]
+    for retries in LIMITS:
+        asked = [mean_requests(prompt.rejected, retries) for prompt in prompts]
+        passed = sum(final_chances(prompt, retries).passed for prompt in prompts)
+        sent, received = (math.fsum(n * t[at] for n, t in zip(asked, each, strict=True)) for at in (0, 1))
+        yield Budget(
+            retries,
+            requests=sum(asked) / len(asked),
+            per_thousand_requests=1_000 * passed / sum(asked),
+            per_million_tokens=_per(MILLION * passed, sent + received),
+            per_money=None if price is None else _per(passed, price.of(sent, received)),
+        )
+
+
+def budget_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """Build a table that shows how many passing programs a budget buys, for runs with checked programs."""
-    checked = [run for run in runs if run.trials]
-    rows = [[run.name, *one] for run in checked for one in budgets(run.table, price_of(run, prices))]
+    rows = [[run.name, *one] for run in runs if run.checked for one in budgets(run)]
     return sheet("budget", rows)
 
 
-def read_prices(texts: Sequence[str]) -> dict[str, Price]:
-    """Parse prices of the form `MODEL=INPUT/OUTPUT`, and return them by model."""
-    prices: dict[str, Price] = {}
-    for text in texts:
-        model, _, numbers = text.rpartition("=")
-        try:
-            price = Price.read(numbers)
-        except ValueError:
-            price = None
-        if price is None or not model:
-            raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, per million tokens')
-        prices[model] = price
-    return prices
-
-
-def price_of(run: JudgedRun, prices: Mapping[str, Price]) -> Price | None:
-    """Return the price that was given for a run's folder, name or model, or None if none was given."""
-    return next((prices[name] for name in (run.folder, run.name, run.model or "") if name in prices), None)
-
-
-def expect_known(prices: Mapping[str, Price], runs: Sequence[JudgedRun]) -> None:
-    """Raise UserError if a price is given for a model that no run used."""
-    for model, price in prices.items():
-        if not any(price_of(run, {model: price}) for run in runs):
-            names = ", ".join(run.name for run in runs)
-            raise UserError(f'--price is given for "{model}", but the runs are {names}')
+def _per(total: float | None, count: float) -> float | None:
+    return None if total is None or not count else total / count

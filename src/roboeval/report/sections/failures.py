@@ -1,13 +1,15 @@
-"""Builds the sections on causes of failures, groups of similar failures, and verdicts under another suite."""
+"""Builds the sections on failures, and on verdicts under another suite or under house rules."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from roboeval.analysis.comparisons.verdict_changes import ranks, sentences, verdict_changes
-from roboeval.analysis.counting.counts import tally_of
+from roboeval.analysis.counting.broken_rules import count_broken_rules
+from roboeval.analysis.counting.counts import tally_of, task_scores
 from roboeval.analysis.counting.summary import ALL, Causes, causes
 from roboeval.analysis.failure_groups import FailureGroup, describe_groups, group_failures
+from roboeval.analysis.metrics import overall
 from roboeval.evaluation.judging.failures import plural_of
 from roboeval.evaluation.runs.completions import name_of
 from roboeval.report import paper
@@ -109,7 +111,7 @@ def _cells(one: FailureGroup) -> list[Cell]:
     return [one.task, *ground, one.why, name_of(one.representative)]
 
 
-# --- other checks
+# --- verdicts under another suite, and under house rules
 
 
 def other_suite(runs: Sequence[JudgedRun]) -> Section:
@@ -134,3 +136,25 @@ def other_suite(runs: Sequence[JudgedRun]) -> Section:
             reversals.append([one.name, f"{suite} only", len(group.members), *_cells(group)])
     sheets = sheet("beside", scores), sheet("beside-tasks", tasks), sheet("reversals", reversals)
     return section("beside", Prose(sentences(found)), *sheets)
+
+
+def house(runs: Sequence[JudgedRun]) -> Section:
+    """Build the section on house rules, for runs judged both with and without them."""
+    rows: list[list[Cell]] = []
+    by_rule: list[list[Cell]] = []
+    notes = []
+    for run in runs:
+        if run.house is None:
+            continue
+        found = count_broken_rules(run.house.table, run.results.table)
+        broken, cost = found.broken, found.cost
+        assert cost is not None, "it was also judged without rules"
+        scores = overall(run.scores, 1).mean, overall(task_scores(run.house.table), 1).mean
+        rows.append([run.name, broken.mean, broken.low, broken.high, *scores, cost.mean, cost.low, cost.high])
+        by_rule += [[rule, run.name, count] for rule, count in found.by_rule.items()]
+        notes += [
+            f"{run.name}: the interval of the {what} is {estimate.ends()}."
+            for what, estimate in (("share that breaks a rule", broken), ("difference", cost))
+            if not estimate.is_known
+        ]
+    return section("house", sheet("house", rows, notes=notes), sheet("broken-rules", by_rule))

@@ -6,27 +6,43 @@ from collections.abc import Sequence
 
 import polars as pl
 
-from roboeval.analysis.comparisons.missions import has_missions, mission_costs
-from roboeval.analysis.counting.counts import completions_of
+from codebotler.core.errors import VIOLATION
+from roboeval.analysis.comparisons.compare import has_missions, per_mission
+from roboeval.analysis.counting.counts import completions_of, task_scores
+from roboeval.analysis.metrics import overall
+from roboeval.evaluation.runs.endings import OUTSIDE_CONTRACT
 from roboeval.report.runs import JudgedRun
-from roboeval.report.sheets import Cell, Section, Sheet, section, sheet
-
-
-def modes(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on the missions of each run."""
-    acted = [run for run in runs if has_missions(run.table)]
-    return section("modes", mode_sheet(runs if acted else []), ending_sheet(acted))
+from roboeval.report.sheets import Cell, Sheet, sheet
 
 
 def mode_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of missions by run."""
+    """Build the table of the success rate and the costs of missions by run, if any run is of an agent."""
     rows: list[list[Cell]] = []
-    for run in runs:
-        one = mission_costs(_table(run))
-        share = one.satisfied.mean, one.satisfied.low, one.satisfied.high, one.forbidden
-        means = one.turns, one.tool_errors, one.tokens, one.tokens_per_success
-        rows.append([run.name, one.mode, one.missions, *share, *means])
+    for run in runs if any(has_missions(run.table) for run in runs) else ():
+        completions, missions = run.completions, per_mission(_table(run))
+        success = overall(task_scores(missions), 1)
+        tokens = _mean(completions["input_tokens"] + completions["output_tokens"])
+        passed = int(missions["satisfied"].sum()) / missions.height
+        ended = missions["error_kind"].is_in([VIOLATION, OUTSIDE_CONTRACT]).fill_null(value=False)
+        rows.append(
+            [
+                run.name,
+                str(completions["mode"].drop_nulls().first() or "program"),
+                missions.height,
+                *(success.mean, success.low, success.high),
+                _mean(ended) or 0.0,
+                _mean(completions["turns"]),
+                _mean(completions["tool_errors"]),
+                tokens,
+                tokens / passed if tokens and passed else None,
+            ]
+        )
     return sheet("modes", rows)
+
+
+def _mean(values: pl.Series) -> float | None:
+    known = values.drop_nulls()
+    return float(known.sum()) / len(known) if len(known) else None
 
 
 def ending_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -42,6 +58,7 @@ def ending_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     rows = [
         [run.name, *ended]
         for run in runs
+        if has_missions(run.table)
         for ended in completions_of(_table(run))
         .group_by("ending")
         .agg(*columns)

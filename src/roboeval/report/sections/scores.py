@@ -10,10 +10,10 @@ from roboeval.analysis.comparisons.compare import (
     MAX_PAIRS,
     compare_tables,
     comparison_sentence,
+    has_missions,
     other_differences,
     pairs_to_compare,
 )
-from roboeval.analysis.comparisons.missions import has_missions
 from roboeval.analysis.metrics import (
     TaskScore,
     by_formula,
@@ -145,11 +145,6 @@ def leader(runs: Sequence[JudgedRun]) -> list[str]:
         return [comparison_sentence(found, (second.name, best.name))]
     except UserError:  # no prompt in common
         return []
-
-
-def prompts(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on pass@1 by prompt, with the published results."""
-    return section("prompts", prompt_sheet(runs), paper.published_sheet(runs))
 
 
 def prompt_sheet(runs: Sequence[JudgedRun]) -> Sheet:

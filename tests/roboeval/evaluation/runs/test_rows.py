@@ -15,7 +15,7 @@ from codebotler.core.files import to_line
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.results import Results, read_results
-from roboeval.evaluation.runs.rows import Row
+from roboeval.evaluation.runs.rows import Row, key_of
 from roboeval.suites.load import Suite
 from seals import unseal
 
@@ -69,20 +69,21 @@ def test_a_finished_evaluation_says_how_many_rows_it_has_and_their_hash(run: Run
 
 def test_only_the_rows_of_a_named_task_are_read(run: RunFolder) -> None:
     found = read(run, task="LunchTime")
-    assert b"".join(found.lines) == run.rows("paper").read_bytes()
+    assert [key_of(found.row(key)) for key in found.places] == [*found.places]
     assert len(found.places) == 3
     others = read(run, task="SayGoodDay")
-    assert (len(others.table), others.lines) == (0, [])
+    assert (len(others.table), others.places) == (0, {})
 
 
 @pytest.mark.parametrize("content", [b"", b"another row\n" * 500])
-def test_lines_of_a_file_that_was_replaced_are_not_taken_for_those_read(
+def test_rows_of_a_file_that_was_replaced_are_not_taken_for_those_read(
     run: RunFolder, content: bytes
 ) -> None:
     found = read(run)
     run.rows("paper").write_bytes(content)
-    with pytest.raises(UserError, match="replaced"):
-        assert found.lines
+    for key in found.places:
+        with pytest.raises(UserError, match="replaced"):
+            found.row(key)
 
 
 def test_no_flipped_bit_is_overlooked(run: RunFolder, paper: Suite) -> None:

@@ -130,7 +130,7 @@ def test_a_table_counts_the_events_that_were_not_kept(suite: Suite) -> None:
 @pytest.mark.parametrize("negated", [False, True])
 def test_a_formula_is_undecided_where_the_trace_was_cut(suite: Suite, *, negated: bool) -> None:
     formula = 'tr.Exists(say("bye"))'
-    found = match_row(cut_row(suite), TraceQuery(formula, negated), parse(formula))
+    found = match_row(cut_row(suite), TraceQuery(parse(formula), negated))
     assert found.cut == ((1, "World 0"),)
     assert found.worlds == (((2, "World 1"),) if negated else ())
-    assert len(match_row(cut_row(suite), TraceQuery(), None).worlds) == 2
+    assert len(match_row(cut_row(suite), TraceQuery()).worlds) == 2

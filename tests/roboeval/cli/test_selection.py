@@ -6,7 +6,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from made_results import results_of
-from roboeval.evaluation.runs.selection import Selection, expect_judged, names_completion, parse_selection
+from roboeval.cli.inputs import Selection, expect_judged, names_completion, parse_selection
 from small_run import ROWS, SUITE
 
 
