@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -20,7 +19,6 @@ from codebotler.core.yaml_files import YamlFile
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.settings import SimulationSettings
 from roboeval.suites.house import HouseRules
-from roboeval.suites.installed import installed_folder, installed_suites
 from roboeval.suites.schema import MAX_WORLDS, SuiteFile
 from roboeval.suites.task import Task
 from roboeval.suites.taskfile import read_task
@@ -30,7 +28,6 @@ if TYPE_CHECKING:
 
 ABLATED = "-ablation"  # file suffix of ablations; suite names may not end like this
 SUITES = Path(__file__).parent
-SUITE_NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 
 @dataclass(frozen=True)
@@ -106,29 +103,6 @@ class Suite:
             known = ", ".join(self.tasks)
             raise UserError(f'the suite "{self.name}" has no task "{name}"; its tasks are {known}')
         return self.tasks[name]
-
-
-def shipped_suites() -> tuple[str, ...]:
-    """Return the names of the suites that ship with RoboEval."""
-    return tuple(sorted(path.parent.name for path in SUITES.glob("*/suite.yaml")))
-
-
-def known_suites() -> tuple[str, ...]:
-    """Return the names of the suites that ship with RoboEval or with installed packages."""
-    return tuple(dict.fromkeys([*shipped_suites(), *sorted(installed_suites().names)]))
-
-
-def suite_folder(name: str) -> Path:
-    """Return the folder of a built-in or installed suite, or a folder's path. Otherwise, raise UserError."""
-    if name in shipped_suites():
-        return SUITES / name
-    if SUITE_NAME.fullmatch(name) and (installed := installed_folder(name)) is not None:
-        return installed.resolve()
-    folder = Path(name)
-    if not (folder / "suite.yaml").is_file():
-        known = ", ".join(known_suites())
-        raise UserError(f'unknown suite "{name}"; use one of {known}, or a folder with a suite.yaml')
-    return folder.resolve()
 
 
 def task_files(folder: Path) -> list[Path]:
