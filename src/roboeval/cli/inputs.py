@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
     """Read a suite by name or folder, with optional files of house rules and additional skills."""
-    from codebotler.checking.house_rules.evasions import find_evasions
+    from codebotler.checking.house_rules.rooms import find_evasions
     from codebotler.core.errors import UserError
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.paper import SKILLS

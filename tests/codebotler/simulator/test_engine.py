@@ -753,7 +753,7 @@ def test_what_a_shell_has_set_changes_no_outcome() -> None:
 
 HANDED_OVER = """
 from hashlib import sha256
-from codebotler.simulator.process.bytecode import code_of, compiled_modules
+from codebotler.simulator.process.spawn import code_of, compiled_modules
 print(sha256(compiled_modules(code_of)).hexdigest())
 """
 
