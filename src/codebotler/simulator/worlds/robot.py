@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
+from typing import Any, NoReturn, Protocol, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import RobotError, UserError
@@ -19,12 +19,24 @@ from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings, ch
 from codebotler.simulator.worlds.entities import Thing
 from codebotler.simulator.worlds.simulated_world import NO_SUCH_THING, SimulatedWorld, unknown_room
 
-if TYPE_CHECKING:
-    from codebotler.simulator.guard.rule_guard import RuleGuard
-
 Argument: TypeAlias = Scalar | tuple[Option, ...] | tuple[Scalar, ...]
 Result: TypeAlias = Scalar | list[str] | list[Scalar] | None
 Setup: TypeAlias = tuple[str, tuple[Any, ...]]  # `simulated` or `sampled`, and the arguments to make a copy
+
+
+class SkillGuard(Protocol):
+    """Judges each skill call before a robot executes it."""
+
+    may_refuse: bool
+
+    def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Let a robot execute one skill, or raise RobotError if it is forbidden."""
+
+    def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
+        """Raise RobotError if an action inside one of the user's own skills is forbidden."""
+
+    def at_end(self) -> RobotError | None:
+        """Return the error that arises if the run ends now, or None if there is none."""
 
 
 class SimulatedRobot(SimulatedWorld):
@@ -38,7 +50,7 @@ class SimulatedRobot(SimulatedWorld):
         settings: SimulationSettings = PAPER_SETTINGS,
         skills: SkillTable = SKILLS,
         *,
-        guard: RuleGuard | None = None,
+        guard: SkillGuard | None = None,
     ) -> None:
         super().__init__(world, settings)
         self.guard, self.skills = guard, skills

@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.kinds import ASK, CHECK, PICK, PLACE
@@ -31,13 +31,10 @@ from codebotler.simulator.worlds.matching import (
     meant_by,
     normalized,
 )
-from codebotler.simulator.worlds.robot import SimulatedRobot
+from codebotler.simulator.worlds.robot import SimulatedRobot, SkillGuard
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.simulator.worlds.sampled_facts import ExploredRoom, RoomSearch, SampledFact, whereabouts
 from codebotler.simulator.worlds.simulated_world import NO_SUCH_THING
-
-if TYPE_CHECKING:
-    from codebotler.simulator.guard.rule_guard import RuleGuard
 
 AS_WRITTEN = SimulationSettings(literals="as-written", matching="longest-name")  # as on a robot
 AGREEING_TEXT = re.compile(r"\s*(?:yes|yeah|sure|ok)\b", re.IGNORECASE)
@@ -64,7 +61,7 @@ class SampledRobot(SimulatedRobot):
         settings: SimulationSettings = AS_WRITTEN,
         skills: SkillTable = SKILLS,
         *,
-        guard: RuleGuard | None = None,
+        guard: SkillGuard | None = None,
     ) -> None:
         rooms = [*map(Room, room_map.rooms), *(Room(place, within=room) for place, room in room_map.places)]
         world = World(tuple(rooms), room_map.start, traits=room_map.traits)
