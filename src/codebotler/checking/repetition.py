@@ -7,7 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from codebotler.checking.problems import CheckResult, Problem, Sample
+from codebotler.checking.problems import CheckResult, Problem
 from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.kinds import PICK, PLACE
@@ -60,7 +60,12 @@ def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = 
     held = held_after(past)
     finished = [one for one in found.samples if one.outcome.status is Status.FINISHED]
     puts_down = "place" in called_skills(parse_leniently(begun))
-    if held and puts_down and finished and all(map(_keeps, finished)):
+    if (
+        held
+        and puts_down
+        and finished
+        and not any(event.kind == PLACE for one in finished for event in one.outcome.trace)
+    ):
         message = f'at the end, the robot still holds "{brief(held)}", which the first program puts down'
         problems.append(Problem("KeepsThing", message, samples=tuple(one.number for one in finished)))
     return replace(found, problems=tuple(problems), samples=tuple(samples))
@@ -126,7 +131,9 @@ def has_same_effect(one: Event, other: Event, room_map: RoomMap) -> bool:
     """Return whether two steps say, ask or do the same in the same room. A thing may be picked up again."""
     if one.kind != other.kind or one.kind == PICK or not _has_effect(one.kind):
         return False
-    if _room(one, room_map) != _room(other, room_map) or _person(one) != _person(other):
+    if _room(one, room_map) != _room(other, room_map) or normalized(one.to or "") != normalized(
+        other.to or ""
+    ):
         return False
     is_equal = _words(one.text) == _words(other.text) and one.more == other.more
     return is_equal or (is_spoken(one.kind) and _says_same(one.text, other.text))
@@ -162,10 +169,6 @@ def _room(event: Event, room_map: RoomMap) -> str:
     return (event.place if room is None else room).casefold()
 
 
-def _person(event: Event) -> str:
-    return normalized(event.to or "")
-
-
 def _says_same(one: str, other: str) -> bool:
     """Return whether two texts differ only in words and numbers that one of them adds."""
     if polarity(one) is not polarity(other):
@@ -181,8 +184,3 @@ def _words(text: str) -> list[str]:
 
 def _numbers(text: str) -> list[tuple[float, ...]]:
     return [numbers for _, _, numbers in numerals(text)]
-
-
-def _keeps(sample: Sample) -> bool:
-    """Return whether a run ends without putting down what the robot held before it."""
-    return all(event.kind != PLACE for event in sample.outcome.trace)

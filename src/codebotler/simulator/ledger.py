@@ -47,6 +47,12 @@ class SkillPerformer(Protocol):
         """Let time pass until `now` seconds since the start, or until the robot is stopped."""
 
 
+def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, bool]:
+    """Return a run's parameters: fuel, simulated seconds, start of the clocks, and whether it is live."""
+    settings = robot.settings
+    return settings.limits.ticks, settings.limits.seconds, settings.clock_starts.timestamp(), robot.is_live
+
+
 class Ledger:
     """Counts the requests of one run to its robot, up to a limit."""
 

@@ -12,7 +12,16 @@ from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import Scalar
 from codebotler.core.text.unicode import compose
 from codebotler.core.trace import Option, Outcome, Status
-from codebotler.simulator.ledger import MAX_LINE, STOP, WAITS, Ledger, SkillAnswer, SkillPerformer, too_long
+from codebotler.simulator.ledger import (
+    MAX_LINE,
+    STOP,
+    WAITS,
+    Ledger,
+    SkillAnswer,
+    SkillPerformer,
+    run_parameters,
+    too_long,
+)
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
 from codebotler.simulator.process.exit_status import cause_of_death
 from codebotler.simulator.process.isolated_process import IsolatedProcess
@@ -110,12 +119,6 @@ def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
         (skill.name, tuple((p.name, p.kind, p.type.choices, p.words) for p in skill.parameters))
         for skill in robot.skills.rows
     )
-
-
-def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, bool]:
-    """Return a run's parameters: fuel, simulated seconds, start of the clocks, and whether it is live."""
-    settings = robot.settings
-    return settings.limits.ticks, settings.limits.seconds, settings.clock_starts.timestamp(), robot.is_live
 
 
 def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:

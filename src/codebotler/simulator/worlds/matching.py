@@ -187,13 +187,9 @@ def trait_words(traits: Iterable[Trait]) -> frozenset[str]:
     return frozenset(word for text in texts for word in content_words(text))
 
 
-def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
-    """Return the room that a request means, or None if it means none or could mean several."""
-    return _resolve_room(tuple(rooms), request, matching)
-
-
 @lru_cache(maxsize=65_536)
-def _resolve_room(rooms: tuple[str, ...], request: str, matching: Matching) -> str | None:
+def resolve_room(rooms: tuple[str, ...], request: str, matching: Matching) -> str | None:
+    """Return the room that a request means, or None if it means none or could mean several."""
     if matching == "longest-name":
         meant = meant_by(request, rooms)
         return meant[0] if len(meant) == 1 else None

@@ -6,8 +6,8 @@ import json
 import logging
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome, Status, Trace
@@ -151,43 +151,41 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
         )
 
 
-@dataclass(frozen=True)
-class Ran:
+class Ran(NamedTuple):
     """What a program did in the worlds in which it is judged."""
 
     task: str
     acted: Acted | None  # where an agent acted; None for a program, which is judged in all worlds
     outcomes: Sequence[Outcome]
 
-    def scenarios(self, suite: Suite, *, ablated: bool) -> tuple[Scenario, ...]:
-        """Return the worlds with their requirements."""
-        scenarios = suite.tasks[self.task].judged_in(ablated=ablated)
-        return scenarios if self.acted is None else scenarios[self.acted.world :][:1]
+
+def _scenarios(suite: Suite, task: str, acted: Acted | None, *, ablated: bool) -> tuple[Scenario, ...]:
+    """Return the worlds in which a program is judged, with their requirements."""
+    scenarios = suite.tasks[task].judged_in(ablated=ablated)
+    return scenarios if acted is None else scenarios[acted.world :][:1]
 
 
 def run_in_worlds(suite: Suite, worker: Worker, works: Sequence[Work], *, ablated: bool) -> list[Ran]:
     """Run programs in the worlds of their tasks, and missions of agents in the worlds where they acted."""
     planned = [
-        (program, Ran(task, Acted(int(where[0]), where[1]) if where else None, ()))
-        for task, program, *where in works
+        (task, program, Acted(int(where[0]), where[1]) if where else None) for task, program, *where in works
     ]
     jobs = [
-        (program, [partial(robot_in, one.world, suite) for one in ran.scenarios(suite, ablated=ablated)])
-        for program, ran in planned
+        (
+            program,
+            [partial(robot_in, one.world, suite) for one in _scenarios(suite, task, acted, ablated=ablated)],
+        )
+        for task, program, acted in planned
     ]
     return [
-        replace(ran, outcomes=_with_ending(outcomes, ran.acted))
-        for (_, ran), outcomes in zip(planned, worker.run_all(jobs), strict=True)
+        Ran(task, acted, outcomes if acted is None else [apply_ending(one, acted.ending) for one in outcomes])
+        for (task, _, acted), outcomes in zip(planned, worker.run_all(jobs), strict=True)
     ]
 
 
-def _with_ending(outcomes: list[Outcome], acted: Acted | None) -> list[Outcome]:
-    return outcomes if acted is None else [apply_ending(outcome, acted.ending) for outcome in outcomes]
-
-
-def robot_in(world: World, suite: Suite, contracts: Sequence[Contract] = ()) -> SimulatedRobot:
+def robot_in(world: World, suite: Suite) -> SimulatedRobot:
     """Return a simulated robot in a world, with the simulation settings and house rules of a suite."""
-    return SimulatedRobot(world, suite.settings, suite.skills, guard=guard_of(suite, contracts))
+    return SimulatedRobot(world, suite.settings, suite.skills, guard=guard_of(suite))
 
 
 def guard_of(suite: Suite, contracts: Sequence[Contract] = ()) -> RuleGuard | None:
@@ -207,7 +205,7 @@ def run_in(
 
 def judge_outcomes(suite: Suite, ran: Ran, *, ablated: bool) -> tuple[bytes, ...] | None:
     """Return the judgement on a program for each prompt as JSON, or None if judging takes too long."""
-    outcomes, scenarios = ran.outcomes, ran.scenarios(suite, ablated=ablated)
+    outcomes, scenarios = ran.outcomes, _scenarios(suite, ran.task, ran.acted, ablated=ablated)
 
     def compute() -> tuple[bytes, ...]:
         with time_limit(BUDGET):
