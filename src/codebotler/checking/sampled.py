@@ -15,7 +15,7 @@ from codebotler.core.text.words import listed
 from codebotler.core.trace import Outcome, Status
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.guard.rule_guard import RuleGuard
-from codebotler.simulator.process.exit_status import PROCESSOR_TIME
+from codebotler.simulator.process.errors import PROCESSOR_TIME
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Job, Worker
 from codebotler.simulator.worlds.fact_sampler import FactSampler

@@ -22,8 +22,7 @@ from codebotler.simulator.ledger import (
     run_parameters,
     too_long,
 )
-from codebotler.simulator.process.errors import LostProcessError, ProtocolError
-from codebotler.simulator.process.exit_status import cause_of_death
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError, cause_of_death
 from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
 from codebotler.simulator.worlds.robot import Argument, Result

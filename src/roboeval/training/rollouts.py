@@ -9,8 +9,7 @@ from functools import partial
 from codebotler.simulator.engine import digest
 from roboeval.evaluation.rewards import AskedWorlds, Components, RewardWork, judge_works, requirements_of
 from roboeval.suites.families.tasks import TRAINING_WORLDS, trained_task
-from roboeval.suites.house import HouseRules
-from roboeval.suites.suite import Suite
+from roboeval.suites.suite import HouseRules, Suite
 
 __all__ = ["Components", "Rollout", "judge"]
 

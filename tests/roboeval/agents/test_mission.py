@@ -20,8 +20,8 @@ from roboeval.evaluation.recording import SLEEP, RecordingRobot
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import recorded_completions
-from roboeval.suites.house import HouseRules
 from roboeval.suites.load import Scenario, Suite, load_suite
+from roboeval.suites.suite import HouseRules
 
 TASK, WORLD = "LunchTime", 0
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import logging
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome, Status, Trace
@@ -20,7 +20,6 @@ from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.robot import SimulatedRobot
 from roboeval.evaluation.engines.engine import Local, OpenEngine, Work
 from roboeval.evaluation.judging.failures import Verdict
-from roboeval.evaluation.judging.result_cache import ResultCache
 from roboeval.evaluation.judging.serialization import add_reply_fault, judgements_for, row_line
 from roboeval.evaluation.judging.time_limit import TimeLimitExceeded, time_limit
 from roboeval.evaluation.runs.completions import Acted, Completion, find_key_fault, name_of
@@ -31,9 +30,6 @@ from roboeval.suites.load import Requirement, Scenario, Suite
 _log = logging.getLogger("roboeval.evaluation.judging.judge")
 
 BUDGET = 60  # seconds of processor time for judging one program in all its worlds
-
-REQUIREMENT_CACHE: ResultCache[tuple[bool, ...]] = ResultCache()
-JUDGEMENT_CACHE: ResultCache[tuple[bytes, ...]] = ResultCache()
 
 
 def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
@@ -217,3 +213,41 @@ def judge_outcomes(suite: Suite, ran: Ran, *, ablated: bool) -> tuple[bytes, ...
         return JUDGEMENT_CACHE.of(key, (tuple(outcomes), scenarios), outcomes, compute)
     except TimeLimitExceeded:
         return None
+
+
+# --- caches
+
+
+MAX_RESULTS, MAX_RESULT_EVENTS = 2_048, 128  # limits on entries, and on all events in an entry's runs
+
+CachedResult = TypeVar("CachedResult")
+
+
+class ResultCache(Generic[CachedResult]):
+    """Caches results by run, because many programs behave identically in a world or in similar worlds."""
+
+    def __init__(self) -> None:
+        # Keys contain object ids, which must not be reused, so entries keep the objects alive.
+        self._known: dict[tuple[object, ...], tuple[CachedResult, object]] = {}
+
+    def of(
+        self,
+        key: tuple[object, ...],
+        keep_alive: object,
+        runs: Iterable[Outcome],
+        compute: Callable[[], CachedResult],
+    ) -> CachedResult:
+        """Return the cached result for the runs, or compute it. The entry keeps `keep_alive` alive."""
+        known = self._known.get(key)  # another thread may clear the cache at any moment
+        if known is not None:
+            return known[0]
+        value = compute()
+        if len(self._known) >= MAX_RESULTS:
+            self._known.clear()
+        if sum(len(outcome.trace) for outcome in runs) <= MAX_RESULT_EVENTS:
+            self._known[key] = value, keep_alive
+        return value
+
+
+REQUIREMENT_CACHE: ResultCache[tuple[bool, ...]] = ResultCache()
+JUDGEMENT_CACHE: ResultCache[tuple[bytes, ...]] = ResultCache()
