@@ -142,10 +142,24 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
         total[name] += (usage or {}).get(name) or 0
 
 
-def run_metadata(
+def begin_batch(
+    run: RunFolder, plan: GenerationPlan, model: str, settings: SamplingSettings
+) -> tuple[dict[str, Any], set[CompletionKey], list[CompletionKey]]:
+    """Return the content of run.json with the batch of a plan, the keys that are done, and those to request.
+
+    Raises UserError if existing completions have other settings.
+    """
+    about, done = _run_metadata(run, plan, model, settings), {one.key for one in plan.completed(run)}
+    copied = {one.key for one in plan.given()}
+    todo = [key for key in plan.keys() if key not in done | copied]  # noqa: SIM118 - a plan is no mapping
+    if todo:
+        about["batches"] = _with_batch(about["batches"], plan, settings)
+    return about, done, todo
+
+
+def _run_metadata(
     run: RunFolder, plan: GenerationPlan, model: str, settings: SamplingSettings
 ) -> dict[str, Any]:
-    """Return the content of run.json. Raise UserError if existing completions have other settings."""
     suite = plan.suite
     fixed = {"model": model, "settings": _recorded(settings), **plan.describe(), "suite": suite.name}
     earlier: dict[str, Any] = {}
@@ -172,7 +186,7 @@ def _recorded(settings: SamplingSettings) -> dict[str, Any]:
     }
 
 
-def with_batch(
+def _with_batch(
     earlier: list[dict[str, Any]], plan: GenerationPlan, settings: SamplingSettings
 ) -> list[dict[str, Any]]:
     """Append the batch of a plan, unless the last batch is the same one."""
