@@ -171,13 +171,9 @@ def _fit(request: str, label: str, traits: frozenset[str], anybody: tuple[str, .
     if named and not traits:
         return named
     others = [word for word in content_words(rest) if not means_anybody(word, anybody)]
-    if not all(_singulars(word) & traits for word in others):
+    if not all({word, word.removesuffix("s"), word.removesuffix("es")} & traits for word in others):
         return 0
     return named + len(others) or bool(anybody and rest.strip())
-
-
-def _singulars(word: str) -> set[str]:
-    return {word, word.removesuffix("s"), word.removesuffix("es")}
 
 
 def trait_words(traits: Iterable[Trait]) -> frozenset[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -12,7 +12,7 @@ from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.missions.storage.past import MissionPast
 from codebotler.models.base import Reply
 from codebotler.prompts import Prompt
-from codebotler.prompts.tools import CallingMessage, ResultMessage, ToolCall
+from codebotler.prompts.tools import CallingMessage, ResultMessage
 from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.worker import EngineError
 from roboeval.evaluation.agents.mission import AgentMission
@@ -94,7 +94,10 @@ class AgentConversation(Conversation):
         if not reply.calls:
             self.mission.answer(reply.text)
             return None
-        self.result = result = self._make(reply.calls)
+        if len(reply.calls) == 1:
+            self.result = result = self.mission.call(reply.calls[0].name, reply.calls[0].arguments)
+        else:
+            self.result = result = self.mission.refuse_several([call.name for call in reply.calls])
         if self.mission.ending is None and self.limit is not None:
             self.mission.end(self.limit)
         if self.mission.ending is not None:
@@ -103,11 +106,6 @@ class AgentConversation(Conversation):
         said = CallingMessage("assistant", reply.text, reply.turn)
         results = [ResultMessage("tool", result, call) for call in reply.calls]
         return replace(self.prompt, messages=(*self.prompt.messages, said, *results))
-
-    def _make(self, calls: Sequence[ToolCall]) -> str:
-        if len(calls) == 1:
-            return self.mission.call(calls[0].name, calls[0].arguments)
-        return self.mission.refuse_several([call.name for call in calls])
 
 
 def mission_data(mission: AgentMission) -> dict[str, Any]:

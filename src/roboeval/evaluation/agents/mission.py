@@ -93,7 +93,10 @@ class AgentMission:
         except UserError as error:
             return self.refuse(WRONG_ARGUMENTS, error.sentence, name)
         text = self._perform(skill, values)
-        self._watch_repeats((skill.name, values, text))
+        made, (last, times) = (skill.name, values, text), self._same
+        self._same = (made, times + 1 if made == last else 1)
+        if self._same[1] >= MAX_REPEATS and self.ending is None:
+            self.ending = REPEATED_CALLS
         return text
 
     def refuse(self, kind: str, sentence: str, what: str) -> str:
@@ -166,12 +169,6 @@ class AgentMission:
         self.mistakes[kind] += 1
         self.ending = kind if kind in {TIMEOUT, OUTSIDE_CONTRACT} else ERROR
         return f"the mission is over: {self._ledger.limit}"
-
-    def _watch_repeats(self, call: object) -> None:
-        last, times = self._same
-        self._same = (call, times + 1 if call == last else 1)
-        if self._same[1] >= MAX_REPEATS and self.ending is None:
-            self.ending = REPEATED_CALLS
 
     def _wait(self, seconds: float) -> str:
         self._in_a_row = 0

@@ -20,7 +20,7 @@ from codebotler.core.world_file import OptionFile
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl.regex_words import first_choice
 from roboeval.suites.sampling.expression import ExpressionError, Names, evaluate, iterate_loop, parse_cached
-from roboeval.suites.sampling.pairwise import Combination, sample_combinations
+from roboeval.suites.sampling.pairwise import sample_combinations
 from roboeval.suites.schema import IN_NO_ROOM, CornerFile, SampledTaskFile
 
 FactorLevel: TypeAlias = str | int  # a room, an answer, an index of an option, or a number of looks
@@ -102,16 +102,13 @@ class WorldSampler:
         rows = sample_combinations(self._free, max(1, left), random) if self._free else [{}] * left
         for number, row in enumerate(rows, len(corners) + 1):
             for _ in range(_TRIES):
-                setting = self._sample(row, number, random)
+                chosen = {factor: levels[row.get(factor, 0)] for factor, levels in self.factors.items()}
+                rooms = random.sample(self.form.worlds.rooms, len(self.form.worlds.rooms))
+                setting = Setting(f"{number}: {self._about(chosen)}", chosen, tuple(rooms))
                 if setting.identity not in seen:
                     seen.add(setting.identity)
                     yield setting
                     break
-
-    def _sample(self, row: Combination, number: int, random: Random) -> Setting:
-        chosen = {factor: levels[row.get(factor, 0)] for factor, levels in self.factors.items()}
-        rooms = random.sample(self.form.worlds.rooms, len(self.form.worlds.rooms))
-        return Setting(f"{number}: {self._about(chosen)}", chosen, tuple(rooms))
 
     def _corner(self, corner: CornerFile, number: int) -> Setting:
         chosen = {factor: levels[0] for factor, levels in self.factors.items()}
