@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
@@ -78,21 +78,17 @@ def repeated_steps(trace: Trace, room_map: RoomMap, remaining: Sequence[Outcome]
     """
     done = _distinct(event for event in room_map.past if not event.failed)
     later = _distinct(event for one in remaining for event in one.trace)
-    done_sorts: defaultdict[tuple[str, str], list[Event]] = defaultdict(list)
-    for one_done in done:
-        done_sorts[_sort(one_done, room_map)].append(one_done)
     left: Counter[tuple[str, str]] = Counter()
     for one in remaining:
-        for sort, count in Counter(_sort(event, room_map) for event in one.trace).items():
-            left[sort] = max(left[sort], UNBOUNDED_COUNT if one.status is Status.TIMEOUT else count)
+        counted = Counter(_sort(event, room_map) for event in one.trace)
+        left |= Counter(dict.fromkeys(counted, UNBOUNDED_COUNT)) if one.status is Status.TIMEOUT else counted
     is_done = {_key(event): _is_done(event, done, later, room_map) for event in _distinct(trace)}
     counts = Counter(_sort(event, room_map) for event in trace)
     for event in trace:
         sort = _sort(event, room_map)
+        alike = (before for before in done if _sort(before, room_map) == sort)
         is_surplus = bool(remaining) and counts[sort] > left[sort]
-        if is_done.get(_key(event)) or (
-            is_surplus and any(is_about_same(event, before) for before in done_sorts[sort])
-        ):
+        if is_done.get(_key(event)) or (is_surplus and any(is_about_same(event, one) for one in alike)):
             yield event
 
 

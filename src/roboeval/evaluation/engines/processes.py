@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from functools import lru_cache
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from typing import Any, Self
+from typing import Any
 
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import map_batches
@@ -32,17 +32,12 @@ class Processes:
     """Runs programs in several processes, each of which replays and judges the programs of its own worker.
 
     With threads instead of processes, a single core would replay and judge for all workers. A process starts
-    when there is work for it. The caller must warn if programs are not fully isolated.
+    when there is work for it, and they end when the results are exhausted. The caller must warn if programs
+    are not fully isolated.
     """
 
     def __init__(self, workers: int, **isolation: bool) -> None:
         self._workers, self._isolation = workers, isolation
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Do nothing: the processes end when the results are exhausted."""
 
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
