@@ -15,7 +15,6 @@ import signal
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from functools import update_wrapper
 from importlib import import_module
 from typing import Any, Generic, NoReturn, ParamSpec, TypeVar
 
@@ -56,7 +55,8 @@ class IsolatedFunction(Generic[_Arguments, _Result]):
 
     def __init__(self, function: Callable[_Arguments, _Result], rehearsal: tuple[Any, ...]) -> None:
         self.function, self.rehearsal = function, rehearsal
-        update_wrapper(self, function)
+        self.__doc__, self.__wrapped__ = function.__doc__, function
+        self.__module__, self.__name__ = function.__module__, function.__name__
 
     def __call__(self, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
         """Call the function in a closed process. If a process that was used before fails, retry in a new one.
