@@ -649,9 +649,7 @@ def test_processes_do_with_what_macos_has_with_linux_patched_to_lack_the_rest(
     def compiled(file: str, shown: str) -> bytes:
         prelude = LIKE_MACOS if shown == "<codebotler.simulator.sandbox>" else ""
         source = Path(file).read_text(encoding="utf-8")
-        return spawn.compiled_source(
-            source.replace('"""The isolated', prelude + '"""The isolated', 1), shown
-        )
+        return spawn.compiled_source(source.replace('"""The isolated', prelude + '"""The isolated', 1), shown)
 
     with TemporaryFile() as file:
         monkeypatch.setattr(spawn, "compiled_file", lambda *_: file)
