@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import timedelta
-from typing import Any, Self
+from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import Skill
@@ -67,13 +67,6 @@ class AgentMission:
     def __post_init__(self) -> None:
         self.robot = RecordingRobot(self.scenario.world, self.suite, contracts=self.contracts)
         self._ledger = Ledger(self.robot)
-
-    @classmethod
-    def begin(
-        cls, suite: Suite, task: str, prompt: int, world: int, contracts: Sequence[Contract] = ()
-    ) -> Self:
-        """Begin a mission for a prompt of a task, in the world with this index."""
-        return cls(suite, suite.task(task).scenarios[world].asked_by(prompt), contracts)
 
     def call(self, name: str, arguments: str | Mapping[str, object]) -> str:
         """Make one call, and return what the agent is told. The call may end the mission."""

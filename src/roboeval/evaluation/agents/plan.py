@@ -94,7 +94,8 @@ class AgentPlan(GenerationPlan):
     def begin_mission(self, key: CompletionKey) -> AgentMission:
         """Begin a mission without a conversation."""
         contracts = () if self.contract is None else (self.contract,)
-        return AgentMission.begin(self.suite, key[0], key[1], self.world(key), contracts)
+        scenario = self.suite.tasks[key[0]].scenarios[self.world(key)].asked_by(key[1])
+        return AgentMission(self.suite, scenario, contracts)
 
     def prompt(self, key: CompletionKey) -> Prompt:
         """Return the first request of a mission."""
