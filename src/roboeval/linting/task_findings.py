@@ -190,7 +190,7 @@ def judge_solutions(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdi
     with WorkerPool(workers) as pool:
 
         def outcomes(program: str, worlds: Sequence[Scenario]) -> list[Outcome]:
-            return run_in(pool.here(), [program], worlds, suite)[0]
+            return run_in(pool.here(), program, worlds, suite)
 
         ran = [pool.submit(outcomes, *each) for each in runs]
         return [

@@ -191,12 +191,10 @@ def guard_of(suite: Suite, contracts: Sequence[Contract] = ()) -> RuleGuard | No
     return RuleGuard(suite.house_rules, contracts=contracts)
 
 
-def run_in(
-    worker: Worker, programs: Sequence[str], scenarios: Iterable[Scenario], suite: Suite
-) -> list[list[Outcome]]:
-    """Run each program in each of some worlds."""
+def run_in(worker: Worker, program: str, scenarios: Iterable[Scenario], suite: Suite) -> list[Outcome]:
+    """Run a program in each of some worlds."""
     robots = [partial(robot_in, scenario.world, suite) for scenario in scenarios]
-    return worker.run_all([(program, robots) for program in programs])
+    return worker.run_all([(program, robots)])[0]
 
 
 def judge_outcomes(suite: Suite, ran: Ran, *, ablated: bool) -> tuple[bytes, ...] | None:
