@@ -30,7 +30,7 @@ def further_rounds(
 
     There are no more rounds once the check accepts all programs.
     """
-    from roboeval.evaluation.generating.rounds import RoundPlan
+    from roboeval.evaluation.generating.requests import RoundPlan
     from roboeval.evaluation.runs.completions import how_many
 
     planned, latest = {*plan.keys()}, run
