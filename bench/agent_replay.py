@@ -168,7 +168,7 @@ def directly(suite: Suite, replays: dict[CompletionKey, Replay]) -> tuple[list[C
     completions = []
     for (task, prompt, index), one in replays.items():
         world = index % len(suite.tasks[task].scenarios)
-        mission = AgentMission.begin(suite, task, prompt, world)
+        mission = AgentMission(suite, suite.tasks[task].scenarios[world].asked_by(prompt))
         for turn in one.turns:
             if mission.ending is None:
                 mission.answer(turn) if isinstance(turn, str) else mission.call(turn[0][0], turn[0][1])  # type: ignore[arg-type]  # arguments

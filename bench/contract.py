@@ -20,11 +20,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from check import Source, real
-from codebotler.checking.check import check_on
+from codebotler.checking.check import check_on, extend_check
 from codebotler.checking.exploration import ExploringGuard
 from codebotler.checking.house_rules.file import read_rules
 from codebotler.checking.problems import CheckResult
-from codebotler.checking.proof import extend_check
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.world import World
 from codebotler.missions.rule_effects import LIMITED_SIMULATION

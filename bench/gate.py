@@ -22,9 +22,8 @@ from types import MappingProxyType
 from typing import TypeAlias
 
 from check import Source, real
-from codebotler.checking.check import check_on
+from codebotler.checking.check import check_on, extend_check
 from codebotler.checking.house_rules.file import read_rules
-from codebotler.checking.proof import extend_check
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, to_options

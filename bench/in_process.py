@@ -18,13 +18,13 @@ from typing import IO, Any, Protocol, Self, TypeAlias
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Option, Outcome, RunError, Status
 from codebotler.core.world import World
-from codebotler.simulator.ledger import texts_in
+from codebotler.simulator.ledger import run_parameters, texts_in
 from codebotler.simulator.process.compiler import CompiledProgram, compile_here, result_of
 from codebotler.simulator.sandbox import execution
 from codebotler.simulator.sandbox.execution import PROGRAM_RECURSION_LIMIT, LimitReachedError, ProgramRun
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings
-from codebotler.simulator.skill_protocol import describe_skills, run_parameters
+from codebotler.simulator.skill_protocol import describe_skills
 from codebotler.simulator.worlds.robot import Argument, SimulatedRobot
 
 CPU_SECONDS = 30

@@ -9,7 +9,7 @@ from codebotler.core.trace import Event, Option
 from codebotler.rtl import holds
 from roboeval.linting.findings import Finding, render
 from roboeval.linting.lint import lint
-from roboeval.linting.trials import judge_solutions
+from roboeval.linting.task_findings import judge_solutions
 from roboeval.suites.load import Suite, load_suite
 
 

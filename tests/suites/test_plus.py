@@ -17,7 +17,7 @@ from codebotler.simulator.engine import run
 from roboeval.evaluation.judging.failures import Verdict
 from roboeval.evaluation.judging.judge import judge
 from roboeval.linting.lint import lint
-from roboeval.linting.trials import Verdicts, judge_solutions
+from roboeval.linting.task_findings import Verdicts, judge_solutions
 from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.solutions import solutions
 

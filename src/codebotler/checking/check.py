@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from codebotler.checking.problems import CheckResult, Sample
-from codebotler.checking.proof import extend_check
-from codebotler.checking.rooms import room_map_for
+from codebotler.checking.contracts.of_program import derive_contract
+from codebotler.checking.contracts.text import contract_clauses
+from codebotler.checking.exploration import explore
+from codebotler.checking.problems import CheckResult, Problem, RuleProof, RuleVerdict, Sample
 from codebotler.checking.sampled import (
     DEFAULT_SAMPLES,
     WORLDS_AT_ONCE,
@@ -17,15 +19,21 @@ from codebotler.checking.sampled import (
     run_in_sampled_worlds,
     run_together,
 )
-from codebotler.checking.source.static import read_program
-from codebotler.core.errors import expect_list
+from codebotler.checking.source.static import read_program, read_rooms
+from codebotler.checking.source.written_arguments import read_arguments
+from codebotler.core.errors import UserError, expect_list
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
+from codebotler.core.text.labels import check_label
+from codebotler.simulator.guard.contract import Contract
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
 from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.simulator.worlds.sampled_robot import AS_WRITTEN
+
+DEFAULT_START = "start_loc"  # the name in the paper's prompt
+PLACEHOLDER_ROOMS = ("room 1", "room 2")  # for a program that visits all rooms but names none
 
 
 def check(
@@ -110,3 +118,97 @@ def check_together(
         check_on(worker, one.program, one.room_map, settings, first)
         for one, first in zip(runs, run_together(worker, runs), strict=True)
     ]
+
+
+# --- the rooms
+
+
+def room_map_for(
+    program: str,
+    rooms: Sequence[str] | None = None,
+    start: str | None = None,
+    *,
+    skills: SkillTable = SKILLS,
+) -> RoomMap:
+    """Return the rooms and the start from the caller, or guess both from the program's source.
+
+    Args:
+        program: its source.
+        rooms: the names of the rooms, in order; None if they are unknown.
+        start: the room where the robot starts; by default `start_loc` if it is a room, else the first room.
+        skills: the skills that the program may call.
+
+    Raises:
+        UserError: a room's name is not a regular expression, or the start is not a room.
+    """
+    if rooms is not None:
+        for room in rooms:
+            try:
+                check_label(room)
+            except ValueError as error:
+                raise UserError(f'the room is "{room}", but {error}') from None
+        names = tuple(dict.fromkeys(rooms)) or (start or DEFAULT_START,)
+        start = start or (DEFAULT_START if DEFAULT_START in names else names[0])
+        if start not in names:
+            raise UserError(f'the robot starts in "{start}", but the rooms are: {", ".join(names)}')
+        return RoomMap(names, start)
+    start = start or DEFAULT_START
+    rooms_in_text, lists_all = read_rooms(program, skills)
+    named = [room for room in rooms_in_text if room != start]
+    if len(named) < len(PLACEHOLDER_ROOMS) and lists_all:
+        named += [room for room in PLACEHOLDER_ROOMS if room not in named]
+    return RoomMap((*named, start), start, guessed=True)
+
+
+# --- contracts and proofs
+
+
+def extend_check(worker: Worker, program: str, found: CheckResult, settings: CheckSettings) -> CheckResult:
+    """Return a check with the contract of the program, a proof for each rule, and the problems that it shows.
+
+    Args:
+        worker: a worker that no other thread uses.
+        program: the program.
+        found: the result of its check; without a run, it is returned unchanged.
+        settings: the settings of the check.
+    """
+    if not found.samples:
+        return found
+    explored = explore(worker, program, found.room_map, settings)
+    written = read_arguments(program, settings.skills)
+    is_complete = explored.is_complete and explored.is_steady and not written.reads_clock
+    samples, problems, proofs = list(found.samples), list(found.problems), []
+    for rule in settings.house_rules:
+        sampler = explored.violations.get(rule.name)
+        number = next((one.samples[0] for one in found.problems if one.rule == rule.name), None)
+        if sampler is not None and number is None:
+            how = replace(settings, house_rules=(rule,), strict=sampler.strict)
+            number = len(samples)
+            runs = SampledRuns(program, found.room_map, [sampler], how)
+            samples.append(replace(runs.samples_on(worker, {})[0], number=number, is_chosen=True))
+            problems += group_failures(samples[number:], found.room_map)
+        verdict: RuleVerdict = "possible" if number is not None else "never" if is_complete else "unknown"
+        proofs.append(RuleProof(rule.name, verdict, explored.cases, number))
+    if any(not problem.rule for problem in problems):  # a robot may get further than these runs
+        explored = replace(explored, is_complete=False)
+    contract = derive_contract(explored, written, found.room_map, settings.skills)
+    problems.sort(key=lambda problem: problem.line or 0)
+    return replace(
+        found,
+        problems=tuple(problems),
+        samples=tuple(samples),
+        proofs=tuple(proofs),
+        contract=contract,
+    )
+
+
+def hold_within(found: CheckResult, allowed: Contract, skills: SkillTable) -> CheckResult:
+    """Return a check with a problem for each skill with which the program may do what a contract forbids."""
+    if found.contract is None:
+        return found
+    new = contract_clauses(found.contract.beyond(allowed), skills)
+    problems = (
+        Problem("OutsideContract", f"the program may {clause}, which the contract does not allow")
+        for clause in new
+    )
+    return replace(found, problems=(*found.problems, *problems))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from codebotler.checking.problems import CheckResult, Problem, Sample
+from codebotler.checking.problems import CheckResult, Problem
 from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.kinds import PICK, PLACE
@@ -61,7 +61,12 @@ def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = 
     held = held_after(past)
     finished = [one for one in found.samples if one.outcome.status is Status.FINISHED]
     puts_down = "place" in called_skills(parse_leniently(begun))
-    if held and puts_down and finished and all(map(_keeps, finished)):
+    if (
+        held
+        and puts_down
+        and finished
+        and not any(event.kind == PLACE for one in finished for event in one.outcome.trace)
+    ):
         message = f'at the end, the robot still holds "{brief(held)}", which the first program puts down'
         problems.append(Problem("KeepsThing", message, samples=tuple(one.number for one in finished)))
     return replace(found, problems=tuple(problems), samples=tuple(samples))
@@ -74,21 +79,17 @@ def repeated_steps(trace: Trace, room_map: RoomMap, remaining: Sequence[Outcome]
     """
     done = _distinct(event for event in room_map.past if not event.failed)
     later = _distinct(event for one in remaining for event in one.trace)
-    done_sorts: defaultdict[tuple[str, str], list[Event]] = defaultdict(list)
-    for one_done in done:
-        done_sorts[_sort(one_done, room_map)].append(one_done)
     left: Counter[tuple[str, str]] = Counter()
     for one in remaining:
-        for sort, count in Counter(_sort(event, room_map) for event in one.trace).items():
-            left[sort] = max(left[sort], UNBOUNDED_COUNT if one.status is Status.TIMEOUT else count)
+        counted = Counter(_sort(event, room_map) for event in one.trace)
+        left |= Counter(dict.fromkeys(counted, UNBOUNDED_COUNT)) if one.status is Status.TIMEOUT else counted
     is_done = {_key(event): _is_done(event, done, later, room_map) for event in _distinct(trace)}
     counts = Counter(_sort(event, room_map) for event in trace)
     for event in trace:
         sort = _sort(event, room_map)
+        alike = (before for before in done if _sort(before, room_map) == sort)
         is_surplus = bool(remaining) and counts[sort] > left[sort]
-        if is_done.get(_key(event)) or (
-            is_surplus and any(is_about_same(event, before) for before in done_sorts[sort])
-        ):
+        if is_done.get(_key(event)) or (is_surplus and any(is_about_same(event, one) for one in alike)):
             yield event
 
 
@@ -127,7 +128,9 @@ def has_same_effect(one: Event, other: Event, room_map: RoomMap) -> bool:
     """Return whether two steps say, ask or do the same in the same room. A thing may be picked up again."""
     if one.kind != other.kind or one.kind == PICK or not _has_effect(one.kind):
         return False
-    if _room(one, room_map) != _room(other, room_map) or _person(one) != _person(other):
+    if _room(one, room_map) != _room(other, room_map) or normalized(one.to or "") != normalized(
+        other.to or ""
+    ):
         return False
     is_equal = _words(one.text) == _words(other.text) and one.more == other.more
     return is_equal or (is_spoken(one.kind) and _says_same(one.text, other.text))
@@ -163,10 +166,6 @@ def _room(event: Event, room_map: RoomMap) -> str:
     return (event.place if room is None else room).casefold()
 
 
-def _person(event: Event) -> str:
-    return normalized(event.to or "")
-
-
 def _says_same(one: str, other: str) -> bool:
     """Return whether two texts differ only in words and numbers that one of them adds."""
     if polarity(one) is not polarity(other):
@@ -182,8 +181,3 @@ def _words(text: str) -> list[str]:
 
 def _numbers(text: str) -> list[tuple[float, ...]]:
     return [numbers for _, _, numbers in numerals(text)]
-
-
-def _keeps(sample: Sample) -> bool:
-    """Return whether a run ends without putting down what the robot held before it."""
-    return all(event.kind != PLACE for event in sample.outcome.trace)

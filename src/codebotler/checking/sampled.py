@@ -15,7 +15,7 @@ from codebotler.core.text.words import listed
 from codebotler.core.trace import Outcome, Status
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.guard.rule_guard import RuleGuard
-from codebotler.simulator.process.exit_status import PROCESSOR_TIME
+from codebotler.simulator.process.errors import PROCESSOR_TIME
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Job, Worker
 from codebotler.simulator.worlds.fact_sampler import FactSampler
@@ -83,19 +83,6 @@ class SampledRuns:
         return robot
 
 
-def run_samples(
-    worker: Worker,
-    program: str,
-    room_map: RoomMap,
-    samplers: Sequence[FactSampler],
-    settings: CheckSettings,
-) -> list[Sample]:
-    """Run a program in sampled worlds, but skip worlds that would repeat a run."""
-    if not samplers:
-        return []
-    return run_together(worker, [SampledRuns(program, room_map, samplers, settings)])[0]
-
-
 def run_together(worker: Worker, runs: Sequence[SampledRuns]) -> list[list[Sample]]:
     """Run several programs, of which tame ones share a process, and return the samples of each."""
     known: list[dict[int, Outcome]] = [{} for _ in runs]
@@ -127,7 +114,8 @@ def run_in_sampled_worlds(
         for start in range(0, len(samplers), WORLDS_AT_ONCE):
             these = samplers[start : start + WORLDS_AT_ONCE]
             new = [s for s in these if not any(one.would_repeat_in(s) for one in runs)]
-            runs.extend(run_samples(worker, program, room_map, new, settings))
+            job = [SampledRuns(program, room_map, new, settings)] if new else []
+            runs.extend(sample for some in run_together(worker, job) for sample in some)
             for sampler in these:
                 same = next(one for one in runs if one.would_repeat_in(sampler))
                 ran.append(replace(same, number=len(ran), is_chosen=bool(sampler.forced)))

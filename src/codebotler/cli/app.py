@@ -111,7 +111,7 @@ def check(
     The check runs the program in imagined worlds. The exit status is 1 if there are problems.
     """
     from codebotler.checking import check
-    from codebotler.checking.proof import hold_within
+    from codebotler.checking.check import hold_within
     from codebotler.cli.programs.check import check_view, contract_view, read_program, write_contract
     from codebotler.cli.programs.rules import rules_for
     from codebotler.core.skills.files import skills_from
@@ -161,9 +161,9 @@ def rules(
 
     For each rule, it shows a short example that keeps the rule and one that breaks it.
     """
-    from codebotler.checking.house_rules.evasions import find_evasions
     from codebotler.checking.house_rules.file import read_rules
     from codebotler.checking.house_rules.review import review_rules
+    from codebotler.checking.house_rules.rooms import find_evasions
     from codebotler.cli.programs.rules import review_data, review_view, rooms_of
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import busy, print_found

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from codebotler.checking.check import check
-from codebotler.checking.proof import hold_within
+from codebotler.checking.check import check, hold_within
 from codebotler.checking.remaining import remaining_outcomes
 from codebotler.checking.repetition import hold_to_past
 from codebotler.missions.display.view import MissionOrder, SessionView

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from codebotler.checking.rooms import room_map_for
+from codebotler.checking.check import room_map_for
 from codebotler.checking.sampled import CheckSettings, first_samplers
 from codebotler.core.errors import VIOLATION, RobotError, UserError
 from codebotler.core.skills.table import SkillTable

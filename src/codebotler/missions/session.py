@@ -16,8 +16,7 @@ from pathlib import Path
 
 from codebotler.candidates.clusters import compare_candidates
 from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
-from codebotler.checking.house_rules.evasions import find_evasions
-from codebotler.checking.house_rules.rooms import unknown_rooms_in
+from codebotler.checking.house_rules.rooms import find_evasions, unknown_rooms_in
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible

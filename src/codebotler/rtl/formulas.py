@@ -9,9 +9,8 @@ from typing import Literal, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.skills.kinds import CHECK, GOTO
-from codebotler.rtl.pattern import compile_regex, quote, whole_word
+from codebotler.rtl.pattern import Matcher, compile_regex, quote, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time
-from codebotler.rtl.text.matcher import Matcher
 
 ScopeName: TypeAlias = Literal[
     "BeforeFirst",

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 from codebotler.core.trace import Event
 from codebotler.rtl import formulas
 from codebotler.rtl.reasoning.alphabet import elements
-from codebotler.rtl.reasoning.automaton import Automaton, Letter, Undecided, machine_of
+from codebotler.rtl.reasoning.automaton import MAX_STATES, machine_of
 from codebotler.rtl.semantics import is_match
 
 MAX_CACHED_STEPS = 4_000  # for each formula
@@ -32,18 +31,24 @@ class Monitor:
         self._state: Any = machine.start
         self.holds = machine.accepts(self._state)
         self._seen = 0
-        letters = None if events is None else [machine.letter(machine.mask(event, 0)) for event in events]
-        self._future = None if letters is None else _Future.of(formula, letters)
-
-    @property
-    def state(self) -> object:
-        """The state of the automaton, which determines the results for all later events."""
-        return self._state
+        self._masks = None if events is None else frozenset(machine.mask(event, 0) for event in events)
 
     @property
     def is_final(self) -> bool | None:
         """Whether the result is final; None without `events`, or if deciding this takes too long."""
-        return None if self._future is None else self._future.is_final
+        if self._masks is None:
+            return None
+        possible, waiting = {self._state}, [self._state]
+        for state in waiting:  # the list grows as the loop runs
+            for after, holds in (self._machine.step(state, mask) for mask in self._masks):
+                if holds != self.holds:
+                    return False
+                if after not in possible:
+                    possible.add(after)
+                    waiting.append(after)
+            if len(waiting) > MAX_STATES:
+                return None
+        return True
 
     def feed(self, event: Event) -> bool:
         """Process the next event, and return whether the formula holds now.
@@ -53,18 +58,15 @@ class Monitor:
             ValueError: the event matches none of `events`, and is ignored.
         """
         mask = self._machine.mask(event, self._seen)
-        if self._future is not None:
-            self._future.step(self._machine.letter(mask))
-        known = self._machine.steps.get((self._state, mask))
-        self._state, self.holds = known or self._machine.step(self._state, mask)
+        if self._masks is not None and mask not in self._masks:
+            raise ValueError("the event is not in the monitor's list of possible events")
+        self._state, self.holds = self._machine.step(self._state, mask)
         self._seen += 1
         return self.holds
 
     def would_hold(self, event: Event) -> bool:
         """Whether the formula would hold after an event; raise Inconclusive if an option is not a string."""
-        machine = self._machine
-        mask = machine.mask(event, self._seen)
-        return (machine.steps.get((self._state, mask)) or machine.step(self._state, mask))[1]
+        return self._machine.step(self._state, self._machine.mask(event, self._seen))[1]
 
 
 class _Machine:
@@ -97,38 +99,14 @@ class _Machine:
                 found |= bit
         return found
 
-    def letter(self, mask: int) -> Letter:
-        return frozenset(one for bit, one in enumerate(self._elements) if mask >> bit & 1)
-
     def step(self, state: Any, mask: int) -> tuple[Any, bool]:  # noqa: ANN401 - as in Machine
-        after = self._machine.step(state, self.letter(mask))
+        """Return the next state, and whether the formula holds there."""
+        known = self.steps.get((state, mask))
+        if known is not None:
+            return known
+        letter = frozenset(one for bit, one in enumerate(self._elements) if mask >> bit & 1)
+        after = self._machine.step(state, letter)
         found = after, self._machine.accepts(after)
         if len(self.steps) < MAX_CACHED_STEPS:
             self.steps[state, mask] = found
         return found
-
-
-class _Future:
-    def __init__(self, automaton: Automaton, letters: tuple[Letter, ...]) -> None:
-        self._automaton, self._letters = automaton, letters
-        self._opposite = replace(automaton, accepts=tuple(not accepted for accepted in automaton.accepts))
-        self._state = 0
-
-    @classmethod
-    def of(cls, formula: formulas.Formula, letters: Iterable[Letter]) -> _Future | None:
-        """Return the start state for a formula, or None if building its automaton takes too long."""
-        different = tuple(dict.fromkeys(letters))
-        try:
-            return cls(Automaton.of(formula, different), different)
-        except Undecided:
-            return None
-
-    @property
-    def is_final(self) -> bool:
-        """Whether no further event can change the result."""
-        return None in {self._automaton.distances[self._state], self._opposite.distances[self._state]}
-
-    def step(self, letter: Letter) -> None:
-        if letter not in self._letters:
-            raise ValueError("the event is not in the monitor's list of possible events")
-        self._state = self._automaton.rows[self._state][self._letters.index(letter)]

@@ -1,17 +1,20 @@
-"""Compile, parse and print the regexes in formulas."""
+"""Compile, parse and print the regexes in formulas, and cache what text patterns match."""
 
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from importlib import import_module
 from typing import Any
 
+from codebotler.core.cachedproperty import cached_property
 from codebotler.core.text.labels import scope_flags
 
 Tree = Any
 """A parsed regex or part of a regex: pairs of an operation and its arguments, in private classes of `re`."""
 
 PATTERN_FLAGS = re.IGNORECASE | re.DOTALL
+MAX_CACHED_LENGTH, MAX_CACHED_TEXTS = 200, 1_000  # characters of a cached text, and number of texts
 
 
 def compile_regex(pattern: str) -> re.Pattern[str]:
@@ -38,3 +41,26 @@ def quote(text: str) -> str:
         return repr(text)
     # A single quote makes `repr` choose double ones.
     return '"' + repr("'" + text)[2:]
+
+
+class Matcher(ABC):
+    """A pattern that texts match or not."""
+
+    def matches(self, text: str) -> bool:
+        """Whether a string matches. The result is cached, since programs repeat texts."""
+        known = self._known
+        found = known.get(text)
+        if found is None:
+            found = self._matches(text)
+            if len(text) <= MAX_CACHED_LENGTH:
+                if len(known) >= MAX_CACHED_TEXTS:
+                    known.clear()
+                known[text] = found
+        return found
+
+    @abstractmethod
+    def _matches(self, text: str) -> bool: ...
+
+    @cached_property
+    def _known(self) -> dict[str, bool]:
+        return {}

@@ -47,6 +47,12 @@ class SkillPerformer(Protocol):
         """Let time pass until `now` seconds since the start, or until the robot is stopped."""
 
 
+def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, float, bool]:
+    """Return a run's fuel, time now, limit of time, start of the clocks, and whether it is live."""
+    settings, limits = robot.settings, robot.settings.limits
+    return limits.ticks, robot.now, limits.seconds, settings.clock_starts.timestamp(), robot.is_live
+
+
 class Ledger:
     """Counts the requests of one run to its robot, up to a limit."""
 

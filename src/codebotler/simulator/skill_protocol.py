@@ -12,9 +12,17 @@ from codebotler.core.skills.table import Skill
 from codebotler.core.skills.values import Scalar
 from codebotler.core.text.unicode import compose
 from codebotler.core.trace import Option, Outcome, Status
-from codebotler.simulator.ledger import MAX_LINE, STOP, WAITS, Ledger, SkillAnswer, SkillPerformer, too_long
-from codebotler.simulator.process.errors import LostProcessError, ProtocolError
-from codebotler.simulator.process.exit_status import cause_of_death
+from codebotler.simulator.ledger import (
+    MAX_LINE,
+    STOP,
+    WAITS,
+    Ledger,
+    SkillAnswer,
+    SkillPerformer,
+    run_parameters,
+    too_long,
+)
+from codebotler.simulator.process.errors import LostProcessError, ProtocolError, cause_of_death
 from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
 from codebotler.simulator.worlds.robot import Argument, Result
@@ -113,12 +121,6 @@ def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
         (skill.name, tuple((p.name, p.kind, p.type.choices, p.words) for p in skill.parameters))
         for skill in robot.skills.rows
     )
-
-
-def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, float, bool]:
-    """Return a run's fuel, time now, limit of time, start of the clocks, and whether it is live."""
-    settings, limits = robot.settings, robot.settings.limits
-    return limits.ticks, robot.now, limits.seconds, settings.clock_starts.timestamp(), robot.is_live
 
 
 def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def engine_named(
                 from roboeval.evaluation.engines.processes import Processes
 
                 pool.close()  # the pool has already warned about missing isolation
-                return Processes(workers, **isolation)
+                return nullcontext(Processes(workers, **isolation))
 
             yield local
         return

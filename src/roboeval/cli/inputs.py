@@ -23,11 +23,11 @@ Selection: TypeAlias = tuple[str, *tuple[int, ...]]
 
 def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
     """Read a suite by name or folder, with optional files of house rules and additional skills."""
-    from codebotler.checking.house_rules.evasions import find_evasions
+    from codebotler.checking.house_rules.rooms import find_evasions
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.paper import SKILLS
-    from roboeval.suites.house import HouseRules
     from roboeval.suites.load import load_suite, rooms_in
+    from roboeval.suites.suite import HouseRules
 
     read = load_suite(suite, skills=skills_from(*(skills or ())))
     if rules is not None and read.house is not None:

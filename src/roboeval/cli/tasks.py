@@ -79,7 +79,7 @@ def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
     from codebotler.simulator.pool import cores
     from roboeval.linting.findings import render
     from roboeval.linting.lint import lint
-    from roboeval.linting.trials import judge_solutions
+    from roboeval.linting.task_findings import judge_solutions
 
     wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
     matching = suite.settings.matching

@@ -20,11 +20,10 @@ from codebotler.models.no_program import classify_reply
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.prompts.extract import program_of
-from codebotler.prompts.tools import ToolCall, agent_prompt, tools_for
+from codebotler.prompts.tools import ToolCall, tools_for
 from codebotler.simulator.pool import shared_pool
-from roboeval.evaluation.agents.conversation import AgentConversation, TurnLimits
-from roboeval.evaluation.agents.mission import AgentMission
-from roboeval.evaluation.agents.plan import DEFAULT_TURNS
+from roboeval.evaluation.agents.conversation import TurnLimits
+from roboeval.evaluation.agents.plan import DEFAULT_TURNS, AgentPlan
 from roboeval.evaluation.engines.engine import Local
 from roboeval.evaluation.judging.explanation import completion_data
 from roboeval.evaluation.judging.judge import evaluate
@@ -125,17 +124,15 @@ def _messages(prompt: Prompt) -> list[Any]:
 def acting(suite: str, worlds: int | None, seed: int | None, max_turns: int) -> Solver:
     """Return a solver that lets the model carry out one mission, like `roboeval generate --mode agent`."""
     by = _suite(suite, worlds, seed)
+    plan = AgentPlan(by, mode="agent", limits=TurnLimits(max_turns))
     offered = [
         ToolInfo(name=one.name, description=one.description, parameters=ToolParams(**json.loads(one.schema)))
         for one in tools_for(by.skills)
     ]
 
     async def act(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001 - that cannot offer these tools
-        about = state.metadata
-        prompt = agent_prompt(state.input_text, rules=by.house_sentences, skills=by.skills)
-        mission = AgentMission.begin(by, about["task"], about["prompt"], about["world"])
-        conversation = AgentConversation(mission, prompt, TurnLimits(max_turns))
-        state.messages = _messages(prompt)
+        key = state.metadata["task"], state.metadata["prompt"], state.metadata["world"]
+        conversation, state.messages = plan.begin(key), _messages(plan.prompt(key))
         while conversation.prompt is not None:
             state.output = await model.get_model().generate(state.messages, tools=offered)
             state.messages.append(state.output.message)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from os import PathLike
@@ -64,14 +64,13 @@ def reward(
     if (problem := find_key_fault((task, prompt, 0), chosen)) is not None:
         raise UserError(problem)
     rules = "" if chosen.house is None else chosen.house.digest
-    names = [digest(chosen.digest, rules, task, str(prompt), program) for program in programs]
 
     def asking() -> tuple[Suite, AskedWorlds]:
         return chosen, requirements_of(chosen, task, prompt)
 
-    works = {name: RewardWork(program, asking) for name, program in zip(names, programs, strict=True)}
-    found = judge_works(works)
-    return [found[name].reward for name in names]
+    names = [digest(chosen.digest, rules, task, str(prompt), program) for program in programs]
+    works = [RewardWork(name, program, asking) for name, program in zip(names, programs, strict=True)]
+    return [one.reward for one in judge_works(works)]
 
 
 @dataclass(frozen=True)
@@ -151,35 +150,33 @@ def components_of(outcomes: Sequence[Outcome], asked: AskedWorlds, *, parses: bo
 
 
 class RewardWork(NamedTuple):
-    """A program, with a function that returns what it is judged by. The function runs in another thread."""
+    """A program to judge."""
 
+    name: bytes  # the same for equal programs that are judged by the same
     program: str
-    asking: Callable[[], tuple[Suite, AskedWorlds]]
+    asking: Callable[[], tuple[Suite, AskedWorlds]]  # returns what it is judged by, in another thread
 
 
 REWARD_CACHE: dict[bytes, Components] = {}
 """The results by name. Each operation on the dictionary is atomic, so that threads and forks need no lock."""
 
 
-def judge_works(
-    works: Mapping[bytes, RewardWork], progress: Callable[[int], object] = bool
-) -> dict[bytes, Components]:
-    """Judge named programs, a few batches at a time, and keep the results for programs of the same name.
+def judge_works(works: Sequence[RewardWork], progress: Callable[[int], object] = bool) -> list[Components]:
+    """Judge programs, a few batches at a time, and keep the results for programs of the same name.
 
-    `progress` is called with the number of results so far whenever there is a new one.
+    `progress` is called with the number of different results so far whenever there is a new one.
     """
-    known = {name: found for name in works if (found := REWARD_CACHE.get(name)) is not None}
-    new = [name for name in works if name not in known]
-    judged = shared_pool().map_distinct(
-        lambda names: judge_batch([works[name] for name in names]), new, name=lambda name: name
-    )
-    for name, found in zip(new, judged, strict=True):
-        known[name] = found
+    distinct = {work.name: work for work in works}
+    known = {name: found for name in distinct if (found := REWARD_CACHE.get(name)) is not None}
+    new = [work for name, work in distinct.items() if name not in known]
+    judged = shared_pool().map_distinct(judge_batch, new, name=lambda work: work.name)
+    for work, found in zip(new, judged, strict=True):
+        known[work.name] = found
         progress(len(known))
     if len(REWARD_CACHE) >= MAX_CACHED_REWARDS:
         REWARD_CACHE.clear()
     REWARD_CACHE.update(known)
-    return known
+    return [known[work.name] for work in works]
 
 
 def judge_batch(works: Sequence[RewardWork]) -> list[Components]:

@@ -10,8 +10,7 @@ from itertools import combinations
 from codebotler.core.yaml_files import YamlFile
 from codebotler.simulator.worlds.matching import Matching
 from roboeval.linting.findings import Finding
-from roboeval.linting.task_findings import task_findings
-from roboeval.linting.trials import Verdicts
+from roboeval.linting.task_findings import Verdicts, task_findings
 from roboeval.linting.world_findings import JudgedWorld, judged_worlds
 from roboeval.suites.load import Requirement, Task
 

@@ -5,23 +5,28 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from itertools import chain
+from typing import TypeAlias
 
 from codebotler.core.text.words import counted
+from codebotler.core.trace import Outcome
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Claim, Number, Regex, TextPattern, Without, Words
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.backtracking import slow_text
 from codebotler.rtl.regex_words import UNCLEAR
 from codebotler.rtl.wording import is_clear
-from roboeval.evaluation.judging.failures import failure_of_verdicts
+from codebotler.simulator.pool import WorkerPool
+from roboeval.evaluation.judging.failures import Verdict, failure_of_verdicts
+from roboeval.evaluation.judging.judge import judge, run_in
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.linting.clauses import clauses_of
 from roboeval.linting.findings import Finding
-from roboeval.linting.trials import Verdicts
 from roboeval.linting.world_findings import judged_worlds
-from roboeval.suites.load import Requirement, Task
+from roboeval.suites.load import Requirement, Scenario, Suite, Task
 from roboeval.suites.solutions import locate_solution, solutions
 from roboeval.suites.task import check_label
+
+Verdicts: TypeAlias = Sequence[Verdict]  # verdicts on a program in all worlds of a task or of its ablation
 
 
 def task_findings(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
@@ -176,3 +181,19 @@ def _compiled(text: TextPattern) -> Iterator[str]:
             yield from (kind.pattern for kind in text.kinds)
         case Regex() | Without() | Claim():
             yield text.compiled.pattern
+
+
+def judge_solutions(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdicts]:
+    """Judge a task's solutions by all requirements, first in its worlds, then in those of its ablation."""
+    judges = [worlds for worlds in (task.scenarios, task.ablation) if worlds]
+    runs = [(solution.program, worlds) for worlds in judges for solution in solutions(task)]
+    with WorkerPool(workers) as pool:
+
+        def outcomes(program: str, worlds: Sequence[Scenario]) -> list[Outcome]:
+            return run_in(pool.here(), program, worlds, suite)
+
+        ran = [pool.submit(outcomes, *each) for each in runs]
+        return [
+            [judge(outcome, scenario) for outcome, scenario in zip(one.result(), worlds, strict=True)]
+            for one, (_, worlds) in zip(ran, runs, strict=True)
+        ]

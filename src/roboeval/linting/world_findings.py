@@ -20,7 +20,7 @@ from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
 from codebotler.simulator.worlds.matching import Matching, resolve_room
 from roboeval.linting.absent_names import absent_names
 from roboeval.linting.findings import Finding, FindingKind
-from roboeval.suites.load import Requirement, Scenario, Task, TaskCheck
+from roboeval.suites.load import Requirement, Scenario, Task
 
 
 @dataclass(frozen=True)
@@ -67,18 +67,15 @@ class JudgedWorld:
         try:
             while (conflict := self._reasoner.conflict([r.formula for r in rest])) is not None:
                 involved = [r for r in rest if r.formula in conflict]
-                yield self._unsatisfiable(involved)
+                subject = " and ".join(r.text for r in involved)
+                together = "" if len(involved) == 1 else " together"
+                message = f'"{subject}" probably cannot hold{together} in {self.name}'
+                yield self.finding("unsatisfiable", subject, message, involved[-1].line)
                 rest = [r for r in rest if r not in involved]
         except Undecided:
             yield self._undecided(self.name, f"whether {self.name} can be satisfied", self.line)
         for requirement in rest:
             yield from self._implied(requirement, [r for r in rest if r is not requirement])
-
-    def _unsatisfiable(self, involved: Sequence[Requirement]) -> Finding:
-        subject = " and ".join(r.text for r in involved)
-        together = "" if len(involved) == 1 else " together"
-        message = f'"{subject}" probably cannot hold{together} in {self.name}'
-        return self.finding("unsatisfiable", subject, message, involved[-1].line)
 
     def _implied(self, requirement: Requirement, others: Sequence[Requirement]) -> Iterator[Finding]:
         subject, line = requirement.text, requirement.line
@@ -96,9 +93,6 @@ class JudgedWorld:
     def _undecided(self, subject: str, what: str, line: int | None) -> Finding:
         return self.finding("undecided", subject, f"{what} takes too long to decide", line)
 
-    def _check(self, requirement: Requirement) -> TaskCheck:
-        return next(check for check in self.task.checks if check.name == requirement.check)
-
     @cached_property
     def _reasoner(self) -> Reasoner:
         moves = {request: self._room_for(request) or request for request in self._requests}
@@ -108,8 +102,8 @@ class JudgedWorld:
         return resolve_room(self._rooms, request, self.matching)
 
     @cached_property
-    def _rooms(self) -> list[str]:
-        return [room.name for room in self.scenario.world.rooms]
+    def _rooms(self) -> tuple[str, ...]:
+        return tuple(room.name for room in self.scenario.world.rooms)
 
     @cached_property
     def _requests(self) -> list[str]:
@@ -118,7 +112,7 @@ class JudgedWorld:
 
     def dead_regexes(self, requirement: Requirement) -> Iterator[Finding]:
         """Yield findings about regexes in a requirement that match nothing, and visits that lead nowhere."""
-        line = self._check(requirement).line
+        line = next(check.line for check in self.task.checks if check.name == requirement.check)
         for element in dict.fromkeys(elements(requirement.formula)):
             for text in [element.text] if element.options is None else [element.text, element.options]:
                 subject = f"{text} in {requirement.check}"

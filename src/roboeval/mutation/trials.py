@@ -45,7 +45,7 @@ def mutation_score(
     def run(program: str) -> Iterator[Outcome]:
         for start in range(0, len(scenarios), WORLDS_PER_BATCH):
             some = scenarios[start : start + WORLDS_PER_BATCH]
-            yield from run_in(pool.here(), [program], some, suite)[0]
+            yield from run_in(pool.here(), program, some, suite)
 
     def outcomes(some: Sequence[Original]) -> list[tuple[Outcome, ...]]:
         return [tuple(run(original.program)) for original in some]

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
 
+from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.yaml_files import YamlFile
 from roboeval.suites.families.suite import family_suite, family_tasks_named
-from roboeval.suites.suite import (
-    ABLATED,
-    SUITES,
-    Suite,
-    known_suites,
-    read_suite,
-    rooms_in,
-    shipped_suites,
-    suite_folder,
-)
+from roboeval.suites.suite import ABLATED, SUITES, Suite, read_suite, rooms_in
 from roboeval.suites.task import Requirement, Scenario, Task, TaskCheck
 from roboeval.suites.taskfile import read_task
 
@@ -36,8 +31,10 @@ __all__ = [
     "read_task",
     "rooms_in",
     "shipped_suites",
-    "suite_folder",
 ]
+
+
+SUITE_NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 
 def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKILLS) -> Suite:
@@ -68,3 +65,79 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
 def has_suite(name: str) -> bool:
     """Whether a suite is built in, installed or generated from families. Folders do not count."""
     return name in known_suites() or family_tasks_named(name) is not None
+
+
+def shipped_suites() -> tuple[str, ...]:
+    """Return the names of the suites that ship with RoboEval."""
+    return tuple(sorted(path.parent.name for path in SUITES.glob("*/suite.yaml")))
+
+
+def known_suites() -> tuple[str, ...]:
+    """Return the names of the suites that ship with RoboEval or with installed packages."""
+    return tuple(dict.fromkeys([*shipped_suites(), *sorted(installed_suites().names)]))
+
+
+def suite_folder(name: str) -> Path:
+    """Return the folder of a built-in or installed suite, or a folder's path. Otherwise, raise UserError."""
+    if name in shipped_suites():
+        return SUITES / name
+    if SUITE_NAME.fullmatch(name) and (installed := installed_folder(name)) is not None:
+        return installed.resolve()
+    folder = Path(name)
+    if not (folder / "suite.yaml").is_file():
+        known = ", ".join(known_suites())
+        raise UserError(f'unknown suite "{name}"; use one of {known}, or a folder with a suite.yaml')
+    return folder.resolve()
+
+
+# --- suites in installed packages
+
+
+def installed_suites() -> EntryPoints:
+    """Return the entry points of suites in installed packages. Several may have the same name."""
+    return entry_points(group="roboeval.suites")
+
+
+def installed_folder(name: str) -> Path | None:
+    """Find the folder of a suite in an installed package, or return None if no package has the suite.
+
+    Raises UserError if several packages have it, or if a local folder has the same name.
+    """
+    points = list(installed_suites().select(name=name))
+    if not points:
+        return None
+    packages = " and ".join(f"{_package(point)} ({point.value})" for point in points)
+    if len(points) > 1:
+        raise UserError(
+            f'several packages have a suite "{name}": {packages}; uninstall all but one, '
+            "or name a folder with --suite"
+        )
+    if (Path(name) / "suite.yaml").is_file():
+        raise UserError(
+            f'"{name}" is both a suite in the package {packages} and a local folder; '
+            f"write ./{name} for the folder, or run the command in another folder to use the package"
+        )
+    return _folder(points[0])
+
+
+def _folder(point: EntryPoint) -> Path:
+    """Find the folder that contains the suite.yaml, without running any of the package's code."""
+    top, *below = point.value.strip().split(".")
+    try:
+        spec = find_spec(top)
+    except (ImportError, ValueError):
+        spec = None
+    found = [Path(place, *below) for place in (spec and spec.submodule_search_locations) or ()]
+    for folder in found:
+        if (folder / "suite.yaml").is_file():
+            return folder
+    missing = f"there is no suite.yaml in {found[0]}" if found else f'there is no package "{top}"'
+    raise UserError(
+        f'the package {_package(point)} declares its suite "{point.name}" at {point.value}, but {missing}; '
+        "reinstall it, or name a folder with --suite"
+    )
+
+
+def _package(point: EntryPoint) -> str:
+    """Return the name and the version of the package that declares a suite."""
+    return "of unknown name" if point.dist is None else f"{point.dist.name} {point.dist.version}"

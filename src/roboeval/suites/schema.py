@@ -43,10 +43,6 @@ class StrictForm(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def _default_to_say(means: object) -> object:
-    return {"say": means} if isinstance(means, str) else means
-
-
 class CheckFile(StrictForm):
     """A check in a task file.
 
@@ -57,7 +53,10 @@ class CheckFile(StrictForm):
     category: Category  # the kind of failure if the check fails
     commonsense: bool = False  # whether the check tests something that no prompt mentions
     rtl: YamlText  # the formula in RTL
-    means: Annotated[dict[str, Name], BeforeValidator(_default_to_say)] = {}
+    means: Annotated[
+        dict[str, Name],
+        BeforeValidator(lambda means: {"say": means} if isinstance(means, str) else means),
+    ] = {}
 
 
 class TaskFact(StrictForm):

@@ -11,6 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from codebotler.checking.house_rules.file import read_rules
 from codebotler.core.errors import UserError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
@@ -19,8 +20,6 @@ from codebotler.core.text.words import counted
 from codebotler.core.yaml_files import YamlFile
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.settings import SimulationSettings
-from roboeval.suites.house import HouseRules
-from roboeval.suites.installed import installed_folder, installed_suites
 from roboeval.suites.schema import MAX_WORLDS, SuiteFile
 from roboeval.suites.task import Task
 from roboeval.suites.taskfile import read_task
@@ -30,7 +29,34 @@ if TYPE_CHECKING:
 
 ABLATED = "-ablation"  # file suffix of ablations; suite names may not end like this
 SUITES = Path(__file__).parent
-SUITE_NAME = re.compile(r"[a-z][a-z0-9-]*")
+
+
+@dataclass(frozen=True)
+class HouseRules:
+    """The house rules in a file."""
+
+    name: str  # the file name without its ending, used in evaluation names; empty for a suite's own rules
+    rules: tuple[Rule, ...]  # the rules, in file order
+    digest: str  # the file's SHA-256 in hexadecimal
+
+    def __post_init__(self) -> None:
+        for rule in self.rules:
+            if rule.inside:
+                raise UserError(
+                    f'the rule "{rule.name}" uses "inside", which evaluations do not support; remove the rule'
+                )
+
+    @classmethod
+    def read(
+        cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (), *, of_suite: bool = False
+    ) -> HouseRules:
+        """Read a rules file, validated against any given rooms. Raise UserError if it is invalid."""
+        rules = read_rules(path, skills, rooms)
+        if not of_suite and not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
+            raise UserError(
+                "is not a valid file name for rules; use lower-case letters, digits and dashes", file=path
+            )
+        return cls("" if of_suite else path.stem, rules, hashlib.sha256(path.read_bytes()).hexdigest())
 
 
 @dataclass(frozen=True)
@@ -106,29 +132,6 @@ class Suite:
             known = ", ".join(self.tasks)
             raise UserError(f'the suite "{self.name}" has no task "{name}"; its tasks are {known}')
         return self.tasks[name]
-
-
-def shipped_suites() -> tuple[str, ...]:
-    """Return the names of the suites that ship with RoboEval."""
-    return tuple(sorted(path.parent.name for path in SUITES.glob("*/suite.yaml")))
-
-
-def known_suites() -> tuple[str, ...]:
-    """Return the names of the suites that ship with RoboEval or with installed packages."""
-    return tuple(dict.fromkeys([*shipped_suites(), *sorted(installed_suites().names)]))
-
-
-def suite_folder(name: str) -> Path:
-    """Return the folder of a built-in or installed suite, or a folder's path. Otherwise, raise UserError."""
-    if name in shipped_suites():
-        return SUITES / name
-    if SUITE_NAME.fullmatch(name) and (installed := installed_folder(name)) is not None:
-        return installed.resolve()
-    folder = Path(name)
-    if not (folder / "suite.yaml").is_file():
-        known = ", ".join(known_suites())
-        raise UserError(f'unknown suite "{name}"; use one of {known}, or a folder with a suite.yaml')
-    return folder.resolve()
 
 
 def task_files(folder: Path) -> list[Path]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from codebotler.core.text.words import counted
-from codebotler.core.world import Answer, Person, Room, Trait, World
+from codebotler.core.world import Answer, Person, Room, World
 from codebotler.rtl import Formula
 from codebotler.rtl.regex_words import first_choice
 from roboeval.suites.schema import Ability, AcceptedFinding, Category, TaskFact
@@ -123,13 +123,12 @@ def world_title(number: int, total: int | None, about: str) -> str:
 
 def describe_contents(world: World, room: Room) -> list[str]:
     """Describe each thing and person in a room or at a place, with their properties."""
-    traits = {name: _describe_traits(of) for name, of in world.traits}
+    traits = {
+        name: [f"{key} {', '.join(value) if isinstance(value, tuple) else value}" for key, value in of]
+        for name, of in world.traits
+    }
     things = [f"{one} ({', '.join(traits[one])})" if one in traits else one for one in room.objects]
     return [*things, *(_describe_person(one, traits.get(one.name, [])) for one in room.people)]
-
-
-def _describe_traits(traits: Sequence[Trait]) -> list[str]:
-    return [f"{key} {', '.join(value) if isinstance(value, tuple) else value}" for key, value in traits]
 
 
 def _describe_person(person: Person, traits: Sequence[str]) -> str:

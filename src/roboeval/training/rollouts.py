@@ -9,8 +9,7 @@ from functools import partial
 from codebotler.simulator.engine import digest
 from roboeval.evaluation.rewards import AskedWorlds, Components, RewardWork, judge_works, requirements_of
 from roboeval.suites.families.tasks import TRAINING_WORLDS, trained_task
-from roboeval.suites.house import HouseRules
-from roboeval.suites.suite import Suite
+from roboeval.suites.suite import HouseRules, Suite
 
 __all__ = ["Components", "Rollout", "judge"]
 
@@ -45,12 +44,15 @@ def judge(
         EngineError: the engine failed, for a reason unrelated to the programs.
     """
     rules = "" if house is None else house.digest
-    names = [
-        digest(one.family, f"{one.seed} {one.prompt_index} {worlds}", rules, one.program) for one in rollouts
+    works = [
+        RewardWork(
+            digest(one.family, f"{one.seed} {one.prompt_index} {worlds}", rules, one.program),
+            one.program,
+            partial(_asked, one, worlds, house),
+        )
+        for one in rollouts
     ]
-    works = (RewardWork(one.program, partial(_asked, one, worlds, house)) for one in rollouts)
-    found = judge_works(dict(zip(names, works, strict=True)), progress or bool)
-    return [found[name] for name in names]
+    return judge_works(works, progress or bool)
 
 
 def _asked(one: Rollout, worlds: int, house: HouseRules | None) -> tuple[Suite, AskedWorlds]:

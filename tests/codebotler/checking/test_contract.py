@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.checking.check import check
+from codebotler.checking.check import check, hold_within
 from codebotler.checking.contracts.file import contract_yaml, read_contract
 from codebotler.checking.contracts.text import contract_rows, contract_sentence
 from codebotler.checking.problems import CheckResult
-from codebotler.checking.proof import hold_within
 from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill

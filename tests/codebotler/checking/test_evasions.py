@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.checking.house_rules.evasions import find_evasions
+from codebotler.checking.house_rules.rooms import find_evasions
 from codebotler.core.errors import UserError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS

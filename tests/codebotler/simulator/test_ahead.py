@@ -14,7 +14,7 @@ import pytest
 
 from codebotler.checking.check import check, check_on
 from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
-from codebotler.simulator.process import bytecode
+from codebotler.simulator.process import spawn
 from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.sandbox import BATCH_SERVER
@@ -121,8 +121,8 @@ def test_an_interrupt_ends_the_pool_of_the_process_and_the_next_check_has_anothe
 def test_bytecode_without_columns_is_not_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "module.py"
     file.write_text('"""A module."""\n\nx = 1 + len("a")\n', encoding="utf-8")
-    wanted = bytecode.compiled_source(file.read_text(encoding="utf-8"), "module")
-    assert bytecode.code_of(str(file), "module") == wanted
+    wanted = spawn.compiled_source(file.read_text(encoding="utf-8"), "module")
+    assert spawn.code_of(str(file), "module") == wanted
     get_code = SourceFileLoader.get_code
 
     def without_columns(self: SourceFileLoader, name: str) -> CodeType | None:
@@ -130,16 +130,16 @@ def test_bytecode_without_columns_is_not_taken(tmp_path: Path, monkeypatch: pyte
         return code and code.replace(co_linetable=b"")
 
     monkeypatch.setattr(SourceFileLoader, "get_code", without_columns)
-    assert bytecode.code_of(str(file), "module") == wanted
+    assert spawn.code_of(str(file), "module") == wanted
 
 
 def test_bytecode_that_is_damaged_is_not_taken(tmp_path: Path) -> None:
     file = tmp_path / "module.py"
     file.write_text('"""A module."""\n\nx = 1 + len("a")\n', encoding="utf-8")
-    wanted = bytecode.compiled_source(file.read_text(encoding="utf-8"), "module")
+    wanted = spawn.compiled_source(file.read_text(encoding="utf-8"), "module")
     cached = Path(cache_from_source(str(file)))
     py_compile.compile(str(file), doraise=True)
     whole = cached.read_bytes()
     for damaged in (whole[:20], whole[:16] + b"\xff" * 9, whole[:16] + marshal.dumps(1)):
         cached.write_bytes(damaged)
-        assert bytecode.code_of(str(file), "module") == wanted
+        assert spawn.code_of(str(file), "module") == wanted

@@ -26,7 +26,7 @@ from codebotler.simulator import pool
 from codebotler.simulator.engine import digest, run
 from codebotler.simulator.ledger import SkillAnswer
 from codebotler.simulator.pool import MIN_BATCH_KEYS, WorkerPool
-from codebotler.simulator.process import bytecode, spawn
+from codebotler.simulator.process import spawn
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.fork_server_client import BatchServer
 from codebotler.simulator.process.isolated_call import IDLE_PROCESSES, end_all
@@ -649,13 +649,11 @@ def test_processes_do_with_what_macos_has_with_linux_patched_to_lack_the_rest(
     def compiled(file: str, shown: str) -> bytes:
         prelude = LIKE_MACOS if shown == "<codebotler.simulator.sandbox>" else ""
         source = Path(file).read_text(encoding="utf-8")
-        return bytecode.compiled_source(
-            source.replace('"""The isolated', prelude + '"""The isolated', 1), shown
-        )
+        return spawn.compiled_source(source.replace('"""The isolated', prelude + '"""The isolated', 1), shown)
 
     with TemporaryFile() as file:
         monkeypatch.setattr(spawn, "compiled_file", lambda *_: file)
-        file.write(bytecode.compiled_modules(compiled))
+        file.write(spawn.compiled_modules(compiled))
         file.flush()
         programs = [saying("a"), "import json\n" + saying("b"), "import os\n\ndef task_program(): os.abort()"]
         outcomes = list(run([(program, WORLD) for program in programs], workers=1))
@@ -753,7 +751,7 @@ def test_what_a_shell_has_set_changes_no_outcome() -> None:
 
 HANDED_OVER = """
 from hashlib import sha256
-from codebotler.simulator.process.bytecode import code_of, compiled_modules
+from codebotler.simulator.process.spawn import code_of, compiled_modules
 print(sha256(compiled_modules(code_of)).hexdigest())
 """
 

@@ -33,7 +33,7 @@ from codebotler.core.files import to_line
 from codebotler.core.trace import Event, Outcome, Status, outcome_data
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
-from codebotler.simulator.process.exit_status import PROCESSOR_TIME
+from codebotler.simulator.process.errors import PROCESSOR_TIME
 from codebotler.simulator.process.fork_server_client import BatchServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.sandbox import BATCH_SERVER

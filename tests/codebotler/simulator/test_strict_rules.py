@@ -45,7 +45,7 @@ def test_rooms_are_found_by_whole_words_and_a_visit_is_where_it_leads() -> None:
     with pytest.raises(RobotError, match="no room"):
         one.perform("go_to", ["room 123"])
     assert [(event.kind, event.text) for event in one.trace] == [("goto", "room 1"), ("goto", "room 12")]
-    assert resolve_room(["lab", "lab 2"], "lab 2", "whole-words") == "lab 2"
+    assert resolve_room(("lab", "lab 2"), "lab 2", "whole-words") == "lab 2"
     loose = robot(settings=PAPER_SETTINGS)
     loose.perform("go_to", ["room 123"])
     assert (loose.room, loose.trace[0].text) == ("room 1", "room 123")

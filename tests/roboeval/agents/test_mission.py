@@ -20,15 +20,15 @@ from roboeval.evaluation.recording import SLEEP, RecordingRobot
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import recorded_completions
-from roboeval.suites.house import HouseRules
 from roboeval.suites.load import Scenario, Suite, load_suite
+from roboeval.suites.suite import HouseRules
 
 TASK, WORLD = "LunchTime", 0
 
 
 @pytest.fixture
 def mission(paper: Suite) -> AgentMission:
-    return AgentMission.begin(paper, TASK, 0, WORLD)
+    return AgentMission(paper, paper.task(TASK).scenarios[WORLD].asked_by(0))
 
 
 def judged(mission: AgentMission, suite: Suite, *, index: int = 0) -> Row:
@@ -171,7 +171,7 @@ def test_a_house_rule_ends_a_mission_as_it_ends_a_program(tmp_path: Path, paper:
     file = tmp_path / "quiet.yaml"
     file.write_text("rules:\n- {name: away, says: Leave her., always: 'not tr.Exists(goto(\"jill\"))'}\n")
     suite = paper.with_house_rules(HouseRules.read(file))
-    mission = AgentMission.begin(suite, TASK, 0, WORLD)
+    mission = AgentMission(suite, suite.task(TASK).scenarios[WORLD].asked_by(0))
     mission.call("go_to", {"location": "jill's office"})
     assert mission.ending == "error"
     assert mission.mistakes == {VIOLATION: 1}
@@ -184,7 +184,7 @@ def test_a_house_rule_ends_a_mission_as_it_ends_a_program(tmp_path: Path, paper:
 
 def test_a_contract_ends_a_mission_before_the_call_that_it_does_not_allow(paper: Suite) -> None:
     allowed = contract_from({"get_all_rooms": {}, "say": {"message": ["hello"]}}, paper.skills)
-    mission = AgentMission.begin(paper, TASK, 0, WORLD, [allowed])
+    mission = AgentMission(paper, paper.task(TASK).scenarios[WORLD].asked_by(0), [allowed])
     mission.call("say", {"message": "hello"})
     mission.call("say", {"message": "goodbye"})
     assert mission.ending == "OutsideContract"
@@ -244,7 +244,7 @@ CALLS = st.one_of(
 def test_a_mission_and_its_program_do_the_same(
     paper: Suite, calls: Sequence[tuple[str, dict[str, object]]], *, ends: bool
 ) -> None:
-    mission = AgentMission.begin(paper, TASK, 0, WORLD)
+    mission = AgentMission(paper, paper.task(TASK).scenarios[WORLD].asked_by(0))
     for name, arguments in calls:
         if mission.ending is None:
             mission.call(name, arguments)

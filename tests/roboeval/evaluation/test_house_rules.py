@@ -10,7 +10,7 @@ import rules
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Event
 from codebotler.simulator.guard.rule_guard import RuleGuard
-from roboeval.suites.house import HouseRules
+from roboeval.suites.suite import HouseRules
 from rules import ALL, Effect, Measuring, errand_of, houses
 
 HASTY = """

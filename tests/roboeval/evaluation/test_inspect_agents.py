@@ -188,7 +188,7 @@ def expected(suite: Suite) -> dict[str, Expected]:
     """All scripts in all worlds, by the names of samples."""
     names, missions, completions = [], [], []
     for (prompt, (turns, failure)), world in product(enumerate(SCRIPTS.values()), range(2)):
-        mission = AgentMission.begin(suite, "T", prompt, world)
+        mission = AgentMission(suite, suite.task("T").scenarios[world].asked_by(prompt))
         missions.append((mission, replay(mission, turns)))
         no_program = mission.ending if failure is not None and failure[0] == "NoProgram" else None
         more = {"world": world, "ending": mission.ending, "no_program": no_program}

@@ -14,8 +14,7 @@ from codebotler.rtl import holds
 from codebotler.rtl.formulas import Formula
 from codebotler.simulator.worker import run_log
 from roboeval.evaluation.judging.failures import Verdict, failure_of_verdicts
-from roboeval.evaluation.judging.judge import evaluate, judge
-from roboeval.evaluation.judging.result_cache import MAX_RESULT_EVENTS, ResultCache
+from roboeval.evaluation.judging.judge import MAX_RESULT_EVENTS, ResultCache, evaluate, judge
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Failure, Row
 from roboeval.suites.load import Scenario, Suite, load_suite
@@ -323,7 +322,7 @@ def test_what_a_run_has_met_is_found_once_for_what_a_world_requires(
 def test_long_runs_are_not_remembered_and_others_forgotten(
     suite: Suite, tested: list[Trace], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("roboeval.evaluation.judging.result_cache.MAX_RESULTS", 2)
+    monkeypatch.setattr("roboeval.evaluation.judging.judge.MAX_RESULTS", 2)
     scenario = suite.tasks["T"].scenarios[1]
     long = Outcome(Status.FINISHED, HI * MAX_RESULT_EVENTS)
     runs = [Outcome(Status.FINISHED, (*HI, Event("say", text))) for text in "abc"]

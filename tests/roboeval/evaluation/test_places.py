@@ -30,8 +30,8 @@ from roboeval.evaluation.judging.serialization import row_line
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import decode_row, key_of
 from roboeval.evaluation.runs.traces import circumstances, trace_of
-from roboeval.suites.house import HouseRules
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
+from roboeval.suites.suite import HouseRules
 
 ROOMS = ("office", "bob's office", "lab", "lab 1", "kitchen")
 THINGS = ("mug", "red mug", "pen")

@@ -9,7 +9,7 @@ import pytest
 from codebotler.core.text.words import brief
 from codebotler.core.trace import Trace
 from codebotler.rtl import explain
-from roboeval.linting.trials import judge_solutions
+from roboeval.linting.task_findings import judge_solutions
 from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.task import check_label
 

@@ -27,8 +27,8 @@ from processes import are_gone, children_of
 from roboeval.evaluation.judging.judge import evaluate, is_met
 from roboeval.evaluation.rewards import Share, reward, total
 from roboeval.evaluation.runs.source import recorded_completions
-from roboeval.suites.house import HouseRules
 from roboeval.suites.load import Suite, load_suite
+from roboeval.suites.suite import HouseRules
 from small_suite import a_suite
 
 RIGHT = """

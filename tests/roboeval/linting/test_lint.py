@@ -14,7 +14,7 @@ from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.linting.findings import Finding, render
 from roboeval.linting.lint import lint
-from roboeval.linting.trials import judge_solutions
+from roboeval.linting.task_findings import judge_solutions
 from roboeval.suites.load import load_suite
 from roboeval.suites.new_task import new_task
 from roboeval.suites.solutions import solutions

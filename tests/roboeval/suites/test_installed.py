@@ -8,8 +8,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from command_line import ENVIRONMENT, roboeval
-from roboeval.suites.installed import installed_suites
-from roboeval.suites.load import load_suite
+from roboeval.suites.load import installed_suites, load_suite
 from roboeval.suites.new_task import new_task
 from roboeval.web.run_store import RunStore
 

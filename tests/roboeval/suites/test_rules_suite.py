@@ -12,7 +12,7 @@ from codebotler.models.recorded import Solution, open_recorded
 from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.linting.lint import lint
-from roboeval.linting.trials import judge_solutions
+from roboeval.linting.task_findings import judge_solutions
 from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.solutions import solutions
 

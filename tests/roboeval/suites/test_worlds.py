@@ -10,12 +10,11 @@ from types import SimpleNamespace
 import pytest
 
 from codebotler.core.errors import UserError
-from roboeval.suites.house import HouseRules
 from roboeval.suites.load import load_suite
 from roboeval.suites.sampling.expression import ExpressionError, evaluate, iterate_loop, parse_cached
 from roboeval.suites.sampling.pairwise import cover_pairs, sample_combinations
 from roboeval.suites.schema import MAX_WORLDS
-from roboeval.suites.suite import _build_suite
+from roboeval.suites.suite import HouseRules, _build_suite
 
 SUITE = "name: mine\nversion: 1\nabout: my tasks\nworlds: 12\nseed: 3\n"
 TASK = """\

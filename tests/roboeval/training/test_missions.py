@@ -78,7 +78,10 @@ def test_worlds_are_counted_round(row: dict[str, Any]) -> None:
 def test_results_are_those_of_an_agents_mission(row: dict[str, Any]) -> None:
     task = trained_task(row["family"], row["seed"])
     number = row["world"] % len(task.suite.tasks[task.name].scenarios)
-    mission, agent = TrainingMission.begin(row), AgentMission.begin(task.suite, task.name, 0, number)
+    mission, agent = (
+        TrainingMission.begin(row),
+        AgentMission(task.suite, task.suite.tasks[task.name].scenarios[number].asked_by(0)),
+    )
     calls: list[Any] = [("get_all_rooms", ""), ("fly", "{}"), ("go_to", "{}"), *right_calls(row)]
     for name, arguments in calls:
         assert mission.call(name, arguments) == agent.call(name, arguments)

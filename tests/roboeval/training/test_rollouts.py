@@ -15,7 +15,7 @@ from roboeval import reward
 from roboeval.evaluation import rewards
 from roboeval.suites.families.suite import FIRST_SEEDS
 from roboeval.suites.families.tasks import TrainedTask, trained_task
-from roboeval.suites.house import HouseRules
+from roboeval.suites.suite import HouseRules
 from roboeval.training import prompts
 from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Components, Rollout, judge

@@ -39,10 +39,6 @@ def _as_set_name(text: str) -> str:
     return text
 
 
-def _on_one_line(text: str) -> str:
-    return " ".join(text.split())
-
-
 SetName = Annotated[YamlText, AfterValidator(_as_set_name)]
 Sets: TypeAlias = Mapping[str, Sequence[str]]
 """The names in each set."""
@@ -54,7 +50,7 @@ class HouseRuleFile(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: Annotated[str, Field(strict=True), AfterValidator(_as_name)]
-    says: Annotated[YamlText, Field(min_length=1), AfterValidator(_on_one_line)]
+    says: Annotated[YamlText, Field(min_length=1), AfterValidator(lambda text: " ".join(text.split()))]
     always: YamlText | None = None
     leaving: YamlText | None = None
     finally_: Annotated[YamlText | None, Field(alias="finally")] = None

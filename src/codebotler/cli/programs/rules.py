@@ -9,9 +9,9 @@ from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from codebotler.checking.house_rules.evasions import find_evasions
 from codebotler.checking.house_rules.file import read_rules
 from codebotler.checking.house_rules.review import Review
+from codebotler.checking.house_rules.rooms import find_evasions
 from codebotler.checking.storyboard import grid, steps_of
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS

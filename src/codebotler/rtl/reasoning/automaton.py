@@ -97,18 +97,13 @@ def machine_of(formula: formulas.Formula) -> Machine:
         case formulas.Not(part):
             start, step, accepts = machine_of(part)
             return Machine(start, step, lambda state: not accepts(state))
-        case formulas.ActAtFirst():
-            arrival = formula.arrival
+        case formulas.ActAtFirst(_, element, scopes):
             stay = (
-                *formula.scopes,
-                formulas.Scope("AfterFirst", arrival),
+                formulas.Scope("AfterFirst", formula.arrival),
                 formulas.Scope("BeforeFirst", formula.departure),
             )
-            return machine_of(
-                formulas.And(
-                    (formulas.Exists(arrival, formula.scopes), formulas.Exists(formula.element, stay))
-                )
-            )
+            arrives = formulas.Exists(formula.arrival, scopes)
+            return machine_of(formulas.And((arrives, formulas.Exists(element, (*scopes, *stay)))))
         case formulas.ActAtSome():
             machine = _during_stays(formula)
         case formulas.Exists(element):

@@ -43,13 +43,8 @@ class Reasoner:
         events = alphabet(wanted, rooms, None if moves is None else [*moves])
         if moves is not None and all(event.kind != GOTO for event in events):
             events += [Event(GOTO, move) for move in moves]
-        distinct: dict[tuple[object, ...], tuple[list[bool], Event]] = {}
-        for event in events:
-            row = [is_match(element, event, 0) for element in wanted]
-            where = () if moves is None else (event.place, event.text if event.kind == GOTO else "")
-            distinct.setdefault((*row, *where), (row, event))
-        rows, self.events = [row for row, _ in distinct.values()], [event for _, event in distinct.values()]
-        self._matched = dict(zip(wanted, zip(*rows, strict=True), strict=True))
+        self.events = events
+        self._matched = {element: [is_match(element, event, 0) for event in events] for element in wanted}
         self._readings: dict[Formula, Reading] = {}
         self._driving: Reading | None = None
         if moves is not None and rooms is not None and any(element.place is not None for element in wanted):

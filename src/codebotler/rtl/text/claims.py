@@ -10,9 +10,8 @@ from functools import lru_cache
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.text.labels import scope_flags
-from codebotler.rtl.pattern import compile_regex, quote, whole_word
+from codebotler.rtl.pattern import Matcher, compile_regex, quote, whole_word
 from codebotler.rtl.text.clauses import clauses, complete_clauses, sentences
-from codebotler.rtl.text.matcher import Matcher
 from codebotler.rtl.text.numbers import numerals
 from codebotler.rtl.text.polarity import Polarity, polarity, without_harmless
 from codebotler.rtl.text.times import TimeOfDay, times_in

@@ -56,12 +56,12 @@ def times_in(text: str) -> tuple[tuple[TimeOfDay, ...], ...]:
     plain = _IN_THE.sub(lambda match: f"{match[1]} {'am' if match[2].lower() == 'morning' else 'pm'}", plain)
     if alone := _ALONE.fullmatch(plain):
         return (*_readings(alone["hour"], 0, None),)
-    named = [match for match in _CLOCK.finditer(plain) if not _is_excluded(match)]
-    return tuple(time for match in named for time in _of(match))
-
-
-def _is_excluded(match: re.Match[str]) -> bool:
-    return _EXCLUDED.search(match.string, max(0, match.start() - _NEAR), match.start()) is not None
+    return tuple(
+        time
+        for match in _CLOCK.finditer(plain)
+        if not _EXCLUDED.search(plain, max(0, match.start() - _NEAR), match.start())
+        for time in _of(match)
+    )
 
 
 def _of(match: re.Match[str]) -> list[tuple[TimeOfDay, ...]]:

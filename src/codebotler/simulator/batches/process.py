@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Option
-from codebotler.simulator.ledger import RememberingLedger
+from codebotler.simulator.ledger import RememberingLedger, run_parameters
 from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, BATCH_MEMORY, HEADER, MAX_FRAME
 from codebotler.simulator.sandbox.channel import receive, send_frames
 from codebotler.simulator.sandbox.environment import simulate_environment
@@ -113,16 +113,8 @@ class TranscribedRun(ProgramRun):
     def transcript(self, code: CodeType, kind: str, arguments: tuple[Any, ...]) -> bytes:
         """Run a program on a new robot, and return the transcript."""
         self._reset(ROBOTS[kind](*arguments))
-        settings = self.ledger.robot.settings
         sys.setrecursionlimit(BATCH_RECURSION_LIMIT)
-        parameters = (
-            settings.limits.ticks,
-            self.ledger.robot.now,
-            settings.limits.seconds,
-            settings.clock_starts.timestamp(),
-            False,
-        )
-        end = self.execute(code, parameters)
+        end = self.execute(code, run_parameters(self.ledger.robot))
         data = UNDECIDED_RUN if self.is_undecided else self._written(end)
         return UNDECIDED_RUN if self.is_undecided or len(data) > MAX_FRAME else data
 

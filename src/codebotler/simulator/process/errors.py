@@ -1,4 +1,13 @@
-"""Errors of isolated processes, and of the engine that starts them."""
+"""Errors of isolated processes and of the engine that starts them, and why a process died."""
+
+from __future__ import annotations
+
+import signal
+
+from codebotler.core.trace import RunError, Status
+from codebotler.simulator.sandbox import CPU_SECONDS
+
+PROCESSOR_TIME = "seconds of processor time"  # ends the message about a program that used too much of it
 
 
 class EngineError(RuntimeError):
@@ -11,3 +20,16 @@ class LostProcessError(Exception):
 
 class ProtocolError(Exception):
     """The program must have written to the channel, since our own code never sends this message."""
+
+
+def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, RunError]:
+    """Explain why a process died without a last message, from its exit status or negative signal number."""
+    match -status:
+        case signal.SIGXCPU:
+            return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} {PROCESSOR_TIME}")
+        case signal.SIGSYS:
+            return Status.KILLED, RunError("ForbiddenCall", "the program made a forbidden system call")
+        case signal.SIGKILL:
+            return Status.KILLED, RunError("MemoryError", "the process was killed from outside")
+    how = f"signal {-status}" if status < 0 else f"exit status {status}"
+    return Status.KILLED, RunError("Crash", f"the process ended by itself ({how})")

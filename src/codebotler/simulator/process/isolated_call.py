@@ -18,8 +18,7 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any, Generic, NoReturn, ParamSpec, TypeVar
 
-from codebotler.simulator.process.errors import EngineError, LostProcessError, ProtocolError
-from codebotler.simulator.process.exit_status import cause_of_death
+from codebotler.simulator.process.errors import EngineError, LostProcessError, ProtocolError, cause_of_death
 from codebotler.simulator.process.isolated_process import IsolatedProcess, channel_pair
 from codebotler.simulator.process.spawn import start_module
 from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS

@@ -171,13 +171,9 @@ def _fit(request: str, label: str, traits: frozenset[str], anybody: tuple[str, .
     if named and not traits:
         return named
     others = [word for word in content_words(rest) if not means_anybody(word, anybody)]
-    if not all(_singulars(word) & traits for word in others):
+    if not all({word, word.removesuffix("s"), word.removesuffix("es")} & traits for word in others):
         return 0
     return named + len(others) or bool(anybody and rest.strip())
-
-
-def _singulars(word: str) -> set[str]:
-    return {word, word.removesuffix("s"), word.removesuffix("es")}
 
 
 def trait_words(traits: Iterable[Trait]) -> frozenset[str]:
@@ -187,13 +183,9 @@ def trait_words(traits: Iterable[Trait]) -> frozenset[str]:
     return frozenset(word for text in texts for word in content_words(text))
 
 
-def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
-    """Return the room that a request means, or None if it means none or could mean several."""
-    return _resolve_room(tuple(rooms), request, matching)
-
-
 @lru_cache(maxsize=65_536)
-def _resolve_room(rooms: tuple[str, ...], request: str, matching: Matching) -> str | None:
+def resolve_room(rooms: tuple[str, ...], request: str, matching: Matching) -> str | None:
+    """Return the room that a request means, or None if it means none or could mean several."""
     if matching == "longest-name":
         meant = meant_by(request, rooms)
         return meant[0] if len(meant) == 1 else None

@@ -165,7 +165,8 @@ class SampledRobot(SimulatedRobot):
         (search.found if is_there else search.vain).add(self.room)
         if not is_there:
             explored.people -= explored.people if name == SOMEBODY else {name}
-            self._remove(name)
+            for place in self._reach.get(self.room, (self.room,)):
+                self.contents[place] = [one for one in self.contents[place] if one.label != name]
             explored.missed.add(name)
             return
         explored.missed -= {name, *([SOMEBODY] if is_person else [])}
@@ -174,10 +175,6 @@ class SampledRobot(SimulatedRobot):
             explored.people |= {name, SOMEBODY}
         elif not any(_is(one, name) for one in self.things_here):
             self._add(name, goal)
-
-    def _remove(self, name: str) -> None:
-        for goal in self._reach.get(self.room, (self.room,)):
-            self.contents[goal] = [one for one in self.contents[goal] if one.label != name]
 
     def is_here(self, name: str) -> bool | None:
         """Return whether a person or thing is in this room, or None if that is undecided."""

@@ -252,7 +252,7 @@ def further_rounds(
 
     There are no more rounds once the check accepts all programs.
     """
-    from roboeval.evaluation.generating.rounds import RoundPlan
+    from roboeval.evaluation.generating.requests import RoundPlan
 
     plan, latest = what.plan, run
     planned = {*plan.keys()}

@@ -1,17 +1,24 @@
-"""A conversation in which a model carries out one mission, turn by turn."""
+"""A conversation in which a model carries out one mission, by calls or by one program after another."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from codebotler.core.errors import VIOLATION
+from codebotler.core.trace import Outcome, RunError, Status
+from codebotler.missions.storage.past import MissionPast
 from codebotler.models.base import Reply
 from codebotler.prompts import Prompt
-from codebotler.prompts.tools import CallingMessage, ResultMessage, ToolCall
+from codebotler.prompts.tools import CallingMessage, ResultMessage
+from codebotler.simulator.pool import shared_pool
+from codebotler.simulator.worker import EngineError
 from roboeval.evaluation.agents.mission import AgentMission
-from roboeval.evaluation.runs.endings import TOKEN_LIMIT, TURN_LIMIT
+from roboeval.evaluation.recording import RecordingRobot
+from roboeval.evaluation.recovery import rest_prompt
+from roboeval.evaluation.runs.endings import ERROR, OUTSIDE_CONTRACT, TIMEOUT, TOKEN_LIMIT, TURN_LIMIT
 
 MAX_REASONING = 200_000
 """The characters of reasoning that a row keeps; the log of turns has all of it."""
@@ -82,7 +89,10 @@ class AgentConversation(Conversation):
         if not reply.calls:
             self.mission.answer(reply.text)
             return None
-        self.result = result = self._make(reply.calls)
+        if len(reply.calls) == 1:
+            self.result = result = self.mission.call(reply.calls[0].name, reply.calls[0].arguments)
+        else:
+            self.result = result = self.mission.refuse_several([call.name for call in reply.calls])
         if self.mission.ending is None and self.limit is not None:
             self.mission.end(self.limit)
         if self.mission.ending is not None:
@@ -91,11 +101,6 @@ class AgentConversation(Conversation):
         said = CallingMessage("assistant", reply.text, reply.turn)
         results = [ResultMessage("tool", result, call) for call in reply.calls]
         return replace(self.prompt, messages=(*self.prompt.messages, said, *results))
-
-    def _make(self, calls: Sequence[ToolCall]) -> str:
-        if len(calls) == 1:
-            return self.mission.call(calls[0].name, calls[0].arguments)
-        return self.mission.refuse_several([call.name for call in calls])
 
 
 def mission_data(mission: AgentMission) -> dict[str, Any]:
@@ -110,3 +115,66 @@ def mission_data(mission: AgentMission) -> dict[str, Any]:
 def _total_usage(usages: list[Mapping[str, int | None]]) -> dict[str, int | None]:
     known = {name: [n for usage in usages if (n := usage[name]) is not None] for name in usages[0]}
     return {name: sum(counts) if counts else None for name, counts in known.items()}
+
+
+# --- programs instead of calls
+
+
+class ReplanConversation(Conversation):
+    """Runs a model's programs one after the other, until one of them ends without an error."""
+
+    def __init__(self, mission: AgentMission, prompt: Prompt, limits: TurnLimits) -> None:
+        super().__init__(mission, prompt, limits)
+        self._first = prompt
+
+    def _act(self, reply: Reply) -> Prompt | None:
+        """Run a reply's program where the last one has stopped."""
+        robot, outcome = self.mission.robot, _run(reply.program, self.mission)
+        if outcome.error is None:
+            self.mission.answer("")
+            return None
+        self.mission.mistakes[OUTSIDE_CONTRACT if robot.is_outside else outcome.error.kind] += 1
+        if not _may_go_on(outcome) or self.limit is not None:
+            self._end_like(outcome, outcome.error)
+            return None
+        why = f"{outcome.error.kind}: {outcome.error.message}"
+        past = MissionPast("", self._first.instruction, "", reply.program, why, robot.trace, robot.place)
+        return rest_prompt(past, self._first)
+
+    def _end_like(self, outcome: Outcome, error: RunError) -> None:
+        """End the mission as the last program ended."""
+        mission = self.mission
+        if mission.robot.is_outside:
+            mission.end(OUTSIDE_CONTRACT)
+        elif error.kind == VIOLATION:
+            mission.end(ERROR)
+        elif outcome.status is Status.ROBOT_ERROR:
+            mission.give_up("")
+        elif outcome.status is Status.TIMEOUT:
+            mission.end(TIMEOUT)
+        else:
+            if error.kind != "Exception":  # Python's own classes may take more than a text, or quote it again
+                mission.robot.lines.append(f"class {error.kind}(Exception): pass")
+            mission.robot.lines.append(f"raise {error.kind}({error.message!r})")
+            mission.end(ERROR)
+
+
+def _may_go_on(outcome: Outcome) -> bool:
+    """Whether a program failed, but neither broke a rule nor reached a limit."""
+    is_failure = outcome.status in {Status.ROBOT_ERROR, Status.PYTHON_ERROR, Status.KILLED}
+    return is_failure and outcome.error is not None and outcome.error.kind != VIOLATION
+
+
+def _run(program: str, mission: AgentMission) -> Outcome:
+    """Run a program on the robot of a mission, which cannot make its calls a second time."""
+    settings, robots = mission.suite.settings, [mission.robot]
+    left = settings.limits.calls - mission.robot.skill_calls  # for one program, as the mission is judged
+    mission.robot.settings = replace(settings, limits=replace(settings.limits, calls=left))
+
+    def only_robot() -> RecordingRobot:
+        if not robots:
+            raise EngineError("an isolated process was lost; start the command again")
+        return robots.pop()
+
+    pool = shared_pool()
+    return pool.submit(lambda: pool.here().run_alone(program, only_robot)).result()

@@ -22,7 +22,7 @@ from codebotler.prompts.tools import GIVE_UP, agent_prompt, object_schema, tools
 from roboeval.evaluation.agents.conversation import mission_data
 from roboeval.evaluation.agents.mission import AgentMission
 from roboeval.evaluation.agents.plan import AgentPlan
-from roboeval.evaluation.generating.requests import run_metadata, with_batch
+from roboeval.evaluation.generating.requests import begin_batch
 from roboeval.evaluation.runs.completions import CompletionKey, row_for
 from roboeval.evaluation.runs.endings import TURN_LIMIT
 from roboeval.evaluation.runs.folder import RunFolder
@@ -110,12 +110,10 @@ class MissionDesk:
 def open_desk(run: RunFolder, plan: AgentPlan, model: str) -> Iterator[MissionDesk]:
     """Open a run whose missions an MCP client carries out. Those that are done stay as they are."""
     with run.writing():
-        about = run_metadata(run, plan, model, UNKNOWN_SETTINGS)
-        done = {completion.key for completion in plan.completed(run)}
-        about["batches"] = with_batch(about["batches"], plan, UNKNOWN_SETTINGS)
+        about, _, todo = begin_batch(run, plan, model, UNKNOWN_SETTINGS)
         write_whole(run.about, to_text(about))
         with contextlib.closing(Appender(run.completions)) as file:
-            yield MissionDesk(plan, model, file, [key for key in plan.keys() if key not in done])  # noqa: SIM118 - a plan is no mapping
+            yield MissionDesk(plan, model, file, todo)
 
 
 async def serve_agent(desk: MissionDesk) -> None:

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import timedelta
-from typing import Any, Self
+from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills.table import Skill
@@ -68,13 +68,6 @@ class AgentMission:
         self.robot = RecordingRobot(self.scenario.world, self.suite, contracts=self.contracts)
         self._ledger = Ledger(self.robot)
 
-    @classmethod
-    def begin(
-        cls, suite: Suite, task: str, prompt: int, world: int, contracts: Sequence[Contract] = ()
-    ) -> Self:
-        """Begin a mission for a prompt of a task, in the world with this index."""
-        return cls(suite, suite.task(task).scenarios[world].asked_by(prompt), contracts)
-
     def call(self, name: str, arguments: str | Mapping[str, object]) -> str:
         """Make one call, and return what the agent is told. The call may end the mission."""
         if self.ending is not None:
@@ -93,7 +86,10 @@ class AgentMission:
         except UserError as error:
             return self.refuse(WRONG_ARGUMENTS, error.sentence, name)
         text = self._perform(skill, values)
-        self._watch_repeats((skill.name, values, text))
+        made, (last, times) = (skill.name, values, text), self._same
+        self._same = (made, times + 1 if made == last else 1)
+        if self._same[1] >= MAX_REPEATS and self.ending is None:
+            self.ending = REPEATED_CALLS
         return text
 
     def refuse(self, kind: str, sentence: str, what: str) -> str:
@@ -166,12 +162,6 @@ class AgentMission:
         self.mistakes[kind] += 1
         self.ending = kind if kind in {TIMEOUT, OUTSIDE_CONTRACT} else ERROR
         return f"the mission is over: {self._ledger.limit}"
-
-    def _watch_repeats(self, call: object) -> None:
-        last, times = self._same
-        self._same = (call, times + 1 if call == last else 1)
-        if self._same[1] >= MAX_REPEATS and self.ending is None:
-            self.ending = REPEATED_CALLS
 
     def _wait(self, seconds: float) -> str:
         self._in_a_row = 0

@@ -12,9 +12,13 @@ from codebotler.models.base import ModelError, Reply
 from codebotler.prompts import Prompt, template_hash
 from codebotler.prompts.tools import agent_prompt, agent_template_hash
 from codebotler.simulator.guard.contract import Contract
-from roboeval.evaluation.agents.conversation import AgentConversation, Conversation, TurnLimits
+from roboeval.evaluation.agents.conversation import (
+    AgentConversation,
+    Conversation,
+    ReplanConversation,
+    TurnLimits,
+)
 from roboeval.evaluation.agents.mission import AgentMission
-from roboeval.evaluation.agents.replan import ReplanConversation
 from roboeval.evaluation.generating.requests import Ask, GenerationPlan
 from roboeval.evaluation.runs.completions import CompletionKey, row_for
 from roboeval.evaluation.runs.endings import SERVER_REJECTED
@@ -91,7 +95,8 @@ class AgentPlan(GenerationPlan):
     def begin_mission(self, key: CompletionKey) -> AgentMission:
         """Begin a mission without a conversation."""
         contracts = () if self.contract is None else (self.contract,)
-        return AgentMission.begin(self.suite, key[0], key[1], self.world(key), contracts)
+        scenario = self.suite.tasks[key[0]].scenarios[self.world(key)].asked_by(key[1])
+        return AgentMission(self.suite, scenario, contracts)
 
     def prompt(self, key: CompletionKey) -> Prompt:
         """Return the first request of a mission."""

@@ -10,10 +10,10 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
-from functools import lru_cache, partial
+from functools import lru_cache
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from typing import Any, Self, TypeVar
+from typing import Any
 
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import map_batches
@@ -27,55 +27,33 @@ from roboeval.evaluation.engines.engine import (
     own_worker,
 )
 
-JobKey = TypeVar("JobKey")
-
 
 class Processes:
     """Runs programs in several processes, each of which replays and judges the programs of its own worker.
 
     With threads instead of processes, a single core would replay and judge for all workers. A process starts
-    when there is work for it. The caller must warn if programs are not fully isolated.
+    when there is work for it, and they end when the results are exhausted. The caller must warn if programs
+    are not fully isolated.
     """
 
     def __init__(self, workers: int, **isolation: bool) -> None:
         self._workers, self._isolation = workers, isolation
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Do nothing: the processes end when the results are exhausted."""
 
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
         """See `Engine`."""
         functions = pickle.dumps((function, then))
-        batch = partial(run_batch, functions, self._isolation)
-        return map_in_processes(batch, works, workers=self._workers, name=lambda work: digest(*work))
+        with process_pool(self._workers) as processes:
 
+            def submit(some: Sequence[Work]) -> Future[Sequence[WorkResult]]:
+                with starting_processes():
+                    return processes.submit(run_batch, functions, self._isolation, some)
 
-def map_in_processes(
-    function: Callable[[Sequence[JobKey]], Sequence[WorkResult]],
-    keys: Iterable[JobKey],
-    *,
-    workers: int,
-    name: Callable[[JobKey], bytes],
-) -> Iterator[WorkResult]:
-    """Call a function in worker processes on a few keys at a time, and yield the results in order.
-
-    `name` returns a short, unique name for a key. Duplicate keys are passed to the function only once.
-    """
-    with process_pool(workers) as processes:
-
-        def submit(keys: Sequence[JobKey]) -> Future[Sequence[WorkResult]]:
-            with starting_processes():
-                return processes.submit(function, keys)
-
-        try:
-            yield from map_batches(submit, keys, workers=workers, name=name)
-        except BrokenExecutor:
-            raise EngineError("a worker process died; it may have run out of memory") from None
+            try:
+                yield from map_batches(submit, works, workers=self._workers, name=lambda work: digest(*work))
+            except BrokenExecutor:
+                raise EngineError("a worker process died; it may have run out of memory") from None
 
 
 @contextmanager

@@ -26,12 +26,7 @@ from codebotler.models.base import ModelError
 from codebotler.models.sampling import SamplingSettings
 from codebotler.models.servers.batch import BatchModel
 from roboeval.evaluation.generating.generate import reply_of_refusal
-from roboeval.evaluation.generating.requests import (
-    GenerationPlan,
-    batches,
-    run_metadata,
-    with_batch,
-)
+from roboeval.evaluation.generating.requests import GenerationPlan, batches, begin_batch
 from roboeval.evaluation.runs.completions import CompletionKey, how_many, row_for
 from roboeval.evaluation.runs.folder import RunFolder, load_json_object
 from roboeval.evaluation.runs.source import MAX_ANSWER_BYTES
@@ -57,12 +52,9 @@ def write_requests(
     """
     expect_replaceable(path, BEGINNING)
     with run.writing():
-        about, keys = run_metadata(run, plan, model.name, model.settings), plan.keys()
-        done = {one.key for one in plan.completed(run)}
-        todo = [key for key in keys if key not in done]
+        about, _, todo = begin_batch(run, plan, model.name, model.settings)
         if not todo:
-            raise UserError(f"already holds all {how_many(len(keys))}", file=run.path)
-        about["batches"] = with_batch(about["batches"], plan, model.settings)
+            raise UserError(f"already holds all {how_many(len(plan.keys()))}", file=run.path)
         with open_replacement(path) as file:
             for number, key in enumerate(todo, 1):
                 asked = model.request(plan.prompt(key), number=plan.sample(key))

@@ -18,9 +18,8 @@ from roboeval.evaluation.generating.requests import (
     GenerationPlan,
     RequestLog,
     add_usage,
+    begin_batch,
     no_usage,
-    run_metadata,
-    with_batch,
 )
 from roboeval.evaluation.runs.completions import CompletionKey, how_many
 from roboeval.evaluation.runs.endings import SERVER_REJECTED
@@ -71,21 +70,16 @@ def generate_run(
 ) -> GenerationProgress:
     """Request the missing completions of a run, save each as it arrives, and close the model."""
     with run.writing():
-        metadata = run_metadata(run, plan, model.name, model.settings)
-        with contextlib.closing(Appender(run.completions)) as file:
-            done = {completion.key for completion in plan.completed(run)}
-            given = [one for one in plan.given() if one.key not in done]
-            done |= {one.key for one in given}
-            keys = plan.keys()
-            todo = [key for key in keys if key not in done]
+        with contextlib.closing(Appender(run.completions)) as file:  # drops a torn last line
+            metadata, done, todo = begin_batch(run, plan, model.name, model.settings)
             log = RequestLog(run.in_flight, done)
             metadata["possibly_paid_twice"] += log.interrupted
-            if todo:
-                metadata["batches"] = with_batch(metadata["batches"], plan, model.settings)
             write_whole(run.about, to_text(metadata))
-            for completion in given:
-                file.append(to_line(completion.row))
-            progress = GenerationProgress(len(keys), len(keys) - len(todo), log.interrupted)
+            for completion in plan.given():
+                if completion.key not in done:
+                    file.append(to_line(completion.row))
+            total = len(plan.keys())
+            progress = GenerationProgress(total, total - len(todo), log.interrupted)
             turns = TurnLog(run.turns, done) if plan.has_turns else None
             with log, contextlib.closing(turns) if turns else contextlib.nullcontext():
                 on_progress(progress)

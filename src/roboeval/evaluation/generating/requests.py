@@ -1,4 +1,4 @@
-"""Plans the requests of a run, describes them in run.json, and logs pending requests."""
+"""Plans the requests of a run and of further rounds, describes them in run.json, and logs pending ones."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import contextlib
 import platform
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeAlias
@@ -33,6 +33,9 @@ Ask: TypeAlias = Callable[[Prompt], Awaitable[Reply]]
 
 WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change a model's replies
 OPTIONAL_SETTINGS = ("reasoning_effort", "extra_body")  # left out of run.json if unset
+
+
+SAMPLE_STRIDE = 1_000_000  # offset of sample numbers between rounds, so that all seeds differ
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,42 @@ class GenerationPlan:
             yield completion
 
 
+@dataclass(frozen=True, kw_only=True)
+class RoundPlan(GenerationPlan):
+    """Plans the completions of a round after the first (paper, section VI), which is a run in its own folder.
+
+    It copies the programs that the check accepts, and regenerates or repairs the others.
+
+    Args:
+        number: the round, from 1; round 0 wrote the first programs.
+        repairs: whether the model sees the rejected program and its problems.
+        earlier: the completions of the previous round.
+        problems: the problems of each rejected program, by completion key.
+    """
+
+    number: int
+    repairs: bool
+    earlier: Mapping[CompletionKey, Completion] = field(repr=False)
+    problems: Mapping[CompletionKey, Sequence[str]] = field(repr=False)
+
+    def prompt(self, key: CompletionKey) -> Prompt:
+        """Return the prompt for a completion. For a repair, it includes the rejected program."""
+        first, program = super().prompt(key), self.earlier[key].program
+        return first.after(program, self.problems[key]) if self.repairs and program.strip() else first
+
+    def sample(self, key: CompletionKey) -> int:
+        """Return the number of the sample, which determines its random seed."""
+        return key[2] + self.number * SAMPLE_STRIDE
+
+    def given(self) -> Iterator[Completion]:
+        """Return the completions of the previous round that the check accepted."""
+        return (one for key, one in self.earlier.items() if key not in self.problems)
+
+    def folder(self, run: RunFolder) -> RunFolder:
+        """Return the run of this round, a subfolder of the first run."""
+        return RunFolder(run.path / f"{'repair' if self.repairs else 'retry'}-{self.number}")
+
+
 def no_usage() -> Counter[str]:
     """Return token counts of zero."""
     return Counter(input_tokens=0, output_tokens=0)
@@ -103,10 +142,24 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
         total[name] += (usage or {}).get(name) or 0
 
 
-def run_metadata(
+def begin_batch(
+    run: RunFolder, plan: GenerationPlan, model: str, settings: SamplingSettings
+) -> tuple[dict[str, Any], set[CompletionKey], list[CompletionKey]]:
+    """Return the content of run.json with the batch of a plan, the keys that are done, and those to request.
+
+    Raises UserError if existing completions have other settings.
+    """
+    about, done = _run_metadata(run, plan, model, settings), {one.key for one in plan.completed(run)}
+    copied = {one.key for one in plan.given()}
+    todo = [key for key in plan.keys() if key not in done | copied]  # noqa: SIM118 - a plan is no mapping
+    if todo:
+        about["batches"] = _with_batch(about["batches"], plan, settings)
+    return about, done, todo
+
+
+def _run_metadata(
     run: RunFolder, plan: GenerationPlan, model: str, settings: SamplingSettings
 ) -> dict[str, Any]:
-    """Return the content of run.json. Raise UserError if existing completions have other settings."""
     suite = plan.suite
     fixed = {"model": model, "settings": _recorded(settings), **plan.describe(), "suite": suite.name}
     earlier: dict[str, Any] = {}
@@ -133,7 +186,7 @@ def _recorded(settings: SamplingSettings) -> dict[str, Any]:
     }
 
 
-def with_batch(
+def _with_batch(
     earlier: list[dict[str, Any]], plan: GenerationPlan, settings: SamplingSettings
 ) -> list[dict[str, Any]]:
     """Append the batch of a plan, unless the last batch is the same one."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import logging
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
+from typing import Generic, NamedTuple, TypeVar
 
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome, Status, Trace
@@ -20,7 +20,6 @@ from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.robot import SimulatedRobot
 from roboeval.evaluation.engines.engine import Local, OpenEngine, Work
 from roboeval.evaluation.judging.failures import Verdict
-from roboeval.evaluation.judging.result_cache import ResultCache
 from roboeval.evaluation.judging.serialization import add_reply_fault, judgements_for, row_line
 from roboeval.evaluation.judging.time_limit import TimeLimitExceeded, time_limit
 from roboeval.evaluation.runs.completions import Acted, Completion, find_key_fault, name_of
@@ -31,9 +30,6 @@ from roboeval.suites.load import Requirement, Scenario, Suite
 _log = logging.getLogger("roboeval.evaluation.judging.judge")
 
 BUDGET = 60  # seconds of processor time for judging one program in all its worlds
-
-REQUIREMENT_CACHE: ResultCache[tuple[bool, ...]] = ResultCache()
-JUDGEMENT_CACHE: ResultCache[tuple[bytes, ...]] = ResultCache()
 
 
 def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
@@ -151,43 +147,41 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
         )
 
 
-@dataclass(frozen=True)
-class Ran:
+class Ran(NamedTuple):
     """What a program did in the worlds in which it is judged."""
 
     task: str
     acted: Acted | None  # where an agent acted; None for a program, which is judged in all worlds
     outcomes: Sequence[Outcome]
 
-    def scenarios(self, suite: Suite, *, ablated: bool) -> tuple[Scenario, ...]:
-        """Return the worlds with their requirements."""
-        scenarios = suite.tasks[self.task].judged_in(ablated=ablated)
-        return scenarios if self.acted is None else scenarios[self.acted.world :][:1]
+
+def _scenarios(suite: Suite, task: str, acted: Acted | None, *, ablated: bool) -> tuple[Scenario, ...]:
+    """Return the worlds in which a program is judged, with their requirements."""
+    scenarios = suite.tasks[task].judged_in(ablated=ablated)
+    return scenarios if acted is None else scenarios[acted.world :][:1]
 
 
 def run_in_worlds(suite: Suite, worker: Worker, works: Sequence[Work], *, ablated: bool) -> list[Ran]:
     """Run programs in the worlds of their tasks, and missions of agents in the worlds where they acted."""
     planned = [
-        (program, Ran(task, Acted(int(where[0]), where[1]) if where else None, ()))
-        for task, program, *where in works
+        (task, program, Acted(int(where[0]), where[1]) if where else None) for task, program, *where in works
     ]
     jobs = [
-        (program, [partial(robot_in, one.world, suite) for one in ran.scenarios(suite, ablated=ablated)])
-        for program, ran in planned
+        (
+            program,
+            [partial(robot_in, one.world, suite) for one in _scenarios(suite, task, acted, ablated=ablated)],
+        )
+        for task, program, acted in planned
     ]
     return [
-        replace(ran, outcomes=_with_ending(outcomes, ran.acted))
-        for (_, ran), outcomes in zip(planned, worker.run_all(jobs), strict=True)
+        Ran(task, acted, outcomes if acted is None else [apply_ending(one, acted.ending) for one in outcomes])
+        for (task, _, acted), outcomes in zip(planned, worker.run_all(jobs), strict=True)
     ]
 
 
-def _with_ending(outcomes: list[Outcome], acted: Acted | None) -> list[Outcome]:
-    return outcomes if acted is None else [apply_ending(outcome, acted.ending) for outcome in outcomes]
-
-
-def robot_in(world: World, suite: Suite, contracts: Sequence[Contract] = ()) -> SimulatedRobot:
+def robot_in(world: World, suite: Suite) -> SimulatedRobot:
     """Return a simulated robot in a world, with the simulation settings and house rules of a suite."""
-    return SimulatedRobot(world, suite.settings, suite.skills, guard=guard_of(suite, contracts))
+    return SimulatedRobot(world, suite.settings, suite.skills, guard=guard_of(suite))
 
 
 def guard_of(suite: Suite, contracts: Sequence[Contract] = ()) -> RuleGuard | None:
@@ -197,17 +191,15 @@ def guard_of(suite: Suite, contracts: Sequence[Contract] = ()) -> RuleGuard | No
     return RuleGuard(suite.house_rules, contracts=contracts)
 
 
-def run_in(
-    worker: Worker, programs: Sequence[str], scenarios: Iterable[Scenario], suite: Suite
-) -> list[list[Outcome]]:
-    """Run each program in each of some worlds."""
+def run_in(worker: Worker, program: str, scenarios: Iterable[Scenario], suite: Suite) -> list[Outcome]:
+    """Run a program in each of some worlds."""
     robots = [partial(robot_in, scenario.world, suite) for scenario in scenarios]
-    return worker.run_all([(program, robots) for program in programs])
+    return worker.run_all([(program, robots)])[0]
 
 
 def judge_outcomes(suite: Suite, ran: Ran, *, ablated: bool) -> tuple[bytes, ...] | None:
     """Return the judgement on a program for each prompt as JSON, or None if judging takes too long."""
-    outcomes, scenarios = ran.outcomes, ran.scenarios(suite, ablated=ablated)
+    outcomes, scenarios = ran.outcomes, _scenarios(suite, ran.task, ran.acted, ablated=ablated)
 
     def compute() -> tuple[bytes, ...]:
         with time_limit(BUDGET):
@@ -219,3 +211,41 @@ def judge_outcomes(suite: Suite, ran: Ran, *, ablated: bool) -> tuple[bytes, ...
         return JUDGEMENT_CACHE.of(key, (tuple(outcomes), scenarios), outcomes, compute)
     except TimeLimitExceeded:
         return None
+
+
+# --- caches
+
+
+MAX_RESULTS, MAX_RESULT_EVENTS = 2_048, 128  # limits on entries, and on all events in an entry's runs
+
+CachedResult = TypeVar("CachedResult")
+
+
+class ResultCache(Generic[CachedResult]):
+    """Caches results by run, because many programs behave identically in a world or in similar worlds."""
+
+    def __init__(self) -> None:
+        # Keys contain object ids, which must not be reused, so entries keep the objects alive.
+        self._known: dict[tuple[object, ...], tuple[CachedResult, object]] = {}
+
+    def of(
+        self,
+        key: tuple[object, ...],
+        keep_alive: object,
+        runs: Iterable[Outcome],
+        compute: Callable[[], CachedResult],
+    ) -> CachedResult:
+        """Return the cached result for the runs, or compute it. The entry keeps `keep_alive` alive."""
+        known = self._known.get(key)  # another thread may clear the cache at any moment
+        if known is not None:
+            return known[0]
+        value = compute()
+        if len(self._known) >= MAX_RESULTS:
+            self._known.clear()
+        if sum(len(outcome.trace) for outcome in runs) <= MAX_RESULT_EVENTS:
+            self._known[key] = value, keep_alive
+        return value
+
+
+REQUIREMENT_CACHE: ResultCache[tuple[bool, ...]] = ResultCache()
+JUDGEMENT_CACHE: ResultCache[tuple[bytes, ...]] = ResultCache()

@@ -136,9 +136,7 @@ def trained_prompts(family: str, seed: int) -> tuple[str, ...]:
 
     For a `.yaml` file, call `trained_task` once beforehand to validate the file.
     """
-    template = _template(family_file(family))
-    random = template.random(seed)
-    return tuple(_phrasings(template, template.choose(random), random))
+    return tuple(_phrasings(*_choices(family, seed)))
 
 
 @dataclass(frozen=True)
@@ -150,20 +148,18 @@ class _Template:
     file: YamlFile
     form: FamilyFile
 
-    def random(self, seed: int) -> Random:
-        """Return the random generator for a seed."""
-        return Random(f"{self.path.stem} {seed}")  # noqa: S311 - not for cryptography
 
-    def choose(self, random: Random) -> dict[str, str]:
-        """Choose a value for each name."""
-        return dict(_choose(self.form, self.file, random))
+def _choices(family: str, seed: int) -> tuple[_Template, dict[str, str], Random]:
+    """Return the template of a family, the value of each name for a seed, and the source of later choices."""
+    template = _template(family_file(family))
+    random = Random(f"{template.path.stem} {seed}")  # noqa: S311 - not for cryptography
+    return template, dict(_choose(template.form, template.file, random)), random
 
 
 @lru_cache(maxsize=1_024)
 def _generate(family: str, seed: int, worlds: int) -> TrainedTask:
-    template = _template(family_file(family))
-    path, random = template.path, template.random(seed)
-    chosen = template.choose(random)
+    template, chosen, random = _choices(family, seed)
+    path = template.path
     file = YamlFile(_fill(template.text, chosen, path), path)
     form = file.validate(FamilyFile)
     _expect_python(form, file)

@@ -105,7 +105,11 @@ def _compute(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR091
                 raise ExpressionError(f'unknown name "{name}"; the known names are {", ".join(names)}')
             return names[name]
         case ast.Attribute(inner, name):
-            return _attribute(_checked_value(inner, names), name)
+            whole = _checked_value(inner, names)
+            if not isinstance(whole, SimpleNamespace) or name not in vars(whole):
+                why = "is not an attribute; people and things have only a name and a room"
+                raise ExpressionError(f'".{name}" {why}')
+            return getattr(whole, name)
         case ast.Subscript(inner, key):
             return _checked_value(inner, names)[_checked_value(key, names)]
         case ast.List(items) | ast.Tuple(items):
@@ -134,12 +138,6 @@ def _compute(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR091
     if isinstance(node, ast.Call):
         known = f"; the only functions are {', '.join(_FUNCTIONS)}, with one argument"
     raise ExpressionError(f'"{ast.unparse(node)}" is not allowed in an expression here{known}')
-
-
-def _attribute(whole: Any, name: str) -> Any:  # noqa: ANN401 - as `evaluate`
-    if isinstance(whole, SimpleNamespace) and name in vars(whole):
-        return getattr(whole, name)
-    raise ExpressionError(f'".{name}" is not an attribute; people and things have only a name and a room')
 
 
 def iterate_loop(loop: ast.comprehension, names: Names) -> Iterator[Names]:

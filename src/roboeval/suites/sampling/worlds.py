@@ -20,8 +20,8 @@ from codebotler.core.world_file import OptionFile
 from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl.regex_words import first_choice
 from roboeval.suites.sampling.expression import ExpressionError, Names, evaluate, iterate_loop, parse_cached
-from roboeval.suites.sampling.pairwise import Combination, sample_combinations
-from roboeval.suites.schema import IN_NO_ROOM, CornerFile, SampledTaskFile, SampledWorldsFile
+from roboeval.suites.sampling.pairwise import sample_combinations
+from roboeval.suites.schema import IN_NO_ROOM, CornerFile, SampledTaskFile
 
 FactorLevel: TypeAlias = str | int  # a room, an answer, an index of an option, or a number of looks
 
@@ -62,23 +62,18 @@ class WorldSampler:
     form: SampledTaskFile
     file: YamlFile
 
-    @property
-    def described(self) -> SampledWorldsFile:
-        """Return the description of the worlds."""
-        return self.form.worlds
-
     @cached_property
     def factors(self) -> dict[str, tuple[FactorLevel, ...]]:
         """Return the levels of each factor, whose names are like `alice.in` and `alice.answer 1`."""
-        found = {ROBOT_FACTOR: self._rooms(self.described.robot, ROBOT_FACTOR)}
-        for name, person in self.described.people.items():
+        found = {ROBOT_FACTOR: self._rooms(self.form.worlds.robot, ROBOT_FACTOR)}
+        for name, person in self.form.worlds.people.items():
             found[f"{name}.in"] = self._rooms(person.where, "people", name, "in")
             for number, answers in enumerate(person.answers, 1):
                 found[f"{name}.answer {number}"] = _levels(answers)
             for topic, answers in person.topics.items():
                 found[f"{name}.topic {topic}"] = _levels(answers)
             found[f"{name}.after_looks"] = _levels(person.after_looks)
-        for name, thing in self.described.things.items():
+        for name, thing in self.form.worlds.things.items():
             found[f"{name}.in"] = self._rooms(thing.where, "things", name, "in")
         return found
 
@@ -87,7 +82,7 @@ class WorldSampler:
         return {factor: len(levels) for factor, levels in self.factors.items() if len(levels) > 1}
 
     def _rooms(self, where: str | list[str], *place: str) -> tuple[FactorLevel, ...]:
-        known = self.described.rooms if place == (ROBOT_FACTOR,) else [*self.described.rooms, IN_NO_ROOM]
+        known = self.form.worlds.rooms if place == (ROBOT_FACTOR,) else [*self.form.worlds.rooms, IN_NO_ROOM]
         for room in _levels(where):
             if room not in known:
                 sentence = f'there is no room "{room}"; use {listed(known)}'
@@ -100,30 +95,27 @@ class WorldSampler:
         At least `count` worlds are yielded, unless fewer exist.
         """
         random = Random(f"{self.form.name} {seed}")  # noqa: S311 - not for cryptography
-        corners = [self._corner(corner, number) for number, corner in enumerate(self.described.corners)]
+        corners = [self._corner(corner, number) for number, corner in enumerate(self.form.worlds.corners)]
         yield from corners
         seen = {corner.identity for corner in corners}
         left = count - len(corners)
         rows = sample_combinations(self._free, max(1, left), random) if self._free else [{}] * left
         for number, row in enumerate(rows, len(corners) + 1):
             for _ in range(_TRIES):
-                setting = self._sample(row, number, random)
+                chosen = {factor: levels[row.get(factor, 0)] for factor, levels in self.factors.items()}
+                rooms = random.sample(self.form.worlds.rooms, len(self.form.worlds.rooms))
+                setting = Setting(f"{number}: {self._about(chosen)}", chosen, tuple(rooms))
                 if setting.identity not in seen:
                     seen.add(setting.identity)
                     yield setting
                     break
-
-    def _sample(self, row: Combination, number: int, random: Random) -> Setting:
-        chosen = {factor: levels[row.get(factor, 0)] for factor, levels in self.factors.items()}
-        rooms = random.sample(self.described.rooms, len(self.described.rooms))
-        return Setting(f"{number}: {self._about(chosen)}", chosen, tuple(rooms))
 
     def _corner(self, corner: CornerFile, number: int) -> Setting:
         chosen = {factor: levels[0] for factor, levels in self.factors.items()}
         for pattern, wanted in corner.set.items():
             level = wanted.option if isinstance(wanted, OptionFile) else wanted
             named = fnmatch.filter(self.factors, pattern)
-            anywhere = level in (*self.described.rooms, IN_NO_ROOM)
+            anywhere = level in (*self.form.worlds.rooms, IN_NO_ROOM)
             may_be_anywhere = anywhere and (len(named) == 1 or level == IN_NO_ROOM)
             fitting = [
                 f for f in named if level in self.factors[f] or (may_be_anywhere and f.endswith(".in"))
@@ -133,11 +125,11 @@ class WorldSampler:
                 sentence = f'no factor that matches "{pattern}" can be "{level}"; the factors are {known}'
                 raise self.file.wrong(sentence, "worlds", "corners", number, "set")
             chosen.update(dict.fromkeys(fitting, level))
-        return Setting(corner.about, chosen, tuple(self.described.rooms))
+        return Setting(corner.about, chosen, tuple(self.form.worlds.rooms))
 
     def _about(self, chosen: Mapping[str, FactorLevel]) -> str:
         parts = []
-        for name in (*self.described.people, *self.described.things):
+        for name in (*self.form.worlds.people, *self.form.worlds.things):
             levels, room = self.factors[f"{name}.in"], chosen[f"{name}.in"]
             if room == IN_NO_ROOM:
                 parts.append(f"{name} out")
@@ -156,10 +148,10 @@ class WorldSampler:
         things = self._things(setting)
         rooms = []
         for room in setting.rooms:
-            here = [name for name in self.described.people if setting.room(name) == room]
+            here = [name for name in self.form.worlds.people if setting.room(name) == room]
             people = tuple(self._person(name, setting) for name in here)
             rooms.append(Room(room, tuple(thing.label for thing in things if thing.room == room), people))
-        wait = self.described.may_wait_forever
+        wait = self.form.worlds.may_wait_forever
         if isinstance(wait, str):
             with self._located("worlds", "may_wait_forever"):
                 wait = bool(evaluate(parse_cached(wait), self._names(setting)))
@@ -173,18 +165,18 @@ class WorldSampler:
                 yield from ((one, number) for one in _expand(form.check, names))
 
     def _person(self, name: str, setting: Setting) -> Person:
-        form, chosen = self.described.people[name], setting.chosen
+        form, chosen = self.form.worlds.people[name], setting.chosen
         answers = tuple(chosen[f"{name}.answer {n + 1}"] for n in range(len(form.answers)))
         topics = tuple((topic, chosen[f"{name}.topic {topic}"]) for topic in form.topics)
         return Person(form.name or name, answers, topics, int(chosen[f"{name}.after_looks"]), form.leaves)
 
     def _things(self, setting: Setting) -> list[SimpleNamespace]:
-        things = self.described.things.items()
+        things = self.form.worlds.things.items()
         return [SimpleNamespace(name=n, label=form.label or n, room=setting.room(n)) for n, form in things]
 
     def _names(self, setting: Setting) -> Names:
         people = []
-        for name in self.described.people:
+        for name in self.form.worlds.people:
             one = self._person(name, setting)
             answered = {"answers": one.answers, "topics": dict(one.topics), "after_looks": one.after_looks}
             people.append(SimpleNamespace(name=name, room=setting.room(name), **answered))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from codebotler.rtl.text.matcher import MAX_CACHED_LENGTH, MAX_CACHED_TEXTS, Matcher
+from codebotler.rtl.pattern import MAX_CACHED_LENGTH, MAX_CACHED_TEXTS, Matcher
 
 
 class Longer(Matcher):
