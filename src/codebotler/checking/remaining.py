@@ -40,7 +40,7 @@ def remaining_outcomes(
     for sampler in first_samplers(settings):
         robot = RepeatingRobot(room_map, sampler, settings.simulation, skills)
         robot.left = deque(event for event in room_map.past[first:] if not event.failed)
-        outcome = worker.run_alone(begun, lambda robot=robot: robot)  # type: ignore[misc]  # mypy does not infer such lambdas
+        outcome = worker.run_on(begun, robot)
         if outcome.status in {Status.FINISHED, Status.TIMEOUT} and not robot.left:
             found.append(outcome)
     return tuple(found)

@@ -60,13 +60,16 @@ class Monitor:
         mask = self._machine.mask(event, self._seen)
         if self._masks is not None and mask not in self._masks:
             raise ValueError("the event is not in the monitor's list of possible events")
-        self._state, self.holds = self._machine.step(self._state, mask)
+        known = self._machine.steps.get((self._state, mask))
+        self._state, self.holds = known or self._machine.step(self._state, mask)
         self._seen += 1
         return self.holds
 
     def would_hold(self, event: Event) -> bool:
         """Whether the formula would hold after an event; raise Inconclusive if an option is not a string."""
-        return self._machine.step(self._state, self._machine.mask(event, self._seen))[1]
+        machine = self._machine
+        mask = machine.mask(event, self._seen)
+        return (machine.steps.get((self._state, mask)) or machine.step(self._state, mask))[1]
 
 
 class _Machine:
@@ -100,10 +103,7 @@ class _Machine:
         return found
 
     def step(self, state: Any, mask: int) -> tuple[Any, bool]:  # noqa: ANN401 - as in Machine
-        """Return the next state, and whether the formula holds there."""
-        known = self.steps.get((state, mask))
-        if known is not None:
-            return known
+        """Return the next state, and whether the formula holds there, and cache both in `steps`."""
         letter = frozenset(one for bit, one in enumerate(self._elements) if mask >> bit & 1)
         after = self._machine.step(state, letter)
         found = after, self._machine.accepts(after)

@@ -206,6 +206,17 @@ class Worker:
         _log_end(source, outcome)
         return outcome
 
+    def run_on(self, source: str, robot: SimulatedRobot) -> Outcome:
+        """Run a program on a given robot, whose calls cannot be made again if a process is lost."""
+        robots = [robot]
+
+        def only_robot() -> SimulatedRobot:
+            if not robots:
+                raise EngineError("an isolated process was lost; start the command again")
+            return robots.pop()
+
+        return self.run_alone(source, only_robot)
+
     def _try(self, source: str, new_robot: NewRobot) -> Outcome:
         try:
             robot = new_robot()

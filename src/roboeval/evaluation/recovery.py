@@ -82,12 +82,12 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
     task = suite.task(one.task)
     for number, scenario in enumerate(task.scenarios):
         asked, robot = scenario.asked_by(one.prompt), RecordingRobot(scenario.world, suite)
-        whole = worker.run_alone(one.program, lambda robot=robot: robot)  # type: ignore[misc]  # mypy does not infer such lambdas
+        whole = worker.run_on(one.program, robot)
         if not judge(whole, asked).satisfied:
             return []
         for call in range(robot.skill_calls if whole.status is Status.FINISHED else 0):
             faulty = RecordingRobot(scenario.world, suite, fault=call)
-            outcome = worker.run_alone(one.program, lambda robot=faulty: robot)  # type: ignore[misc]  # mypy does not infer such lambdas
+            outcome = worker.run_on(one.program, faulty)
             result = FaultResult(one.task, number, call, len(whole.trace))
             if outcome.error is None:
                 found.append(result)

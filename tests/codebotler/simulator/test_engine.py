@@ -455,6 +455,19 @@ def test_run_whose_fork_server_is_killed_is_run_again() -> None:
     assert [said(outcome) for outcome in outcomes] == [["a", "b"], ["c"]]
 
 
+@pytest.mark.usefixtures("nothing_is_left")
+def test_a_robot_that_has_acted_is_not_given_to_a_second_run() -> None:
+    program = "def task_program():\n    say('a')\n    say('b')\n"
+    with WorkerPool(1) as workers:
+
+        def run_on(robot: SimulatedRobot) -> Outcome:
+            return workers.submit(lambda: workers.here().run_on(program, robot)).result()
+
+        assert said(run_on(SimulatedRobot(WORLD))) == ["a", "b"]
+        with pytest.raises(EngineError, match="start the command again"):
+            run_on(SimulatedRobot(WORLD, skills=doing(killing(1))))
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("nothing_is_left")
 def test_fork_server_that_is_killed_again_and_again_is_an_error_of_the_engine_and_no_verdict() -> None:

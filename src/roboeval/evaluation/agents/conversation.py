@@ -14,9 +14,7 @@ from codebotler.models.base import Reply
 from codebotler.prompts import Prompt
 from codebotler.prompts.tools import CallingMessage, ResultMessage
 from codebotler.simulator.pool import shared_pool
-from codebotler.simulator.worker import EngineError
 from roboeval.evaluation.agents.mission import AgentMission
-from roboeval.evaluation.recording import RecordingRobot
 from roboeval.evaluation.recovery import rest_prompt
 from roboeval.evaluation.runs.endings import ERROR, OUTSIDE_CONTRACT, TIMEOUT, TOKEN_LIMIT, TURN_LIMIT
 
@@ -129,7 +127,10 @@ class ReplanConversation(Conversation):
 
     def _act(self, reply: Reply) -> Prompt | None:
         """Run a reply's program where the last one has stopped."""
-        robot, outcome = self.mission.robot, _run(reply.program, self.mission)
+        pool, robot, settings = shared_pool(), self.mission.robot, self.mission.suite.settings
+        left = settings.limits.calls - robot.skill_calls  # for one program, as the mission is judged
+        robot.settings = replace(settings, limits=replace(settings.limits, calls=left))
+        outcome = pool.submit(lambda: pool.here().run_on(reply.program, robot)).result()
         if outcome.error is None:
             self.mission.answer("")
             return None
@@ -163,18 +164,3 @@ def _may_go_on(outcome: Outcome) -> bool:
     """Whether a program failed, but neither broke a rule nor reached a limit."""
     is_failure = outcome.status in {Status.ROBOT_ERROR, Status.PYTHON_ERROR, Status.KILLED}
     return is_failure and outcome.error is not None and outcome.error.kind != VIOLATION
-
-
-def _run(program: str, mission: AgentMission) -> Outcome:
-    """Run a program on the robot of a mission, which cannot make its calls a second time."""
-    settings, robots = mission.suite.settings, [mission.robot]
-    left = settings.limits.calls - mission.robot.skill_calls  # for one program, as the mission is judged
-    mission.robot.settings = replace(settings, limits=replace(settings.limits, calls=left))
-
-    def only_robot() -> RecordingRobot:
-        if not robots:
-            raise EngineError("an isolated process was lost; start the command again")
-        return robots.pop()
-
-    pool = shared_pool()
-    return pool.submit(lambda: pool.here().run_alone(program, only_robot)).result()
