@@ -25,7 +25,8 @@ class SampledFact:
     @property
     def sentence(self) -> str:
         """The fact in words, where no text ends its quotation."""
-        return self.form.format(*(brief(name).replace('"', "'") for name in self.names))
+        names = map(brief, self.names)
+        return self.form.format(*(name.replace('"', "'") if '"' in self.form else name for name in names))
 
 
 def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True) -> SampledFact:
