@@ -1,4 +1,4 @@
-"""Check a program before a robot moves: analyse its source, then run it in sampled worlds."""
+"""Check a program before a robot moves: its source, its contract, and its runs in sampled worlds."""
 
 from __future__ import annotations
 

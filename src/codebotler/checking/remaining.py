@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from functools import partial
 
 from codebotler.checking.sampled import CheckSettings, first_samplers
 from codebotler.core.errors import RobotError
@@ -37,11 +38,16 @@ def remaining_outcomes(
         pool = shared_pool()
         return pool.call(lambda: remaining_outcomes(begun, room_map, skills, first=first, worker=pool.here()))
     settings, found = CheckSettings(skills=skills), []
+    robots: list[RepeatingRobot] = []  # of all runs, since a run is repeated if its process is lost
+
+    def begin(sampler: FactSampler) -> RepeatingRobot:
+        robots.append(RepeatingRobot(room_map, sampler, settings.simulation, skills))
+        robots[-1].left = deque(event for event in room_map.past[first:] if not event.failed)
+        return robots[-1]
+
     for sampler in first_samplers(settings):
-        robot = RepeatingRobot(room_map, sampler, settings.simulation, skills)
-        robot.left = deque(event for event in room_map.past[first:] if not event.failed)
-        outcome = worker.run_on(begun, robot)
-        if outcome.status in {Status.FINISHED, Status.TIMEOUT} and not robot.left:
+        outcome = worker.run_alone(begun, partial(begin, sampler))
+        if outcome.status in {Status.FINISHED, Status.TIMEOUT} and not robots[-1].left:
             found.append(outcome)
     return tuple(found)
 

@@ -11,7 +11,7 @@ from codebotler.checking.problems import CheckResult, Problem
 from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.kinds import PICK, PLACE
-from codebotler.core.text.phrases import NO_ANSWER, is_spoken, phrase
+from codebotler.core.text.phrases import is_spoken, phrase
 from codebotler.core.text.words import brief
 from codebotler.core.trace import Event, Outcome, Status, Trace, held_after
 from codebotler.rtl.text.numbers import numerals
@@ -53,8 +53,7 @@ def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = 
         repeated = (*repeated_steps(sample.outcome.trace, found.room_map, remaining),)
         samples.append(replace(sample, repeated=repeated))
         for event in repeated:
-            asks = phrase(replace(event, answer=None), "base").removesuffix(f" → {NO_ANSWER}")
-            again = f'{asks} in "{brief(event.place)}"'
+            again = f'{phrase(replace(event, answer=None), "base")} in "{brief(event.place)}"'
             message = f"the robot has done this already and would do it again: {again}"
             if all(problem.message != message for problem in problems):
                 problems.append(Problem("RepeatedStep", message, samples=(sample.number,)))
@@ -85,9 +84,10 @@ def repeated_steps(trace: Trace, room_map: RoomMap, remaining: Sequence[Outcome]
         left |= Counter(dict.fromkeys(counted, UNBOUNDED_COUNT)) if one.status is Status.TIMEOUT else counted
     is_done = {_key(event): _is_done(event, done, later, room_map) for event in _distinct(trace)}
     counts = Counter(_sort(event, room_map) for event in trace)
+    sorted_done = [(_sort(before, room_map), before) for before in done]
     for event in trace:
         sort = _sort(event, room_map)
-        alike = (before for before in done if _sort(before, room_map) == sort)
+        alike = (before for of, before in sorted_done if of == sort)
         is_surplus = bool(remaining) and counts[sort] > left[sort]
         if is_done.get(_key(event)) or (is_surplus and any(is_about_same(event, one) for one in alike)):
             yield event

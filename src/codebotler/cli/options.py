@@ -58,7 +58,7 @@ CandidatesOption = Annotated[
         min=1,
         max=20,
         help="Ask the model for this many programs, and ask which one you mean if fewer than three in four "
-        "behave alike. For the rest of a mission, one is written.",
+        "behave alike. The rest of a mission is always one program.",
         metavar="K",
     ),
 ]

@@ -207,7 +207,7 @@ def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, in
 def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
     """Return the line of each undefined name, the name, and whether it is a local variable used too early."""
     from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - takes a tenth of a second
-    from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - see above
+    from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - slow
 
     # Names in string annotations are never looked up at run time.
     spelled = {(n.lineno, n.col_offset) for n in nodes(tree) if isinstance(n, ast.Name)}

@@ -1,4 +1,4 @@
-"""Open a robot by its kind, and check which kinds work on this machine."""
+"""Open a robot by its kind, with names in one spelling, and check which kinds work on this machine."""
 
 from __future__ import annotations
 

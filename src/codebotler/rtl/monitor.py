@@ -60,8 +60,7 @@ class Monitor:
         mask = self._machine.mask(event, self._seen)
         if self._masks is not None and mask not in self._masks:
             raise ValueError("the event is not in the monitor's list of possible events")
-        known = self._machine.steps.get((self._state, mask))
-        self._state, self.holds = known or self._machine.step(self._state, mask)
+        self._state, self.holds = self._machine.step(self._state, mask)
         self._seen += 1
         return self.holds
 
@@ -69,7 +68,7 @@ class Monitor:
         """Whether the formula would hold after an event; raise Inconclusive if an option is not a string."""
         machine = self._machine
         mask = machine.mask(event, self._seen)
-        return (machine.steps.get((self._state, mask)) or machine.step(self._state, mask))[1]
+        return machine.step(self._state, mask)[1]
 
 
 class _Machine:
@@ -103,7 +102,10 @@ class _Machine:
         return found
 
     def step(self, state: Any, mask: int) -> tuple[Any, bool]:  # noqa: ANN401 - as in Machine
-        """Return the next state, and whether the formula holds there, and cache both in `steps`."""
+        """Return the next state, and whether the formula holds there, both of which are cached."""
+        known = self.steps.get((state, mask))
+        if known is not None:
+            return known
         letter = frozenset(one for bit, one in enumerate(self._elements) if mask >> bit & 1)
         after = self._machine.step(state, letter)
         found = after, self._machine.accepts(after)

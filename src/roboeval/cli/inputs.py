@@ -148,7 +148,7 @@ def open_current(
     if results.table.is_empty():
         raise UserError(unjudged or "no completion has been judged", file=run)
     if unjudged:
-        note(unjudged)
+        note(f"only judged completions count: {unjudged}")
     return results
 
 

@@ -152,7 +152,7 @@ def components_of(outcomes: Sequence[Outcome], asked: AskedWorlds, *, parses: bo
 class RewardWork(NamedTuple):
     """A program to judge."""
 
-    name: bytes  # the same for equal programs that are judged by the same
+    name: bytes  # the same for equal programs with equal requirements
     program: str
     asking: Callable[[], tuple[Suite, AskedWorlds]]  # returns what it is judged by, in another thread
 

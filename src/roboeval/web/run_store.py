@@ -30,7 +30,7 @@ FileStamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
 
 
 class MissingError(UserError):
-    """Raised if a run or a completion does not exist or was removed."""
+    """Raised if a run, or a part of it, does not exist or was removed."""
 
 
 class RunStore:

@@ -387,7 +387,7 @@ def test_a_contract_given_at_the_start_approves(gatekeeper: Gatekeeper) -> None:
         proposed = await agent.call("propose_mission", program=HELLO)
         done = await agent.call("run_mission", digest=proposed["digest"])
         assert done["state"] == "done"
-        assert "approved by the contract given at the start" in done["events"]
+        assert 'approved by the contract given at the start, for agent "mcp"' in done["events"]
         other = await agent.call("propose_mission", program=FAR)
         waiting = await agent.call("run_mission", digest=other["digest"], seconds=0.05)
         assert waiting["state"] == "checked"

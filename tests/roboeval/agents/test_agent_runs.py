@@ -312,9 +312,13 @@ def test_the_programs_of_a_mission_share_its_limits(tmp_path: Path, small: Suite
     assert {row["failure"]["kind"] for row in rows if row["failure"]} == {"TimeoutError"}
 
 
-def test_time_goes_on_from_one_program_to_the_next(tmp_path: Path, small: Suite) -> None:
+LATE = "try: pick('moon')\n    except Exception as error: time.sleep(100); raise error"
+
+
+@pytest.mark.parametrize("fails", ["time.sleep(100); int('x')", f"0\n    {LATE}"])
+def test_time_goes_on_from_one_program_to_the_next(tmp_path: Path, small: Suite, fails: str) -> None:
     says = "time.sleep(50); say(str(time.monotonic()))"
-    _, rows, _ = replan(tmp_path, small, ["import time; time.sleep(100); int('x')", f"import time; {says}"])
+    _, rows, _ = replan(tmp_path, small, [f"import time; {fails}", f"import time; {says}"])
     assert {event[1] for row in rows for event in row["verdicts"][0]["trace"]} == {"150.0"}
 
 

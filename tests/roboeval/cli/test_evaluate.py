@@ -597,7 +597,7 @@ def test_an_unfinished_evaluation_says_so(tmp_path: Path) -> None:
     assert data["missing"]["not_judged"] == ["LunchTime"]
     assert "GetDrink" in data["missing"]["not_selected"]
     exported = roboeval("export", "run", cwd=tmp_path).err
-    assert exported.startswith("2 of 4 completions")
+    assert exported.startswith("only judged completions count: 2 of 4 completions")
     assert pasted(shown.err, tmp_path).status == 0
     assert roboeval("show", "run", cwd=tmp_path).err == ""
 

@@ -126,9 +126,6 @@ def missions(
     from codebotler.missions.storage.log import MissionSummary, read_events
     from codebotler.missions.storage.pictures import PICTURE_FOLDER, read_picture
 
-    if mcap is not None:
-        from codebotler.missions.storage.mcap import export_mcap  # fails first if its package is missing
-
     if mcap is not None and mission is None:
         raise UserError("--mcap writes one mission; give its ID, or `last`")
     if mcap is not None and json:
@@ -144,9 +141,9 @@ def missions(
     folder = store.find_mission(home(), mission)
     summary, events = MissionSummary.read(folder), read_events(folder)
     if mcap is not None:
-        export_mcap(  # type: ignore[possibly-undefined]  # imported above
-            mcap, summary, events, "robot" if clock == "robot" else "wall", folder
-        )
+        from codebotler.missions.storage.mcap import export_mcap
+
+        export_mcap(mcap, summary, events, "robot" if clock == "robot" else "wall", folder)
         note(f"wrote {len(events):,} events of mission {summary.id} to {mcap}")
         return
     print_found(

@@ -117,7 +117,7 @@ def line_reader(*, is_allowed: bool) -> Callable[[str], str] | None:
 
 
 def choose_candidate(
-    open_model: Callable[[], Model],
+    opener: Callable[[], Model],
     make_prompt: Callable[[str], Prompt],
     instruction: str,
     settings: CheckSettings,
@@ -131,7 +131,7 @@ def choose_candidate(
     After the first "none of these", they may add a sentence to the instruction for a second round.
 
     Args:
-        open_model: opens the model.
+        opener: opens the model.
         make_prompt: makes the prompt for an instruction.
         instruction: the instruction.
         settings: the settings for runs in imagined worlds.
@@ -144,7 +144,7 @@ def choose_candidate(
     """
     rejected: ClarifyingQuestion | None = None
     while True:
-        opened, prompt = open_model(), make_prompt(instruction)
+        opened, prompt = opener(), make_prompt(instruction)
         if rejected is not None:
             prompt = prompt.after(rejected.options[0].program, rejected.rejections)
         with busy(f"asking {opened.name}"):

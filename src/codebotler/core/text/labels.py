@@ -1,4 +1,4 @@
-"""Validate the labels of a world, and reject regexes that may take exponential time.
+"""Validate the labels of a world, reject regexes that may take exponential time, and scope their flags.
 
 Python tries every way to match a regex and cannot be interrupted. In a label, a repetition may therefore
 contain only single characters, at most one may be unlimited, and the ways to match a string are limited. This

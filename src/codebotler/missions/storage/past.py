@@ -219,7 +219,8 @@ def expect_rest(folder: Path) -> None:
         raise UserError(f"mission {summary.id} is done; there is nothing to continue")
     rest = find_rest(folder)
     if rest is not None:
-        mend = "is done" if rest.state is MissionState.DONE else "can be continued instead"
+        mend = "can be continued instead" if rest.has_ended else "is doing it"
+        mend = "is done" if rest.state is MissionState.DONE else mend
         raise UserError(f"mission {summary.id} was continued already; mission {rest.id} {mend}")
 
 

@@ -86,7 +86,7 @@ def choose_python(named: Path = ROS_PYTHON) -> Path:
 
 
 def ros_readiness(name: str, python: Path = ROS_PYTHON) -> Readiness:
-    """Check whether an interpreter has the modules for ros1 or ros2, which builds missing message types."""
+    """Check whether an interpreter has the modules for ros1 or ros2. Message types are built later."""
     if name == "ros1":
         needs: Sequence[str] = ROS1_MODULES
         mend = INSTALL_ROS1 if python == ROS_PYTHON else USE_OTHER_PYTHON

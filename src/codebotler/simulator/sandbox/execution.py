@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
     ParameterDescription: TypeAlias = tuple[str, str, tuple[Any, ...], str]  # name, kind, choices, words
     SkillDescriptions: TypeAlias = tuple[tuple[str, tuple[ParameterDescription, ...]], ...]
-    RunParameters: TypeAlias = tuple[int, float, float, float, bool]  # as `run_parameters` says
+    # The fuel, the time now, the limit of time, the start of the clocks, and whether the run is live.
+    RunParameters: TypeAlias = tuple[int, float, float, float, bool]
 
 # This module's own copy of the builtins, which a program cannot change.
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # Python also accepts a dict
@@ -92,7 +93,7 @@ class ProgramRun:
         if issubclass(kind, SkillError):
             number = _number_of(error)
             if number is not None:
-                return f'{{"end":"robot-error","number":{number},{where}}}'
+                return f'{{"end":"robot-error","number":{number},"now":{self.now!r},{where}}}'
         if issubclass(kind, SyntaxError) and line is None:
             lineno = _own(SyntaxError, "lineno", error)
             where = f'"line":{lineno if type(lineno) is int else "null"}'
@@ -201,7 +202,7 @@ class ProgramRun:
         return self.request(f"{quoted(name)},[{','.join(given)}]")
 
     def sleep(self, seconds: object, /) -> None:
-        """Advance time. The engine learns of simulated time with the next request, or at the time limit."""
+        """Advance simulated time, of which the engine learns with the next request or at the end."""
         if not isinstance(seconds, int | float):
             raise TypeError(f"{NAME_OF(type(seconds))!r} object cannot be interpreted as an integer")
         if not 0 <= seconds < float("inf"):

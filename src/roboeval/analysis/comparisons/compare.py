@@ -233,6 +233,7 @@ def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str,
     return {
         "first": {"name": names[0], "pass@1": comparison.first},
         "second": {"name": names[1], "pass@1": comparison.second},
+        "counts": "missions" if comparison.counts_missions else "completions",
         "prompts": comparison.prompts,
         "prompts_left_out": comparison.left_out,
         "difference": comparison.over_tasks.mean,

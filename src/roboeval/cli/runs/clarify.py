@@ -32,7 +32,7 @@ def clarify(
         typer.Option(
             min=2,
             max=20,
-            help="Number of candidates for a prompt; by default 10, or what half of the prompts have.",
+            help="Number of candidates for a prompt; by default what half of the prompts have, at most 10.",
             show_default=False,
         ),
     ] = None,

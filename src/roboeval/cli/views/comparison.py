@@ -35,7 +35,7 @@ def comparison_view(
     """Show a comparison of two runs, given the shares of their completions that fail, by class."""
     a, b = map(visible, names)
     rows = grid("left", "right", "left")
-    what = "missions that succeed, of" if comparison.counts_missions else "pass@1 of"
+    what = "missions that succeed:" if comparison.counts_missions else "pass@1 of"
     rows.add_row(f"{what} {a}", f"{comparison.first:.3f}", str(runs[0].coverage))
     rows.add_row(f"{what} {b}", f"{comparison.second:.3f}", str(runs[1].coverage))
     over = f"over {counted(comparison.prompts, 'prompt')} that both have"

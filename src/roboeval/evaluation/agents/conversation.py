@@ -128,7 +128,8 @@ class ReplanConversation(Conversation):
     def _act(self, reply: Reply) -> Prompt | None:
         """Run a reply's program where the last one has stopped."""
         pool, robot, settings = shared_pool(), self.mission.robot, self.mission.suite.settings
-        left = settings.limits.calls - robot.skill_calls  # for one program, as the mission is judged
+        # The mission is judged as one program, so its programs share the limit.
+        left = settings.limits.calls - robot.skill_calls
         robot.settings = replace(settings, limits=replace(settings.limits, calls=left))
         outcome = pool.submit(lambda: pool.here().run_on(reply.program, robot)).result()
         if outcome.error is None:

@@ -140,6 +140,8 @@ async def serve_agent(desk: MissionDesk) -> None:
 
 
 def _end(desk: MissionDesk, number: int) -> None:
-    desk.leave()
-    signal.signal(number, signal.SIG_DFL)
-    signal.raise_signal(number)  # any other end would wait for the thread that reads standard input
+    try:
+        desk.leave()
+    finally:
+        signal.signal(number, signal.SIG_DFL)
+        signal.raise_signal(number)  # any other end would wait for the thread that reads standard input

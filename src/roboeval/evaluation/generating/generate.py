@@ -54,10 +54,10 @@ class GenerationProgress:
 
     @property
     def missing(self) -> str | None:
-        """Return a sentence that says how many completions are missing and why, or None if none are."""
+        """Say how many completions are missing, and why, or why generation stopped; None if all is well."""
         left = self.total - self.done
         reason = self.stopped or next(iter(self.failures.values()), "they were not requested")
-        return f"{how_many(left)} {'is' if left == 1 else 'are'} missing: {reason}" if left else None
+        return f"{how_many(left)} {'is' if left == 1 else 'are'} missing: {reason}" if left else self.stopped
 
 
 def generate_run(

@@ -150,8 +150,8 @@ def begin_batch(
     Raises UserError if existing completions have other settings.
     """
     about, done = _run_metadata(run, plan, model, settings), {one.key for one in plan.completed(run)}
-    copied = {one.key for one in plan.given()}
-    todo = [key for key in plan.keys() if key not in done | copied]  # noqa: SIM118 - a plan is no mapping
+    there = done | {one.key for one in plan.given()}
+    todo = [key for key in plan.keys() if key not in there]  # noqa: SIM118 - a plan is no mapping
     if todo:
         about["batches"] = _with_batch(about["batches"], plan, settings)
     return about, done, todo

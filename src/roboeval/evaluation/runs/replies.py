@@ -36,9 +36,9 @@ def reply_data(completion: Completion | None) -> dict[str, Any] | None:
     }
 
 
-def reply_numbers(completion: Completion | None) -> dict[str, float | None]:
+def reply_numbers(completion: Completion) -> dict[str, float | None]:
     """Return the token counts of a reply and its latency in seconds. Each is None if it was not recorded."""
-    more = {} if completion is None else completion.more
+    more = completion.more
     usage = more.get("usage")
     usage = usage if isinstance(usage, dict) else {}
     tokens = {name: number_or_none(usage.get(name), int) for name in TOKENS}

@@ -135,9 +135,8 @@ class TableBuilder:
         judged = {"program_sha256": program, "passed": row["passed"], "stale": is_stale}
         failure = {f"failure_{name}": value for name, value in (row["failure"] or {}).items()}
         known = {} if written is None else _reply(written) | ({} if is_stale else _texts(written))
-        self._rows.append(
-            {**dict(zip(KEY, key, strict=True)), **judged, **failure, **known}
-        )  # others are null
+        # Columns without an entry are null.
+        self._rows.append({**dict(zip(KEY, key, strict=True)), **judged, **failure, **known})
         self._counts.append(len(row["verdicts"]))
         for number, verdict in enumerate(row["verdicts"]):
             checks, error = verdict["failed_checks"], verdict["error"]

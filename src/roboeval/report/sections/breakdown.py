@@ -1,4 +1,4 @@
-"""Builds the sections on the abilities that tasks require, and on the phrasing of instructions."""
+"""Builds the tables on the abilities that tasks require, and on the phrasing of instructions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Builds the section that compares programs with agents, if there is a run of an agent."""
+"""Builds the tables that compare programs with agents, if there is a run of an agent."""
 
 from __future__ import annotations
 

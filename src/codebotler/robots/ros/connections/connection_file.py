@@ -76,7 +76,7 @@ class ConnectionForm(_ConnectionPart):
     robot: Literal["ros1", "rosbridge", "ros2"] = "ros2"
     places: Any = None
     pose: PoseForm | None = None
-    velocity: Annotated[dict[Literal["topic"], Topic], Field(min_length=1)] = {}
+    velocity: Annotated[dict[Literal["topic"], Topic], Field(min_length=1)] | None = None
     packages: list[str] = []
     keepout: KeepoutForm | None = None
     skills: Annotated[dict[str, SkillForm], Field(min_length=1)]
@@ -114,7 +114,7 @@ def read_connection(path: Path, skills: SkillTable) -> Connection:
         form.robot,
         places,
         (form.pose and form.pose.topic) or usual_topic,
-        form.velocity.get("topic", ""),
+        (form.velocity or {}).get("topic", ""),
         None if tf is None else (tf.get("from", "map"), tf.get("to", "base_link")),
         folders,
         cameras,
