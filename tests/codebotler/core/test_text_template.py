@@ -91,3 +91,16 @@ def test_a_single_brace_is_an_error(wrong: str) -> None:
 def test_a_template_without_parts_is_an_error() -> None:
     with pytest.raises(ValueError, match="part"):
         TextTemplate(())
+
+
+def test_a_text_with_the_character_of_a_hole_is_any_text() -> None:
+    assert TextTemplate(("\ud800",)).is_any, "so that a person sees what it allows"
+    assert not TextTemplate(("\udfff",)).matches("kitchen")
+
+
+def test_what_is_beyond_others_is_what_none_of_them_covers() -> None:
+    texts = [*map(TextTemplate.parse, ("mug", "Mug", "cup", "{} cup", "a {}", "a cup", "", "{}"))]
+    for number in range(1 << 6):
+        allowed = [one for bit, one in enumerate(texts[:6]) if number >> bit & 1]
+        uncovered = [one for one in texts if not any(each.covers(one) for each in allowed)]
+        assert TextTemplate.beyond(texts, allowed) == uncovered

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from string import Formatter
@@ -10,7 +11,7 @@ from codebotler.core.cachedproperty import cached_property
 from codebotler.core.text.unicode import normalize_text
 
 MAX_PIECES, MAX_TEMPLATE_LENGTH = 20, 2_000
-_HOLE = "\ud800"  # a lone surrogate, which no text of a program contains
+_HOLE = "\ud800"  # a lone surrogate
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,8 @@ class TextTemplate:
 
     Args:
         parts: the pieces around the holes; a single piece is one exact text, and two empty ones are any text.
-            Adjacent holes become one. More than 20 pieces or 2,000 characters become any text.
+            Adjacent holes become one. More than 20 pieces or 2,000 characters become any text, and so does a
+            text with the character that stands for a hole.
 
     Raises:
         ValueError: there are no parts.
@@ -34,7 +36,8 @@ class TextTemplate:
             raise ValueError("a text template has at least one part")
         first, *rest = self.parts
         parts = (first, *filter(None, rest[:-1]), *rest[-1:])
-        if len(parts) > MAX_PIECES or sum(map(len, parts)) > MAX_TEMPLATE_LENGTH:
+        is_long = len(parts) > MAX_PIECES or sum(map(len, parts)) > MAX_TEMPLATE_LENGTH
+        if is_long or any(_HOLE in part for part in parts):
             parts = ("", "")
         object.__setattr__(self, "parts", parts)
 
@@ -44,8 +47,13 @@ class TextTemplate:
         return len(self.parts) > 1 and not any(map(str.strip, self._pieces))
 
     @cached_property
+    def joined(self) -> str:
+        """The text in the spelling in which texts are compared, with a character for each hole."""
+        return _comparable(_HOLE.join(self.parts))
+
+    @cached_property
     def _pieces(self) -> list[str]:
-        return _comparable(_HOLE.join(self.parts)).split(_HOLE)
+        return self.joined.split(_HOLE)
 
     def matches(self, text: str) -> bool:
         """Whether a text is one of this template's texts."""
@@ -56,7 +64,15 @@ class TextTemplate:
 
         The answer may be False although it is so, but not True although it is not.
         """
-        return _are_in_order(self._pieces, _comparable(_HOLE.join(other.parts)))
+        return _are_in_order(self._pieces, other.joined)
+
+    @staticmethod
+    def beyond(templates: Iterable[TextTemplate], allowed: Iterable[TextTemplate]) -> list[TextTemplate]:
+        """Return the templates that no allowed one covers, in linear time for texts without holes."""
+        known = [*allowed]
+        exact, open_ones = {one.joined for one in known}, [one for one in known if len(one.parts) > 1]
+        left = [one for one in templates if one.joined not in exact]
+        return [one for one in left if not any(each.covers(one) for each in open_ones)]
 
     def __str__(self) -> str:
         return "{}".join(part.replace("{", "{{").replace("}", "}}") for part in self.parts)

@@ -100,8 +100,7 @@ class SkillBound:
         """
         added: list[tuple[str, Templates]] = []
         for (name, templates), (_, allowed) in zip(self.texts, other.texts, strict=True):
-            new = (one for one in templates if not any(each.covers(one) for each in allowed))
-            added.append((name, tuple(new)))
+            added.append((name, tuple(TextTemplate.beyond(templates, allowed))))
         places: tuple[str, ...] | None = ()
         if other.places is not None:
             known = {place.casefold() for place in other.places}
