@@ -86,6 +86,10 @@ def test_a_name_that_the_program_binds_is_no_skill() -> None:
         ("from random import choice; choice([1])", True),
         ("from time import sleep; sleep(1)", False),
         ("from time import time; time()", True),
+        ("import time as t; t.time()", True),
+        ("from calendar import datetime as t; t.datetime.now()", True),
+        ("import calendar; calendar.datetime.datetime.now()", True),
+        ("t = time; t.time()", True),
     ],
 )
 def test_clocks_and_random_numbers(line: str, *, reads: bool) -> None:

@@ -83,15 +83,18 @@ def _read(program: str, parameters: list[tuple[str, list[str]]]) -> tuple[_Found
 
 def _reads_clock(tree: ast.Module) -> bool:
     """Return whether a program uses a clock or random numbers, rather than only waiting."""
+    waits = {node.value for node in nodes(tree) if isinstance(node, ast.Attribute) and node.attr == "sleep"}
     for node in nodes(tree):
         match node:
-            case ast.Name(name) | ast.Attribute(ast.Name(name)) if name in CLOCKS:
+            case ast.Name("time", ast.Load()) if node not in waits:
+                return True
+            case ast.Name(name) | ast.Attribute(_, name) if name in CLOCKS:
                 return True
             case ast.ImportFrom(module) if module in CLOCKS:
                 return True
             case ast.ImportFrom("time", names) if any(one.name != "sleep" for one in names):
                 return True
-            case ast.Attribute(ast.Name("time"), attribute) if attribute != "sleep":
+            case ast.alias(name, str()) if {*name.split(".")} & {*CLOCKS, "time"}:
                 return True
     return False
 
