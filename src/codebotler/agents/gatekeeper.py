@@ -57,6 +57,7 @@ class Gatekeeper:
     asks_client: bool = False
     writes: bool = False
     page: str = ""
+    shown_problems: tuple[str, ...] = field(default=(), init=False)  # in the last dialog about a program
     _session: MissionSession | None = field(default=None, init=False)  # the latest one of an agent
     _steps: Steps | None = field(default=None, init=False)  # of that session, if it is step by step
     _waiting: int = field(default=0, init=False)  # calls of agents that wait for a mission or a skill
@@ -73,7 +74,7 @@ class Gatekeeper:
             raise UserError(f"the program has more than {MAX_PROGRAM_LENGTH:,} characters; shorten it")
         if not order.has_program and not self.writes:
             raise UserError("no model is configured that can write programs; send a program")
-        session = self.console.begin(order)
+        session = self.console.begin(order, by_agent=True)
         self._session, self._steps = session, steps
         return session
 
@@ -122,9 +123,11 @@ class Gatekeeper:
     def approves_alone(self, session: MissionSession) -> bool:
         """Whether the contract given at the start allows all that an agent's own proposal may do.
 
-        If a person has edited the program or switched off a rule, a person must approve it.
+        If a person has edited the program, switched off a rule or pressed STOP, a person must approve it.
         """
         view = session.view
+        if self.console.is_held:
+            return False
         is_agents = session is self._session and bool(view.author) and not view.disabled_rules
         is_within = view.within is not None and view.contract is not None
         return is_agents and is_within and view.may_be_approved and not view.problems

@@ -128,5 +128,6 @@ def _deed_text(deed: Action) -> str:
 
 def _scene_text(scene: Scene) -> str:
     deeds = "; ".join(map(_deed_text, scene.deeds))
-    where = scene.room if scene.is_found else f"{scene.room} (there is no such room)"
+    room = scene.room.replace(";", ",").replace(":", ",")
+    where = room if scene.is_found else f"{room} (there is no such room)"
     return f"{where}: {deeds}" if deeds else where

@@ -66,7 +66,7 @@ class Steps:
 
     def call(self, name: str, arguments: Mapping[str, object]) -> Future[SkillOutcome]:
         """Call a skill of the running mission. Raise UserError for a wrong call."""
-        if name not in self.contract.skills.keys() | TELLING_SKILLS:
+        if name not in (self.contract.skills.keys() | TELLING_SKILLS) & {*self.skills}:
             raise UserError(f"this mission may call only {listed(list(self.contract.skills))}")
         call = self.skills[name], named_arguments(self.skills[name], arguments), Future[SkillOutcome]()
         with self._lock:

@@ -263,7 +263,7 @@ async def stop(ctx: AgentContext) -> MissionReport:
     """
     gatekeeper = gatekeeper_of(ctx)
     session = gatekeeper.console.session
-    if gatekeeper.console.stop(agent_name(ctx)) and session is not None:
+    if gatekeeper.console.stop(agent_name(ctx), holds=False) and session is not None:
         await gatekeeper.console.notifier.until(lambda: session.view.is_over, 15)
     return gatekeeper.report(session)
 
@@ -296,7 +296,10 @@ def _take_answer(
                 session.approve(digest, by=f"the contract given at the start, for {client}")
         case AcceptedElicitation(data=Consent(approve=True)):
             if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
+                if view.problems != gatekeeper.shown_problems:
+                    raise MissionError("the check has found something else meanwhile; ask again")
                 session.approve(digest, despite_problems=bool(view.problems), by=person)
+                gatekeeper.console.is_held = False
         case AcceptedElicitation() | DeclinedElicitation():
             session.stop_soon(person)
 

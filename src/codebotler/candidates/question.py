@@ -213,7 +213,7 @@ def _words(key: Aspect, sample: Sample) -> str:
     outcome = sample.outcome
     if kind == "said":
         said = [*statements(outcome.trace)]
-        texts = [f'"{brief(text)}"' for room, text in said if room == name]
+        texts = ['"{}"'.format(brief(text).replace('"', "'")) for room, text in said if room == name]
         return f"says {listed(texts) or 'nothing'} in {name}" if said else "says nothing"
     if kind == "moved":
         moves = (one for one in outcome.trace if one.kind in {PICK, PLACE} and normalized(one.text) == name)
@@ -232,6 +232,6 @@ def _words(key: Aspect, sample: Sample) -> str:
 
 def _events(events: Iterable[Event], nothing: str) -> str:
     words = (
-        f"{phrase(one, 'third')}{f' to {brief(one.to)}' if one.to else ''} in {one.place}" for one in events
+        f"{phrase(one, 'third')}{f' to {brief(one.to)!r}' if one.to else ''} in {one.place}" for one in events
     )
     return listed([*dict.fromkeys(words)]) or nothing

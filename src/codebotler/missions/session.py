@@ -323,7 +323,12 @@ class MissionSession(SharedView):
         self._show(busy="comparing the programs")
         refused = () if self._rejected is None else self._rejected.programs
         how = CheckSettings(skills=self._robot.skills, house_rules=self._view.rules_in_force)
-        groups = compare_candidates(programs, how, self._view.room_map, refused)
+        try:
+            groups = compare_candidates(programs, how, self._view.room_map, refused)
+        except UserError:
+            if self._next_task is None:  # else a person has written a program meanwhile
+                raise
+            return
         is_second = self._rejected is not None
         question = question_about(groups, model=self._view.model, is_second=is_second)
         if question is not None and self._order.asks:

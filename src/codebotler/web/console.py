@@ -73,6 +73,7 @@ class Console:
         self._lock = threading.RLock()  # held briefly, and again by a signal handler
         self.session: MissionSession | None = None  # the current session, or else the last one
         self._may_recover: MissionSession | None = None  # the current session, unless somebody pressed STOP
+        self.is_held = False  # whether a person has pressed STOP and approved nothing since
         self.unfinished = ""  # the mission that had begun and ended early before another one was written
         self._checking = threading.Lock()
 
@@ -108,9 +109,14 @@ class Console:
         await self.notifier.until(lambda: self.view.is_over == over, MAX_WAIT_SECONDS)
         return self.view
 
-    def begin(self, order: MissionOrder) -> MissionSession:
-        """Begin a mission, by default with the first model. Raise MissionError while another mission runs."""
+    def begin(self, order: MissionOrder, *, by_agent: bool = False) -> MissionSession:
+        """Begin a mission, by default with the first model. Raise MissionError while another mission runs.
+
+        If an agent begins it, the notice about an interrupted mission stays for a person.
+        """
+        noticed = self.interrupted if by_agent else ()
         session = self._begin(order)
+        self.interrupted = noticed
         if self.recoveries:
             threading.Thread(target=self._recover, args=(session,), daemon=True).start()
         return session
@@ -119,7 +125,10 @@ class Console:
         """Begin a mission, or only if nothing has happened since the end of the session `after`."""
         model = order.model.strip() or ("" if order.has_program else self.models[0])
         count = 1 if order.has_program or order.past is not None else self.candidates
-        order = replace(order, instruction=order.instruction.strip(), model=model, candidates=count)
+        program = order.program if order.has_program else ""
+        order = replace(
+            order, instruction=order.instruction.strip(), model=model, program=program, candidates=count
+        )
         for text in (order.instruction, order.program):
             _check_length(text)
         with self._lock:
@@ -208,8 +217,12 @@ class Console:
         self.interrupted = ()
         self.notifier.change()
 
-    def stop(self, by: str, *, only_moving: bool = False) -> bool:
-        """Stop the mission, or only an approved one, without waiting. Return whether there was one."""
+    def stop(self, by: str, *, only_moving: bool = False, holds: bool = True) -> bool:
+        """Stop the mission, or only an approved one, without waiting. Return whether there was one.
+
+        If it `holds`, as a person's STOP does, a person must approve the next mission.
+        """
+        self.is_held = self.is_held or holds
         with self._lock:
             session, self._may_recover = self.session, None
         if session is None or session.view.is_over or (only_moving and not session.view.is_approved):

@@ -23,6 +23,7 @@ from codebotler.agents.server import make_server
 from codebotler.agents.steps import Steps
 from codebotler.checking.contracts.file import contract_from
 from codebotler.checking.house_rules.file import read_rules
+from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.display.view import MissionOrder, SessionView, program_digest
@@ -1101,3 +1102,49 @@ def test_no_text_in_a_storyboard_begins_another_deed(gatekeeper: Gatekeeper) -> 
         assert (scene.count(";"), scene.count('"'), world.count('"')) == (2, 6, 8)
 
     use(gatekeeper, act)
+
+
+def test_after_a_persons_stop_the_contract_of_the_start_approves_nothing(gatekeeper: Gatekeeper) -> None:
+    gatekeeper.console.within = contract_from({"go_to": {"location": "any"}}, SKILLS)
+
+    async def act(agent: Agent) -> None:
+        async def proposed() -> Any:  # noqa: ANN401 - a report
+            found = await agent.call("propose_mission", program=QUIET)
+            return await agent.call("run_mission", digest=found["digest"], seconds=1)
+
+        await agent.call("stop")
+        assert (await proposed())["state"] == "done", "an agent's own stop holds nothing"
+        gatekeeper.console.stop("a person")
+        assert (await proposed())["state"] == "checked"
+
+    use(gatekeeper, act)
+
+
+def test_a_late_yes_does_not_accept_what_the_check_has_found_since(gatekeeper: Gatekeeper) -> None:
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+        gatekeeper.shown_problems = ("as if the question had been about another check",)
+        return ElicitResult(action="accept", content={"approve": True})
+
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=QUIET)
+        await agent.fails("run_mission", digest=proposed["digest"])
+        assert view_of(gatekeeper).may_be_approved
+
+    gatekeeper.asks_client = True
+    use(gatekeeper, act, answer=answer, mode="legacy")
+
+
+def test_a_skill_that_the_robot_lacks_is_refused_in_words() -> None:
+    known = SKILLS.without({"get_all_rooms"})
+    steps = Steps("Look around.", contract_from({"go_to": {"location": "any"}}, known), known)
+    with pytest.raises(UserError):
+        steps.call("get_all_rooms", {})
+
+
+def test_a_notice_for_people_outlives_an_agents_proposal(gatekeeper: Gatekeeper, tmp_path: Path) -> None:
+    left(tmp_path, "say", "result")
+    with gatekeeper.console:
+        noticed = gatekeeper.console.interrupted
+        assert noticed
+        gatekeeper.propose(MissionOrder(program=QUIET, author="agent"))
+        assert gatekeeper.console.interrupted == noticed

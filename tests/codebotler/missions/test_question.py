@@ -12,6 +12,7 @@ import pytest
 
 from codebotler.candidates.clusters import CandidateClusters, compare_candidates
 from codebotler.candidates.question import ClarifyingAnswer
+from codebotler.core.errors import UserError
 from codebotler.core.world import Room, World
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.mission import MissionError
@@ -205,3 +206,21 @@ def test_an_edit_while_programs_are_compared_takes_the_place_of_the_question(
         go_on.set()
         view = waited(session)
         assert (view.program, view.question, view.author) == (GO, None, "")
+
+
+def test_an_edit_outlives_candidates_that_all_do_what_was_not_meant(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, go_on = Event(), Event()
+
+    def refuse(*_: Any) -> CandidateClusters:  # noqa: ANN401 - not used
+        begun.set()
+        assert go_on.wait(10)
+        raise UserError("all would do again what was not meant")
+
+    monkeypatch.setattr("codebotler.missions.session.compare_candidates", refuse)
+    with asking(tmp_path, STAY, FETCH) as (session, _):
+        assert begun.wait(10)
+        session.edit(GO)
+        go_on.set()
+        assert waited(session).program == GO

@@ -98,15 +98,15 @@ def recover_missions(home: Path) -> list[MissionSummary]:
 
 
 def find_interrupted(home: Path) -> list[MissionSummary]:
-    """Close missions whose process died. Return them, with the last mission if it was interrupted before.
+    """Close missions whose process died. Return them, and the last one if it was interrupted before.
 
-    A rest that never ran changed nothing, so the mission before it counts.
+    So is the last one that ran, since later ones that did not run changed nothing.
     """
     found = recover_missions(home)
     with suppress(UserError):
         known = read_missions(home, RECENT_MISSIONS)
-        last = [one for one in known if one.if_tool_dies or not one.continues][-1:]
-        found += [one for one in last if one.state is MissionState.INTERRUPTED and one not in found]
+        for last in (known, [one for one in known if one.if_tool_dies]):
+            found += [one for one in last[-1:] if one.state is MissionState.INTERRUPTED and one not in found]
     return found
 
 
