@@ -216,6 +216,12 @@ def test_what_was_said_is_not_said_again(lines: list[str], problems: set[str]) -
     assert rest(*lines, past=(SAID,)) == problems
 
 
+def test_a_long_past_is_not_compared_for_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("codebotler.checking.repetition.MAX_COMPARED_PAIRS", 3)
+    assert rest("say('a')", "say('b')", past=(SAID, replace(SAID, text="c"))) == {"LongPast"}
+    assert rest("say('a')", past=(SAID, replace(SAID, text="c"))) == set()
+
+
 @pytest.mark.parametrize(
     ("lines", "problems"),
     [

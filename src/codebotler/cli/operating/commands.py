@@ -132,6 +132,9 @@ def missions(
         raise UserError("--mcap and --json cannot be used together")
     if clock not in {"wall", "robot"}:
         raise UserError(f'unknown clock "{clock}"; use wall or robot')
+    if mcap is not None:
+        from codebotler.missions.storage.mcap import export_mcap  # fails first if its package is missing
+
     skills_from(*(skills or ()))  # registers the verbs that describe the skills
     store.recover_missions(home())
     if mission is None:
@@ -141,9 +144,9 @@ def missions(
     folder = store.find_mission(home(), mission)
     summary, events = MissionSummary.read(folder), read_events(folder)
     if mcap is not None:
-        from codebotler.missions.storage.mcap import export_mcap
-
-        export_mcap(mcap, summary, events, "robot" if clock == "robot" else "wall", folder)
+        export_mcap(  # type: ignore[possibly-undefined]  # imported above
+            mcap, summary, events, "robot" if clock == "robot" else "wall", folder
+        )
         note(f"wrote {len(events):,} events of mission {summary.id} to {mcap}")
         return
     print_found(
