@@ -390,7 +390,7 @@ def test_resampling_counts_only_what_was_judged_as_it_stands(tmp_path: Path) -> 
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:4]))
     unseal(tmp_path / "run")
     ended = roboeval("resample", "run", "--json", cwd=tmp_path)
-    assert ended.err.startswith("4 of 20 completions ")
+    assert ended.err.startswith("only judged completions count: 4 of 20 completions ")
     assert "`roboeval evaluate run --tasks LunchTime,SayGoodDay`" in ended.err
     assert sum(prompt["completions"] for prompt in json.loads(ended.out)["prompts"]) == 4
     completions = tmp_path / "run" / "completions.jsonl"
