@@ -269,8 +269,8 @@ def test_after_a_failure_the_model_writes_the_rest(tmp_path: Path, suite: Suite)
 
 def test_rooms_and_waits_are_no_steps(tmp_path: Path, small: Suite) -> None:
     _, _, server = replan(tmp_path, small, ["get_all_rooms(); time.sleep(1); int('x')", "say('hello')"])
-    told = max(server.requests, key=turns_before).body["messages"][-1]["content"]
-    assert "- no step was finished" in told  # rather than that nothing was seen
+    sent = max(server.requests, key=turns_before).body["messages"][-1]["content"]
+    assert "- no step was finished" in sent  # rather than that nothing was seen
 
 
 @pytest.mark.parametrize(
