@@ -68,23 +68,17 @@ def generate(
         return
     if candidates > 1 and (repair or retries is not None):
         raise UserError("--candidates cannot be combined with --retries or --repair")
+    how = CheckSettings(skills=table, house_rules=house_rules)
     with suggesting_here(room_map):
         if candidates > 1:
-            how = CheckSettings(skills=table, house_rules=house_rules)
             ask = programs.line_reader(is_allowed=not yes)
             given = (lambda: open_model(chosen.name, settings)), make_prompt, instruction, how, room_map
             program = programs.choose_candidate(*given, count=candidates, ask=ask)
             accepted = program is not None and programs.print_checked(program, how, room_map)
         else:
+            tries, prompt = int(repair) if retries is None else retries, make_prompt(instruction)
             accepted = programs.write(
-                make_prompt(instruction),
-                chosen.name,
-                settings,
-                room_map=room_map,
-                house_rules=house_rules,
-                skills=table,
-                retries=int(repair) if retries is None else retries,
-                repair=repair,
+                prompt, chosen.name, settings, how, room_map, retries=tries, repair=repair
             )
     raise typer.Exit(0 if accepted else 1)
 

@@ -16,8 +16,6 @@ from codebotler.checking.check import check
 from codebotler.checking.sampled import CheckSettings
 from codebotler.checking.storyboard import storyboard
 from codebotler.core.errors import UserError
-from codebotler.core.skills.paper import SKILLS
-from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import (
     busy,
     console,
@@ -36,7 +34,6 @@ from codebotler.models.open import kind_of, open_model
 from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
-from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.worlds.room_map import RoomMap
 
 MAX_REPLY_SHOWN = 300  # how many characters to show of a reply without a program
@@ -47,22 +44,21 @@ def write(
     prompt: Prompt,
     model: str,
     settings: SamplingSettings,
-    *,
+    how: CheckSettings,
     room_map: RoomMap | None,
-    house_rules: tuple[Rule, ...] = (),
-    skills: SkillTable = SKILLS,
+    *,
     retries: int,
     repair: bool,
 ) -> bool:
-    """Have a model write a program, print it, and return whether the check accepts it."""
+    """Have a model write a program, print it, and return whether the check, set as `how`, accepts it."""
     with busy(f"asking {model}"):
         opened = open_model(model, settings)
         generation = write_checked_program(
             opened,
             prompt,
             room_map=room_map,
-            house_rules=house_rules,
-            skills=skills,
+            house_rules=how.house_rules,
+            skills=how.skills,
             retries=retries,
             repair=repair,
             on_attempt=partial(_note_attempt, most=retries + 1),
