@@ -101,6 +101,7 @@ class MissionSession(SharedView):
         self._stop_button.on_press(self._end_waiting)
         self._thread = threading.Thread(target=self._run, name=f"session-{number}", daemon=True)
         self.error: Exception | None = None  # set if an error ended the session
+        self.is_approved_by_person = False
 
     def start(self) -> None:
         """Start the session's thread."""
@@ -164,10 +165,17 @@ class MissionSession(SharedView):
             )
             self._change(question=None, busy=CHECKING)
 
-    def approve(self, seen: str, *, despite_problems: bool = False, by: str = "") -> None:
-        """Approve the program that the person saw, identified by its digest. `by` goes to the log."""
+    def approve(
+        self, seen: str, *, despite_problems: bool = False, by: str = "", is_person: bool = True
+    ) -> None:
+        """Approve the program that the person saw, identified by its digest. `by` goes to the log.
+
+        `is_person` is whether a person decides this now, rather than what a person has approved before.
+        """
         with self._editing:
             view, mission = self._view, self._mission
+            if self._is_stopped:
+                raise MissionError("the mission is being stopped")
             if mission is None or view.busy or view.question is not None:
                 raise MissionError("the program has not been checked yet")
             if seen != view.digest or seen != program_digest(mission.summary.program):
@@ -175,6 +183,7 @@ class MissionSession(SharedView):
             if not view.can_run:
                 raise MissionError("this program cannot run; mend it")
             mission.approve(despite_problems=despite_problems, by=by)
+            self.is_approved_by_person = is_person
 
     def reject(self, reason: str) -> None:
         """End the mission before it runs."""

@@ -202,7 +202,6 @@ def _add_changes(api: APIRouter, console: Console) -> None:
         """Run exactly the program that the person reviewed."""
         session = _current_session(console, mission)
         session.approve(approval.program, despite_problems=approval.despite_problems)
-        console.is_held = False
         return view_data(session.view)
 
     @api.post("/stop", status_code=202)

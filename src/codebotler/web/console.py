@@ -73,7 +73,7 @@ class Console:
         self._lock = threading.RLock()  # held briefly, and again by a signal handler
         self.session: MissionSession | None = None  # the current session, or else the last one
         self._may_recover: MissionSession | None = None  # the current session, unless somebody pressed STOP
-        self.is_held = False  # whether a person has pressed STOP and approved nothing since
+        self._held_since: int | None = None  # the session, or 0, at which a person pressed STOP
         self.unfinished = ""  # the mission that had begun and ended early before another one was written
         self._checking = threading.Lock()
 
@@ -137,6 +137,8 @@ class Console:
                 raise MissionError(f"mission {before.view.id} is {before.view.state}; stop it first")
             if after is not None and after is not self._may_recover:
                 raise MissionError("somebody pressed STOP, or began another mission")
+            if before is not None and self._held_since is not None and before.is_approved_by_person:
+                self._held_since = self._held_since if before.view.number <= self._held_since else None
             if order.past is not None:
                 self.unfinished = ""
             elif before is not None and before.view.progress.has_begun:
@@ -153,10 +155,10 @@ class Console:
                 world=self.world,
                 within=self.within,
             )
+            session.start()
         if before is not None:
             before.stop_soon("another instruction")
         self.interrupted = ()
-        session.start()
         self.notifier.change()
         return session
 
@@ -193,7 +195,9 @@ class Console:
                 session = self._begin(self.rest_of(past), after=session)
                 view = session.wait_until(lambda now: now.may_be_approved or now.waits_for_program)
                 if approval is not None and approval.allows(view, past) and self._may_recover is session:
-                    session.approve(view.digest, by=f"the approval of mission {past.mission}")
+                    session.approve(
+                        view.digest, by=f"the approval of mission {past.mission}", is_person=False
+                    )
                     if self._may_recover is not session:
                         session.stop(BY_PAGE)
 
@@ -212,6 +216,11 @@ class Console:
         session.edit(program)
         return session
 
+    @property
+    def is_held(self) -> bool:
+        """Whether a person has pressed STOP, and has approved no later mission."""
+        return self._held_since is not None
+
     def dismiss(self) -> None:
         """Dismiss the notice about interrupted missions."""
         self.interrupted = ()
@@ -222,9 +231,10 @@ class Console:
 
         If it `holds`, as a person's STOP does, a person must approve the next mission.
         """
-        self.is_held = self.is_held or holds
         with self._lock:
             session, self._may_recover = self.session, None
+            if holds:
+                self._held_since = 0 if session is None else session.view.number
         if session is None or session.view.is_over or (only_moving and not session.view.is_approved):
             return False
         session.stop_soon(by)
