@@ -8,6 +8,7 @@ To turn it into an agent, give `tools` to your model, and call those that it cho
 import asyncio
 import os
 import sys
+import termios
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,8 @@ def task_program():
 async def ask(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - the client passes it
     """Ask the person at the terminal. Never answer such a question with a model."""
     print(f"\n{params.message}\n")
+    if sys.stdin.isatty():  # what was typed before the question is no answer to it
+        termios.tcflush(sys.stdin, termios.TCIFLUSH)
     try:
         answer = await asyncio.to_thread(input, "May the robot do this? [y/N] ")
     except EOFError:

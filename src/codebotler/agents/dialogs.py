@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
@@ -102,21 +102,29 @@ def ask_whether(
     return Elicit(asked, StepWord)  # without the robot's own word, since an agent may not occupy the robot
 
 
-async def find_session(digest: str, ctx: AgentContext) -> MissionSession:
+class ProposedProgram(NamedTuple):
+    """A mission that waits for approval, and what its check had found when a person was asked."""
+
+    session: MissionSession
+    problems: Sequence[str]
+
+
+async def find_program(digest: str, ctx: AgentContext) -> ProposedProgram:
     """Return the mission whose program has a digest."""
     with as_tool_errors():
-        return gatekeeper_of(ctx).find_session(digest)
+        session = gatekeeper_of(ctx).find_session(digest)
+    return ProposedProgram(session, session.view.problems)
 
 
 def ask_person(
-    session: Annotated[MissionSession, Resolve(find_session)], ctx: AgentContext
+    proposed: Annotated[ProposedProgram, Resolve(find_program)], ctx: AgentContext
 ) -> Elicit[Consent] | NotAsked:
     """Have the client ask its person, unless the program is already approved or the client cannot ask."""
-    gatekeeper, view = gatekeeper_of(ctx), session.view
+    gatekeeper, session = gatekeeper_of(ctx), proposed.session
+    view = session.view
     may_ask = view.may_be_approved and gatekeeper.may_ask_client(view) and _has_dialogs(ctx)
     if not may_ask or gatekeeper.approves_alone(session):
         return NotAsked()
-    gatekeeper.shown_problems = view.problems
     return Elicit(
         question(view, gatekeeper.console.robot.name, gatekeeper.contract_text(view.contract)), Consent
     )

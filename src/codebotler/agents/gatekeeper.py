@@ -57,7 +57,6 @@ class Gatekeeper:
     asks_client: bool = False
     writes: bool = False
     page: str = ""
-    shown_problems: tuple[str, ...] = field(default=(), init=False)  # in the last dialog about a program
     _session: MissionSession | None = field(default=None, init=False)  # the latest one of an agent
     _steps: Steps | None = field(default=None, init=False)  # of that session, if it is step by step
     _waiting: int = field(default=0, init=False)  # calls of agents that wait for a mission or a skill

@@ -82,11 +82,13 @@ def report_check(check: CheckResult, program: str, problems: Sequence[str], cont
 def question(view: SessionView, robot: str, contract: str) -> str:
     """Return the question by which a client asks its person to approve a program."""
     problems = "\n".join(f"- {shortened(problem)}" for problem in view.problems)
+    switched_off = listed([*map(shortened, view.disabled_rules)])
     boards = [] if view.check is None else strips(view.check)
     boards = [board for board in boards if len(board.scenes) > 1 or board.scenes[0].deeds]
     parts = [
         f"An agent asks to run a program on the robot {robot}.",
         f"THE CHECK FOUND PROBLEMS:\n{problems}" if problems else "The check found no problems.",
+        f"A person has switched off rules for this program: {switched_off}." if switched_off else "",
         f"It says: {shortened(view.instruction)}" if view.instruction else "",
         f"At most, the program can do this:\n{visible_lines(contract)}" if contract else "",
         f"For example:\n{_board_text(boards[0])}" if boards else "",

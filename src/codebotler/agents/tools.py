@@ -20,14 +20,15 @@ from codebotler.agents.dialogs import (
     Consent,
     NotAsked,
     OpenQuestion,
+    ProposedProgram,
     StepWord,
     agent_name,
     as_tool_errors,
     ask_person,
     ask_whether,
     ask_which_behaviour,
+    find_program,
     find_question,
-    find_session,
     gatekeeper_of,
     read_last_past,
 )
@@ -196,7 +197,7 @@ async def begin_steps(
 async def run_mission(
     digest: _Digest,
     ctx: AgentContext,
-    session: Annotated[MissionSession, Resolve(find_session)],
+    proposed: Annotated[ProposedProgram, Resolve(find_program)],
     answer: Annotated[ElicitationResult[Consent | NotAsked], Resolve(ask_person)],
     seconds: _Seconds = 45,
 ) -> MissionReport:
@@ -206,9 +207,9 @@ async def run_mission(
     the mission is still running, the answer says so. Then call run_mission or follow_mission again. If you
     cancel this call while the robot works, the robot stops.
     """
-    gatekeeper = gatekeeper_of(ctx)
+    gatekeeper, session = gatekeeper_of(ctx), proposed.session
     with as_tool_errors():
-        _take_answer(gatekeeper, session, digest, answer, agent_name(ctx))
+        _take_answer(gatekeeper, proposed, digest, answer, agent_name(ctx))
         # If too many calls wait, the report still says what was approved.
         with suppress(MissionError), gatekeeper.waiting(), _stopping_if_cancelled(session, agent_name(ctx)):
             await _follow(gatekeeper, session, ctx, seconds)
@@ -283,23 +284,23 @@ ACTING: Sequence[Callable[..., object]] = (
 
 def _take_answer(
     gatekeeper: Gatekeeper,
-    session: MissionSession,
+    proposed: ProposedProgram,
     digest: str,
     answer: ElicitationResult[Consent | NotAsked],
     client: str,
 ) -> None:
     """Approve the program if a person or a contract accepts it. End the mission if a person declines."""
-    view, person = session.view, f"a person, asked by {client}"
+    session, person = proposed.session, f"a person, asked by {client}"
+    view = session.view
     match answer:
         case AcceptedElicitation(data=NotAsked()):
             if gatekeeper.approves_alone(session):
-                session.approve(digest, by=f"the contract given at the start, for {client}")
+                session.approve(digest, by=f"the contract given at the start, for {client}", is_person=False)
         case AcceptedElicitation(data=Consent(approve=True)):
             if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
-                if view.problems != gatekeeper.shown_problems:
+                if view.problems != proposed.problems:
                     raise MissionError("the check has found something else meanwhile; ask again")
                 session.approve(digest, despite_problems=bool(view.problems), by=person)
-                gatekeeper.console.is_held = False
         case AcceptedElicitation() | DeclinedElicitation():
             session.stop_soon(person)
 

@@ -48,6 +48,7 @@ HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
 QUIET = "def task_program():\n    go_to('kitchen')\n"
 FAULTY = "def task_program():\n    go_to('cellar')\n"
 FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('hall')\n"
+INTO_VAULT = "def task_program():\n    go_to('vault')\n"
 STAY_OUT = Rule("vault", "Stay out of the vault.", parse('not tr.Exists(goto("vault"))'))
 SOON = 30.0
 MODES = pytest.mark.parametrize("mode", ["auto", "legacy"])
@@ -1108,30 +1109,56 @@ def test_after_a_persons_stop_the_contract_of_the_start_approves_nothing(gatekee
     gatekeeper.console.within = contract_from({"go_to": {"location": "any"}}, SKILLS)
 
     async def act(agent: Agent) -> None:
-        async def proposed() -> Any:  # noqa: ANN401 - a report
+        async def state(seconds: float) -> str:
             found = await agent.call("propose_mission", program=QUIET)
-            return await agent.call("run_mission", digest=found["digest"], seconds=1)
+            ran = await agent.call("run_mission", digest=found["digest"], seconds=seconds)
+            return str(ran["state"])
 
         await agent.call("stop")
-        assert (await proposed())["state"] == "done", "an agent's own stop holds nothing"
+        assert await state(SOON) == "done", "an agent's own stop holds nothing"
         gatekeeper.console.stop("a person")
-        assert (await proposed())["state"] == "checked"
+        assert await state(0.05) == "checked"
+        approve(gatekeeper)
+        gatekeeper.console.stop("a person, at the same time")
+        await until(gatekeeper, lambda view: view.is_over)
+        assert await state(0.05) == "checked"
+        approve(gatekeeper)
+        await until(gatekeeper, lambda view: view.is_over)
+        assert await state(SOON) == "done", "a person has approved one since"
 
     use(gatekeeper, act)
 
 
-def test_a_late_yes_does_not_accept_what_the_check_has_found_since(gatekeeper: Gatekeeper) -> None:
-    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
-        gatekeeper.shown_problems = ("as if the question had been about another check",)
-        return ElicitResult(action="accept", content={"approve": True})
+def test_a_late_yes_accepts_only_the_problems_of_its_own_question(tmp_path: Path) -> None:
+    gatekeeper, asked = gatekeeper_at(tmp_path, rules=(STAY_OUT,)), list[str]()
+    gatekeeper.asks_client = True
 
     async def act(agent: Agent) -> None:
-        proposed = await agent.call("propose_mission", program=QUIET)
-        await agent.fails("run_mission", digest=proposed["digest"])
-        assert view_of(gatekeeper).may_be_approved
+        async def answer_later(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+            asked.append(params.message)
+            if len(asked) > 1:  # the second question, about the rule that is in force again
+                return ElicitResult(action="cancel")
+            session_of(gatekeeper).edit(INTO_VAULT)
+            await until(gatekeeper, lambda view: view.may_be_approved and bool(view.problems))
+            await agent.call("run_mission", digest=digest, seconds=0)
+            return ElicitResult(action="accept", content={"approve": True})
 
-    gatekeeper.asks_client = True
-    use(gatekeeper, act, answer=answer, mode="legacy")
+        answers.append(answer_later)
+        digest = (await agent.call("propose_mission", program=INTO_VAULT))["digest"]
+        session_of(gatekeeper).switch_off(STAY_OUT.name, "a test")
+        await until(gatekeeper, lambda view: view.may_be_approved and not view.problems)
+        await agent.fails("run_mission", digest=digest)
+        assert view_of(gatekeeper).may_be_approved
+        assert len(asked) == 2
+        assert [STAY_OUT.name in one.splitlines()[4] for one in asked] == [True, False]
+
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:
+        result: ElicitResult = await answers[0](context, params)
+        return result
+
+    answers: list[Any] = []
+    with gatekeeper.console:
+        use(gatekeeper, act, answer=answer, mode="legacy")
 
 
 def test_a_skill_that_the_robot_lacks_is_refused_in_words() -> None:
