@@ -24,7 +24,7 @@ UNBOUNDED_COUNT = 1_000_000
 """The number of steps that remain of a kind that a program repeats without end."""
 
 MAX_COMPARED_PAIRS = 20_000
-"""The number of pairs of a step that was done and one of a program that are compared at most."""
+"""The limit for pairs of a program's step and one that was, or remains to be, done. More are not compared."""
 
 EMPTY_WORDS = frozenset(
     {
@@ -50,10 +50,8 @@ def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = 
         remaining: what that program would still do, in several worlds; none if that is unknown.
     """
     past, problems, samples = found.room_map.past, list(found.problems), []
-    if (
-        len(_distinct(past)) * max((len(one.outcome.trace) for one in found.samples), default=0)
-        > MAX_COMPARED_PAIRS
-    ):
+    others = len(_distinct(past)) + len(_distinct(event for one in remaining for event in one.trace))
+    if others * max((len(one.outcome.trace) for one in found.samples), default=0) > MAX_COMPARED_PAIRS:
         message = "too many steps were done before to compare this program with them"
         return replace(found, problems=(*problems, Problem("LongPast", message)))
     if remaining and all(one.status is Status.TIMEOUT for one in remaining):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.checking.check import check, hold_within
-from codebotler.checking.contracts.file import contract_yaml, read_contract
+from codebotler.checking.contracts.file import contract_from, contract_yaml, read_contract
 from codebotler.checking.contracts.text import contract_rows, contract_sentence
 from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
@@ -110,6 +110,23 @@ def test_what_cannot_be_bounded_is_anything(contracts: Contracts, monkeypatch: p
 def test_texts_that_depend_on_the_clock_are_anything(contracts: Contracts) -> None:
     contract = contracts("import datetime\ndef task_program():\n    say(str(datetime.datetime.now()))\n")
     assert allowed(contract, "say") == {"message": ["{}"]}
+
+
+@pytest.mark.parametrize("limit", ["MAX_TEXTS", "MAX_CHARACTERS"])
+def test_more_texts_than_a_person_reads_are_any_text(
+    contracts: Contracts, monkeypatch: pytest.MonkeyPatch, limit: str
+) -> None:
+    program = "def task_program():\n    for number in range(4):\n        say(''.join(['a', str(number)]))\n"
+    assert len(allowed(contracts(program), "say")["message"]) == 4
+    monkeypatch.setattr(f"codebotler.checking.contracts.of_program.{limit}", 3)
+    assert allowed(contracts(program), "say") == {"message": ["{}"]}
+
+
+@pytest.mark.parametrize("text", ["a" * 2_001, "{}".join("abcdefghijklmnopqrstuvw")])
+def test_a_text_that_would_allow_any_text_is_refused(text: str) -> None:
+    with pytest.raises(UserError, match="too long"):
+        contract_from({"say": {"message": [text]}}, SKILLS)
+    assert contract_from({"say": {"message": ["{}"]}}, SKILLS).skills["say"].texts[0][1] == (ANY_TEXT,)
 
 
 def test_a_branch_that_only_a_changing_world_reaches_is_allowed(contracts: Contracts) -> None:

@@ -90,6 +90,10 @@ def test_a_name_that_the_program_binds_is_no_skill() -> None:
         ("from calendar import datetime as t; t.datetime.now()", True),
         ("import calendar; calendar.datetime.datetime.now()", True),
         ("t = time; t.time()", True),
+        ("import logging; logging.time.time()", True),
+        ("import timeit as t; t.default_timer()", True),
+        ("import math, re; math.sqrt(2)", False),
+        ("from collections import Counter; Counter()", False),
     ],
 )
 def test_clocks_and_random_numbers(line: str, *, reads: bool) -> None:

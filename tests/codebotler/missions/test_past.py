@@ -240,6 +240,12 @@ def test_a_thing_may_stay_in_hand_if_the_program_never_put_it_down() -> None:
 
 # --- what the program would still have done
 
+
+def test_a_long_rest_is_not_compared_for_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("codebotler.checking.repetition.MAX_COMPARED_PAIRS", 2)  # one is done, two remain
+    assert follow(POLL, "def task_program():\n    say('Bye.')\n", WENT, ASKED) == {"LongPast"}
+
+
 POLL = """
 def task_program():
     go_to("lab")

@@ -89,10 +89,13 @@ def _templates(file: YamlFile, row: Skill, name: str, given: str | list[str]) ->
         return (ANY_TEXT,)
     found = []
     for number, text in enumerate(given):
+        where = "skills", row.name, name, number
         try:
             found.append(TextTemplate.parse(text))
         except ValueError as error:
-            raise file.wrong(str(error), "skills", row.name, name, number) from None
+            raise file.wrong(str(error), *where) from None
+        if found[-1].is_any and text.replace("{}", "").strip():
+            raise file.wrong("this text is too long, so that any text would be allowed; shorten it", *where)
     return tuple(found)
 
 

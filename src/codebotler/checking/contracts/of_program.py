@@ -20,6 +20,8 @@ from codebotler.simulator.guard.contract import (
 from codebotler.simulator.guard.rule_guard import name_of
 from codebotler.simulator.worlds.room_map import RoomMap
 
+MAX_TEXTS, MAX_CHARACTERS = 1_000, 50_000  # of an argument; it may have any text if it has more
+
 
 def derive_contract(
     found: Exploration, written: WrittenArguments, room_map: RoomMap, skills: SkillTable
@@ -65,13 +67,19 @@ def _bound(
             allowed = tuple(dict.fromkeys(room for one in allowed for room in _rooms(one, room_map)))
         met = sorted({text for call in calls for text in call.texts[number]})
         met = [text for text in met if not any(one.matches(text) for one in allowed)]
-        texts.append((parameter.name, (*allowed, *(TextTemplate((text,)) for text in met))))
+        texts.append((parameter.name, _limited((*allowed, *(TextTemplate((text,)) for text in met)))))
     places = {call.place for call in calls} if has_place(row) and knows_all else None
     return SkillBound(
         tuple(texts),
         tuple(sorted(places)) if places else None,
         found.most_calls.get(row.name) if knows_all else None,
     )
+
+
+def _limited(templates: Templates) -> Templates:
+    """Return texts, or any text if these are more than a person would read."""
+    is_short = sum(len(part) for one in templates for part in one.parts) <= MAX_CHARACTERS
+    return templates if is_short and len(templates) <= MAX_TEXTS else (ANY_TEXT,)
 
 
 def _rooms(template: TextTemplate, room_map: RoomMap) -> list[TextTemplate]:

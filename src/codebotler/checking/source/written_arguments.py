@@ -24,6 +24,12 @@ FIELD = re.compile(r"%[-+ #0]*\d*(?:\.\d+)?[a-zA-Z]|\{[^{}]*\}")
 
 ESCAPED = re.compile(r"%%|\{\{|\}\}|%\(|%[^a-zA-Z]*\*")
 CLOCKS = frozenset({"datetime", "random", "secrets", "uuid"})
+PURE_MODULES = frozenset(
+    {"collections", "dataclasses", "enum", "functools", "itertools", "json", "math", "operator", "re"}
+    | {"string", "typing"}
+)
+"""Modules without a clock. A program that imports another module may depend on the time of day."""
+
 TRICKS = frozenset(
     {"eval", "exec", "globals", "locals", "vars", "getattr", "__builtins__", "__import__", "sys"}
 )
@@ -84,18 +90,21 @@ def _read(program: str, parameters: list[tuple[str, list[str]]]) -> tuple[_Found
 def _reads_clock(tree: ast.Module) -> bool:
     """Return whether a program uses a clock or random numbers, rather than only waiting."""
     waits = {node.value for node in nodes(tree) if isinstance(node, ast.Attribute) and node.attr == "sleep"}
-    for node in nodes(tree):
-        match node:
-            case ast.Name("time", ast.Load()) if node not in waits:
-                return True
-            case ast.Name(name) | ast.Attribute(_, name) if name in CLOCKS:
-                return True
-            case ast.ImportFrom(module) if module in CLOCKS:
-                return True
-            case ast.ImportFrom("time", names) if any(one.name != "sleep" for one in names):
-                return True
-            case ast.alias(name, str()) if {*name.split(".")} & {*CLOCKS, "time"}:
-                return True
+    return any(_is_clock(node) for node in nodes(tree) if node not in waits)
+
+
+def _is_clock(node: ast.AST) -> bool:
+    match node:
+        case ast.Name("time", ast.Load()) | ast.Attribute(_, "time") | ast.alias("time", str()):
+            return True
+        case ast.Name(name) | ast.Attribute(_, name) if name in CLOCKS:
+            return True
+        case ast.Import(names):
+            return not {one.name for one in names} <= PURE_MODULES | {"time"}
+        case ast.ImportFrom("time", names):
+            return any(one.name != "sleep" for one in names)
+        case ast.ImportFrom(module):
+            return module not in PURE_MODULES
     return False
 
 
