@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import re
-from difflib import get_close_matches
 from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills.options import SKILL_OPTIONS
 from codebotler.core.skills.own_modules import is_own_module, load_own_module, location_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
@@ -57,9 +54,6 @@ def load_skill_module(path: Path) -> ModuleType:
         raise _as_user_error(path, error) from None
 
 
-UNKNOWN_OPTION = re.compile(r"skill\(\) got an unexpected keyword argument '(\w+)'")
-
-
 def _as_user_error(path: Path, error: BaseException) -> UserError:
     """Convert an error of a file to a UserError with the line at which the file failed."""
     if isinstance(error, UserError) and error.file is not None:
@@ -69,10 +63,6 @@ def _as_user_error(path: Path, error: BaseException) -> UserError:
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path)]
     is_ours = isinstance(error, UserError)
     sentence = str(error) if is_ours else f"it cannot be run: {type(error).__name__}: {error}"
-    if named := UNKNOWN_OPTION.match(str(error)):
-        alike = get_close_matches(named[1], SKILL_OPTIONS, 1)
-        hint = f"did you mean {alike[0]}?" if alike else f"its options are {', '.join(SKILL_OPTIONS)}"
-        sentence = f"@skill has no option {named[1]}; {hint}"
     return UserError(sentence, file=path, line=lines[-1] if lines else None)
 
 
