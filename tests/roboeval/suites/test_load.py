@@ -123,7 +123,7 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
             13,
             '" One "',
         ),
-        ("require: [goes,", "demand: [goes,", 8, '"require" is missing'),
+        ("require: [goes,", "demand: [goes,", 11, '"demand" is unknown'),
         ("robot: kitchen", "robot: hall", 9, '"hall"'),
         (
             "prompts: [p]",
