@@ -317,8 +317,8 @@ def test_a_function_that_fails_ends_the_command_with_a_sentence(
 
 
 TRUTHS = {
-    "reed('a'): 1": "there is no skill reed; did you mean read?",
-    "open_gate('a'): true": "the code of open_gate computes its result",
+    "reed('a'): 1": "reed is not a skill with an empty body",
+    "open_gate('a'): true": "open_gate is not a skill with an empty body",
     "read(3): 1": "its signature is read(what: str) -> int",
     "read('a', 'b'): 1": "the arguments of read are wrong",
     "read('a'): 1.5": "read cannot return 1.5; write a whole number or Broken",
