@@ -26,7 +26,6 @@ from codebotler.models.base import (
     TextListener,
     ignore_text,
 )
-from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 
 MODELS_LOG = logging.getLogger("codebotler.models")
@@ -82,16 +81,6 @@ class RateLimited:
             rate = f"{self.requests_per_minute:g}"
             raise UserError(f"the number of requests per minute is {rate}; it must be above 0")
         self._free = asyncio.Semaphore(self.concurrency)
-
-    @property
-    def name(self) -> str:
-        """The name of the model."""
-        return self.model.name
-
-    @property
-    def settings(self) -> SamplingSettings:
-        """The settings of the model."""
-        return self.model.settings
 
     async def reply(
         self,

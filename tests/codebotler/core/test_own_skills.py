@@ -248,7 +248,7 @@ BAD = {
     "@skill\ndef wiggle(): 'Wiggle.'": "must take the simulation first, then the arguments",
     "@skill\ndef wiggle(sim, *who: str) -> None: 'Wiggle.'": "must take the simulation first, then",
     "@skill\ndef wiggle(sim, who) -> None: 'Wiggle.'": "who of wiggle has no type; write who: str",
-    "@skill\ndef wiggle(sim, who: str = 'a') -> None: 'Wiggle.'": "wiggle has a default value",
+    "@skill\ndef wiggle(sim, who: str = 'a') -> None: 'Wiggle.'": "of programs without default values",
     "@skill\ndef wiggle(sim, who: dict) -> None: 'Wiggle.'": "who of wiggle is dict",
     "@skill\ndef wiggle(sim, who: 'Nobody') -> None: 'Wiggle.'": "who of wiggle cannot be read: name",
     "@skill\ndef wiggle(sim, who: None) -> None: 'Wiggle.'": "a parameter of wiggle cannot be None",
@@ -264,8 +264,8 @@ BAD = {
     "@skill(sets='on')\ndef wiggle(sim) -> None: 'W.'": "must set or clear a state of the thing",
     "@skill(sets='on', clears='on')\ndef wiggle(sim, a: str) -> None: 'W.'": "must set or clear a state",
     "@skill(sets='on', event=None)\ndef wiggle(sim, a: str) -> None: 'W.'": "needs an event",
-    "@skill\ndef go_to(sim, who: str) -> None: 'Wiggle.'": "there is already a skill go_to",
-    "@skill(event='goto')\ndef fly(sim, who: str) -> None: 'Fly.'": 'of another skill are called "goto"',
+    "@skill\ndef go_to(sim, who: str) -> None: 'Wiggle.'": '"go_to" is the name, event or ROS action of',
+    "@skill(event='goto')\ndef fly(sim, who: str) -> None: 'Fly.'": '"goto" is the name, event or',
     "@skill(verb='wiggle {to}')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "which is not a parameter",
     "@skill(ros='Wave')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": '"Wave" is not a ROS action',
     "@skill(fails={'KeyError': 'x'})\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": '"KeyError" cannot name',
@@ -434,7 +434,7 @@ def test_two_skills_with_one_ros_action_are_refused(tmp_path: Path) -> None:
     path.write_text(
         HEAD + f"{action}def wiggle(sim) -> None: 'W.'\n{action}def jiggle(sim, how: str) -> None: 'J.'\n"
     )
-    with pytest.raises(UserError, match="another skill already uses the ROS action /wiggle"):
+    with pytest.raises(UserError, match='"/wiggle" is the name, event or ROS action'):
         skills_from(path)
 
 

@@ -45,7 +45,7 @@ def use(
     async def used() -> tuple[RateLimited, T]:
         model = open_model(name, SamplingSettings(base_url=server.url, seed=0, timeout=timeout))
         paced = RateLimited(model, first_wait=0.01, **limits)
-        assert paced.name == name
+        assert paced.model.name == name
         try:
             return paced, await work(paced)
         finally:

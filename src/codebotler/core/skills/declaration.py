@@ -6,6 +6,7 @@ import builtins
 import functools
 import re
 from collections.abc import Callable, Mapping
+from inspect import iscoroutinefunction, signature
 from keyword import iskeyword
 from math import inf
 from types import FunctionType
@@ -41,7 +42,7 @@ RTL_WORDS = frozenset(
 """Words with a meaning in formulas, which cannot name events."""
 _DECLARED: dict[str, Skill] = {}
 PAPER_MODULE = "codebotler.core.skills.paper"
-COROUTINE_FLAG, MORE_ARGUMENTS_FLAGS = 0x80, 0x04 | 0x08  # bits of `co_flags`
+ROS_ACTION = re.compile(r"([^\W\d]\w*)/([A-Z]\w*):(/*[^/].*)")
 ROS_TYPES = {"str": "string", "int": "int64", "float": "float64", "bool": "bool"}
 USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a list of one of these"
 
@@ -155,23 +156,16 @@ class _Declaration:
                 self.wrong(f'formulas cannot use "{word}" as a name; choose another one')
 
     def parameters(self) -> tuple[Parameter, ...]:
-        code = self.does.__code__
-        if code.co_flags & COROUTINE_FLAG:
+        if iscoroutinefunction(self.does):
             self.wrong(f"{self.name} is async, but skills must be ordinary functions; write def")
-        first = self.annotation(code.co_varnames[0]) if code.co_argcount else None
-        if (
-            not code.co_argcount
-            or code.co_kwonlyargcount
-            or code.co_flags & MORE_ARGUMENTS_FLAGS
-            or value_type(first or object) is not None
-        ):
+        taken = signature(self.does).parameters
+        first, *names = taken or ("",)
+        is_plain = all(p.kind is p.POSITIONAL_OR_KEYWORD and p.default is p.empty for p in taken.values())
+        if not taken or not is_plain or value_type(self.annotation(first) or object) is not None:
             self.wrong(
-                f"{self.name} must take the simulation first, then the arguments of programs by position, "
-                "as in (sim: Simulation, door: str)"
+                f"{self.name} must take the simulation first, then the arguments of programs without default "
+                "values, as in (sim: Simulation, door: str)"
             )
-        if self.does.__defaults__:
-            self.wrong(f"{self.name} has a default value; programs pass every argument, so leave it out")
-        names = code.co_varnames[1 : code.co_argcount]
         for name in names:
             if name not in self.does.__annotations__:
                 self.wrong(
@@ -264,21 +258,15 @@ class _Declaration:
         ros = self.options.get("ros")
         if ros is None or isinstance(ros, RosAction):
             return ros
-        full, colon, server = ros.partition(":")
-        package, slash, kind = full.partition("/")
-        if not (
-            colon
-            and slash
-            and package.isidentifier()
-            and re.fullmatch(r"[A-Z]\w*", kind)
-            and server.strip("/")
-        ):
+        written = ROS_ACTION.fullmatch(ros)
+        if written is None:
             self.wrong(
                 f'"{ros}" is not a ROS action; write package/Type:/topic, as in lab_msgs/OpenDoor:/open_door'
             )
         unusable = [each.name for each in parameters if not re.fullmatch(r"[a-z][a-z0-9_]*", each.name)]
         if unusable:
             self.wrong(f"{unusable[0]} of {self.name} cannot be a ROS field; use lower-case letters")
+        package, kind, server = written.groups()
         goal = tuple(f"{_ros_type(each.type)} {each.name}" for each in parameters)
         result = None if returns.base is None else _ros_type(returns)
         return RosAction(kind, server, goal, result, package=package)

@@ -67,17 +67,18 @@ def _as_user_error(path: Path, error: BaseException) -> UserError:
 
 
 def _expect_new(row: Skill, rows: list[Skill]) -> None:
-    kinds = {other.recording.kind for other in rows if other.recording is not None}
-    topic = None if row.ros is None else row.ros.server
-    if topic is not None and topic in {other.ros.server for other in rows if other.ros is not None}:
-        row.wrong(f"another skill already uses the ROS action {topic}; choose another topic")
-    if row.name in {other.name for other in rows}:
-        row.wrong(f"there is already a skill {row.name}; choose another name")
-    if row.recording is not None and row.recording.kind in kinds:
-        row.wrong(f'the events of another skill are called "{row.recording.kind}"; choose another name')
+    clash = _names_of(row) & {name for other in rows for name in _names_of(other)}
+    if clash:
+        row.wrong(f'"{min(clash)}" is the name, event or ROS action of another skill; choose another one')
     every = [*rows, row]
     recordings = [one.recording for one in every if one.recording is not None]
     states = {state for one in recordings for state in (one.sets, one.clears)}
-    both = states & {*(one.name for one in every), *(one.kind for one in recordings)}
+    both = states & {name for one in every for name in _names_of(one)}
     if both:
         row.wrong(f"{min(both)} is the name of a skill and of a state; choose another name")
+
+
+def _names_of(row: Skill) -> set[str]:
+    """Return the name of a skill, of its events and of its ROS action."""
+    event, topic = row.recording and row.recording.kind, row.ros and row.ros.server
+    return {name for name in (row.name, event, topic) if name}
