@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -175,28 +174,17 @@ def _with_places(room: Room, world: World) -> Iterator[Room]:
         yield replace(place, footprint=place.footprint or corners, stand_at=(x, y))
 
 
-_EDGE_TOLERANCE = 1e-9  # relative to the size of a footprint; decimal fractions are rarely exact
+MIN_PART = 1e-9  # a fraction of an edge or a path, or metres; smaller values are rounding errors
 
 
 def is_within(point: Point, corners: Sequence[Point]) -> bool:
     """Whether a point is in a polygon or on its edge."""
-    x, y = point
-    size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
-    edges = zip(corners, [*corners[1:], corners[0]], strict=True)
-    if any(_distance(point, *edge) <= _EDGE_TOLERANCE * size for edge in edges):
-        return True
+    (x, y), here, ends = point, complex(*point), [complex(*corner) for corner in corners]
+    for start, end in zip(ends, [*ends[1:], ends[0]], strict=True):
+        along = (here - start) / (end - start or MIN_PART)
+        if abs(along.imag) <= MIN_PART and -MIN_PART <= along.real <= 1 + MIN_PART:
+            return True
     return sum(x < crossing for crossing in crossings(y, corners)) % 2 == 1
-
-
-def _distance(point: Point, start: Point, end: Point) -> float:
-    (x, y), (x1, y1), (x2, y2) = point, start, end
-    dx, dy = x2 - x1, y2 - y1
-    square = dx * dx + dy * dy
-    along = min(1.0, max(0.0, ((x - x1) * dx + (y - y1) * dy) / square)) if square else 0.0
-    return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
-
-
-MIN_PART = 1e-9  # a fraction of a path, or metres; smaller values are rounding errors
 
 
 def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tuple[str, ...]]:
