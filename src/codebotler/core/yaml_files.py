@@ -183,10 +183,6 @@ EXPECTED_TYPES = {
 FAULT_WORDS = {
     "extra_forbidden": "the key {name} is unknown; remove it or correct its spelling",
     "invalid_key": "this key is not text; remove it or put quotes around it",
-    "string_too_short": "{name} is empty; write a string",
-    "too_short": "{name} has too few entries; it needs at least {min_length}",
-    "too_long": "{name} has too many entries; it takes {max_length}",
-    "finite_number": "{name} is not a finite number",
 }
 
 
@@ -208,6 +204,6 @@ def _sentence(error: ErrorDetails, name: str) -> str:
     if kind in EXPECTED_TYPES:
         return f"{name} is {found}, but it should be {EXPECTED_TYPES[kind]}"
     if kind in FAULT_WORDS:
-        return FAULT_WORDS[kind].format(name=name, **error.get("ctx", {}))
-    plain = error["msg"].removeprefix("Value error, ").replace("Input should be", "it should be")
+        return FAULT_WORDS[kind].format(name=name)
+    plain = re.sub(r"^\w+ should", "it should", error["msg"].removeprefix("Value error, "))
     return f"{name} is {found}, but {plain[:1].lower()}{plain[1:]}"
