@@ -13,7 +13,6 @@ from typing import Any, TypeVar
 
 import pytest
 
-from codebotler.core.errors import UserError
 from codebotler.models.base import BudgetSpentError, ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
@@ -370,18 +369,3 @@ def test_every_reply_comes_once_through_many_faults(name: str, server: Server) -
     assert paced.retry_count > 5
     asked = Counter(request.body["seed"] for request in server.requests)
     assert set(asked) == set(range(100))
-
-
-@pytest.mark.parametrize(
-    ("limits", "named"),
-    [
-        ({"concurrency": 0}, ["concurrency", " 0", " 1"]),
-        ({"requests_per_minute": 0.0}, ["requests per minute", "above 0"]),
-        ({"retries": -1}, ["retries", " -1", " 0"]),
-        ({"token_budget": 0}, ["token budget", " 0", " 1"]),
-    ],
-)
-def test_limits_out_of_range_are_told(limits: dict[str, Any], named: list[str]) -> None:
-    with pytest.raises(UserError) as caught:
-        RateLimited(open_model("recorded", SamplingSettings()), **limits)
-    assert all(name in caught.value.sentence for name in named), caught.value
