@@ -107,7 +107,8 @@ class World:
 
     def to_data(self) -> dict[str, object]:
         """Return the content of a world file."""
-        traits, rooms = {name: _traits_data(of) for name, of in self.traits}, self.rooms
+        traits = {name: {key: _as_lists(value) for key, value in of} for name, of in self.traits}
+        rooms = self.rooms
         places = {room.name: [_room_data(one) for one in rooms if one.within == room.name] for room in rooms}
         data = {
             "about": self.about,
@@ -116,7 +117,7 @@ class World:
             "objects": {r.name: [_thing_data(one, traits) for one in r.objects] for r in rooms if r.objects},
             "people": {r.name: [_person_data(one, traits) for one in r.people] for r in rooms if r.people},
             "may_wait_forever": self.may_wait_forever,
-            "truths": {key: list(v) if isinstance(v, tuple) else v for key, v in self.truths},
+            "truths": {key: _as_lists(value) for key, value in self.truths},
         }
         return {key: value for key, value in data.items() if value or key == "about"}
 
@@ -209,8 +210,8 @@ def crossings(y: float, corners: Sequence[Point]) -> list[float]:
     )
 
 
-def _traits_data(traits: Iterable[Trait]) -> dict[str, object]:
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in traits}
+def _as_lists(value: object) -> object:
+    return [_as_lists(one) for one in value] if isinstance(value, tuple) else value
 
 
 def _thing_data(label: str, traits: Mapping[str, dict[str, object]]) -> object:
@@ -232,11 +233,6 @@ def _answer_data(answer: Answer) -> object:
 
 
 def _room_data(room: Room, places: Sequence[object] = ()) -> object:
-    data: dict[str, object] = {"name": room.name}
-    if room.footprint is not None:
-        data["footprint"] = [list(corner) for corner in room.footprint]
-    if room.stand_at is not None:
-        data["stand_at"] = list(room.stand_at)
-    if places:
-        data["places"] = list(places)
-    return data if len(data) > 1 else room.name
+    more = {"footprint": _as_lists(room.footprint), "stand_at": _as_lists(room.stand_at), "places": [*places]}
+    data = {key: value for key, value in more.items() if value}
+    return {"name": room.name, **data} if data else room.name
