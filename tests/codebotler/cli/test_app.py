@@ -189,7 +189,7 @@ def test_lines_on_standard_input_are_counted_as_they_stand() -> None:
 
 
 def test_what_cannot_be_checked_is_refused_in_a_sentence(files: Path) -> None:
-    for path, fault in ((files / "gone.py", "no such file"), (files, "a folder")):
+    for path, fault in ((files / "gone.py", "No such file"), (files, "Is a directory")):
         refusal = refused("check", path)
         assert refusal.at == (str(path), None)
         assert fault in refusal.sentence

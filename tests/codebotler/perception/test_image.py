@@ -118,10 +118,10 @@ def test_every_cut_of_a_picture_is_refused_or_read() -> None:
 
 
 def test_missing_file_and_folder_are_said(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="no such file") as error:
+    with pytest.raises(UserError, match="No such file") as error:
         read_image(tmp_path / "none.jpg")
     assert error.value.file == tmp_path / "none.jpg"
-    with pytest.raises(UserError, match="is a folder"):
+    with pytest.raises(UserError, match="Is a directory"):
         read_image(tmp_path)
 
 
