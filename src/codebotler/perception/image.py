@@ -6,7 +6,6 @@ import base64
 import io
 import warnings
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageOps, UnidentifiedImageError
@@ -62,20 +61,14 @@ def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> 
 
     `data` must be in base64. Raise a UserError that contains `name` if there is no image or it is too large.
     """
+    try:
+        data = base64.b64decode(message["data"], validate=True)  # type: ignore[arg-type]  # a text, or an error
+    except (LookupError, TypeError, ValueError):
+        raise UserError(f"{name} is not an image message") from None
     match message:
         case {"encoding": str(encoding), "width": int(width), "height": int(height), "step": int(step)}:
-            return _decode_raw(encoding, (width, height), step, _decode_data(message, name), name)
-        case {"data": _}:
-            return image_of(_decode_data(message, name), name)
-    raise UserError(f"{name} is not an image message")
-
-
-def _decode_data(message: Mapping[str, object], name: str) -> bytes:
-    data = message.get("data")
-    with suppress(ValueError):  # not base64
-        if isinstance(data, str):
-            return base64.b64decode(data, validate=True)
-    raise UserError(f"{name} is not an image message")
+            return _decode_raw(encoding, (width, height), step, data, name)
+    return image_of(data, name)
 
 
 def _decode_raw(encoding: str, size: tuple[int, int], step: int, data: bytes, name: str) -> Image.Image:
