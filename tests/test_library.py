@@ -364,7 +364,7 @@ def test_a_type_checker_finds_what_is_misspelt(right: str, wrong: str, found: st
 
 
 def test_completions_are_read_from_a_file() -> None:
-    with pytest.raises(codebotler.UserError, match="no such file") as error:
+    with pytest.raises(codebotler.UserError, match="No such file") as error:
         next(roboeval.read_completions("x.jsonl"))
     assert str(error.value.file) == "x.jsonl"
 

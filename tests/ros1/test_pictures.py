@@ -219,7 +219,7 @@ def test_model_that_is_down_is_said_and_may_come_back(eyes: Eyes, model: Server)
     assert re.search("openai-chat:eyes: .*status 404", str(error.value))
     model.fault = lambda _: None
     assert robot.perform("is_in_room", ["mug"])
-    with pytest.raises(RobotError, match="label is empty"):
+    with pytest.raises(RobotError, match='label "" is not valid'):
         robot.perform("is_in_room", [""])
 
 

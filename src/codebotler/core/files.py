@@ -34,10 +34,7 @@ def read_text(path: Path, *, limit: int = MAX_FILE_BYTES) -> str:
 def read_bytes(path: Path, most: int) -> bytes:
     """Read at most `most` bytes from the start of a file, or raise UserError."""
     with _open(path) as file:
-        try:
-            return file.read(most)
-        except OSError as error:
-            raise UserError(f"cannot be read ({error.strerror})", file=path) from None
+        return file.read(most)
 
 
 def decode_text(data: bytes, name: Path | str, *, limit: int = MAX_FILE_BYTES) -> str:
@@ -58,13 +55,11 @@ def _expect_not_utf_16(data: bytes, name: Path | str) -> None:
         raise UserError("is UTF-16 text; save it as UTF-8", file=name)
 
 
-def _open(path: Path) -> BinaryIO:
+@contextmanager
+def _open(path: Path) -> Iterator[BinaryIO]:
     try:
-        return path.open("rb")
-    except FileNotFoundError:
-        raise UserError("there is no such file", file=path) from None
-    except IsADirectoryError:
-        raise UserError("is a folder; name a file", file=path) from None
+        with path.open("rb") as file:
+            yield file
     except OSError as error:
         raise UserError(f"cannot be read ({error.strerror})", file=path) from None
 

@@ -17,6 +17,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import lru_cache
+from inspect import Parameter as Argument
+from inspect import Signature
 from itertools import islice
 from typing import Any
 
@@ -31,6 +33,7 @@ MAX_KNOWN_NAMES, MAX_MISSPELT_LENGTH, MAX_HINTS = 1_000, 60, 10  # limits of hin
 NAME_CUTOFF = 0.65  # the minimum similarity of a suggested name, from 0 to 1
 GIVEN_MODULES = ("time", "sys")  # modules that every program can use without an import
 SOURCE_NAME = "<program>"
+NO_LISTS = (ast.Constant, ast.Tuple, ast.Dict, ast.Set, ast.GeneratorExp, ast.JoinedStr)
 
 warnings.filterwarnings("ignore", module=SOURCE_NAME)  # about invalid escapes such as "\d" in programs
 
@@ -299,32 +302,17 @@ def _call_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
 def _check_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
     if any(isinstance(a, ast.Starred) for a in node.args) or any(k.arg is None for k in node.keywords):
         return
-    message = _describe_mismatch(node, skill)
-    if message:
-        yield Flaw(node.lineno, "TypeError", message)
+    takes = Signature([Argument(p.name, Argument.POSITIONAL_OR_KEYWORD) for p in skill.parameters])
+    try:
+        given = takes.bind(*node.args, **{k.arg: k.value for k in node.keywords if k.arg}).arguments
+    except TypeError as error:
+        yield Flaw(node.lineno, "TypeError", f"wrong call of {skill.signature}: {error}")
         return
-    given = dict(zip((p.name for p in skill.parameters), node.args, strict=False))
-    given |= {k.arg: k.value for k in node.keywords if k.arg}
     for parameter in skill.parameters:
         if parameter.is_options:
             yield from _check_options(given[parameter.name], skill, parameter)
         elif skill.name not in SKILLS:
             yield from _check_value(given[parameter.name], skill, parameter)
-
-
-def _describe_mismatch(node: ast.Call, skill: Skill) -> str | None:
-    names = [p.name for p in skill.parameters]
-    takes = f"{skill.name} takes {listed(names) or 'no arguments'}"
-    keywords = [k.arg for k in node.keywords if k.arg]
-    for word in keywords:
-        if word not in names:
-            return f"{takes}, not an argument {word}"
-        if word in names[: len(node.args)]:
-            return f"{takes}, but {word} is given twice"
-    count = len(node.args) + len(keywords)
-    if count == len(names):
-        return None
-    return f"{takes}, but got {counted(count, 'argument') if count else 'none'}"
 
 
 def _check_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
@@ -340,23 +328,7 @@ def _check_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator
 
 def _check_options(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
     what = f"the {parameter.name} of {skill.name}"
-    if isinstance(node, ast.List):
-        if not node.elts:
-            yield Flaw(node.lineno, "AskEmptyOptions", f"{what} are an empty list")
-    elif given := _name_literal(node):
-        yield Flaw(node.lineno, "TypeError", f"{what} must be a list, but {given} is given")
-
-
-_LITERALS: dict[type[ast.expr], str] = {
-    ast.Tuple: "a tuple",
-    ast.Dict: "a dictionary",
-    ast.Set: "a set",
-    ast.GeneratorExp: "a generator",
-    ast.JoinedStr: "a string",
-}
-
-
-def _name_literal(node: ast.expr) -> str | None:
-    if isinstance(node, ast.Constant):
-        return "a string" if isinstance(node.value, str) else f"the value {node.value!r:.40}"
-    return _LITERALS.get(type(node))
+    if isinstance(node, NO_LISTS):
+        yield Flaw(node.lineno, "TypeError", f'{what} must be a list, such as ["yes", "no"]')
+    elif isinstance(node, ast.List) and not node.elts:
+        yield Flaw(node.lineno, "AskEmptyOptions", f"{what} are an empty list")

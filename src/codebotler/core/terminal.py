@@ -14,7 +14,6 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import Timer
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 MAX_PIPE_WIDTH = 10_000
-QUIET_S = 2.0  # seconds before a command says what it is doing
 
 
 @contextmanager
@@ -116,18 +114,12 @@ def print_rich(what: RenderableType) -> None:
 
 @contextmanager
 def busy(doing: str) -> Iterator[None]:
-    """Show what a command is doing, with a timer on a terminal and otherwise in a line after two seconds."""
+    """Show on a terminal what a command is doing, and for how long."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    line = Timer(QUIET_S, note, [f"{doing} ..."])
     with progress(SpinnerColumn(), TextColumn(doing, markup=False), TimeElapsedColumn()) as shown:
         shown.add_task(doing)
-        try:
-            if shown.disable:
-                line.start()
-            yield
-        finally:
-            line.cancel()
+        yield
 
 
 def print_found(view: Callable[[], RenderableType], data: Callable[[], object], *, as_json: bool) -> None:

@@ -163,17 +163,8 @@ def trace_from(data: Iterable[object]) -> Trace:
 
 def placed_trace_data(trace: Trace) -> list[dict[str, Any]]:
     """Convert a trace to plain data that also tells where each event happened, and with whom."""
-    return [
-        {
-            "what": trace_data((event,))[0],
-            "place": event.place,
-            "holding": event.holding,
-            "to": event.to,
-            "destination": event.destination,
-            "failed": event.failed,
-        }
-        for event in trace
-    ]
+    names = ("place", "holding", "to", "destination", "failed")
+    return [{"what": trace_data((event,))[0], **{n: getattr(event, n) for n in names}} for event in trace]
 
 
 def placed_trace_from(data: Iterable[Mapping[str, Any]]) -> Trace:

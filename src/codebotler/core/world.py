@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -108,7 +107,8 @@ class World:
 
     def to_data(self) -> dict[str, object]:
         """Return the content of a world file."""
-        traits, rooms = {name: _traits_data(of) for name, of in self.traits}, self.rooms
+        traits = {name: {key: _as_lists(value) for key, value in of} for name, of in self.traits}
+        rooms = self.rooms
         places = {room.name: [_room_data(one) for one in rooms if one.within == room.name] for room in rooms}
         data = {
             "about": self.about,
@@ -117,7 +117,7 @@ class World:
             "objects": {r.name: [_thing_data(one, traits) for one in r.objects] for r in rooms if r.objects},
             "people": {r.name: [_person_data(one, traits) for one in r.people] for r in rooms if r.people},
             "may_wait_forever": self.may_wait_forever,
-            "truths": {key: list(v) if isinstance(v, tuple) else v for key, v in self.truths},
+            "truths": {key: _as_lists(value) for key, value in self.truths},
         }
         return {key: value for key, value in data.items() if value or key == "about"}
 
@@ -175,28 +175,17 @@ def _with_places(room: Room, world: World) -> Iterator[Room]:
         yield replace(place, footprint=place.footprint or corners, stand_at=(x, y))
 
 
-_EDGE_TOLERANCE = 1e-9  # relative to the size of a footprint; decimal fractions are rarely exact
+MIN_PART = 1e-9  # a fraction of an edge or a path, or metres; smaller values are rounding errors
 
 
 def is_within(point: Point, corners: Sequence[Point]) -> bool:
     """Whether a point is in a polygon or on its edge."""
-    x, y = point
-    size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
-    edges = zip(corners, [*corners[1:], corners[0]], strict=True)
-    if any(_distance(point, *edge) <= _EDGE_TOLERANCE * size for edge in edges):
-        return True
+    (x, y), here, ends = point, complex(*point), [complex(*corner) for corner in corners]
+    for start, end in zip(ends, [*ends[1:], ends[0]], strict=True):
+        along = (here - start) / (end - start or MIN_PART)
+        if abs(along.imag) <= MIN_PART and -MIN_PART <= along.real <= 1 + MIN_PART:
+            return True
     return sum(x < crossing for crossing in crossings(y, corners)) % 2 == 1
-
-
-def _distance(point: Point, start: Point, end: Point) -> float:
-    (x, y), (x1, y1), (x2, y2) = point, start, end
-    dx, dy = x2 - x1, y2 - y1
-    square = dx * dx + dy * dy
-    along = min(1.0, max(0.0, ((x - x1) * dx + (y - y1) * dy) / square)) if square else 0.0
-    return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
-
-
-MIN_PART = 1e-9  # a fraction of a path, or metres; smaller values are rounding errors
 
 
 def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tuple[str, ...]]:
@@ -221,8 +210,8 @@ def crossings(y: float, corners: Sequence[Point]) -> list[float]:
     )
 
 
-def _traits_data(traits: Iterable[Trait]) -> dict[str, object]:
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in traits}
+def _as_lists(value: object) -> object:
+    return [_as_lists(one) for one in value] if isinstance(value, tuple) else value
 
 
 def _thing_data(label: str, traits: Mapping[str, dict[str, object]]) -> object:
@@ -244,11 +233,6 @@ def _answer_data(answer: Answer) -> object:
 
 
 def _room_data(room: Room, places: Sequence[object] = ()) -> object:
-    data: dict[str, object] = {"name": room.name}
-    if room.footprint is not None:
-        data["footprint"] = [list(corner) for corner in room.footprint]
-    if room.stand_at is not None:
-        data["stand_at"] = list(room.stand_at)
-    if places:
-        data["places"] = list(places)
-    return data if len(data) > 1 else room.name
+    more = {"footprint": _as_lists(room.footprint), "stand_at": _as_lists(room.stand_at), "places": [*places]}
+    data = {key: value for key, value in more.items() if value}
+    return {"name": room.name, **data} if data else room.name

@@ -169,9 +169,7 @@ class WorldFile(_Form):
         names: dict[str, str] = {}  # by lower-case name
         for where, room, _ in self._goals():
             if other := names.get(room.name.lower()):
-                sentence = f'the room "{other}" is listed twice; remove one'
-                if room.name != other:
-                    sentence = f'the rooms "{other}" and "{room.name}" differ only in case; rename one'
+                sentence = f'the room "{room.name}" is already listed as "{other}"; rename or remove one'
                 raise file.wrong(sentence, *at, *where)
             names[room.name.lower()] = room.name
             if room.stand_at and room.footprint and not is_within(room.stand_at, room.footprint):
@@ -236,16 +234,9 @@ def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
         if isinstance(value, list):
             raise ValueError(f'"{statement}" is a list; write a single value')
         return statement
-    node: ast.expr = ast.Constant(None)
-    given: list[object] = []
-    with suppress(SyntaxError, ValueError, RecursionError):
-        node = parse_expression(statement)
-        given = [literal(one) for one in node.args] if isinstance(node, ast.Call) else []
-    match node:
-        case ast.Call(ast.Name(name), arguments, []) if len(arguments) == len(given):
-            pass
-        case _:
-            raise ValueError(f'"{statement}" is not a call; write it as in read_gauge("boiler")')
+    name, given = _parse_call(statement)
+    if not name:
+        raise ValueError(f'"{statement}" is not a call; write it as in read_gauge("boiler")')
     if skills is not None and len(skills) > len(SKILLS):
         _expect_possible(name, given, value, skills)
         taken = zip(skills[name].parameters, given, strict=True)
@@ -253,14 +244,20 @@ def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
     return written_call(name, given)
 
 
+def _parse_call(statement: str) -> tuple[str, list[object]]:
+    """Return the name and the arguments of a call, or an empty name if the statement is not one."""
+    with suppress(SyntaxError, ValueError, RecursionError):
+        match parse_expression(statement):
+            case ast.Call(ast.Name(name), arguments, []):
+                return name, [literal(one) for one in arguments]
+    return "", []
+
+
 def _expect_possible(name: str, given: list[object], value: object, skills: SkillTable) -> None:
     """Raise ValueError if a call cannot return this value, or if the skill's code computes its result."""
-    if name not in skills:
-        alike = get_close_matches(name, skills, 1)
-        raise ValueError(f"there is no skill {name}" + (f"; did you mean {alike[0]}?" if alike else ""))
-    row = skills[name]
-    if not row.is_random:
-        raise ValueError(f"the code of {name} computes its result; instead, set the facts it depends on")
+    row = skills.get(name)
+    if row is None or not row.is_random:
+        raise ValueError(f"{name} is not a skill with an empty body; instead, set the facts it depends on")
     if len(given) != len(row.parameters) or not all(
         parameter.type.fits(one) for parameter, one in zip(row.parameters, given, strict=True)
     ):

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from copy import copy
-from datetime import date
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
@@ -127,9 +125,9 @@ class YamlFile:
         try:
             return model.model_validate(self.data if data is None and not at else data)
         except ValidationError as error:
-            first, hint = _select_error(error.errors(include_url=False))
+            first = _select_error(error.errors(include_url=False))
             place = (*at, *first["loc"])
-            raise self.wrong(_sentence(first, self._name(place)) + hint, *place) from None
+            raise self.wrong(_sentence(first, self._name(place)), *place) from None
 
     def _name(self, place: YamlPath) -> str:
         if not place:
@@ -173,8 +171,8 @@ class YamlFile:
 # --- pydantic errors in plain English
 
 EXPECTED_TYPES = {
-    "string_type": "a string",
-    "list_type": "a list",
+    "string_type": "a string in quotes",
+    "list_type": 'a list whose entries begin with "- "',
     "tuple_type": "a list",
     "dict_type": "a mapping of keys to values",
     "model_type": "a mapping of keys to values",
@@ -185,31 +183,14 @@ EXPECTED_TYPES = {
 FAULT_WORDS = {
     "extra_forbidden": "the key {name} is unknown; remove it or correct its spelling",
     "invalid_key": "this key is not text; remove it or put quotes around it",
-    "string_too_short": "{name} is empty; write a string",
-    "too_short": "{name} has too few entries; it needs at least {min_length}",
-    "too_long": "{name} has too many entries; it takes {max_length}",
-    "finite_number": "{name} is not a finite number",
 }
-VALUE_KINDS = (
-    (bool, "a truth value"),
-    (int | float, "a number"),
-    (str, "a string"),
-    (date, "a date"),
-    (Mapping, "a mapping"),
-    (object, "a list"),
-)
 
 
-def _select_error(errors: Sequence[ErrorDetails]) -> tuple[ErrorDetails, str]:
-    """Return the error to report, and a hint in case a missing key is only misspelt."""
+def _select_error(errors: Sequence[ErrorDetails]) -> ErrorDetails:
+    """Return the first error, or if a key is missing, an unknown one beside it, which may be the same key."""
     first = errors[0]
-    *around, missing = first["loc"] or ("",)
-    for other in errors[1:] if first["type"] == "missing" else ():
-        *place, key = other["loc"] or ("",)
-        is_beside = other["type"] == "extra_forbidden" and place == around
-        if is_beside and get_close_matches(str(key), [str(missing)]):
-            return other, f'; did you mean "{missing}"?'
-    return first, ""
+    unknown = (e for e in errors if e["type"] == "extra_forbidden" and e["loc"][:-1] == first["loc"][:-1])
+    return next(unknown, first) if first["type"] == "missing" else first
 
 
 def _sentence(error: ErrorDetails, name: str) -> str:
@@ -219,21 +200,10 @@ def _sentence(error: ErrorDetails, name: str) -> str:
         if isinstance(last, str):
             return f'the key "{last}" is missing'
         return f"this entry has too few values; it needs at least {last + 1}"
+    found = "empty" if value is None else _quoted(value)
     if kind in EXPECTED_TYPES:
-        return f"{name} {_describe_mismatch(EXPECTED_TYPES[kind], value)}"
+        return f"{name} is {found}, but it should be {EXPECTED_TYPES[kind]}"
     if kind in FAULT_WORDS:
-        return FAULT_WORDS[kind].format(name=name, **error.get("ctx", {}))
-    plain = error["msg"].removeprefix("Value error, ").replace("Input should be", "it should be")
-    return f"{name} is {_quoted(value)}, but {plain[:1].lower()}{plain[1:]}"
-
-
-def _describe_mismatch(expected: str, value: object) -> str:
-    if value is None:
-        return "is empty; fill it in or remove it"
-    sentence = f"is {next(word for kind, word in VALUE_KINDS if isinstance(value, kind))}, not {expected}"
-    if expected == "a list" and isinstance(value, Mapping):
-        return f'{sentence}; begin each entry with "- "'
-    if expected != "a string" or not isinstance(value, int | float | date):
-        return sentence
-    word = {True: ' ("yes")', False: ' ("no")'}[value] if isinstance(value, bool) else ""
-    return f"{sentence}; put quotes around it{word}"
+        return FAULT_WORDS[kind].format(name=name)
+    plain = re.sub(r"^\w+ should", "it should", error["msg"].removeprefix("Value error, "))
+    return f"{name} is {found}, but {plain[:1].lower()}{plain[1:]}"

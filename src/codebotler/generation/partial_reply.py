@@ -5,11 +5,15 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-REPLY_FENCE = re.compile(r"[ \t]*(`{3,}|~{3,})")
-CODE_START = re.compile(r"(?:async\s+)?def\s|class\s|import\s|from\s+[\w.]+\s+import\b|@\w")
-CONTINUATION = re.compile(r" {2,}\S|\t")  # the body of a function whose start is in the prompt
-REASONING_END = re.compile(r"[<\[]/(?:think(?:ing)?|thought|reason(?:ing)?)[>\]]", re.IGNORECASE)
-REASONING_TAG = re.compile(r"\s*[<\[](?P<end>/?)(?:think(?:ing)?|thought|reason(?:ing)?)[>\]]", re.IGNORECASE)
+TAG_NAME = r"(?:think(?:ing)?|thought|reason(?:ing)?)"
+REASONING_START = re.compile(rf"\s*[<\[]{TAG_NAME}[>\]]", re.IGNORECASE)
+REASONING_END = re.compile(rf"[<\[]/{TAG_NAME}[>\]]\n?", re.IGNORECASE)
+FENCE = re.compile(r"^[ \t]*(?:`{3,}|~{3,}).*\n?", re.MULTILINE)
+CODE_START = re.compile(
+    r"\A(?: {2,}\S|\t)"  # the body of a function whose start is in the prompt
+    r"|^(?:(?:async\s+)?def\s|class\s|import\s|from\s+[\w.]+\s+import\b|@\w)",
+    re.MULTILINE,
+)
 
 
 @dataclass(frozen=True)
@@ -22,29 +26,13 @@ class PartialReply:
 
 def split_partial(reply: str) -> PartialReply:
     """Split the start of a reply into text and code, where reasoning between tags counts as text."""
-    if CONTINUATION.match(reply) and not REASONING_TAG.match(reply):
-        return PartialReply("", reply)
-    text: list[str] = []
-    code: list[str] = []
-    fence, is_bare, is_reasoning = "", False, False
-    for line in reply.splitlines(keepends=True):
-        marks = REPLY_FENCE.match(line)
-        tag = REASONING_TAG.match(line)
-        if tag and tag["end"]:  # reasoning that began in the prompt may contain drafts of code
-            text, code, is_bare = [*text, *code, line], [], False
-            is_reasoning = False
-        elif is_reasoning or tag:
-            text.append(line)
-            is_reasoning = not REASONING_END.search(line)
-        elif fence:
-            is_end = marks is not None and marks[1].startswith(fence) and not line.strip().strip(fence[0])
-            fence = "" if is_end else fence
-            code += [] if is_end else [line]
-        elif marks is not None:
-            fence, code, is_bare = marks[1], [], False
-        elif is_bare or (not code and CODE_START.match(line)):
-            is_bare = True
-            code.append(line)
-        else:
-            text.append(line)
-    return PartialReply("".join(text), "".join(code))
+    thought = max((tag.end() for tag in REASONING_END.finditer(reply)), default=0)
+    reasoning, answer = reply[:thought], reply[thought:]
+    if REASONING_START.match(answer):
+        return PartialReply(reply, "")
+    parts = FENCE.split(answer)  # text and code take turns
+    if len(parts) > 1:
+        return PartialReply(reasoning + "".join(parts[::2]), parts[1::2][-1])
+    code = CODE_START.search(answer)
+    start = len(answer) if code is None else code.start()
+    return PartialReply(reasoning + answer[:start], answer[start:])

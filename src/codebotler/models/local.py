@@ -70,8 +70,6 @@ class LocalModel:
 
     def __init__(self, path: str, settings: SamplingSettings) -> None:
         self.name, self.settings = f"hf:{path}", settings
-        if settings.base_url is not None:
-            raise UserError(f"{self.name} runs on this machine and does not support --base-url; remove it")
         source = find_source(path)
         self.device, dtype = _device()
         transformers.utils.logging.disable_progress_bar()

@@ -39,11 +39,11 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
         UserError: the model does not exist, or a key or a package is missing.
     """
     kind, rest = kind_of(name), name.partition(":")[2]
+    if settings.base_url is not None:
+        expect_server(name)
     # Each of these modules imports a large library, so import only the one that is needed.
     match kind:
         case "recorded":
-            if settings.base_url is not None:
-                expect_server(name)
             return open_recorded(name)
         case "completions":
             with installed():
@@ -63,8 +63,8 @@ def expect_server(*names: str) -> None:
     """Raise UserError if no model runs on a server, because a base URL would then have no effect."""
     if not any(map(runs_on_server, names)):
         raise UserError(
-            f"a base URL is given, but {' and '.join(names)} {'does' if len(names) == 1 else 'do'} not use "
-            "a server; use a model that does, such as openai-chat:NAME"
+            f"no server runs {' or '.join(names)}; leave out the base URL, or choose a model such as "
+            "openai-chat:NAME"
         )
 
 

@@ -17,7 +17,6 @@ from tenacity import (
     wait_exponential_jitter,
 )
 
-from codebotler.core.errors import UserError
 from codebotler.models.base import (
     BudgetSpentError,
     Model,
@@ -26,7 +25,6 @@ from codebotler.models.base import (
     TextListener,
     ignore_text,
 )
-from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
 
 MODELS_LOG = logging.getLogger("codebotler.models")
@@ -50,9 +48,6 @@ class RateLimited:
         token_budget: the number of tokens after which no request starts. Running requests complete. If the
             model does not count tokens, three characters are assumed per token. None for no limit.
         first_wait: about how many seconds to wait before the second try. The wait doubles each time.
-
-    Raises:
-        UserError: a limit is out of range.
     """
 
     model: Model
@@ -71,27 +66,7 @@ class RateLimited:
     _deferred_until: float = field(default=-math.inf, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name, value, least in (
-            ("concurrency", self.concurrency, 1),
-            ("number of retries", self.retries, 0),
-            ("token budget", self.token_budget, 1),
-        ):
-            if value is not None and value < least:
-                raise UserError(f"the {name} is {value}; it must be at least {least}")
-        if self.requests_per_minute is not None and not self.requests_per_minute > 0:
-            rate = f"{self.requests_per_minute:g}"
-            raise UserError(f"the number of requests per minute is {rate}; it must be above 0")
         self._free = asyncio.Semaphore(self.concurrency)
-
-    @property
-    def name(self) -> str:
-        """The name of the model."""
-        return self.model.name
-
-    @property
-    def settings(self) -> SamplingSettings:
-        """The settings of the model."""
-        return self.model.settings
 
     async def reply(
         self,

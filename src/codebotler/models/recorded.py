@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import SequenceMatcher
 from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -128,14 +127,13 @@ class RecordedModel:
 
 
 def find_closest(instruction: str, known: Iterable[str]) -> list[str]:
-    """Return the known instructions that share the most long words with `instruction`, in the same order."""
-    matcher = SequenceMatcher(a=(), b=LONG_WORD.findall(instruction.lower()), autojunk=False)
+    """Return the known instructions that share the most long words with `instruction`, short ones first."""
+    words = {*LONG_WORD.findall(instruction.lower())}
 
-    def similarity(other: str) -> tuple[int, float]:
-        matcher.set_seq1(LONG_WORD.findall(other.lower()))
-        return sum(block.size for block in matcher.get_matching_blocks()), matcher.ratio()
+    def rank(other: str) -> tuple[int, int]:
+        return -len(words & {*LONG_WORD.findall(other.lower())}), len(other)
 
-    return sorted(known, key=similarity, reverse=True)[:MAX_SUGGESTIONS]
+    return sorted(known, key=rank)[:MAX_SUGGESTIONS]
 
 
 def _words(text: str) -> tuple[str, ...]:

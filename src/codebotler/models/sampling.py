@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 from urllib.parse import urlsplit
@@ -79,18 +80,12 @@ class SamplingSettings:
 
 def _check_url(url: str) -> None:
     # Never quote the URL: in a mistyped URL, any part may be a password.
-    if any(mark in url for mark in "@?#"):
-        raise UserError(
-            "the base URL contains a user name, a password, a query or a fragment; remove it, "
-            "and put keys into the environment"
-        )
-    try:
+    is_valid = False
+    with suppress(ValueError):  # an unmatched bracket, or an invalid port
         parts = urlsplit(url)
-        is_valid = parts.scheme in {"http", "https"} and parts.hostname and parts.port != 0
-    except ValueError:  # an unmatched bracket, or an invalid port
-        is_valid = False
-    if not is_valid:
+        is_valid = parts.scheme in {"http", "https"} and bool(parts.hostname) and parts.port != 0
+    if not is_valid or any(mark in url for mark in "@?#"):
         raise UserError(
-            "the base URL is not http:// or https:// with a host and port; "
-            "write one like http://localhost:8000/v1"
+            "the base URL must be http:// or https:// with a host and port, as in http://localhost:8000/v1, "
+            "without a user name, password, query or fragment; put keys into the environment"
         )

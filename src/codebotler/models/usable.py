@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from http.client import HTTPConnection, HTTPException
-from threading import Thread
 
-from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from codebotler.models.keys import read_key
 from codebotler.models.recorded import RECORDED_NAMES, is_recorded
 
 MODEL_SERVERS: Mapping[str, int] = {"Ollama": 11434, "LM Studio": 1234, "vLLM": 8000, "llama.cpp": 8080}
@@ -51,16 +49,9 @@ class UsableModel:
 
 def find_usable_models(servers: Mapping[str, int] = MODEL_SERVERS) -> list[UsableModel]:
     """List the models of local servers, then an example for each key, then the recorded models."""
-    local: list[UsableModel] = []
-
-    def ask() -> None:
-        for server, port in servers.items():
-            local.extend(_list_models(server, port))
-
-    thread = Thread(target=ask, daemon=True)
-    thread.start()
-    thread.join(len(servers) * SERVER_TIMEOUT)  # a slow trickle of bytes resets a socket's own timeout
-    by_key = [UsableModel(name, f"{key} is set") for key, name in KEY_VARIABLES.items() if _is_set(key)]
+    local = [model for server, port in servers.items() for model in _list_models(server, port)]
+    keys = [key for key in KEY_VARIABLES if os.environ.get(key, "").strip()]
+    by_key = [UsableModel(KEY_VARIABLES[key], f"{key} is set") for key in keys]
     recorded = [
         UsableModel(f"recorded:{name}", "written by hand, for known instructions") for name in RECORDED_NAMES
     ]
@@ -71,13 +62,6 @@ def suggest_model(servers: Mapping[str, int] = MODEL_SERVERS) -> str:
     """Return the options that select the first usable model, or else how to set up a model."""
     first = find_usable_models(servers)[0]
     return MODEL_HINT if first.is_recorded else f"add {first.options}"
-
-
-def _is_set(key: str) -> bool:
-    try:
-        return read_key(key) is not None
-    except UserError:  # the key is not valid in an HTTP header
-        return False
 
 
 def _list_models(server: str, port: int) -> list[UsableModel]:

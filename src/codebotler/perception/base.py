@@ -8,7 +8,7 @@ from typing import Protocol, TypeAlias
 from PIL.Image import Image
 
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import visible
+from codebotler.core.terminal import shortened
 
 Box: TypeAlias = tuple[float, float, float, float]
 """Left, top, right and bottom, as fractions of the image's width and height from its top left corner."""
@@ -79,10 +79,7 @@ class PerceptionError(Exception):
 def check_label(label: str) -> str:
     """Return the label as one line, or raise UserError if it is empty, too long or not printable."""
     words = " ".join(label.split())
-    if not words:
-        raise UserError("the label is empty; name an object to look for")
-    if len(words) > MAX_LABEL_CHARACTERS:
-        raise UserError(f"the label has {len(words):,} characters; use at most {MAX_LABEL_CHARACTERS}")
-    if not words.isprintable():
-        raise UserError(f'the label "{visible(words)}" has unprintable characters; remove them')
+    if not (0 < len(words) <= MAX_LABEL_CHARACTERS and words.isprintable()):
+        limits = f"use 1 to {MAX_LABEL_CHARACTERS} printable characters"
+        raise UserError(f'the label "{shortened(words, 40)}" is not valid; {limits}')
     return words

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice
@@ -98,7 +97,7 @@ def _find_marked(reply: str, parses: ParseTest) -> Iterator[tuple[int, Segment, 
         if (fence := FENCE_LINE.match(text)) and not _is_in_code(fence, reply[:start]):
             code, length = _read_fence(fence, reply[end:], parses)
             yield start, Segment("fence", reply[start : end + length], code), end + length
-        for marker in _markers_at_ends(text):
+        for marker in islice(_markers(text), MAX_MARKERS):
             if found := _read_thought(marker, reply[start:]):
                 segment, length = found
                 yield start + marker.start, segment, start + length
@@ -184,12 +183,6 @@ def _markers(text: str, start: int = 0) -> Iterator[_Marker]:
         is_last = bool(found["slash"] or (found["right"] and not found["left"]) or END_WORDS & {*words})
         name = "_".join(word for word in words if word not in {*START_WORDS, *END_WORDS, "of"})
         yield _Marker(name, is_last, bool(found["channel"] or found["left"]), *found.span())
-
-
-def _markers_at_ends(line: str) -> Iterator[_Marker]:
-    markers = _markers(line)
-    yield from islice(markers, MAX_MARKERS)
-    yield from deque(markers, maxlen=1)
 
 
 def _read_thought(marker: _Marker, rest: str) -> tuple[Segment, int] | None:

@@ -8,7 +8,7 @@ from time import monotonic
 from typing import NoReturn, TypeVar
 
 from codebotler.cli.ending import STOPPED
-from codebotler.core.terminal import QUIET_S, note, print_json, print_rich, print_text, progress
+from codebotler.core.terminal import note, print_json, print_rich, print_text, progress
 
 __all__ = [
     "fail",
@@ -21,6 +21,7 @@ __all__ = [
     "stoppable",
 ]
 
+QUIET_S = 2.0  # seconds before a command says what it is doing
 Watched = TypeVar("Watched")
 
 

@@ -4,7 +4,6 @@ import json
 import os
 import re
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,6 @@ import pytest
 import command_line
 from codebotler.cli.app import app
 from codebotler.cli.ending import obey
-from codebotler.core.terminal import busy
 from command_line import Ended, Refusal, command
 
 GOOD = """def task_program():
@@ -98,15 +96,6 @@ def test_a_room_that_may_take_too_long_to_find_ends_the_command(files: Path) -> 
     assert status == 2
     assert "slow.yaml, line 4: " in err
     assert "too long" in err
-
-
-def test_what_takes_long_says_that_it_goes_on(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("codebotler.core.terminal.QUIET_S", 0.0)
-    with busy("checking"):
-        time.sleep(0.05)
-    assert capsys.readouterr().err == "checking ...\n"
 
 
 def test_guessed_rooms_are_said_to_be_guessed(files: Path) -> None:
@@ -200,7 +189,7 @@ def test_lines_on_standard_input_are_counted_as_they_stand() -> None:
 
 
 def test_what_cannot_be_checked_is_refused_in_a_sentence(files: Path) -> None:
-    for path, fault in ((files / "gone.py", "no such file"), (files, "a folder")):
+    for path, fault in ((files / "gone.py", "No such file"), (files, "Is a directory")):
         refusal = refused("check", path)
         assert refusal.at == (str(path), None)
         assert fault in refusal.sentence

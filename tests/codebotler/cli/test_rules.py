@@ -113,7 +113,7 @@ def test_rules_that_cannot_be_read_end_a_command_before_anything_else(
     monkeypatch.chdir(files)
     refused = command_line.refused(*arguments, "--rules", "bad.yaml", name="codebotler")
     assert refused.at == ("bad.yaml", 1)
-    assert '"rules" is a number' in refused.sentence
+    assert '"rules" is 3, but it should be a list' in refused.sentence
     missing = command_line.refused(*arguments, "--rules", "none.yaml", name="codebotler")
     assert "none.yaml" in str(missing)
     assert not (files / "home").exists()

@@ -36,8 +36,8 @@ def test_missing_file_folder_no_utf8_and_too_large_are_told_in_a_sentence(tmp_pa
     latin, large = tmp_path / "latin.yaml", tmp_path / "large.yaml"
     latin.write_bytes("a: 1\nb: café\n".encode("latin-1"))
     large.write_bytes(b"a" * (MAX_FILE_BYTES + 1))
-    refused(tmp_path / "no.yaml", "no such file")
-    refused(tmp_path, "a folder")
+    refused(tmp_path / "no.yaml", "No such file")
+    refused(tmp_path, "Is a directory")
     refused(latin, "UTF-8", 2)
     refused(large, "5,000,000 bytes")
     refused(latin / "inside", "(Not a directory)")

@@ -248,35 +248,35 @@ BAD = {
     "@skill\ndef wiggle(): 'Wiggle.'": "must take the simulation first, then the arguments",
     "@skill\ndef wiggle(sim, *who: str) -> None: 'Wiggle.'": "must take the simulation first, then",
     "@skill\ndef wiggle(sim, who) -> None: 'Wiggle.'": "who of wiggle has no type; write who: str",
-    "@skill\ndef wiggle(sim, who: str = 'a') -> None: 'Wiggle.'": "wiggle has a default value",
+    "@skill\ndef wiggle(sim, who: str = 'a') -> None: 'Wiggle.'": "of programs without default values",
     "@skill\ndef wiggle(sim, who: dict) -> None: 'Wiggle.'": "who of wiggle is dict",
     "@skill\ndef wiggle(sim, who: 'Nobody') -> None: 'Wiggle.'": "who of wiggle cannot be read: name",
     "@skill\ndef wiggle(sim, who: None) -> None: 'Wiggle.'": "a parameter of wiggle cannot be None",
     "@skill\ndef wiggle(sim, who: str): 'Wiggle.'": "wiggle does not say what it returns; write -> None",
     "@skill\ndef wiggle(sim, who: str) -> None: pass": "wiggle has no docstring",
     "@skill\ndef print(sim, who: str) -> None: 'Wiggle.'": "print is a reserved name",
-    "@skill\ndef found(sim, who: str) -> None: 'Wiggle.'": "found has another meaning in formulas",
-    "@skill(sets='holding')\ndef wiggle(sim, a: str) -> None: 'W.'": "holding has another meaning in",
+    "@skill\ndef found(sim, who: str) -> None: 'Wiggle.'": 'formulas cannot use "found" as a name',
+    "@skill(sets='holding')\ndef wiggle(sim, a: str) -> None: 'W.'": 'formulas cannot use "holding"',
     "@skill(sets='goto')\ndef wiggle(sim, a: str) -> None: 'W.'": "goto is the name of a skill and of a",
     "@skill(clears='pick')\ndef wiggle(sim, a: str) -> None: 'W.'": "pick is the name of a skill and of a",
-    "@skill(sets='a b')\ndef wiggle(sim, a: str) -> None: 'W.'": "sets of wiggle must be the name of a state",
-    "@skill(clears=1)\ndef wiggle(sim, a: str) -> None: 'W.'": "clears of wiggle must be the name of a state",
+    "@skill(sets='a b')\ndef wiggle(sim, a: str) -> None: 'W.'": 'formulas cannot use "a b" as a name',
+    "@skill(clears=1)\ndef wiggle(sim, a: str) -> None: 'W.'": "the option clears cannot be 1",
     "@skill(sets='on')\ndef wiggle(sim) -> None: 'W.'": "must set or clear a state of the thing",
     "@skill(sets='on', clears='on')\ndef wiggle(sim, a: str) -> None: 'W.'": "must set or clear a state",
     "@skill(sets='on', event=None)\ndef wiggle(sim, a: str) -> None: 'W.'": "needs an event",
-    "@skill\ndef go_to(sim, who: str) -> None: 'Wiggle.'": "there is already a skill go_to",
-    "@skill(event='goto')\ndef fly(sim, who: str) -> None: 'Fly.'": 'of another skill are called "goto"',
+    "@skill\ndef go_to(sim, who: str) -> None: 'Wiggle.'": '"go_to" is the name, event or ROS action of',
+    "@skill(event='goto')\ndef fly(sim, who: str) -> None: 'Fly.'": '"goto" is the name, event or',
     "@skill(verb='wiggle {to}')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "which is not a parameter",
     "@skill(ros='Wave')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": '"Wave" is not a ROS action',
     "@skill(fails={'KeyError': 'x'})\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": '"KeyError" cannot name',
     "@skill\ndef wiggle(who: str) -> None: 'Wiggle.'": "wiggle must take the simulation first, then",
     "@skill\nasync def wiggle(sim) -> None: 'Wiggle.'": "wiggle is async, but skills must be",
-    "@skill(fail={})\ndef wiggle(sim) -> None: 'Wiggle.'": "@skill has no option fail; did you mean fails?",
-    "@skill(fails=['A'])\ndef wiggle(sim) -> None: 'Wiggle.'": "fails of wiggle must be errors with clauses",
-    "@skill(seconds='2')\ndef wiggle(sim) -> None: 'Wiggle.'": "must be a number of at least 0, not '2'",
-    "@skill(results=('a', 'b', 'c'))\ndef wiggle(sim) -> bool: 'Wiggle.'": "must be two texts",
-    "@skill(names={'who': 'room'})\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "names of wiggle must be",
-    "@skill(event='a b')\ndef wiggle(sim) -> None: 'Wiggle.'": "event of wiggle must be a name, or None",
+    "@skill(fail={})\ndef wiggle(sim) -> None: 'Wiggle.'": "@skill has no option fail; its options are verb,",
+    "@skill(fails=['A'])\ndef wiggle(sim) -> None: 'Wiggle.'": "the option fails cannot be ['A']",
+    "@skill(seconds='2')\ndef wiggle(sim) -> None: 'Wiggle.'": "the option seconds cannot be '2'",
+    "@skill(results=('a', 'b', 'c'))\ndef wiggle(sim) -> bool: 'Wiggle.'": "the option results cannot be",
+    "@skill(names={'who': 'room'})\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "the option names cannot",
+    "@skill(event='a b')\ndef wiggle(sim) -> None: 'Wiggle.'": 'formulas cannot use "a b" as a name',
     "@skill\ndef wiggle(sim, who: str) -> 'int | None': 'Wiggle.'": "the result of wiggle is int | None,",
     "@skill(text='whom')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "wiggle has no parameter whom",
     "def wiggle(sim, who: str) -> None: 'Wiggle.'": "it declares no skill; put @skill above a function",
@@ -317,8 +317,8 @@ def test_a_function_that_fails_ends_the_command_with_a_sentence(
 
 
 TRUTHS = {
-    "reed('a'): 1": "there is no skill reed; did you mean read?",
-    "open_gate('a'): true": "the code of open_gate computes its result",
+    "reed('a'): 1": "reed is not a skill with an empty body",
+    "open_gate('a'): true": "open_gate is not a skill with an empty body",
     "read(3): 1": "its signature is read(what: str) -> int",
     "read('a', 'b'): 1": "the arguments of read are wrong",
     "read('a'): 1.5": "read cannot return 1.5; write a whole number or Broken",
@@ -434,7 +434,7 @@ def test_two_skills_with_one_ros_action_are_refused(tmp_path: Path) -> None:
     path.write_text(
         HEAD + f"{action}def wiggle(sim) -> None: 'W.'\n{action}def jiggle(sim, how: str) -> None: 'J.'\n"
     )
-    with pytest.raises(UserError, match="another skill already uses the ROS action /wiggle"):
+    with pytest.raises(UserError, match='"/wiggle" is the name, event or ROS action'):
         skills_from(path)
 
 

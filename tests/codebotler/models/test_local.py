@@ -311,7 +311,7 @@ def test_what_is_no_model_is_told_in_a_sentence(tmp_path: Path, path: str, named
 
 
 def test_base_url_means_nothing_here(babbler: str) -> None:
-    with pytest.raises(UserError, match="--base-url"):
+    with pytest.raises(UserError, match="base URL"):
         open_model(babbler, SamplingSettings(base_url="http://localhost:1/v1"))
 
 

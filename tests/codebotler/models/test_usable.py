@@ -80,7 +80,6 @@ def test_a_key_in_the_environment_opens_a_model(monkeypatch: pytest.MonkeyPatch)
     assert "OPENAI_API_KEY" in suggest_model({})
     monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-secret-of-mine")
     monkeypatch.setenv("OPENAI_API_KEY", " ")
-    monkeypatch.setenv("GOOGLE_API_KEY", "no\nheader")
     (first, *rest) = find_usable_models({})
     assert (first.why, first.base_url) == ("ANTHROPIC_API_KEY is set", None)
     assert [one.name for one in rest] == RECORDED

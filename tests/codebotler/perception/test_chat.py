@@ -91,10 +91,10 @@ def test_name_that_is_an_order_arrives_as_a_text(server: Server, detector: Detec
 @pytest.mark.parametrize(
     ("label", "named"),
     [
-        ("", ["empty"]),
-        (" \n\t", ["empty"]),
-        ("mug " * 2_500, ["9,999 characters", "200"]),
-        ("mug\x1b[2J", [r'"mug\x1b[2J"', "characters"]),
+        ("", ['""', "1 to 200"]),
+        (" \n\t", ['""', "1 to 200"]),
+        ("mug " * 2_500, ["more characters", "200"]),
+        ("mug\x1b[2J", [r'"mug\x1b[2J"', "printable characters"]),
     ],
 )
 def test_what_is_no_name_is_refused(server: Server, detector: Detector, label: str, named: list[str]) -> None:

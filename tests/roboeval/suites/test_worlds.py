@@ -173,7 +173,7 @@ def test_checks_name_phrases(tmp_path: Path) -> None:
     [
         ("some:", "people:", ['"people"', "phrases"]),
         ("some:", "two words:", ['"two words"', "phrases"]),
-        ("[tea, cups? for]", "[]", ['"some"', "too few"]),
+        ("[tea, cups? for]", "[]", ['"some"', "at least"]),
     ],
 )
 def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, named: list[str]) -> None:

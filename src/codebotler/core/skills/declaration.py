@@ -6,13 +6,15 @@ import builtins
 import functools
 import re
 from collections.abc import Callable, Mapping
+from inspect import iscoroutinefunction, signature
 from keyword import iskeyword
+from math import inf
 from types import FunctionType
-from typing import Any, NoReturn, overload
+from typing import Any, NoReturn, Unpack, overload
 
 from codebotler.core.errors import VIOLATION, UserError
 from codebotler.core.skills.kinds import INSIDE
-from codebotler.core.skills.options import SKILL_OPTIONS
+from codebotler.core.skills.options import SkillOptions, wrong_options
 from codebotler.core.skills.own_modules import is_own_module
 from codebotler.core.skills.table import Parameter, Recording, RosAction, Skill, refuse
 from codebotler.core.skills.values import NO_VALUE, TEXT_TYPE, ValueType, plain, value_type
@@ -40,7 +42,7 @@ RTL_WORDS = frozenset(
 """Words with a meaning in formulas, which cannot name events."""
 _DECLARED: dict[str, Skill] = {}
 PAPER_MODULE = "codebotler.core.skills.paper"
-COROUTINE_FLAG, MORE_ARGUMENTS_FLAGS = 0x80, 0x04 | 0x08  # bits of `co_flags`
+ROS_ACTION = re.compile(r"([^\W\d]\w*)/([A-Z]\w*):(/*[^/].*)")
 ROS_TYPES = {"str": "string", "int": "int64", "float": "float64", "bool": "bool"}
 USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a list of one of these"
 
@@ -66,47 +68,11 @@ def skill(does: Callable[..., Any], /) -> Skill: ...
 
 
 @overload
-def skill(
-    *,
-    verb: Verb | str | None = None,
-    past: str = "",
-    results: tuple[str, str] = ("no", "yes"),
-    fails: Mapping[str, str] | None = None,
-    ros: RosAction | str | None = None,
-    example: str = "",
-    event: str | None = "",
-    text: str = "",
-    names: str = "thing",
-    to: str | None = None,
-    when_tried: bool | None = None,
-    sets: str = "",
-    clears: str = "",
-    seconds: float = 1.0,
-    is_idle: bool = False,
-    adds_event: bool = True,
-) -> Callable[[Callable[..., Any]], Skill]: ...
+def skill(**options: Unpack[SkillOptions]) -> Callable[[Callable[..., Any]], Skill]: ...
 
 
 def skill(
-    does: Callable[..., Any] | None = None,
-    /,
-    *,
-    verb: Verb | str | None = None,
-    past: str = "",
-    results: tuple[str, str] = ("no", "yes"),
-    fails: Mapping[str, str] | None = None,
-    ros: RosAction | str | None = None,
-    example: str = "",
-    event: str | None = "",
-    text: str = "",
-    names: str = "thing",
-    to: str | None = None,
-    when_tried: bool | None = None,
-    sets: str = "",
-    clears: str = "",
-    seconds: float = 1.0,
-    is_idle: bool = False,
-    adds_event: bool = True,
+    does: Callable[..., Any] | None = None, /, **options: Unpack[SkillOptions]
 ) -> Skill | Callable[[Callable[..., Any]], Skill]:
     """Declare a skill as a function that acts on a simulated robot, which is its first parameter.
 
@@ -115,33 +81,16 @@ def skill(
 
     Args:
         does: the function, if `@skill` is used without options.
-        verb: the English verb, such as `open {door}`, with parameters in braces.
-        past: the past form of an irregular verb that is not in the list, such as `wove`.
-        results: the meanings of False and True in words.
-        fails: the kinds of its errors, each with a clause that says when it occurs.
-        ros: the ROS action that executes it, such as `lab_msgs/OpenDoor:/open_door`.
-        example: an example call for prompts; by default, its arguments are the names of the parameters.
-        event: the kind of event that it records, or None for no event; by default the name of the function.
-        text: the parameter that becomes the text of the event; by default the first one.
-        names: the sort of thing that the text names, such as `room`; empty for speech.
-        to: the parameter that names the addressee of a question.
-        when_tried: whether failed attempts are recorded, too. By default, only house rules count them, unless
-            the skill only clears a state.
-        sets: the state into which it brings the thing that the text names, such as `on`.
-        clears: the state that it ends.
-        seconds: its duration on the simulated clock in seconds, without driving.
-        is_idle: whether it changes neither the robot nor its world.
-        adds_event: whether the simulation records the event afterwards; False if the function does it.
+        options: see `SkillOptions`.
 
     Raises:
         UserError: the function cannot be a skill; the message gives the file and the line.
     """
-    said = {**locals(), "fails": fails or {}}
 
     def declare(function: Callable[..., Any]) -> Skill:
         if not isinstance(function, FunctionType):
             raise UserError(f"@skill belongs above a function, not above {function!r:.80}")
-        return _Declaration(function, said).skill()
+        return _Declaration(function, options).skill()
 
     return declare if does is None else declare(does)
 
@@ -149,8 +98,8 @@ def skill(
 class _Declaration:
     """Builds a skill from a function and the options of its declaration."""
 
-    def __init__(self, does: Callable[..., Any], said: Mapping[str, Any]) -> None:
-        self.does, self.said = does, said
+    def __init__(self, does: Callable[..., Any], options: SkillOptions) -> None:
+        self.does, self.options = does, options
         self.name = does.__name__
 
     def skill(self) -> Skill:
@@ -173,12 +122,12 @@ class _Declaration:
             recording,
             self.ros(parameters, returns),
             self.verb(parameters, recording),
-            self.said["seconds"],
-            is_idle=self.said["is_idle"],
+            self.options.get("seconds", 1.0),
+            is_idle=self.options.get("is_idle", False),
             does=_drawn(self.does) if _is_empty(self.does) else self.does,
-            adds_event=self.said["adds_event"],
+            adds_event=self.options.get("adds_event", True),
             fails=tuple(fails.items()),
-            example=self.said["example"],
+            example=self.options.get("example", ""),
         )
         known = _DECLARED.get(self.name)
         if known is None or getattr(known.does, "__module__", "") != PAPER_MODULE:
@@ -189,39 +138,34 @@ class _Declaration:
         refuse(self.does, sentence)
 
     def check_options(self) -> None:
-        for name, (fits, wanted) in SKILL_OPTIONS.items():
-            if not fits(self.said[name]):
-                self.wrong(f"{name} of {self.name} must be {wanted}, not {self.said[name]!r:.60}")
+        if self.does.__module__ != PAPER_MODULE:
+            for sentence in wrong_options(self.options):
+                self.wrong(sentence)
+        if not 0 <= self.options.get("seconds", 0.0) < inf:
+            self.wrong("the option seconds must be at least 0")
 
     def check_name(self) -> None:
-        kind = self.said["event"] or self.name
         is_second = isinstance(self.does.__globals__.get(self.name), Skill)
         if is_second and is_own_module(self.does.__module__):
             self.wrong(f"there is already a skill {self.name}; choose another name")
         if self.name in RESERVED_NAMES:
             self.wrong(f"{self.name} is a reserved name; choose another one")
-        for word in (kind, self.said["sets"], self.said["clears"]):
-            if word in RTL_WORDS:
-                self.wrong(f"{word} has another meaning in formulas; choose another name")
+        event = self.options.get("event") or self.name
+        for word in (event, self.options.get("sets"), self.options.get("clears")):
+            if word and (word in RTL_WORDS or iskeyword(word) or not word.isidentifier()):
+                self.wrong(f'formulas cannot use "{word}" as a name; choose another one')
 
     def parameters(self) -> tuple[Parameter, ...]:
-        code = self.does.__code__
-        if code.co_flags & COROUTINE_FLAG:
+        if iscoroutinefunction(self.does):
             self.wrong(f"{self.name} is async, but skills must be ordinary functions; write def")
-        first = self.annotation(code.co_varnames[0]) if code.co_argcount else None
-        if (
-            not code.co_argcount
-            or code.co_kwonlyargcount
-            or code.co_flags & MORE_ARGUMENTS_FLAGS
-            or value_type(first or object) is not None
-        ):
+        taken = signature(self.does).parameters
+        first, *names = taken or ("",)
+        is_plain = all(p.kind is p.POSITIONAL_OR_KEYWORD and p.default is p.empty for p in taken.values())
+        if not taken or not is_plain or value_type(self.annotation(first) or object) is not None:
             self.wrong(
-                f"{self.name} must take the simulation first, then the arguments of programs by position, "
-                "as in (sim: Simulation, door: str)"
+                f"{self.name} must take the simulation first, then the arguments of programs without default "
+                "values, as in (sim: Simulation, door: str)"
             )
-        if self.does.__defaults__:
-            self.wrong(f"{self.name} has a default value; programs pass every argument, so leave it out")
-        names = code.co_varnames[1 : code.co_argcount]
         for name in names:
             if name not in self.does.__annotations__:
                 self.wrong(
@@ -262,16 +206,16 @@ class _Declaration:
         return eval(annotation, self.does.__globals__)  # noqa: S307 - of the user's own file
 
     def recording(self, parameters: tuple[Parameter, ...]) -> Recording | None:
-        event = self.said["event"]
-        sets, clears = self.said["sets"], self.said["clears"]
+        event = self.options.get("event", "")
+        sets, clears = self.options.get("sets", ""), self.options.get("clears", "")
         if event is None:
             if sets or clears:
                 self.wrong(f"{self.name} changes a state, so it needs an event; leave out event=None")
             return None
-        to = self.said["to"]
+        to = self.options.get("to")
         options = next((each.name for each in parameters if each.is_options), None)
         names = [each.name for each in parameters if each.name != options]
-        text = self.said["text"] or next((name for name in names if name != to), "")
+        text = self.options.get("text") or next((name for name in names if name != to), "")
         for name in filter(None, (text, to)):
             if name not in names:
                 self.wrong(f"{self.name} has no parameter {name}")
@@ -280,15 +224,15 @@ class _Declaration:
         if (sets or clears) and (not text or options or sets == clears):
             self.wrong(f"{self.name} must set or clear a state of the thing that its parameter names")
         more = tuple(name for name in names if name not in {text, to})
-        tried = self.said["when_tried"]
+        tried = self.options.get("when_tried")
         is_judged = tried is True or (tried is None and (bool(sets) or not clears))
-        named = self.said["names"]
+        named = self.options.get("names", "thing")
         return Recording(
             event or self.name, text, options, to, named, tried is True, is_judged, more, sets, clears
         )
 
     def fails(self) -> Mapping[str, str]:
-        fails: Mapping[str, str] = self.said["fails"]
+        fails = self.options.get("fails", {})
         for kind in fails:
             if not kind.isidentifier() or iskeyword(kind) or kind == VIOLATION or hasattr(builtins, kind):
                 self.wrong(
@@ -297,36 +241,32 @@ class _Declaration:
         return fails
 
     def verb(self, parameters: tuple[Parameter, ...], recording: Recording | None) -> Verb | None:
-        verb = self.said["verb"]
+        verb = self.options.get("verb")
         if not isinstance(verb, str):
-            return verb if verb is None or isinstance(verb, Verb) else self.wrong("a verb must be a string")
+            return verb
         try:
             names = [each.name for each in parameters]
             if recording is not None:  # in the order of the event
                 names = [name for name in (recording.text, *recording.more) if name]
-            return verb_of(verb, names, self.said["results"], self.said["past"])
+            return verb_of(
+                verb, names, self.options.get("results", ("no", "yes")), self.options.get("past", "")
+            )
         except ValueError as error:
             self.wrong(f"{error}")
 
     def ros(self, parameters: tuple[Parameter, ...], returns: ValueType) -> RosAction | None:
-        ros = self.said["ros"]
+        ros = self.options.get("ros")
         if ros is None or isinstance(ros, RosAction):
             return ros
-        full, colon, server = ros.partition(":")
-        package, slash, kind = full.partition("/")
-        if not (
-            colon
-            and slash
-            and package.isidentifier()
-            and re.fullmatch(r"[A-Z]\w*", kind)
-            and server.strip("/")
-        ):
+        written = ROS_ACTION.fullmatch(ros)
+        if written is None:
             self.wrong(
                 f'"{ros}" is not a ROS action; write package/Type:/topic, as in lab_msgs/OpenDoor:/open_door'
             )
         unusable = [each.name for each in parameters if not re.fullmatch(r"[a-z][a-z0-9_]*", each.name)]
         if unusable:
             self.wrong(f"{unusable[0]} of {self.name} cannot be a ROS field; use lower-case letters")
+        package, kind, server = written.groups()
         goal = tuple(f"{_ros_type(each.type)} {each.name}" for each in parameters)
         result = None if returns.base is None else _ros_type(returns)
         return RosAction(kind, server, goal, result, package=package)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import re
-from difflib import get_close_matches
 from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
 
 from codebotler.core.errors import UserError
-from codebotler.core.skills.options import SKILL_OPTIONS
 from codebotler.core.skills.own_modules import is_own_module, load_own_module, location_of
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
@@ -57,9 +54,6 @@ def load_skill_module(path: Path) -> ModuleType:
         raise _as_user_error(path, error) from None
 
 
-UNKNOWN_OPTION = re.compile(r"skill\(\) got an unexpected keyword argument '(\w+)'")
-
-
 def _as_user_error(path: Path, error: BaseException) -> UserError:
     """Convert an error of a file to a UserError with the line at which the file failed."""
     if isinstance(error, UserError) and error.file is not None:
@@ -69,25 +63,22 @@ def _as_user_error(path: Path, error: BaseException) -> UserError:
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path)]
     is_ours = isinstance(error, UserError)
     sentence = str(error) if is_ours else f"it cannot be run: {type(error).__name__}: {error}"
-    if named := UNKNOWN_OPTION.match(str(error)):
-        alike = get_close_matches(named[1], SKILL_OPTIONS, 1)
-        hint = f"did you mean {alike[0]}?" if alike else f"its options are {', '.join(SKILL_OPTIONS)}"
-        sentence = f"@skill has no option {named[1]}; {hint}"
     return UserError(sentence, file=path, line=lines[-1] if lines else None)
 
 
 def _expect_new(row: Skill, rows: list[Skill]) -> None:
-    kinds = {other.recording.kind for other in rows if other.recording is not None}
-    topic = None if row.ros is None else row.ros.server
-    if topic is not None and topic in {other.ros.server for other in rows if other.ros is not None}:
-        row.wrong(f"another skill already uses the ROS action {topic}; choose another topic")
-    if row.name in {other.name for other in rows}:
-        row.wrong(f"there is already a skill {row.name}; choose another name")
-    if row.recording is not None and row.recording.kind in kinds:
-        row.wrong(f'the events of another skill are called "{row.recording.kind}"; choose another name')
+    clash = _names_of(row) & {name for other in rows for name in _names_of(other)}
+    if clash:
+        row.wrong(f'"{min(clash)}" is the name, event or ROS action of another skill; choose another one')
     every = [*rows, row]
     recordings = [one.recording for one in every if one.recording is not None]
     states = {state for one in recordings for state in (one.sets, one.clears)}
-    both = states & {*(one.name for one in every), *(one.kind for one in recordings)}
+    both = states & {name for one in every for name in _names_of(one)}
     if both:
         row.wrong(f"{min(both)} is the name of a skill and of a state; choose another name")
+
+
+def _names_of(row: Skill) -> set[str]:
+    """Return the name of a skill, of its events and of its ROS action."""
+    event, topic = row.recording and row.recording.kind, row.ros and row.ros.server
+    return {name for name in (row.name, event, topic) if name}

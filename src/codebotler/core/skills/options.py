@@ -1,51 +1,45 @@
-"""The options of `@skill`: for each, a test of its value, and words for the values that pass."""
+"""The options of `@skill`, all of which may be left out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from keyword import iskeyword
-from math import inf
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal, TypedDict, get_type_hints
 
 from codebotler.core.skills.table import RosAction
 from codebotler.core.skills.verbs import Verb
 
-SORTS_OF_THINGS = ("room", "object", "object or person", "thing", "")
+
+class SkillOptions(TypedDict, total=False):
+    """The options of `@skill`, with their defaults in brackets."""
+
+    verb: Verb | str | None  # the English verb, such as `open {door}`, with parameters in braces [none]
+    past: str  # the past form of an irregular verb that is not in the list, such as `wove`
+    results: tuple[str, str]  # the meanings of False and True in words ["no", "yes"]
+    fails: Mapping[str, str]  # the kinds of its errors, each with a clause that says when it occurs
+    ros: RosAction | str | None  # the ROS action that executes it, such as `lab_msgs/OpenDoor:/open_door`
+    example: str  # an example call for prompts [a call with the names of the parameters]
+    event: str | None  # the kind of event that it records, or None for no event [the function's name]
+    text: str  # the parameter that becomes the text of the event [the first one]
+    names: Literal["room", "object", "object or person", "thing", ""]  # what the text names; empty for speech
+    to: str | None  # the parameter that names the addressee of a question [none]
+    when_tried: bool | None  # whether failed attempts are recorded, too [only for house rules, if at all]
+    sets: str  # the state into which it brings the thing that the text names, such as `on`
+    clears: str  # the state that it ends
+    seconds: float  # its duration on the simulated clock in seconds, without driving [1]
+    is_idle: bool  # whether it changes neither the robot nor its world [False]
+    adds_event: bool  # whether the simulation records the event afterwards, not the function itself [True]
 
 
-def _is_state_name(name: object) -> bool:
-    return isinstance(name, str) and (not name or (name.isidentifier() and not iskeyword(name)))
+def wrong_options(options: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a sentence for each option that does not exist or whose value has the wrong type."""
+    from pydantic import ConfigDict, TypeAdapter, ValidationError  # noqa: PLC0415 - slow, and the paper's skills need none
 
-
-SKILL_OPTIONS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
-    "verb": (lambda it: it is None or isinstance(it, str | Verb), 'a string such as "open {door}"'),
-    "past": (lambda it: isinstance(it, str), "a string"),
-    "results": (
-        lambda it: isinstance(it, tuple | list) and len(it) == 2 and all(isinstance(one, str) for one in it),  # noqa: PLR2004 - for False and True
-        "two texts, for False and True",
-    ),
-    "fails": (
-        lambda it: (
-            isinstance(it, Mapping) and all(isinstance(one, str) for pair in it.items() for one in pair)
-        ),
-        'errors with clauses, as in {"DoorLocked": "the door is locked"}',
-    ),
-    "ros": (
-        lambda it: it is None or isinstance(it, str | RosAction),
-        "a string such as lab_msgs/OpenDoor:/open_door",
-    ),
-    "example": (lambda it: isinstance(it, str), "a string that calls the skill"),
-    "event": (
-        lambda it: it is None or (isinstance(it, str) and (it or "x").isidentifier()),
-        "a name, or None",
-    ),
-    "text": (lambda it: isinstance(it, str), "the name of a parameter"),
-    "names": (lambda it: it in SORTS_OF_THINGS, "one of " + ", ".join(f'"{one}"' for one in SORTS_OF_THINGS)),
-    "to": (lambda it: it is None or isinstance(it, str), "the name of a parameter"),
-    "when_tried": (lambda it: it is None or isinstance(it, bool), "True, False or None"),
-    "sets": (_is_state_name, 'the name of a state, such as "on"'),
-    "clears": (_is_state_name, 'the name of a state, such as "on"'),
-    "seconds": (lambda it: type(it) in {int, float} and 0 <= it < inf, "a number of at least 0"),
-    "is_idle": (lambda it: isinstance(it, bool), "True or False"),
-    "adds_event": (lambda it: isinstance(it, bool), "True or False"),
-}
+    types = get_type_hints(SkillOptions)
+    for name, value in options.items():
+        if name not in types:
+            yield f"@skill has no option {name}; its options are {', '.join(types)}"
+            continue
+        try:
+            TypeAdapter(types[name], config=ConfigDict(strict=True)).validate_python(value)
+        except ValidationError as error:
+            yield f"the option {name} cannot be {value!r:.60}: {error.errors()[0]['msg']}"

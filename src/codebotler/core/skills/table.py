@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, NoReturn, SupportsIndex
 
 from codebotler.core.cachedproperty import cached_property
@@ -159,12 +159,8 @@ def refuse(does: Callable[..., Any] | None, sentence: str) -> NoReturn:
 
 def _sample(parameter: Parameter) -> object:
     """Return an example argument, which for a string is the parameter's name."""
-    value = parameter.type
-    if value.choices:
-        one: object = value.choices[0]
-    else:
-        one = parameter.name if value.base == "str" else sample_values(replace(value, is_list=False))[0]
-    return [one] if value.is_list else one
+    names = [parameter.name] if parameter.type.base == "str" else []
+    return sample_values(parameter.type, names)[0]
 
 
 @dataclass(frozen=True)

@@ -290,10 +290,7 @@ def _request_settings(model: Model, settings: SamplingSettings) -> ModelSettings
 def _open_model(name: str, settings: SamplingSettings, http_client: object) -> Model:
     provider = name.partition(":")[0]
     try:
-        variables = _key_variables(provider)
-        for variable in variables:
-            read_key(variable)
-        blank = [one for one in variables if not os.environ.get(one, "").strip()]
+        blank = [variable for variable in _key_variables(provider) if read_key(variable) is None]
         with unset(blank):  # since libraries only test whether a variable exists
             with without_proxy(settings.base_url):
                 model = infer_model(
