@@ -8,7 +8,6 @@ import time
 from collections.abc import Hashable, Mapping
 from dataclasses import asdict
 from enum import StrEnum
-from pathlib import Path
 from typing import Any
 
 from codebotler.core.errors import UserError
@@ -20,7 +19,7 @@ from roboeval.suites.load import Suite
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 
-MAX_FAULTS_SHOWN, MAX_SUITE_NAME, MAX_FAILURE_REASON = 5, 120, 300
+MAX_SUITE_NAME, MAX_FAILURE_REASON = 120, 300
 
 
 class RunState(StrEnum):
@@ -33,7 +32,6 @@ class RunState(StrEnum):
     NOT_JUDGED = "not judged"
     JUDGED = "judged"
     EMPTY = "empty"
-    DAMAGED = "damaged"
     UNREADABLE = "not read"
 
 
@@ -45,7 +43,6 @@ def state_of(run: Snapshot) -> RunState:
     stages = (
         (RunState.GENERATING, run.is_written and (lacks or not written)),
         (RunState.JUDGING, run.is_written and unjudged),
-        (RunState.DAMAGED, bool(run.results.faults)),
         (RunState.EMPTY, run.completions.is_empty()),
         (RunState.NOT_JUDGED, not lacks and not run.judged),
         (RunState.UNFINISHED, lacks or unjudged),
@@ -101,12 +98,7 @@ def date_of(about: Mapping[str, Any]) -> str | None:
 def notes(run: Snapshot) -> list[str]:
     """Describe the problems of a run, one sentence each."""
     results, stale = run.results, len(run.results.stale)
-    faults = [UserError(f.sentence, file=Path(str(f.file)).name, line=f.line) for f in results.faults]
-    found = [str(fault) for fault in faults[:MAX_FAULTS_SHOWN]]
-    if len(faults) > MAX_FAULTS_SHOWN:
-        found.append(f"{len(faults) - MAX_FAULTS_SHOWN:,} more lines are damaged.")
-    if faults:
-        found.append("All other rows are shown.")
+    found = []
     if (missions := results.scope.missions_sentence) is not None:
         found.append(f"{missions[0].upper()}{missions[1:]}.")
     if (warning := results.scope.cut_off_warning) is not None:
@@ -138,14 +130,17 @@ class RunList:
 
     def _run_data(self, name: str, *, may_read: bool) -> dict[str, Any]:
         unread = {"run": name, "state": RunState.READING, "notes": []}
-        version, data = self._known.get(name, (None, unread))
+        known, data = self._known.get(name, (None, unread))
+        version: Hashable = None
         try:
-            if may_read and version != self._store.version(name):
-                run = self._store.open(name)
-                data = run_data(run)
-                self._known[name] = run.version, data
+            version = self._store.version(name)
+            if not may_read or version == known:
+                return data
+            run = self._store.open(name)
+            version, data = run.version, run_data(run)
         except UserError as error:
-            return {**unread, "state": RunState.UNREADABLE, "notes": [str(error)]}
+            data = {**unread, "state": RunState.UNREADABLE, "notes": [str(error)]}
+        self._known[name] = version, data
         return data
 
 

@@ -29,6 +29,7 @@ from roboeval.report.sections.scores import results
 from roboeval.report.sheets import Section, Sheet
 from roboeval.report.writing import write_report
 from runs_server import serving
+from seals import unseal
 
 HOSTILE = "<script>window.owned=1</script>[x](javascript:owned)\u202e\ud800\x00'\"&"
 
@@ -207,6 +208,7 @@ def test_a_completion_without_a_verdict_has_the_entries_of_a_judged_one(runs: Pa
     run = RunFolder(runs / "hasty")
     places = ["/".join(str(row[part]) for part in KEY) for _, row in read_rows(run.completions)]
     rows = run.rows("paper")
+    unseal(run.path)
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:9]))
     with serving(runs) as server:
         judged, waits = (told(server, f"/api/runs/hasty/completions/{places[at]}") for at in (0, -1))
@@ -214,17 +216,20 @@ def test_a_completion_without_a_verdict_has_the_entries_of_a_judged_one(runs: Pa
         assert server.call("GET", f"/runs/hasty/{places[-1]}").status == 200
 
 
-def test_damaged_rows_are_said_and_the_others_are_there(runs: Path) -> None:
+def test_a_damaged_row_is_said(runs: Path) -> None:
     rows = RunFolder(runs / "hasty").rows("paper")
     lines = rows.read_bytes().splitlines(keepends=True)
     at = next(n for n, line in enumerate(lines) if json.loads(line)["failure"])
     row = json.loads(lines[at])
     forged = {**row, "verdicts": [{**verdict, "trace": [["goto", 3]]} for verdict in row["verdicts"]]}
-    rows.write_bytes(b"".join([*lines[:at], to_line(forged), *lines[at + 1 :], b"nonsense\n"]))
+    unseal(runs / "hasty")
+    rows.write_bytes(b"".join([*lines, b"nonsense\n"]))
     with serving(runs) as server:
         (run,) = told(server, "/api/runs")
-        assert (run["state"], run["judged"]) == ("damaged", 45)
-        assert run["notes"][0].startswith("paper.jsonl, line 46: ")
+        assert (run["state"], run["notes"][0].partition(": ")[0]) == ("not read", "paper.jsonl, line 46")
+        assert "paper.jsonl, line 46" in server.call("GET", "/runs/hasty").text
+        assert server.call("GET", "/api/runs/hasty").status == 422
+        rows.write_bytes(b"".join([*lines[:at], to_line(forged), *lines[at + 1 :]]))
         place = f"{row['task']}/{row['prompt']}/{row['index']}"
         answer = server.call("GET", f"/api/runs/hasty/completions/{place}")
         assert answer.status == 422

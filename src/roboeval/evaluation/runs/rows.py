@@ -91,13 +91,6 @@ class Row(TypedDict):
     verdicts: list[WorldVerdict]
 
 
-def add_or_raise(fault: UserError, faults: list[UserError] | None) -> None:
-    """Append an error to the list, or raise it if there is no list."""
-    if faults is None:
-        raise fault from None
-    faults.append(fault)
-
-
 def key_of(row: Mapping[str, Any]) -> tuple[str, int, int]:
     """Return the task, prompt and index of a row."""
     return row["task"], row["prompt"], row["index"]
@@ -156,17 +149,12 @@ class LocatedRow:
 
 
 def read_lines_of(
-    path: Path,
-    manifest: Mapping[str, Any],
-    *,
-    seal: Seal | None = None,
-    task: str | None = None,
-    faults: list[UserError] | None = None,
+    path: Path, manifest: Mapping[str, Any], *, seal: Seal | None = None, task: str | None = None
 ) -> Iterator[LocatedRow]:
-    """Read the rows of all tasks, or of one task. Ignore an incomplete last line, and add or raise faults."""
+    """Read the rows of all tasks, or of one task. Ignore an incomplete last line."""
     name = b"" if task is None else to_line(task).removesuffix(b"\n")
     seal = seal or Seal()
-    at, is_reported = 0, False
+    at = 0
     for number, line in read_lines(path, limit=MAX_LINE_BYTES):
         seal.add(line)
         try:
@@ -175,11 +163,10 @@ def read_lines_of(
         except UserError as error:
             if not line.endswith(b"\n"):
                 break
-            add_or_raise(UserError(f"{error.sentence}; --redo starts over", file=path, line=number), faults)
-            is_reported = True
+            raise UserError(f"{error.sentence}; --redo starts over", file=path, line=number) from None
         at += len(line)
-    if seal.is_broken(manifest) and not is_reported:
-        add_or_raise(UserError(f"{BROKEN}; --redo starts over", file=path), faults)
+    if seal.is_broken(manifest):
+        raise UserError(f"{BROKEN}; --redo starts over", file=path)
 
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
