@@ -276,7 +276,7 @@ def changed(row: Row, **values: object) -> Row:
     [
         (lambda row: changed(row, custom_id="LunchTime/0/0/00000000"), "another run"),
         (lambda row: changed(row, custom_id="mine"), "'mine'"),
-        (lambda row: {"custom_id": row["custom_id"], "method": "POST"}, "a request"),
+        (lambda row: {"custom_id": row["custom_id"], "method": "POST"}, "not an answer"),
         (lambda row: {"custom_id": row["custom_id"]}, "not an answer"),
     ],
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -34,7 +33,6 @@ from roboeval.suites.load import Suite
 
 BEGINNING = b'{"custom_id": '
 IDENTITY = ("model", "settings", "template", "suite")  # entries of run.json that identify a batch
-REQUEST_ID = re.compile(r"(?P<task>.+)/(?P<prompt>\d{1,9})/(?P<index>\d{1,9})/[0-9a-f]{8}", re.ASCII)
 
 
 def write_requests(
@@ -173,16 +171,13 @@ def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> BatchAnswer:
     row = parse_row(line)
     if row is None:
         raise UserError("this line is not JSON; the file may be incomplete")
-    name = row.get("custom_id")
+    key, response, error = ids.get(str(row.get("custom_id"))), row.get("response"), row.get("error")
     if "response" not in row and "error" not in row:
-        what = "a request" if "method" in row else "not an answer from a batch endpoint"
-        raise UserError(f"this line is {what}; name the file with the answers")
-    if not isinstance(name, str) or name not in ids:
-        known = isinstance(name, str) and REQUEST_ID.fullmatch(name)
-        whose = "of another run or with other settings" if known else "that belongs to no run"
-        raise UserError(f"this line answers a request {whose}: {name!r}")
-    response, error = row.get("response"), row.get("error")
+        raise UserError("this line is not an answer from a batch endpoint; name the file with the answers")
+    if key is None:
+        name = repr(row.get("custom_id"))
+        raise UserError(f"this line answers a request of another run or with other settings: {name}")
     if not isinstance(response, dict):
-        return ids[name], 200, error
+        return key, 200, error
     status, body = response.get("status_code"), response.get("body")
-    return ids[name], status if isinstance(status, int) else 200, error if body is None else body
+    return key, status if isinstance(status, int) else 200, error if body is None else body
