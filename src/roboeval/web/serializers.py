@@ -13,8 +13,8 @@ from typing import Any
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from roboeval.evaluation.generating.requests import batches
-from roboeval.evaluation.judging.explanation import PROGRAM_GONE, completion_data, suite_instruction
-from roboeval.evaluation.runs.completions import KEY, CompletionKey, how_many, name_of, recorded_suffix
+from roboeval.evaluation.judging.explanation import completion_data, suite_instruction
+from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of, recorded_suffix
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.snapshot import CompletionFilter, Snapshot
@@ -97,14 +97,12 @@ def date_of(about: Mapping[str, Any]) -> str | None:
 
 def notes(run: Snapshot) -> list[str]:
     """Describe the problems of a run, one sentence each."""
-    results, stale = run.results, len(run.results.stale)
+    results = run.results
     found = []
     if (missions := results.scope.missions_sentence) is not None:
         found.append(f"{missions[0].upper()}{missions[1:]}.")
     if (warning := results.scope.cut_off_warning) is not None:
         found.append(f"{warning}.")
-    if stale:
-        found.append(f"{how_many(stale)} changed since the verdict; use `roboeval evaluate --redo`.")
     if run.judged and run.suite is None:
         name = shortened(str(results.manifest.get("suite")), MAX_SUITE_NAME)
         found.append(
@@ -181,7 +179,6 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
         "failure": None if row["failure_class"] is None else failure,
         "why": shortened(row["why"], MAX_FAILURE_REASON),
         "worlds": row["worlds"],
-        "stale": row["stale"],
     }
 
 
@@ -191,11 +188,9 @@ def completion_details(run: Snapshot, name: str) -> dict[str, Any]:
     if row is None:
         raise MissingError(f'this run has no completion "{shortened(name, MAX_SUITE_NAME)}"')
     key: CompletionKey = row["task"], row["prompt"], row["index"]
-    completion = results.completions.get(key)
-    more = {"evaluation": results.key, "stale": row["stale"], "note": PROGRAM_GONE if row["stale"] else None}
     judged = {**entry_data(row), "verdicts": []} if row["passed"] is None else results.row(key)
     try:
-        data = completion_data(judged, completion, run.suite, ablated=results.is_ablated)
+        data = completion_data(judged, results.completions[key], run.suite, ablated=results.is_ablated)
     except (UserError, KeyError, TypeError, IndexError, AttributeError, ValueError):
         what = f"the row of {shortened(name_of(key), MAX_SUITE_NAME)} is damaged; --redo judges it again"
         raise UserError(what, file=results.run.rows(results.key or "").name) from None
@@ -203,4 +198,4 @@ def completion_details(run: Snapshot, name: str) -> dict[str, Any]:
         for world in data["worlds"]:
             for check in world["failed_checks"]:
                 check["explanation"] = None
-    return {**data, **more}
+    return {**data, "evaluation": results.key}

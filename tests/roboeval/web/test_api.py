@@ -23,7 +23,7 @@ from codebotler.web.security.guard import Guard
 from command_line import refused, roboeval
 from made_up_runs import made_up
 from pageserver import PageServer
-from roboeval.evaluation.runs.completions import KEY
+from roboeval.evaluation.runs.completions import KEY, Completion
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.report.sections.scores import results
 from roboeval.report.sheets import Section, Sheet
@@ -150,7 +150,7 @@ def test_one_completion_has_what_show_tells(server: PageServer, folder: Path) ->
         found = told(server, f"/api/runs/hasty/completions/{place}")
         assert shown.pop("ablation") is False
         assert {name: found[name] for name in shown} == shown
-        assert (found["evaluation"], found["stale"]) == ("paper", False)
+        assert found["evaluation"] == "paper"
         assert any(check["explanation"] for world in found["worlds"] for check in world["failed_checks"]) or (
             found["failure"] is None or found["failure"]["check"] is None
         )
@@ -243,11 +243,14 @@ def test_hostile_texts_come_as_they_are(runs: Path) -> None:
     lines = run.completions.read_bytes().splitlines(keepends=True)
     row = {**json.loads(lines[0]), "model": HOSTILE, "program": HOSTILE * 3_000}
     run.completions.write_bytes(to_line(row) + b"".join(lines[1:]))
+    judged, *others = run.rows("paper").read_bytes().splitlines(keepends=True)
+    of_it = {**json.loads(judged), "program_sha256": Completion.of(row).program_sha256}
+    run.rows("paper").write_bytes(to_line(of_it) + b"".join(others))
+    unseal(run.path)
     with serving(runs) as server:
         place = f"{row['task']}/{row['prompt']}/{row['index']}"
         found = told(server, f"/api/runs/hasty/completions/{place}")
         assert (found["model"], found["program"]) == (HOSTILE, HOSTILE * 3_000)
-        assert found["stale"]
         page = server.call("GET", f"/runs/hasty/{place}")
         assert page.status == 200
         assert "<script>window" not in page.text

@@ -36,7 +36,7 @@ def test_a_row_for_each_completion(runs: Path) -> None:
     rows = [json.loads(line) for line in lines_of(RunFolder(runs / "hasty").rows("paper"))]
     assert run.completions.height == len(rows) == 45
     assert len(run.results.completions) == run.results.scope.total == run.judged == 45
-    assert (len(run.results.stale), run.models) == (0, ["recorded:hasty"])
+    assert run.models == ["recorded:hasty"]
     assert state_of(run) is RunState.JUDGED
     for row in rows:
         shown = run.row(f"{row['task']}/{row['prompt']}/{row['index']}")
@@ -71,23 +71,15 @@ def test_a_limit_that_ended_a_program_is_called_one(runs: Path) -> None:
         assert opened(runs / "hasty").completions["why"][at] == why
 
 
-def test_what_is_not_judged_yet_or_judged_and_gone_is_there_too(runs: Path) -> None:
+def test_what_is_not_judged_yet_is_there_too(runs: Path) -> None:
     run = RunFolder(runs / "hasty")
     completions, rows = lines_of(run.completions), lines_of(run.rows("paper"))
     unseal(run.path)
-    run.completions.write_bytes(b"".join(completions[5:]))
     run.rows("paper").write_bytes(b"".join(rows[:40]))
     seen = opened(run.path)
-    assert (len(seen.results.completions), seen.judged, len(seen.results.stale), seen.completions.height) == (
-        40,
-        40,
-        5,
-        45,
-    )
+    assert (len(seen.results.completions), seen.judged, seen.completions.height) == (45, 40, 45)
     waiting = seen.completions.filter(seen.completions["passed"].is_null())
     assert sorted(keys(waiting)) == sorted(_key(line) for line in completions[40:])
-    gone = seen.completions.filter(~seen.completions["written"])
-    assert sorted(keys(gone)) == sorted(_key(line) for line in completions[:5])
 
 
 def _key(line: bytes) -> tuple[str, int, int]:
@@ -95,13 +87,17 @@ def _key(line: bytes) -> tuple[str, int, int]:
     return row["task"], row["prompt"], row["index"]
 
 
-def test_a_program_that_changed_since_it_was_judged_is_stale(runs: Path) -> None:
+def test_a_program_that_changed_since_it_was_judged_is_named(runs: Path) -> None:
     completions = RunFolder(runs / "hasty").completions
     lines = lines_of(completions)
     row = json.loads(lines[7])
-    completions.write_bytes(b"".join([*lines[:7], to_line({**row, "program": "x = 1\n"}), *lines[8:]]))
-    run = opened(runs / "hasty")
-    assert keys(run.completions.filter("stale")) == [_key(lines[7])]
+    changed = to_line({**row, "program": "x = 1\n"})
+    for content in ([*lines[:7], changed, *lines[8:]], [*lines[:7], *lines[8:]]):
+        completions.write_bytes(b"".join(content))
+        with pytest.raises(UserError, match="--redo") as caught:
+            opened(runs / "hasty")
+        assert (caught.value.file, caught.value.line) == ("paper.jsonl", 8)
+        assert "/".join(map(str, _key(lines[7]))) in caught.value.sentence
 
 
 def test_filters_prompts_and_neighbours(runs: Path) -> None:

@@ -23,7 +23,7 @@ from roboeval.evaluation.runs.folder import (
     load_json_object,
     selected_tasks,
 )
-from roboeval.evaluation.runs.rows import LocatedRow, Row, key_of, read_checks, read_lines_of
+from roboeval.evaluation.runs.rows import LocatedRow, Row, key_of, read_checks, read_lines_of, take_judged
 from roboeval.evaluation.runs.scope import Coverage, JudgingScope
 from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_answers, with_cost
 from roboeval.suites.load import ABLATED, Suite, load_suite
@@ -49,15 +49,16 @@ def load_results(
     Returns:
         A table sorted by completion and world. These columns repeat in all rows of a completion: `task`,
         `prompt`, `index`, `model`, `program_sha256`, `passed`, the first failure (`failure_class`,
-        `failure_kind`, `failure_world`, `failure_check`), `stale` (whether the run now has a different
-        program; then `instruction`, `program`, `no_program`, `finish_reason` and `cut_off` are null),
-        `input_tokens`, `output_tokens`, `reasoning_tokens`, `latency_s`, `cost` and `accepted` (whether the
-        check found no problem; null if the program was not checked). These columns describe a world:
+        `failure_kind`, `failure_world`, `failure_check`), `instruction`, `program`, `no_program`,
+        `finish_reason`, `cut_off`, `input_tokens`, `output_tokens`, `reasoning_tokens`, `latency_s`, `cost`
+        and `accepted` (whether the check found no problem; null if the program was not checked). These
+        columns describe a world:
         `world_number`, `world`, `satisfied`, `status`, `error_kind`, `error_message`, `line`, `failed_checks`
         (joined by "; "), `category` (of the first failed check) and `events`. Numbers count from 0.
 
     Raises:
-        UserError: the run or suite does not exist, the suite has not judged the run, or a file is damaged.
+        UserError: the run or suite does not exist, the suite has not judged the run, a file is damaged, or
+            a program has changed since it was judged.
     """
     known = load_suite(suite)
     table = read_results(*evaluation_of(Path(run), known, ablated=ablation)).table
@@ -73,7 +74,7 @@ class Results:
     suite: Suite | None  # the suite that judged, or None if it is not available
     manifest: Mapping[str, Any]  # the content of KEY.json
     about: Mapping[str, Any]  # the content of run.json
-    completions: Mapping[CompletionKey, Completion]  # the completions now in the run, in order
+    completions: Mapping[CompletionKey, Completion]  # all completions in the run, in order
     places: Mapping[CompletionKey, tuple[int, int]] = field(
         repr=False
     )  # the offset and size of each row in the file, in bytes
@@ -88,11 +89,6 @@ class Results:
     def failed(self) -> Sequence[CompletionKey]:
         """Return the completions that failed."""
         return keys_where(self.table, ~pl.col("passed"))
-
-    @cached_property
-    def stale(self) -> Sequence[CompletionKey]:
-        """Return the completions whose programs have changed since the evaluation."""
-        return keys_where(self.table, pl.col("stale"))
 
     @property
     def known_suite(self) -> Suite:
@@ -125,9 +121,8 @@ class Results:
 
     @property
     def programs(self) -> Mapping[CompletionKey, str]:
-        """Return the judged programs that are still in the run."""
-        stale = set(self.stale)
-        return {key: c.program for key, c in self.completions.items() if key not in stale}
+        """Return the programs of all completions."""
+        return {key: completion.program for key, completion in self.completions.items()}
 
     def row(self, key: CompletionKey) -> Row:
         """Read a row from the file, with all its traces. Raise UserError if the file was replaced."""
@@ -174,12 +169,12 @@ def read_results(
     manifest = {} if key is None else load_json_object(run.manifest(key))
     selected = selected_tasks(manifest) if task is None else {task}
     total = sum(selected is None or name in selected for name, _, _ in completions)
-    builder = TableBuilder(completions, _categories(suite))
+    builder, left = TableBuilder(_categories(suite)), dict(completions)
     places: dict[CompletionKey, tuple[int, int]] = {}
     rows = run.rows(key or "")
     lines = iter(()) if key is None else read_lines_of(rows, manifest, task=task)
     for line in progress(lines, total):
-        builder.add(line.row)
+        builder.add(line.row, take_judged(left, line, rows))
         places[key_of(line.row)] = line.at, line.size
     checks = run.checks((key or "").removesuffix(ABLATED))
     problems = dict(read_checks(checks)) if checks.is_file() else {}

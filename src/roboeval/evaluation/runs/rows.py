@@ -14,6 +14,7 @@ import msgspec
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_lines, read_rows, to_line
 from codebotler.core.trace import Status
+from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of
 
 MAX_LINE_BYTES = 1_000_000_000  # enough for a row with very many worlds
 NO_ROW = "this line is not an evaluation row"
@@ -91,7 +92,7 @@ class Row(TypedDict):
     verdicts: list[WorldVerdict]
 
 
-def key_of(row: Mapping[str, Any]) -> tuple[str, int, int]:
+def key_of(row: Mapping[str, Any]) -> CompletionKey:
     """Return the task, prompt and index of a row."""
     return row["task"], row["prompt"], row["index"]
 
@@ -167,6 +168,21 @@ def read_lines_of(
         at += len(line)
     if seal.is_broken(manifest):
         raise UserError(f"{BROKEN}; --redo starts over", file=path)
+
+
+def take_judged(left: dict[CompletionKey, Completion], line: LocatedRow, file: Path) -> Completion:
+    """Remove the completion that a row judges from `left`, and return it.
+
+    Raises UserError if the completion is not there, since an evaluation must fit the run's completions.
+    """
+    key = key_of(line.row)
+    completion = left.pop(key, None)
+    if completion is not None and completion.program_sha256 == line.row["program_sha256"]:
+        return completion
+    sentence = f"this row judges {name_of(key)}, which is not in the run, or which an earlier row judges"
+    if completion is not None:
+        sentence = f"the program of {name_of(key)} has changed since it was judged"
+    raise UserError(f"{sentence}; --redo starts over", file=file, line=line.number)
 
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
