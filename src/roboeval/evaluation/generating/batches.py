@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -78,7 +78,8 @@ class ImportResult:
 
     new: int  # completions that the import added
     total: int  # completions that the run should have
-    missing: Mapping[CompletionKey, str] = field(repr=False)  # why each other completion is missing
+    missing: int
+    why: str  # an error message of a missing completion, if any request failed
 
 
 BatchAnswer: TypeAlias = tuple[CompletionKey, int, object]  # to which request, the status, and the body
@@ -115,15 +116,12 @@ def import_answers(
                 if refusal.is_refusal and key not in rows:
                     data = reply_of_refusal(refusal).data()
                     rows[key] = row_for(key, plan.instruction(key), about["model"], data)
-        missing = {
-            key: failed[key].sentence if key in failed else "not answered"
-            for key in expected
-            if key not in there and key not in rows
-        }
         with closing(Appender(run.completions)) as file:
             for row in [rows[key] for key in expected if key in rows]:
                 file.append(to_line(row))
-    return ImportResult(len(rows), len(expected), missing)
+    missing = [key for key in expected if key not in there and key not in rows]
+    reasons = (failed[key].sentence for key in missing if key in failed)
+    return ImportResult(len(rows), len(expected), len(missing), next(reasons, "they were not answered"))
 
 
 def _row(
