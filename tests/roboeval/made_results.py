@@ -101,7 +101,7 @@ def results_of(
     Args:
         rows: of the evaluation.
         suite: by which they were judged.
-        programs: what was judged; a completion without one is gone.
+        programs: what was judged; the program of any other completion is empty.
         completions: the same with all there is to say of them.
         ablated: whether common sense only was required.
         head: what KEY.json says.
@@ -109,10 +109,15 @@ def results_of(
     written = {one.key: one for one in completions}
     for (task, prompt, index), program in programs.items():
         written[task, prompt, index] = Completion(task=task, prompt=prompt, index=index, program=program)
+    rows = list(rows)
+    for task, prompt, index in map(key_of, rows):
+        if (task, prompt, index) not in written:
+            none = Completion(task=task, prompt=prompt, index=index, program="")
+            written[none.key] = none
     judged = judged_rows(rows, {key: one.program for key, one in written.items()})
-    builder = TableBuilder(written)
+    builder = TableBuilder()
     for row in judged:
-        builder.add(row)
+        builder.add(row, written[key_of(row)])
     return MadeResults(
         run=RunFolder(Path("nowhere")),
         key=f"paper{'-ablation' * ablated}",

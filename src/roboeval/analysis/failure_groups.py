@@ -45,9 +45,9 @@ class FailureGroup:
     failure: Mapping[str, Any]  # class, kind and check of the representative's failure
     members: tuple[CompletionKey, ...]
     representative: CompletionKey  # first completion that contains the most frequent program
-    program: str | None  # program of the representative, or None if it was removed
+    program: str  # program of the representative
     reason: Mapping[str, Any]  # explanation of the representative's failure, with world and line
-    fix: Fix | None  # None if there is no program or no passing one
+    fix: Fix | None  # None if the reply has no program or no program passes
 
     @property
     def has_no_program(self) -> bool:
@@ -90,10 +90,10 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
     programs = results.programs
     candidates = cache(partial(_passing_in, results))
     for rows in groups:
-        often = Counter(programs.get(key_of(row)) for row in rows)
+        often = Counter(programs[key_of(row)] for row in rows)
         program = often.most_common(1)[0][0]
-        row = next(row for row in rows if programs.get(key_of(row)) == program)
-        has_none = program is None or failure_of(row)["class"] == NO_PROGRAM_CLASS
+        row = next(row for row in rows if programs[key_of(row)] == program)
+        has_none = failure_of(row)["class"] == NO_PROGRAM_CLASS
         yield FailureGroup(
             task=row["task"],
             failure=failure_of(row),
@@ -103,22 +103,20 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
             reason=reason(row, results.suite, ablated=results.is_ablated),
             fix=None
             if has_none
-            else shortest_fix(str(program), candidates(row["task"], row.get("mission_world"))),
+            else shortest_fix(program, candidates(row["task"], row.get("mission_world"))),
         )
 
 
 def nearest_fix(results: Results, key: CompletionKey) -> Fix | None:
-    """Find the smallest fix for a completion, or None if its program was removed or no program passes."""
-    program = results.programs.get(key)
-    if program is None:
-        return None
-    return shortest_fix(program, _passing_in(results, key[0], results.completions[key].more.get("world")))
+    """Find the smallest fix for a completion, or None if no program passes."""
+    written = results.completions[key]
+    return shortest_fix(written.program, _passing_in(results, key[0], written.more.get("world")))
 
 
 def _passing_in(results: Results, task: str, world: int | None) -> dict[ProgramLines, str]:
     """Return the passing programs of a task or, for missions of an agent, those in one world."""
     programs = results.programs
-    of_task = [key for key in results.passed if key[0] == task and key in programs]
+    of_task = [key for key in results.passed if key[0] == task]
     right = sorted(key for key in of_task if results.completions[key].more.get("world") == world)
     return passing_programs((name_of(key), programs[key]) for key in right)
 
@@ -131,7 +129,7 @@ def _group_similar(
         return
     of_shape: defaultdict[ProgramLines, list[Row]] = defaultdict(list)
     for row in sorted(rows, key=key_of):
-        of_shape[shape_of(programs.get(key_of(row), ""))].append(row)
+        of_shape[shape_of(programs[key_of(row)])].append(row)
     leaders: list[tuple[Counter[str], list[Row]]] = []
     for lines, those in sorted(of_shape.items(), key=lambda item: (-len(item[1]), key_of(item[1][0]))):
         counts = Counter(lines)

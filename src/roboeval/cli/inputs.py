@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from codebotler.core.text.words import counted
 from roboeval.cli.output import note, show_progress
 
 if TYPE_CHECKING:
@@ -140,11 +139,9 @@ def open_current(
     rules: Path | None = None,
     reuse_from: Results | None = None,
 ) -> Results:
-    """Read a judged run with `open_run`. Raise UserError if verdicts are absent or outdated."""
+    """Read a judged run with `open_run`. Raise UserError if no completion is judged."""
     results = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from)
-    outdated, unjudged = find_gaps(results, suite_name, rules)
-    if outdated:
-        raise UserError(outdated)
+    unjudged = find_gap(results, suite_name, rules)
     if results.table.is_empty():
         raise UserError(unjudged or "no completion has been judged", file=run)
     if unjudged:
@@ -152,18 +149,13 @@ def open_current(
     return results
 
 
-def find_gaps(results: Results, suite_name: str, rules: Path | None) -> tuple[str | None, str | None]:
-    """Return sentences about rows whose programs have changed, and about completions not judged yet."""
-    from roboeval.evaluation.runs.completions import how_many, name_of
+def find_gap(results: Results, suite_name: str, rules: Path | None) -> str | None:
+    """Return a sentence about the completions that are not judged yet, or None if there are none."""
+    from roboeval.evaluation.runs.completions import how_many
 
+    count, total = len(results.places), results.scope.total
     again = evaluate_again(results, suite_name, rules)
-    stale, count, total = results.stale, len(results.places), results.scope.total
-    outdated = None
-    if stale:
-        judge = f"and {counted(len(stale) - 1, 'other row')} judge" if len(stale) > 1 else "judges"
-        outdated = f"{name_of(stale[0])} {judge} a program that is no longer in {results.run.completions}"
-        outdated += f"; `{again} --redo` judges the current programs"
-    return outdated, f"{count:,} of {how_many(total)} judged; `{again}` continues" if count < total else None
+    return f"{count:,} of {how_many(total)} judged; `{again}` continues" if count < total else None
 
 
 def evaluate_again(results: Results, suite_name: str, rules: Path | None = None) -> str:

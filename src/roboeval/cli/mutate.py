@@ -47,7 +47,7 @@ def mutate(
         Path | None,
         typer.Option(help="Save scores, mutants and survivors in this folder.", parser=path_to("a folder")),
     ] = None,
-    brief: Annotated[bool, typer.Option("--brief", help="Print only the tables, not the survivors.")] = False,
+    brief: Annotated[bool, typer.Option("--brief", help="Print only the table, not the survivors.")] = False,
     at_least: Annotated[
         float | None, typer.Option(min=0, max=1, help="Exit with status 1 if a task scores less than this.")
     ] = None,
@@ -97,14 +97,12 @@ def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Or
 
 
 def show_scores(scores: Sequence[MutationScore], suite: str, *, brief: bool) -> None:
-    """Print the tables, the survivors and any warnings."""
+    """Print the table, the survivors and any warnings."""
     from rich.console import Group
-    from rich.text import Text
 
-    from roboeval.mutation.report import operators_view, scores_view, survivors_view
+    from roboeval.mutation.report import scores_view, survivors_view
 
-    parts = [scores_view(scores, suite), Text(), operators_view(scores)]
-    print_rich(Group(*parts, *([] if brief else map(survivors_view, scores))))
+    print_rich(Group(scores_view(scores, suite), *([] if brief else map(survivors_view, scores))))
     for score in scores:
         for warning in score.warnings:
             note(f"warning: {warning}")

@@ -6,7 +6,6 @@ import contextlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from codebotler import __version__
@@ -18,9 +17,9 @@ from codebotler.core.text.words import brief
 from roboeval.evaluation.engines.engine import PYTHON_VERSION, Local, OpenEngine
 from roboeval.evaluation.judging.judge import judgements
 from roboeval.evaluation.judging.serialization import row_line
-from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of
+from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import RunFolder, evaluation_key, load_json_object, selected_tasks
-from roboeval.evaluation.runs.rows import LocatedRow, Row, Seal, decode_row, is_sealed, key_of, read_lines_of
+from roboeval.evaluation.runs.rows import Row, Seal, decode_row, is_sealed, read_lines_of, take_judged
 from roboeval.suites.load import Suite
 
 
@@ -50,12 +49,11 @@ def evaluate_run(
         about = evaluation_metadata(suite, ablated=ablated, tasks=_selected(tasks, was))
         if was is None:
             write_whole(run.manifest(key), to_text(about))
-        written = {one.key: one for one in (run.read(suite) if completions is None else completions)}
+        left = {one.key: one for one in (run.read(suite) if completions is None else completions)}
         with contextlib.closing(Appender(run.rows(key))) as rows:
-            seal, left = Seal(), dict(written)
+            seal = Seal()
             for line in read_lines_of(rows.path, was or {}, seal=seal):
-                _expect_of_run(line, written, left, rows.path)
-                del left[key_of(line.row)]
+                take_judged(left, line, rows.path)
                 if _is_in(line.row["task"], tasks):
                     yield line.row
             left = {key: one for key, one in left.items() if _is_in(one.task, selected_tasks(about))}
@@ -80,25 +78,6 @@ def evaluate_run(
 
 def _is_in(task: str, tasks: frozenset[str] | None) -> bool:
     return tasks is None or task in tasks
-
-
-def _expect_of_run(
-    line: LocatedRow,
-    written: Mapping[CompletionKey, Completion],
-    left: Mapping[CompletionKey, Completion],
-    file: Path,
-) -> None:
-    key = key_of(line.row)
-    completion = written.get(key)
-    if completion is None:
-        sentence = f"this row judges {name_of(key)}, which is not in the run"
-    elif key not in left:
-        sentence = f"this row judges {name_of(key)} a second time"
-    elif completion.program_sha256 != line.row["program_sha256"]:
-        sentence = f"the program of {name_of(key)} has changed since it was judged"
-    else:
-        return
-    raise UserError(f"{sentence}; --redo starts over", file=file, line=line.number)
 
 
 def evaluation_metadata(

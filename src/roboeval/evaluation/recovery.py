@@ -160,11 +160,7 @@ def write_continuations(
 
     async def write_all() -> None:
         try:
-            async with asyncio.TaskGroup() as group:
-                for prompt in dict.fromkeys(prompts):
-                    group.create_task(write(prompt))
-        except BaseExceptionGroup as errors:
-            raise errors.exceptions[0] from None
+            await asyncio.gather(*map(write, dict.fromkeys(prompts)))
         finally:
             await model.close()
 

@@ -1,10 +1,9 @@
-"""Splits prompts into clauses, and finds the checks that cover each clause or the reason why none does."""
+"""Splits prompts into clauses, and finds the clauses that no check covers."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from roboeval.suites.load import Task
 
@@ -17,53 +16,31 @@ _SKIP = re.compile(r"(?<!\\)\.\*\??|\[\^[^\]]+\]\*\??")  # parts of a regex that
 Span = tuple[int, int]
 
 
-@dataclass(frozen=True)
-class Clause:
-    """A clause of a prompt, with the checks that cover it."""
+def uncovered_clauses(task: Task) -> Iterator[tuple[int, str]]:
+    """Yield the clauses of prompts that no check covers, each with the number of its prompt.
 
-    prompt: int  # the number of the prompt, from 0
-    text: str
-    checks: tuple[str, ...]  # the checks that cover the clause
-    because: tuple[str, ...]  # reasons from the task file why no check covers the clause
-
-    @property
-    def is_covered(self) -> bool:
-        """Whether a check covers the clause, or the task file gives a reason why none does."""
-        return bool(self.checks or self.because)
-
-
-def clauses_of(task: Task) -> Iterator[Clause]:
-    """Yield the clauses of all prompts, in order.
-
-    A check covers a clause if they share a word. They share it if a requirement with the check quotes the
-    word, or if the task lists a fact for the check and the fact's regex matches the word other than by `.*`.
+    A clause is covered if a requirement quotes one of its words, or if a fact in `covered_by`, which names
+    checks or a reason why there is none, has a regex that matches one of its words other than by `.*`.
     """
     for number, prompt in enumerate(task.prompts):
         text = " ".join(prompt.split())
-        covering = [*_covering(task, number, text)]
+        covered = [*_covered(task, number, text)]
         for start, end in _split_clauses(text):
-            found = [what for (first, last), what in covering if first < end and last > start]
-            checks = dict.fromkeys(name for what in found if isinstance(what, tuple) for name in what)
-            reasons = dict.fromkeys(what for what in found if isinstance(what, str))
-            yield Clause(number, text[start:end].strip(), tuple(checks), tuple(reasons))
+            if not any(first < end and last > start for first, last in covered):
+                yield number, text[start:end].strip()
 
 
-def _covering(task: Task, number: int, text: str) -> Iterator[tuple[Span, tuple[str, ...] | str]]:
-    """Yield parts of a prompt, each with the checks that cover it or the reason why none does."""
-    by_fact = dict(task.covered_by)
+def _covered(task: Task, number: int, text: str) -> Iterator[Span]:
+    """Yield the parts of a prompt that facts or requirements cover."""
+    facts = {fact for fact, _ in task.covered_by}
     for fact in task.facts:
-        for words in fact.words if fact.fact in by_fact else ():
-            yield from ((span, by_fact[fact.fact]) for span in _find(words, text))
+        for words in fact.words if fact.fact in facts else ():
+            yield from _find(words, text)
     required = {requirement for scenario in task.scenarios for requirement in scenario.require}
-    quotes = {
-        (" ".join(words.split()), one.check)
-        for one in required
-        for asked, words in one.words
-        if asked == number
-    }
-    for words, check in sorted(quotes):
+    for quoted in {words for one in required for asked, words in one.words if asked == number}:
+        words = " ".join(quoted.split())
         start = text.lower().find(words.lower())
-        yield (start, start + len(words)), (check,)
+        yield start, start + len(words)
 
 
 def _find(words: str, text: str) -> Iterator[Span]:

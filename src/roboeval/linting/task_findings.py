@@ -19,7 +19,7 @@ from codebotler.simulator.pool import WorkerPool
 from roboeval.evaluation.judging.failures import Verdict, failure_of_verdicts
 from roboeval.evaluation.judging.judge import judge, run_in
 from roboeval.evaluation.runs.rows import Failure
-from roboeval.linting.clauses import clauses_of
+from roboeval.linting.clauses import uncovered_clauses
 from roboeval.linting.findings import Finding
 from roboeval.linting.world_findings import judged_worlds
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
@@ -75,12 +75,9 @@ def _uncovered(task: Task) -> Iterator[Finding]:
         if fact.fact not in dict(task.covered_by):
             message = f'covered_by lacks the fact "{fact.fact}"; add it'
             yield Finding("uncovered", fact.fact, message, task.path, line)
-    for clause in clauses_of(task):
-        if not clause.is_covered:
-            message = (
-                f'no check covers "{clause.text}" in prompt {clause.prompt}; add a fact with these words'
-            )
-            yield Finding("uncovered", f"{clause.prompt}: {clause.text}", message, task.path, line)
+    for prompt, clause in uncovered_clauses(task):
+        message = f'no check covers "{clause}" in prompt {prompt}; add a fact with these words'
+        yield Finding("uncovered", f"{prompt}: {clause}", message, task.path, line)
 
 
 def _unworded(task: Task) -> Iterator[Finding]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -24,7 +23,9 @@ DESCRIPTIONS = {operator.name: operator.about for operator in MUTATION_OPERATORS
 def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
     """Return a table with the score of each task."""
     heads = "task", "worlds", "originals", "mutants", "killed", "equivalent", "survived", "score", "of all"
-    table = _table(*heads, "same traces", "crashes")
+    table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
+    for number, head in enumerate((*heads, "same traces", "crashes")):
+        table.add_column(head, justify="right" if number else "left", no_wrap=True)
     for score in scores:
         outcomes = MutantStatus.KILLED, MutantStatus.EQUIVALENT, MutantStatus.SURVIVED
         table.add_row(
@@ -38,18 +39,6 @@ def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
     return Group(title, Text(), table)
 
 
-def operators_view(scores: Sequence[MutationScore]) -> RenderableType:
-    """Return a table with the number of mutants of each operator that change behaviour."""
-    table = _table("operator", "mutants", "killed", "survived")
-    tried = (one for score in scores for one in score.mutants)
-    counts = Counter((one.mutant.operator, one.result.status) for one in tried)
-    for name in DESCRIPTIONS:
-        if changing := sum(counts[name, status] for status in CHANGING_STATUSES):
-            killed, survived = counts[name, MutantStatus.KILLED], counts[name, MutantStatus.SURVIVED]
-            table.add_row(name, *map(str, (changing, killed, survived)))
-    return Group(Text("By operator", "bold"), Text(), table)
-
-
 def survivors_view(score: MutationScore) -> RenderableType:
     """Return the surviving mutants of a task, each with its operator and diff."""
     parts: list[RenderableType] = []
@@ -61,13 +50,6 @@ def survivors_view(score: MutationScore) -> RenderableType:
         diff.rstrip()
         parts += [Text(), head, Text(DESCRIPTIONS[mutant.operator], "dim"), Padding(diff, (0, 0, 0, 2))]
     return Group(*parts)
-
-
-def _table(*heads: str) -> Table:
-    table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
-    for number, head in enumerate(heads):
-        table.add_column(head, justify="right" if number else "left", no_wrap=True)
-    return table
 
 
 def write_scores(scores: Sequence[MutationScore], folder: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeAlias
 
-from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome, Status
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool
@@ -88,15 +87,10 @@ def _satisfied(scenarios: Sequence[Scenario], faults: Sequence[MutantResult | No
 
 def mutation_worlds(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
     """Return the worlds for mutants. If worlds are sampled, they have another seed than the suite's."""
-    if suite.worlds is not None:
-        return (
-            suite.with_worlds(count or DEFAULT_MUTANT_WORLDS, seed + 1 + (suite.seed or 0))
-            .tasks[task.name]
-            .scenarios
-        )
-    if count is not None:
-        raise UserError(f'the worlds of the suite "{suite.name}" are written by hand; omit --worlds')
-    return task.scenarios
+    if suite.worlds is None and count is None:
+        return task.scenarios
+    sampled = suite.with_worlds(count or DEFAULT_MUTANT_WORLDS, seed + 1 + (suite.seed or 0))
+    return sampled.tasks[task.name].scenarios
 
 
 def find_failure(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> MutantResult | None:

@@ -201,8 +201,6 @@ def _inside(group: FailureGroup) -> str:
     name = _text(name_of(group.representative))
     where = "" if group.has_no_program else f", world \u201c{world}\u201d"
     head = f"<p>{prompts}. Example: {name}{where}.</p>"
-    if group.program is None:
-        return f"{head}<p>The judged program was changed or removed.</p>"
     program = f"<pre>{_text(shortened(group.program, MAX_REPORTED_PROGRAM, str))}</pre>"
     fix = group.fix
     if fix is None:

@@ -86,7 +86,7 @@ class _Comparison:
             try:
                 runs.append(self._store.open(name))
             except UserError as error:
-                errors.append(error.sentence)
+                errors.append(str(error))
         heads = [run.results.manifest for run in runs if run.judged]
         judged_by = {tuple(str(head.get(part)) for part in ("suite", "digest", "ablation")) for head in heads}
         return runs, [*errors, *[DIFFERENT_SUITES] * (len(judged_by) > 1)]

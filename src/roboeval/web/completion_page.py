@@ -38,7 +38,6 @@ from roboeval.web.widgets import ProgramView
 MAX_SENTENCE, MAX_INSTRUCTION, MAX_REPLY = 2_000, 5_000, 50_000
 FAILED_STEP_NOTE = "Red marks the step at which a check failed."
 NEIGHBOUR_LINKS = ("Previous completion", "Next completion")
-PROGRAM_CHANGED = "The program was changed or removed after judging. Verdicts refer to the earlier version."
 
 
 async def draw_completion(
@@ -99,8 +98,6 @@ def _draw_head(
         if fix is not None:
             text = f"Most similar program that passes: {counted(fix.changed, 'line')} changed"
             html.a(text, href=outside(f"{run_address(run.name)}/{quote(fix.name, errors='replace')}{query}"))
-    if data["stale"]:
-        PlainText("p", PROGRAM_CHANGED, "trouble")
     origin, instruction = instruction_shown(data["instruction"], data["suite_instruction"])
     if origin is not None:
         PlainText("p", origin[0].upper() + origin[1:], "quiet")
@@ -112,9 +109,6 @@ def _draw_program(data: Mapping[str, Any]) -> None:
     with ui.element("section").classes("pane").props("aria-labelledby=h-program"):
         title = "Program" if _no_program_sentence(data) is None else "Extracted from the reply"
         PlainText("h2", title).props("id=h-program")
-        if data["program"] is None:
-            PlainText("p", "This run no longer contains the program.", "quiet")
-            return
         ran = data["worlds"] if _no_program_sentence(data) is None else ()
         lines = (world["line"] for world in ran if not world["satisfied"])
         view = ProgramView(data["program"], (line for line in lines if line is not None))

@@ -9,6 +9,7 @@ from urllib.parse import quote
 
 from nicegui import html, ui
 
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Button, PlainText, outside
 from roboeval.analysis.metrics import percent
@@ -73,6 +74,10 @@ class _RunPage:
             self._error.say(RUN_DELETED)
             self.timer.deactivate()
             return
+        except UserError as error:  # a file may be damaged, or may have changed while being read
+            self._error.say(str(error))
+            return
+        self._error.say("")
         if run.version != self._run.version:
             self._run = run
             self._changes += 1

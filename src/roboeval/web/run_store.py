@@ -134,9 +134,7 @@ class _Reader:
                 began = time.monotonic()
                 self._results, self._stamps = self._read_files(), stamps
                 ended = time.monotonic()
-                # Files that changed while being read may cause faults, so read them again soon.
-                mixed = bool(self._results.faults) and self._stamps_now() != stamps
-                self._rests_until = ended + (0 if mixed else REST_FACTOR * (ended - began))
+                self._rests_until = ended + REST_FACTOR * (ended - began)
             version = self._version(self._stamps)
             if self._snapshot is None or self._snapshot.version != version:
                 self._snapshot = Snapshot(
@@ -159,12 +157,13 @@ class _Reader:
         return tuple(_stamp(path, within) for path in paths)
 
     def _read_files(self) -> Results:
-        faults: list[UserError] = []
-        results = read_results(self._run, self._key, faults=faults)
-        existing = tuple(fault for fault in faults if Path(str(fault.file)).exists())  # new runs lack files
+        try:
+            results = read_results(self._run, self._key)
+        except UserError as error:  # pages show no folders of this machine
+            raise UserError(error.sentence, file=Path(str(error.file)).name, line=error.line) from None
         name = results.manifest.get("suite") or results.about.get("suite")
         suite = self._store.suite(name if isinstance(name, str) else "paper")
-        return replace(results, suite=suite, faults=existing)
+        return replace(results, suite=suite)
 
 
 def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:

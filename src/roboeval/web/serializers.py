@@ -8,19 +8,18 @@ import time
 from collections.abc import Hashable, Mapping
 from dataclasses import asdict
 from enum import StrEnum
-from pathlib import Path
 from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from roboeval.evaluation.generating.requests import batches
-from roboeval.evaluation.judging.explanation import PROGRAM_GONE, completion_data, suite_instruction
-from roboeval.evaluation.runs.completions import KEY, CompletionKey, how_many, name_of, recorded_suffix
+from roboeval.evaluation.judging.explanation import completion_data, suite_instruction
+from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of, recorded_suffix
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 
-MAX_FAULTS_SHOWN, MAX_SUITE_NAME, MAX_FAILURE_REASON = 5, 120, 300
+MAX_SUITE_NAME, MAX_FAILURE_REASON = 120, 300
 
 
 class RunState(StrEnum):
@@ -33,7 +32,6 @@ class RunState(StrEnum):
     NOT_JUDGED = "not judged"
     JUDGED = "judged"
     EMPTY = "empty"
-    DAMAGED = "damaged"
     UNREADABLE = "not read"
 
 
@@ -45,7 +43,6 @@ def state_of(run: Snapshot) -> RunState:
     stages = (
         (RunState.GENERATING, run.is_written and (lacks or not written)),
         (RunState.JUDGING, run.is_written and unjudged),
-        (RunState.DAMAGED, bool(run.results.faults)),
         (RunState.EMPTY, run.completions.is_empty()),
         (RunState.NOT_JUDGED, not lacks and not run.judged),
         (RunState.UNFINISHED, lacks or unjudged),
@@ -100,19 +97,12 @@ def date_of(about: Mapping[str, Any]) -> str | None:
 
 def notes(run: Snapshot) -> list[str]:
     """Describe the problems of a run, one sentence each."""
-    results, stale = run.results, len(run.results.stale)
-    faults = [UserError(f.sentence, file=Path(str(f.file)).name, line=f.line) for f in results.faults]
-    found = [str(fault) for fault in faults[:MAX_FAULTS_SHOWN]]
-    if len(faults) > MAX_FAULTS_SHOWN:
-        found.append(f"{len(faults) - MAX_FAULTS_SHOWN:,} more lines are damaged.")
-    if faults:
-        found.append("All other rows are shown.")
+    results = run.results
+    found = []
     if (missions := results.scope.missions_sentence) is not None:
         found.append(f"{missions[0].upper()}{missions[1:]}.")
     if (warning := results.scope.cut_off_warning) is not None:
         found.append(f"{warning}.")
-    if stale:
-        found.append(f"{how_many(stale)} changed since the verdict; use `roboeval evaluate --redo`.")
     if run.judged and run.suite is None:
         name = shortened(str(results.manifest.get("suite")), MAX_SUITE_NAME)
         found.append(
@@ -138,14 +128,17 @@ class RunList:
 
     def _run_data(self, name: str, *, may_read: bool) -> dict[str, Any]:
         unread = {"run": name, "state": RunState.READING, "notes": []}
-        version, data = self._known.get(name, (None, unread))
+        known, data = self._known.get(name, (None, unread))
+        version: Hashable = None
         try:
-            if may_read and version != self._store.version(name):
-                run = self._store.open(name)
-                data = run_data(run)
-                self._known[name] = run.version, data
+            version = self._store.version(name)
+            if not may_read or version == known:
+                return data
+            run = self._store.open(name)
+            version, data = run.version, run_data(run)
         except UserError as error:
-            return {**unread, "state": RunState.UNREADABLE, "notes": [str(error)]}
+            data = {**unread, "state": RunState.UNREADABLE, "notes": [str(error)]}
+        self._known[name] = version, data
         return data
 
 
@@ -186,7 +179,6 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
         "failure": None if row["failure_class"] is None else failure,
         "why": shortened(row["why"], MAX_FAILURE_REASON),
         "worlds": row["worlds"],
-        "stale": row["stale"],
     }
 
 
@@ -196,11 +188,9 @@ def completion_details(run: Snapshot, name: str) -> dict[str, Any]:
     if row is None:
         raise MissingError(f'this run has no completion "{shortened(name, MAX_SUITE_NAME)}"')
     key: CompletionKey = row["task"], row["prompt"], row["index"]
-    completion = results.completions.get(key)
-    more = {"evaluation": results.key, "stale": row["stale"], "note": PROGRAM_GONE if row["stale"] else None}
     judged = {**entry_data(row), "verdicts": []} if row["passed"] is None else results.row(key)
     try:
-        data = completion_data(judged, completion, run.suite, ablated=results.is_ablated)
+        data = completion_data(judged, results.completions[key], run.suite, ablated=results.is_ablated)
     except (UserError, KeyError, TypeError, IndexError, AttributeError, ValueError):
         what = f"the row of {shortened(name_of(key), MAX_SUITE_NAME)} is damaged; --redo judges it again"
         raise UserError(what, file=results.run.rows(results.key or "").name) from None
@@ -208,4 +198,4 @@ def completion_details(run: Snapshot, name: str) -> dict[str, Any]:
         for world in data["worlds"]:
             for check in world["failed_checks"]:
                 check["explanation"] = None
-    return {**data, **more}
+    return {**data, "evaluation": results.key}

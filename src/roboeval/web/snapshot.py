@@ -103,28 +103,28 @@ class Snapshot:
 
     @cached_property
     def completions(self) -> pl.DataFrame:
-        """One row for each completion in the order of the suite, even if only its verdict still exists.
+        """One row for each completion in the order of the suite.
 
         `passed` is null if the completion was not judged. `worlds` contains a sign for each world. `why` is
-        the check or error that caused the failure. `written` says whether the completion still exists.
+        the check or error that caused the failure.
         """
         judged = self.results.table.group_by(KEY, maintain_order=True).agg(
-            pl.col("passed", "^failure_.*$", "stale").first(),
+            pl.col("passed", "^failure_.*$").first(),
             pl.when(HAS_NO_PROGRAM.first())
             .then(pl.lit(""))
             .otherwise(WORLD_SIGN.str.join(""))
             .alias("worlds"),
             FAILURE_CAUSE.filter(pl.col("world_number") == pl.col("failure_world")).first().alias("why"),
         )
-        keys = [(storable(task), prompt, index, True) for task, prompt, index in self.results.completions]
-        schema = {"task": pl.String, "prompt": pl.Int64, "index": pl.Int64, "written": pl.Boolean}
+        keys = [(storable(task), prompt, index) for task, prompt, index in self.results.completions]
+        schema = {"task": pl.String, "prompt": pl.Int64, "index": pl.Int64}
         written = pl.DataFrame(keys, schema=schema, orient="row")
         tasks = () if self.suite is None else tuple(self.suite.tasks)
         place = pl.col("task").replace_strict(
             tasks, range(len(tasks)), default=len(tasks), return_dtype=pl.Int64
         )
-        filled = (pl.col("stale", "written").fill_null(value=False), pl.col("worlds", "why").fill_null(""))
-        return judged.join(written, on=KEY, how="full", coalesce=True).with_columns(*filled).sort(place, *KEY)
+        every = written.join(judged, on=KEY, how="left")
+        return every.with_columns(pl.col("worlds", "why").fill_null("")).sort(place, *KEY)
 
     def row(self, name: str) -> dict[str, Any] | None:
         """Find the row of a completion by its name. Return None if there is no such completion."""
@@ -150,7 +150,7 @@ class Snapshot:
         """
         judged = pl.col("judged")
         counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
-            written=pl.col("written").sum(),
+            written=pl.len(),
             judged=pl.col("passed").count(),
             counted=chosen.verdict.condition.sum(),
         )

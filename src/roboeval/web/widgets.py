@@ -38,7 +38,7 @@ def page_of(frame: Frame, title: str) -> Iterator[None]:
         except UserError as error:
             if isinstance(error, MissingError):
                 ui.context.client.status_code = HTTPStatus.NOT_FOUND
-            PlainText("p", error.sentence, "trouble").props("role=alert")
+            PlainText("p", str(error), "trouble").props("role=alert")
             html.a("All runs", href=outside("/runs"))
 
 

@@ -207,7 +207,7 @@ def test_the_command_warns_and_refuses(runs: Path) -> None:
     kept = head.read_text()
     head.write_text(json.dumps(json.loads(kept) | {"python": "3.99"}))
     warned = roboeval("compare", "careful", "hasty", cwd=runs)
-    assert "warning: the Python versions" in warned.err
+    assert "warning: Python for judging" in warned.err
     assert warned.status == 0
     head.write_text(json.dumps(json.loads(kept) | {"digest": "1"}))
     ended = roboeval("compare", "careful", "hasty", cwd=runs)

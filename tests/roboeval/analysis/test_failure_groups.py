@@ -8,7 +8,7 @@ from made_results import results_of
 from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures, nearest_fix
 from roboeval.cli.views.groups import failure_group_view
 from roboeval.evaluation.runs.completions import CompletionKey
-from roboeval.evaluation.runs.rows import Failure, Row, WorldVerdict
+from roboeval.evaluation.runs.rows import Failure, Row, WorldVerdict, key_of
 from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
 GOES = """\
@@ -92,7 +92,8 @@ def test_replies_without_a_program_are_one_group_without_a_fix() -> None:
 def test_groups_of_one_size_take_turns_by_task() -> None:
     rows = [failed(n, 0, task=task, check=f"{n}()") for task in ("Visit", "FindBook") for n in range(3)]
     rows += [failed(9, n, check="nine()") for n in range(2)]
-    found = [(those[0]["task"], those[0]["prompt"]) for those in group_failures(rows, {})]
+    programs = {key_of(row): "" for row in rows}
+    found = [(those[0]["task"], those[0]["prompt"]) for those in group_failures(rows, programs)]
     tasks = ("FindBook", "Visit")
     assert found == [("Visit", 9), *((task, n) for n in range(3) for task in tasks)]
 
@@ -102,11 +103,12 @@ def test_the_nearest_program_that_passes() -> None:
     programs["FindBook", 0, 0] = GOES.format("lab")
     right = [{**row(prompt, 0), "passed": True} for prompt in (4, 5)]
     right.append({**row(0, 0), "task": "FindBook", "passed": True})
-    results = results_of([failed(0, 0), failed(1, 0), *right], SUITE, programs)
+    results = results_of([failed(0, 0), *right], SUITE, programs)
     fix = nearest_fix(results, ("Visit", 0, 0))
     assert fix is not None
     assert (fix.name, fix.changed) == ("Visit/4/0", 4)
-    assert nearest_fix(results, ("Visit", 1, 0)) is None
+    alone = results_of([failed(0, 0)], SUITE, programs)
+    assert nearest_fix(alone, ("Visit", 0, 0)) is None
 
 
 def told(program: str = GOES.format("lab")) -> Any:  # noqa: ANN401 - one group
@@ -138,13 +140,3 @@ def test_a_group_for_people_shows_what_models_write_as_it_is() -> None:
     assert SHOWN.removesuffix("\\n") in shown
     assert "\x1b" not in shown
     assert shown.startswith("3 completions of Visit, failed check: Location")
-
-
-def test_programs_that_are_gone() -> None:
-    rows = [failed(0, 0), failed(0, 1)]
-    results = results_of(rows, SUITE)
-    (group,) = group_failures(map(results.row, results.failed), results.programs)
-    (one,) = describe_groups([group], results)
-    assert one.program is None
-    assert one.fix is None
-    assert "no longer in this run" in printed(failure_group_view(one), width=200)

@@ -131,5 +131,5 @@ def test_rows_about_other_programs_are_refused(runs: Path) -> None:
     ended = roboeval("find", runs)
     file.write_text(kept)
     assert ended.status == 2
-    assert "run/completions.jsonl" in ended.err
+    assert "run/evaluations/paper.jsonl, line 1: the program of " in ended.err
     assert "--redo" in ended.err

@@ -159,11 +159,6 @@ def test_tasks_without_a_score_are_told_apart() -> None:
         summary([], suite, scope=scope)
 
 
-def test_rows_whose_completions_are_gone_are_told() -> None:
-    text = printed(summary_view(summary(ROWS, SUITE, scope=JudgingScope({"Visit": 3})), title="x"))
-    assert re.search(r"\n4 completions, but only 3 .*\n", text)
-
-
 def test_requested_completions_that_are_missing_are_counted() -> None:
     about = {"batches": [{"tasks": ["Visit"], "num_completions": 3}], "settings": {"max_tokens": 512}}
     there = [completion(n // 2, n % 2, finish_reason="length" if n else "stop") for n in range(4)]

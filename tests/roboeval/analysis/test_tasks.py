@@ -40,7 +40,6 @@ def test_a_task_is_shown_prompt_by_prompt() -> None:
         "models": [],
         "completions": 2,
         "requested": None,
-        "gone": 0,
         "passed": 1,
         "pass@1": 0.5,
         "failures": [failure],

@@ -606,25 +606,13 @@ def test_a_program_that_was_changed_since_it_was_judged_is_noticed(tmp_path: Pat
     (tmp_path / "a.jsonl").write_text("".join(map(row, range(3))))
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
     (tmp_path / "run" / "completions.jsonl").write_text(row() + row(1, "say('other')") + row(2, "say('one')"))
-    changed = roboeval("show", "run", cwd=tmp_path).err
-    for named in ("SayGoodDay/0/1", "1 other row", "run/completions.jsonl"):
-        assert named in changed
-    assert changed.count("\n") == 1
-    for what in ("SayGoodDay", "SayGoodDay/0", "SayGoodDay/0/1"):
-        assert roboeval("show", "run", what, cwd=tmp_path).err == changed
-    one = roboeval("show", "run", "SayGoodDay/0/1", cwd=tmp_path).out
-    assert "no longer" in one
-    assert "other" not in one
-    assert roboeval("show", "run", "SayGoodDay/0", cwd=tmp_path).out.count("no longer") == 2
-    data = json.loads(roboeval("show", "run", "--json", cwd=tmp_path).out)
-    assert data["stale"] == ["SayGoodDay/0/1", "SayGoodDay/0/2"]
-    assert refused("export", "run", cwd=tmp_path).sentence == changed.rstrip("\n")
-    assert "`roboeval evaluate run --redo`" in changed
-    refusal = refused("evaluate", "run", cwd=tmp_path)
-    assert refusal.at == ("run/evaluations/paper.jsonl", 2)
-    assert "SayGoodDay/0/1" in refusal.sentence
-    assert "--redo" in refusal.sentence
-    assert pasted(changed, tmp_path).status == 0
+    for words in (("evaluate",), ("show",), ("show", "SayGoodDay/0/1"), ("export",)):
+        verb, *what = words
+        refusal = refused(verb, "run", *what, cwd=tmp_path)
+        assert refusal.at == ("run/evaluations/paper.jsonl", 2)
+        assert "SayGoodDay/0/1" in refusal.sentence
+        assert "--redo" in refusal.sentence
+    assert roboeval("evaluate", "run", "--redo", cwd=tmp_path).status == 0
     assert roboeval("show", "run", cwd=tmp_path).err == ""
 
 

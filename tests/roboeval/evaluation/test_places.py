@@ -41,6 +41,9 @@ SAYS_THERE = 'tr.Exists(at("bob\'s office", say("hi")))'
 THERE = "def task_program():\n    go_to(\"bob's office\")\n    say('hi')\n"
 
 
+WRITTEN = Completion(task="T", prompt=0, index=0, program="")
+
+
 @pytest.fixture(scope="module")
 def worker() -> Iterator[Worker]:
     made = Worker()
@@ -59,7 +62,7 @@ def judge(worker: Worker, suite: Suite, program: str) -> tuple[Outcome, dict[str
     (ran,) = run_in_worlds(suite, worker, [("T", program)], ablated=False)
     told = judge_outcomes(suite, ran, ablated=False)
     assert told is not None
-    line = row_line(Completion(task="T", prompt=0, index=0, program=program), told[0])
+    line = row_line(replace(WRITTEN, program=program), told[0])
     assert key_of(decode_row(line)) == ("T", 0, 0)
     return ran.outcomes[0], json.loads(line)
 
@@ -68,7 +71,7 @@ def explained(row: dict[str, Any], suite: Suite) -> list[str]:
     """The explanations of all requirements, as if each had failed."""
     texts = [one.text for one in suite.tasks["T"].scenarios[0].require]
     verdicts = [{**verdict, "failed_checks": texts} for verdict in row["verdicts"]]
-    (world,) = completion_data({**row, "verdicts": verdicts}, None, suite)["worlds"]
+    (world,) = completion_data({**row, "verdicts": verdicts}, WRITTEN, suite)["worlds"]
     return [check["explanation"] for check in world["failed_checks"]]
 
 
@@ -162,7 +165,7 @@ def expect_the_same_answers(
     suite = suite_of(world, rules, *dict.fromkeys(formulas))
     expect_agreement(worker, suite, program)
     outcome, row = judge(worker, suite, program)
-    (shown,) = completion_data(row, None, suite)["worlds"]
+    (shown,) = completion_data(row, WRITTEN, suite)["worlds"]
     assert [(step["place"], step.get("to")) for step in shown["steps"]] == [
         (event.place, event.destination) for event in outcome.trace
     ]
@@ -216,7 +219,7 @@ def test_drives_that_fail_lead_nowhere(worker: Worker) -> None:
     _, row = judge(worker, suite, program)
     (verdict,) = row["verdicts"]
     assert (verdict["places"], verdict["destinations"]) == ([[1, "kitchen"]], [[2, None]])
-    (world,) = completion_data(row, None, suite)["worlds"]
+    (world,) = completion_data(row, WRITTEN, suite)["worlds"]
     assert [step["to"] for step in world["steps"]] == ["kitchen", None]
     assert find(row, 'tr.Exists(at("kitchen", goto("moon")))').worlds
 
@@ -239,7 +242,7 @@ def test_events_within_skills_of_a_users_own(worker: Worker) -> None:
     program = "def task_program():\n    bring_from_kitchen('mug')\n    say('got it')\n"
     assert expect_agreement(worker, suite, program) == [True, True, True]
     _, row = judge(worker, suite, program)
-    (world_shown,) = completion_data(row, None, suite)["worlds"]
+    (world_shown,) = completion_data(row, WRITTEN, suite)["worlds"]
     drive = next(step for step in world_shown["steps"] if step["kind"] == "goto")
     assert (drive["place"], drive["to"]) == ("office", "kitchen")
 

@@ -434,20 +434,15 @@ def test_one_of_several_alternatives_that_is_not_in_the_world(linted: Lint) -> N
 @pytest.mark.parametrize(
     ("pattern", "absent"),
     [
-        ("(kitchen|attic)", ["attic"]),
-        ("^(?:the )?(?:kitchen|attic)$", ["^(?:the )?attic$"]),
-        ("the (kitchen|attic) please|conference room", ["the attic please"]),
-        (r"kitchen|\\battic\\b", [r"\battic\b"]),
-        ("(kitchen|attic)?", []),
-        ("(kitchen|attic)+", []),
-        ("(kitchen|conference room)", []),
+        ("kitchen|attic|dean's office", ["attic", "dean's office"]),
+        ("^(the )?attic$", ["^(the )?attic$"]),
+        ("(kitchen|attic)", []),
         ("(red|blue)? kitchen", []),
         ("[|(]?kitchen", []),
-        (r"(kitchen|attic)(\\1)?", []),
         ("kitchen|", []),
     ],
 )
-def test_alternatives_in_a_group(linted: Lint, pattern: str, absent: list[str]) -> None:
+def test_alternatives_without_a_group(linted: Lint, pattern: str, absent: list[str]) -> None:
     found = linted({"goes": f'tr.Exists(goto("{pattern}"))'}, ["goes"])
     assert [one.subject.removesuffix(" in goes") for one in found if one.kind == "absent"] == absent
 

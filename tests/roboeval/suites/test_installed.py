@@ -83,21 +83,21 @@ def test_the_pages_show_runs_that_were_judged_by_it(
         False,
     ]
     warning = capsys.readouterr().err
-    assert "broken-suite 1.0" in warning
+    assert "broken_suite" in warning
     assert '"broken"' in warning
 
 
 def test_two_packages_with_one_name(install: Install) -> None:
     install()
     install("other-suite")
-    with pytest.raises(UserError, match=r'"garden": garden-suite 1\.0 \(garden_suite\) and other-suite 1\.0'):
+    with pytest.raises(UserError, match='"garden": garden_suite and other_suite;'):
         load_suite("garden")
 
 
 def test_a_folder_here_with_the_name_of_a_package(install: Install) -> None:
     install()
     new_task(Path("garden"), "WaterPlants")
-    with pytest.raises(UserError, match=r"garden-suite 1\.0 .* and .* \./garden "):
+    with pytest.raises(UserError, match=r"garden_suite and \./garden;"):
         load_suite("garden")
     assert load_suite("./garden").folder == Path("garden").resolve()
 
@@ -110,9 +110,9 @@ def test_a_package_cannot_take_the_name_of_a_suite_that_ships(install: Install) 
 @pytest.mark.parametrize(
     ("changed", "named"),
     [
-        ({"whole": False}, r'"garden" at garden_suite, .*suite\.yaml in .*garden_suite'),
-        ({"place": "gone"}, r'"garden" at gone, .*no package "gone"'),
-        ({"place": "garden_suite:SUITE"}, r'no package "garden_suite:SUITE"'),
+        ({"whole": False}, r'"garden" has no suite\.yaml in garden_suite;'),
+        ({"place": "gone"}, r'"garden" .*in gone;'),
+        ({"place": "garden_suite:SUITE"}, r'"garden" .*in garden_suite:SUITE;'),
         ({"point": "roses", "name": "garden"}, r'line 1: .*"garden", .*"roses"'),
     ],
 )

@@ -23,12 +23,13 @@ from codebotler.web.security.guard import Guard
 from command_line import refused, roboeval
 from made_up_runs import made_up
 from pageserver import PageServer
-from roboeval.evaluation.runs.completions import KEY
+from roboeval.evaluation.runs.completions import KEY, Completion
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.report.sections.scores import results
 from roboeval.report.sheets import Section, Sheet
 from roboeval.report.writing import write_report
 from runs_server import serving
+from seals import unseal
 
 HOSTILE = "<script>window.owned=1</script>[x](javascript:owned)\u202e\ud800\x00'\"&"
 
@@ -149,7 +150,7 @@ def test_one_completion_has_what_show_tells(server: PageServer, folder: Path) ->
         found = told(server, f"/api/runs/hasty/completions/{place}")
         assert shown.pop("ablation") is False
         assert {name: found[name] for name in shown} == shown
-        assert (found["evaluation"], found["stale"]) == ("paper", False)
+        assert found["evaluation"] == "paper"
         assert any(check["explanation"] for world in found["worlds"] for check in world["failed_checks"]) or (
             found["failure"] is None or found["failure"]["check"] is None
         )
@@ -207,6 +208,7 @@ def test_a_completion_without_a_verdict_has_the_entries_of_a_judged_one(runs: Pa
     run = RunFolder(runs / "hasty")
     places = ["/".join(str(row[part]) for part in KEY) for _, row in read_rows(run.completions)]
     rows = run.rows("paper")
+    unseal(run.path)
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:9]))
     with serving(runs) as server:
         judged, waits = (told(server, f"/api/runs/hasty/completions/{places[at]}") for at in (0, -1))
@@ -214,17 +216,20 @@ def test_a_completion_without_a_verdict_has_the_entries_of_a_judged_one(runs: Pa
         assert server.call("GET", f"/runs/hasty/{places[-1]}").status == 200
 
 
-def test_damaged_rows_are_said_and_the_others_are_there(runs: Path) -> None:
+def test_a_damaged_row_is_said(runs: Path) -> None:
     rows = RunFolder(runs / "hasty").rows("paper")
     lines = rows.read_bytes().splitlines(keepends=True)
     at = next(n for n, line in enumerate(lines) if json.loads(line)["failure"])
     row = json.loads(lines[at])
     forged = {**row, "verdicts": [{**verdict, "trace": [["goto", 3]]} for verdict in row["verdicts"]]}
-    rows.write_bytes(b"".join([*lines[:at], to_line(forged), *lines[at + 1 :], b"nonsense\n"]))
+    unseal(runs / "hasty")
+    rows.write_bytes(b"".join([*lines, b"nonsense\n"]))
     with serving(runs) as server:
         (run,) = told(server, "/api/runs")
-        assert (run["state"], run["judged"]) == ("damaged", 45)
-        assert run["notes"][0].startswith("paper.jsonl, line 46: ")
+        assert (run["state"], run["notes"][0].partition(": ")[0]) == ("not read", "paper.jsonl, line 46")
+        assert "paper.jsonl, line 46" in server.call("GET", "/runs/hasty").text
+        assert server.call("GET", "/api/runs/hasty").status == 422
+        rows.write_bytes(b"".join([*lines[:at], to_line(forged), *lines[at + 1 :]]))
         place = f"{row['task']}/{row['prompt']}/{row['index']}"
         answer = server.call("GET", f"/api/runs/hasty/completions/{place}")
         assert answer.status == 422
@@ -238,11 +243,14 @@ def test_hostile_texts_come_as_they_are(runs: Path) -> None:
     lines = run.completions.read_bytes().splitlines(keepends=True)
     row = {**json.loads(lines[0]), "model": HOSTILE, "program": HOSTILE * 3_000}
     run.completions.write_bytes(to_line(row) + b"".join(lines[1:]))
+    judged, *others = run.rows("paper").read_bytes().splitlines(keepends=True)
+    of_it = {**json.loads(judged), "program_sha256": Completion.of(row).program_sha256}
+    run.rows("paper").write_bytes(to_line(of_it) + b"".join(others))
+    unseal(run.path)
     with serving(runs) as server:
         place = f"{row['task']}/{row['prompt']}/{row['index']}"
         found = told(server, f"/api/runs/hasty/completions/{place}")
         assert (found["model"], found["program"]) == (HOSTILE, HOSTILE * 3_000)
-        assert found["stale"]
         page = server.call("GET", f"/runs/hasty/{place}")
         assert page.status == 200
         assert "<script>window" not in page.text

@@ -12,6 +12,7 @@ from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.web.heat_map import TaskCells, failure_rows, failure_text, shade
 from roboeval.web.run_store import RunStore
 from roboeval.web.snapshot import CompletionFilter
+from seals import unseal
 
 
 @pytest.mark.parametrize(
@@ -34,6 +35,7 @@ def test_little_is_not_nothing_and_nearly_all_is_not_all(share: float, text: str
 )
 def test_cells_of_a_run(runs: Path, chosen: CompletionFilter, column: str, value: object) -> None:
     rows = RunFolder(runs / "hasty").rows("paper")
+    unseal(runs / "hasty")
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:30]))
     run = RunStore(runs).open("hasty")
     cells = TaskCells(run, chosen, "paper")

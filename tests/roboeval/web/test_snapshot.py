@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from codebotler.core.errors import UserError
 from codebotler.core.files import to_line
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from roboeval.evaluation.runs.folder import RunFolder
@@ -35,7 +36,7 @@ def test_a_row_for_each_completion(runs: Path) -> None:
     rows = [json.loads(line) for line in lines_of(RunFolder(runs / "hasty").rows("paper"))]
     assert run.completions.height == len(rows) == 45
     assert len(run.results.completions) == run.results.scope.total == run.judged == 45
-    assert (len(run.results.stale), run.results.faults, run.models) == (0, (), ["recorded:hasty"])
+    assert run.models == ["recorded:hasty"]
     assert state_of(run) is RunState.JUDGED
     for row in rows:
         shown = run.row(f"{row['task']}/{row['prompt']}/{row['index']}")
@@ -70,22 +71,15 @@ def test_a_limit_that_ended_a_program_is_called_one(runs: Path) -> None:
         assert opened(runs / "hasty").completions["why"][at] == why
 
 
-def test_what_is_not_judged_yet_or_judged_and_gone_is_there_too(runs: Path) -> None:
+def test_what_is_not_judged_yet_is_there_too(runs: Path) -> None:
     run = RunFolder(runs / "hasty")
     completions, rows = lines_of(run.completions), lines_of(run.rows("paper"))
-    run.completions.write_bytes(b"".join(completions[5:]))
+    unseal(run.path)
     run.rows("paper").write_bytes(b"".join(rows[:40]))
     seen = opened(run.path)
-    assert (len(seen.results.completions), seen.judged, len(seen.results.stale), seen.completions.height) == (
-        40,
-        40,
-        5,
-        45,
-    )
+    assert (len(seen.results.completions), seen.judged, seen.completions.height) == (45, 40, 45)
     waiting = seen.completions.filter(seen.completions["passed"].is_null())
     assert sorted(keys(waiting)) == sorted(_key(line) for line in completions[40:])
-    gone = seen.completions.filter(~seen.completions["written"])
-    assert sorted(keys(gone)) == sorted(_key(line) for line in completions[:5])
 
 
 def _key(line: bytes) -> tuple[str, int, int]:
@@ -93,13 +87,17 @@ def _key(line: bytes) -> tuple[str, int, int]:
     return row["task"], row["prompt"], row["index"]
 
 
-def test_a_program_that_changed_since_it_was_judged_is_stale(runs: Path) -> None:
+def test_a_program_that_changed_since_it_was_judged_is_named(runs: Path) -> None:
     completions = RunFolder(runs / "hasty").completions
     lines = lines_of(completions)
     row = json.loads(lines[7])
-    completions.write_bytes(b"".join([*lines[:7], to_line({**row, "program": "x = 1\n"}), *lines[8:]]))
-    run = opened(runs / "hasty")
-    assert keys(run.completions.filter("stale")) == [_key(lines[7])]
+    changed = to_line({**row, "program": "x = 1\n"})
+    for content in ([*lines[:7], changed, *lines[8:]], [*lines[:7], *lines[8:]]):
+        completions.write_bytes(b"".join(content))
+        with pytest.raises(UserError, match="--redo") as caught:
+            opened(runs / "hasty")
+        assert (caught.value.file, caught.value.line) == ("paper.jsonl", 8)
+        assert "/".join(map(str, _key(lines[7]))) in caught.value.sentence
 
 
 def test_filters_prompts_and_neighbours(runs: Path) -> None:
@@ -168,15 +166,13 @@ def test_how_far_a_run_has_come(runs: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [b"{broken\n", b"[1]\n", b'{"task": "LunchBreak"}\n', b"\xff\n"])
-def test_a_damaged_row_is_named_and_the_others_are_shown(runs: Path, content: bytes) -> None:
+def test_a_damaged_row_is_named(runs: Path, content: bytes) -> None:
     rows = RunFolder(runs / "hasty").rows("paper")
     lines = lines_of(rows)
     rows.write_bytes(b"".join([*lines[:10], content, *lines[11:]]))
-    run = opened(runs / "hasty")
-    (fault,) = run.results.faults
-    assert (fault.file, fault.line) == (rows, 11)
-    assert (run.judged, len(run.results.stale)) == (44, 0)
-    assert state_of(run) is RunState.DAMAGED
+    with pytest.raises(UserError) as caught:
+        opened(runs / "hasty")
+    assert (caught.value.file, caught.value.line) == (rows.name, 11)
 
 
 def test_half_a_character_in_a_name_of_a_task_breaks_nothing(runs: Path) -> None:

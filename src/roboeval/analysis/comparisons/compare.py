@@ -186,37 +186,29 @@ def _better_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
     return f"{better} passes more often than {other} by {by}, but the difference is not significant ({p})."
 
 
-def other_differences(first: Results, second: Results) -> list[str]:
-    """Describe differences other than the model that may explain why the results of two runs differ."""
-    judged_with = ("python", "codebotler")  # in run.json, these are the versions used for generation
-    runs = [
-        {**one.about, **{name: one.manifest.get(name) for name in judged_with}} for one in (first, second)
-    ]
-    found = []
-    modes = [run.get("mode", "program") for run in runs]
-    if modes[0] != modes[1]:
-        found.append(f"the modes differ: {modes[0]} and {modes[1]}; {MISSIONS_COMPARED}")
-    for name, words in COMPARED_SETTINGS.items():
-        a, b = (run.get(name) for run in runs)
-        if a is not None and b is not None and a != b and (name != "template" or modes[0] == modes[1]):
-            found.append(f"{words} differ: {_short(a)} and {_short(b)}")
-    settings = [value if isinstance(value := run.get("settings"), dict) else {} for run in runs]
-    if bool(settings[0]) != bool(settings[1]):
-        found.append("the settings of one run were not recorded")
-    for name in sorted({*settings[0], *settings[1]} if all(settings) else ()):
-        a, b = (one.get(name) for one in settings)
-        if a != b:
-            found.append(f"{name.replace('_', '-')} differs: {_short(a)} and {_short(b)}")
-    return found
-
-
 MISSIONS_COMPARED = "each program or agent in each world counts as one mission"
 
-COMPARED_SETTINGS = {
-    "python": "the Python versions used for judging",
-    "codebotler": "the versions of codebotler used for judging",
-    "template": "the prompt templates",
-}
+
+def other_differences(first: Results, second: Results) -> list[str]:
+    """Describe differences other than the model that may explain why the results of two runs differ."""
+    runs, found = (first, second), []
+    modes = [run.about.get("mode", "program") for run in runs]
+    if modes[0] != modes[1]:
+        found.append(f"the modes differ: {modes[0]} and {modes[1]}; {MISSIONS_COMPARED}")
+    compared = {
+        "Python for judging": [run.manifest.get("python") for run in runs],
+        "codebotler for judging": [run.manifest.get("codebotler") for run in runs],
+        "prompt template": [run.about.get("template") if modes[0] == modes[1] else None for run in runs],
+    }
+    compared = {name: both for name, both in compared.items() if None not in both}
+    settings = [value if isinstance(value := run.about.get("settings"), dict) else {} for run in runs]
+    if all(settings):
+        names = sorted({*settings[0], *settings[1]})
+        compared |= {name.replace("_", "-"): [one.get(name) for one in settings] for name in names}
+    elif any(settings):
+        found.append("the settings of one run were not recorded")
+    differing = ((name, *both) for name, both in compared.items() if both[0] != both[1])
+    return found + [f"{name} differs: {_short(a)} and {_short(b)}" for name, a, b in differing]
 
 
 def _short(value: object) -> str:

@@ -68,7 +68,7 @@ def verdict_changes(name: str, first: Results, second: Results) -> VerdictChange
         tasks=tuple(_by_task(both, first.known_suite.tasks)),
         first_only=tuple(describe_groups(group_failures(map(second.row, lost), programs), second)),
         second_only=tuple(describe_groups(group_failures(map(first.row, won), programs), first)),
-        programs=len({(key[0], programs.get(key)) for key in lost + won}),
+        programs=len({(key[0], programs[key]) for key in lost + won}),
         left_out=one.height + other.height - 2 * both.height,
     )
 

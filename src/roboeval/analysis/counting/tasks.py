@@ -32,17 +32,16 @@ def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
     """Summarise a judged prompt as plain data: its distinct programs, and why each of them fails."""
     of_prompt = completions_of(results.table).filter(pl.col("task") == task, pl.col("prompt") == prompt)
     programs = results.programs
-    groups: dict[object, list[CompletionKey]] = defaultdict(list)
+    groups: dict[str, list[CompletionKey]] = defaultdict(list)
     for index in of_prompt["index"]:
         key = task, prompt, index
-        groups[programs.get(key, index)].append(key)
+        groups[programs[key]].append(key)
     return {
         "task": task,
         **_prompt_head(results, of_prompt),
         "programs": [
             {
                 "indices": [index for _, _, index in same],
-                "gone": same[0] not in programs,
                 **_reason(results, same[0]),
             }
             for same in groups.values()
@@ -58,8 +57,7 @@ def _reason(results: Results, key: CompletionKey) -> dict[str, Any]:
 
 
 def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
-    keys = [*of_prompt.filter(~pl.col("stale")).select(KEY).iter_rows()]
-    written = [results.completions[key] for key in keys]
+    written = [results.completions[key] for key in of_prompt.select(KEY).iter_rows()]
     (of_task,) = task_scores(of_prompt)
     (score,) = of_task.prompts
     task, prompt = score.task, score.prompt
@@ -72,7 +70,6 @@ def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
         "models": _distinct(written, "model"),
         "completions": score.n,
         "requested": None if requested is None else requested.get(task, 0) // len(prompts),
-        "gone": score.n - len(written),
         "passed": score.c,
         "pass@1": score.pass_at(1),
     }

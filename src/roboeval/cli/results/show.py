@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,7 +19,7 @@ from codebotler.core.errors import UserError
 from roboeval.cli.inputs import (
     command,
     expect_judged,
-    find_gaps,
+    find_gap,
     load,
     names_completion,
     open_current,
@@ -86,10 +85,8 @@ def show(
             show_completion(judged, key, suite, in_full=in_full, with_reply=with_reply, as_json=json)
         else:
             show_part(judged, task, numbers[0] if numbers else None, as_json=json)
-    outdated, unjudged = find_gaps(judged, suite, rules)
-    for sentence in (outdated, None if is_one else unjudged):
-        if sentence is not None:
-            note(sentence)
+    if not is_one and (unjudged := find_gap(judged, suite, rules)) is not None:
+        note(unjudged)
 
 
 def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
@@ -109,16 +106,14 @@ def print_summary(
     *,
     title: str,
     as_json: bool,
-    stale: Iterable[CompletionKey] = (),
     house: BrokenRules | None = None,
 ) -> None:
     """Print the tables of an evaluation."""
     from roboeval.analysis.counting.summary import summary_data
     from roboeval.cli.views.results import house_view, summary_view
-    from roboeval.evaluation.runs.completions import name_of
 
     if as_json:
-        data = {**summary_data(counted), "stale": list(map(name_of, stale))}
+        data = summary_data(counted)
         if house is not None:
             from roboeval.analysis.counting.broken_rules import broken_rules_data
 
@@ -138,7 +133,7 @@ def show_run(results: Results, k: list[int], *, title: str, has_rules: bool, as_
     ablated, suite = results.is_ablated, results.known_suite
     counted = summarise(tally_of(results.table), suite, results.scope, k=sorted({1, *k}), ablated=ablated)
     house = house_of(results.run, suite, results.table, ablated=ablated) if has_rules else None
-    print_summary(counted, title=title, as_json=as_json, stale=results.stale, house=house)
+    print_summary(counted, title=title, as_json=as_json, house=house)
 
 
 def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool) -> None:
@@ -170,7 +165,7 @@ def show_completion(
     from roboeval.evaluation.judging.explanation import completion_data
     from roboeval.evaluation.judging.failures import NO_PROGRAM_CLASS
 
-    written = None if key in judged.stale else judged.completions.get(key)
+    written = judged.completions[key]
     data = completion_data(judged.row(key), written, judged.suite, ablated=judged.is_ablated)
     if as_json:
         print_json({**data, "ablation": judged.is_ablated})

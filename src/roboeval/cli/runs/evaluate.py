@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +10,6 @@ import typer
 
 from codebotler.cli.options import SkillsOption
 from codebotler.core.errors import installed
-from codebotler.core.text.words import counted
 from roboeval.cli.engine_choice import engine_named
 from roboeval.cli.inputs import command, load
 from roboeval.cli.options import (
@@ -182,21 +180,18 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
     """Add the answers from a batch endpoint to their run. Exit with status 1 if completions are missing."""
     with installed():
         from roboeval.evaluation.generating.batches import import_answers
-    from roboeval.evaluation.runs.completions import how_many, name_of
+    from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import RunFolder
 
     with path.open("rb") as file:
         count = sum(1 for _ in file)
     with progress_meter("reading", count) as update:
         found = import_answers(RunFolder(out), load(suite), path, progress=lambda done: update(done, ""))
-    there, again = found.total - len(found.missing), command("evaluate", out, suite=suite)
+    there, again = found.total - found.missing, command("evaluate", out, suite=suite)
     note(
         f"{there:,} of {how_many(found.total)} are in {out}, {found.new:,} of them new; `{again}` judges them"
     )
-    examples = {why: key for key, why in reversed([*found.missing.items()])}
-    for why, count in Counter(found.missing.values()).items():
-        note(f"{counted(count, 'request')} failed, such as {name_of(examples[why])}: {why}")
     if found.missing:
-        lacks = how_many(len(found.missing))
-        note(f"roboeval: {lacks} missing; `roboeval generate --requests` requests them again")
+        lacks = f"{how_many(found.missing)} missing: {found.why}"
+        note(f"roboeval: {lacks}; `roboeval generate --requests` requests them again")
         raise SystemExit(1)

@@ -15,7 +15,6 @@ from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.core.text.words import counted
 from roboeval.evaluation.judging.explanation import (
     LOWERCASED_NOTE,
-    PROGRAM_GONE,
     cut_sentence,
     error_sentence,
     failing_first,
@@ -28,7 +27,6 @@ from roboeval.evaluation.runs.replies import reply_facts
 from roboeval.suites.task import check_label, world_title
 
 MAX_EXPLANATION = 2_000  # characters
-ALL_GONE = "the judged programs are no longer in this run"
 ALL_STEPS = "--all shows what the robot did in satisfied worlds."
 SHOW_REPLY = "--reply shows them."
 SHOWN_REPLY_CHARACTERS = 100_000  # the most characters of a reply or its reasoning to print
@@ -47,8 +45,6 @@ def prompt_view(data: Mapping[str, Any]) -> RenderableType:
 def _program_line(program: Mapping[str, Any]) -> Text:
     same = len(program["indices"])
     often = Text(f"x{same:,}  " if same > 1 else "")
-    if program["gone"]:
-        often.append(f"{PROGRAM_GONE}\n", "yellow")
     if program["passed"]:
         return often.append("passed", "green")
     text = Text.assemble(often, kind_view(program["failure"]))
@@ -74,8 +70,7 @@ def completion_view(
     why_none = None if failure is None else no_program_sentence(failure)
     lines = {world["line"] for world in data["worlds"] if not world["satisfied"] and why_none is None}
     parts: list[RenderableType] = [_completion_head(data)]
-    if data["program"] is not None:
-        parts += [Text(), *_program(data["program"], lines)]
+    parts += [Text(), *_program(data["program"], lines)]
     parts += _reply(data["reply"], with_texts=with_reply)
     if why_none is not None:  # without a program, there are no steps to show
         return Group(*parts, Text(), Text(why_none, "red"))
@@ -100,8 +95,6 @@ def _completion_head(data: Mapping[str, Any]) -> Text:
     head.append_text(Text("passed", "green") if why is None else kind_view(why))
     if data["model"] is not None:
         head.append(f"\nwritten by {visible(data['model'])}{recorded_suffix([data['model']])}", "dim")
-    if data["program"] is None:
-        return head.append(f"\n{PROGRAM_GONE}", "yellow")
     origin, instruction = instruction_shown(data["instruction"], data["suite_instruction"])
     if origin is not None:
         head.append(f"\n{origin}", "dim")
@@ -182,8 +175,6 @@ def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
     if (prompt["requested"] or 0) > prompt["completions"]:
         score += f"; {prompt['requested']:,} were requested"
     head = Text.assemble((f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score)
-    if prompt["gone"] == prompt["completions"]:
-        return [head, Text(ALL_GONE, "yellow")]
     known: list[tuple[str | None, str | None]] = [(None, text) for text in prompt["instructions"]]
     lines = [head]
     for origin, text in known or [instruction_shown(None, prompt["suite_instruction"])]:

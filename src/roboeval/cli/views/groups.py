@@ -16,7 +16,6 @@ from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resample
 from roboeval.analysis.search import TraceMatch
 from roboeval.cli.views.completions import kind_view
 from roboeval.cli.views.results import ruled
-from roboeval.evaluation.judging.explanation import PROGRAM_GONE
 from roboeval.evaluation.runs.completions import CompletionKey, how_many, name_of
 from roboeval.evaluation.runs.scope import Coverage
 from roboeval.suites.task import check_label
@@ -72,8 +71,6 @@ def failure_group_view(group: FailureGroup) -> RenderableType:
     lines = [Text(f"such as {name}{world}", "dim")]
     check = group.failure["check"]
     lines.append(Text(shortened(f"{check_label(check)}: {group.why}" if check else group.why)))
-    if group.program is None:
-        lines.append(Text(PROGRAM_GONE, "yellow"))
     if (fix := group.fix) is not None:
         changed = f"{fix.changed} line{'s' * (fix.changed != 1)}"
         lines.append(Text(f"{visible(fix.name)} passes, and differs in {changed}:", "dim"))

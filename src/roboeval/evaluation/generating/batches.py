@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -34,7 +33,6 @@ from roboeval.suites.load import Suite
 
 BEGINNING = b'{"custom_id": '
 IDENTITY = ("model", "settings", "template", "suite")  # entries of run.json that identify a batch
-REQUEST_ID = re.compile(r"(?P<task>.+)/(?P<prompt>\d{1,9})/(?P<index>\d{1,9})/[0-9a-f]{8}", re.ASCII)
 
 
 def write_requests(
@@ -80,7 +78,8 @@ class ImportResult:
 
     new: int  # completions that the import added
     total: int  # completions that the run should have
-    missing: Mapping[CompletionKey, str] = field(repr=False)  # why each other completion is missing
+    missing: int
+    why: str  # an error message of a missing completion, if any request failed
 
 
 BatchAnswer: TypeAlias = tuple[CompletionKey, int, object]  # to which request, the status, and the body
@@ -117,15 +116,12 @@ def import_answers(
                 if refusal.is_refusal and key not in rows:
                     data = reply_of_refusal(refusal).data()
                     rows[key] = row_for(key, plan.instruction(key), about["model"], data)
-        missing = {
-            key: failed[key].sentence if key in failed else "not answered"
-            for key in expected
-            if key not in there and key not in rows
-        }
         with closing(Appender(run.completions)) as file:
             for row in [rows[key] for key in expected if key in rows]:
                 file.append(to_line(row))
-    return ImportResult(len(rows), len(expected), missing)
+    missing = [key for key in expected if key not in there and key not in rows]
+    reasons = (failed[key].sentence for key in missing if key in failed)
+    return ImportResult(len(rows), len(expected), len(missing), next(reasons, "they were not answered"))
 
 
 def _row(
@@ -173,16 +169,13 @@ def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> BatchAnswer:
     row = parse_row(line)
     if row is None:
         raise UserError("this line is not JSON; the file may be incomplete")
-    name = row.get("custom_id")
+    key, response, error = ids.get(str(row.get("custom_id"))), row.get("response"), row.get("error")
     if "response" not in row and "error" not in row:
-        what = "a request" if "method" in row else "not an answer from a batch endpoint"
-        raise UserError(f"this line is {what}; name the file with the answers")
-    if not isinstance(name, str) or name not in ids:
-        known = isinstance(name, str) and REQUEST_ID.fullmatch(name)
-        whose = "of another run or with other settings" if known else "that belongs to no run"
-        raise UserError(f"this line answers a request {whose}: {name!r}")
-    response, error = row.get("response"), row.get("error")
+        raise UserError("this line is not an answer from a batch endpoint; name the file with the answers")
+    if key is None:
+        name = repr(row.get("custom_id"))
+        raise UserError(f"this line answers a request of another run or with other settings: {name}")
     if not isinstance(response, dict):
-        return ids[name], 200, error
+        return key, 200, error
     status, body = response.get("status_code"), response.get("body")
-    return ids[name], status if isinstance(status, int) else 200, error if body is None else body
+    return key, status if isinstance(status, int) else 200, error if body is None else body

@@ -18,7 +18,6 @@ from roboeval.suites.load import Scenario, Suite
 
 INSTRUCTION_NOT_RECORDED = "instruction not recorded"
 OF_SUITE = "the suite's current prompt is:"
-PROGRAM_GONE = "the judged program is no longer in this run"
 SUITE_CHANGED = "the suite has changed since this was judged"
 TRACE_CUT = "the trace was too long to save, so this cannot be explained"
 TRACES_TOO_LONG = "the traces of this program are too long to explain this check"
@@ -43,13 +42,13 @@ def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dic
 
 
 def completion_data(
-    row: Mapping[str, Any], completion: Completion | None, suite: Suite | None, *, ablated: bool = False
+    row: Mapping[str, Any], completion: Completion, suite: Suite | None, *, ablated: bool = False
 ) -> dict[str, Any]:
     """Describe a completion: its instruction, its program, and the steps and failed checks in each world."""
     budget = ExplanationBudget()
     return {
         **{key: row[key] for key in (*KEY, "passed", "failure")},
-        **{key: getattr(completion, key, None) for key in ("model", "instruction", "program")},
+        **{key: getattr(completion, key) for key in ("model", "instruction", "program")},
         "suite_instruction": suite_instruction(suite, row["task"], row["prompt"]),
         "reply": reply_data(completion),
         "lowered": suite is not None and suite.settings.literals == "lowercase",

@@ -15,7 +15,6 @@ from codebotler.core.text.words import counted
 from codebotler.models.no_program import NO_PROGRAM_KINDS, NoProgram, classify_reply, is_cut_off
 from codebotler.prompts.extract import read_reply
 from roboeval.evaluation.runs.endings import ENDINGS
-from roboeval.evaluation.runs.rows import add_or_raise
 from roboeval.suites.load import Suite
 
 COMPLETIONS = "completions.jsonl"
@@ -156,11 +155,7 @@ def row_for(key: CompletionKey, instruction: str, model: str, more: Mapping[str,
 
 
 def read_completions(
-    path: str | PathLike[str],
-    suite: Suite | None = None,
-    *,
-    growing: bool = False,
-    faults: list[UserError] | None = None,
+    path: str | PathLike[str], suite: Suite | None = None, *, growing: bool = False
 ) -> Iterator[Completion]:
     """Read completions from a file of JSON lines.
 
@@ -168,24 +163,20 @@ def read_completions(
         path: the file.
         suite: the suite whose tasks and prompts are allowed; any by default.
         growing: whether to ignore an incomplete last line, because the file is still being written.
-        faults: a list that collects errors while invalid lines are skipped; by default, errors are raised.
 
     Raises:
         UserError: the file is missing or empty, or a row is invalid, unknown to the suite, or a duplicate.
     """
     path = Path(path)
     seen: dict[CompletionKey, int] = {}  # line numbers
-    try:
-        for number, line in read_lines(path):
-            try:
-                if line.strip() and (completion := _completion(line, suite, growing=growing)) is not None:
-                    _expect_new(completion.key, seen, number)
-                    yield completion
-            except UserError as error:
-                add_or_raise(UserError(error.sentence, file=path, line=number), faults)
-    except UserError as error:
-        add_or_raise(error, faults)
-    if not seen and faults is None:
+    for number, line in read_lines(path):
+        try:
+            if line.strip() and (completion := _completion(line, suite, growing=growing)) is not None:
+                _expect_new(completion.key, seen, number)
+                yield completion
+        except UserError as error:
+            raise UserError(error.sentence, file=path, line=number) from None
+    if not seen:
         raise UserError("contains no completion", file=path)
 
 

@@ -15,16 +15,15 @@ REPLY_TEXTS = ("reasoning", "raw_reply")
 MAX_RECORDED = 10**12  # tokens or seconds; larger numbers cannot be measurements
 
 
-def reply_data(completion: Completion | None) -> dict[str, Any] | None:
+def reply_data(completion: Completion) -> dict[str, Any] | None:
     """Return the information recorded about a completion's reply, or None if there is none.
 
     The entries are `finish_reason` in the server's words, `cut_off`, `input_tokens`, `output_tokens`,
     `reasoning_tokens`, `latency_s`, `reasoning` and `raw_reply`. Each may be None. A mission of an agent also
     has `mode`, `ending`, `turns` and `tool_errors`.
     """
-    more = {} if completion is None else completion.more
-    is_recorded = any(more.get(name) for name in ("finish_reason", "raw_reply", "reasoning", "ending"))
-    if completion is None or not is_recorded:
+    more = completion.more
+    if not any(more.get(name) for name in ("finish_reason", "raw_reply", "reasoning", "ending")):
         return None
     texts = {name: text if isinstance(text := more.get(name), str) else None for name in REPLY_TEXTS}
     return {

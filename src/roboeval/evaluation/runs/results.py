@@ -15,9 +15,15 @@ import polars as pl
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import UserError
 from roboeval.evaluation.generating.requests import requested_tasks
-from roboeval.evaluation.runs.completions import Completion, CompletionKey, read_completions
-from roboeval.evaluation.runs.folder import RunFolder, evaluation_of, load_json_object, selected_tasks
-from roboeval.evaluation.runs.rows import LocatedRow, Row, add_or_raise, key_of, read_checks, read_lines_of
+from roboeval.evaluation.runs.completions import Completion, CompletionKey
+from roboeval.evaluation.runs.folder import (
+    RunFolder,
+    about_of,
+    evaluation_of,
+    load_json_object,
+    selected_tasks,
+)
+from roboeval.evaluation.runs.rows import LocatedRow, Row, key_of, read_checks, read_lines_of, take_judged
 from roboeval.evaluation.runs.scope import Coverage, JudgingScope
 from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_answers, with_cost
 from roboeval.suites.load import ABLATED, Suite, load_suite
@@ -43,15 +49,16 @@ def load_results(
     Returns:
         A table sorted by completion and world. These columns repeat in all rows of a completion: `task`,
         `prompt`, `index`, `model`, `program_sha256`, `passed`, the first failure (`failure_class`,
-        `failure_kind`, `failure_world`, `failure_check`), `stale` (whether the run now has a different
-        program; then `instruction`, `program`, `no_program`, `finish_reason` and `cut_off` are null),
-        `input_tokens`, `output_tokens`, `reasoning_tokens`, `latency_s`, `cost` and `accepted` (whether the
-        check found no problem; null if the program was not checked). These columns describe a world:
+        `failure_kind`, `failure_world`, `failure_check`), `instruction`, `program`, `no_program`,
+        `finish_reason`, `cut_off`, `input_tokens`, `output_tokens`, `reasoning_tokens`, `latency_s`, `cost`
+        and `accepted` (whether the check found no problem; null if the program was not checked). These
+        columns describe a world:
         `world_number`, `world`, `satisfied`, `status`, `error_kind`, `error_message`, `line`, `failed_checks`
         (joined by "; "), `category` (of the first failed check) and `events`. Numbers count from 0.
 
     Raises:
-        UserError: the run or suite does not exist, the suite has not judged the run, or a file is damaged.
+        UserError: the run or suite does not exist, the suite has not judged the run, a file is damaged, or
+            a program has changed since it was judged.
     """
     known = load_suite(suite)
     table = read_results(*evaluation_of(Path(run), known, ablated=ablation)).table
@@ -67,12 +74,11 @@ class Results:
     suite: Suite | None  # the suite that judged, or None if it is not available
     manifest: Mapping[str, Any]  # the content of KEY.json
     about: Mapping[str, Any]  # the content of run.json
-    completions: Mapping[CompletionKey, Completion]  # the completions now in the run, in order
+    completions: Mapping[CompletionKey, Completion]  # all completions in the run, in order
     places: Mapping[CompletionKey, tuple[int, int]] = field(
         repr=False
     )  # the offset and size of each row in the file, in bytes
     table: pl.DataFrame  # the table that `load_results` returns
-    faults: tuple[UserError, ...] = ()
 
     @cached_property
     def passed(self) -> Sequence[CompletionKey]:
@@ -83,11 +89,6 @@ class Results:
     def failed(self) -> Sequence[CompletionKey]:
         """Return the completions that failed."""
         return keys_where(self.table, ~pl.col("passed"))
-
-    @cached_property
-    def stale(self) -> Sequence[CompletionKey]:
-        """Return the completions whose programs have changed since the evaluation."""
-        return keys_where(self.table, pl.col("stale"))
 
     @property
     def known_suite(self) -> Suite:
@@ -120,9 +121,8 @@ class Results:
 
     @property
     def programs(self) -> Mapping[CompletionKey, str]:
-        """Return the judged programs that are still in the run."""
-        stale = set(self.stale)
-        return {key: c.program for key, c in self.completions.items() if key not in stale}
+        """Return the programs of all completions."""
+        return {key: completion.program for key, completion in self.completions.items()}
 
     def row(self, key: CompletionKey) -> Row:
         """Read a row from the file, with all its traces. Raise UserError if the file was replaced."""
@@ -150,7 +150,6 @@ def read_results(
     *,
     task: str | None = None,
     reuse_from: Results | None = None,
-    faults: list[UserError] | None = None,
     progress: ShowProgress = lambda lines, _: lines,
 ) -> Results:
     """Read an evaluation of a run. Each file is read once.
@@ -161,24 +160,24 @@ def read_results(
         suite: the suite that judged the run, or None if it is not available.
         task: the only task whose rows are read, by default all tasks.
         reuse_from: another evaluation of the same run whose completions can be reused.
-        faults: a list that collects errors in files, which are raised by default.
         progress: a function that passes rows through and shows progress.
     """
     if reuse_from:
         about, completions = reuse_from.about, reuse_from.completions
     else:
-        about, completions = read_written(run, faults)
-    manifest = {} if key is None else _load_or_add_fault(run.manifest(key), faults)
+        about, completions = about_of(run), _read_completions(run)
+    manifest = {} if key is None else load_json_object(run.manifest(key))
     selected = selected_tasks(manifest) if task is None else {task}
     total = sum(selected is None or name in selected for name, _, _ in completions)
-    builder = TableBuilder(completions, _categories(suite))
+    builder, left = TableBuilder(_categories(suite)), dict(completions)
     places: dict[CompletionKey, tuple[int, int]] = {}
     rows = run.rows(key or "")
-    lines = iter(()) if key is None else read_lines_of(rows, manifest, task=task, faults=faults)
+    lines = iter(()) if key is None else read_lines_of(rows, manifest, task=task)
     for line in progress(lines, total):
-        builder.add(line.row)
+        builder.add(line.row, take_judged(left, line, rows))
         places[key_of(line.row)] = line.at, line.size
-    problems = _problems(run, key, faults)
+    checks = run.checks((key or "").removesuffix(ABLATED))
+    problems = dict(read_checks(checks)) if checks.is_file() else {}
     return Results(
         run=run,
         key=key,
@@ -187,7 +186,6 @@ def read_results(
         about=about,
         completions=completions,
         places=places,
-        faults=tuple(faults or ()),
         table=with_answers(builder.table(), problems) if problems else builder.table(),
     )
 
@@ -202,29 +200,7 @@ def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:
     }
 
 
-def _problems(
-    run: RunFolder, key: str | None, faults: list[UserError] | None
-) -> Mapping[tuple[str, str], Sequence[str]]:
-    path = run.checks((key or "").removesuffix(ABLATED))
-    try:
-        return dict(read_checks(path)) if path.is_file() else {}
-    except UserError as error:
-        add_or_raise(error, faults)
+def _read_completions(run: RunFolder) -> dict[CompletionKey, Completion]:
+    if not run.completions.exists() or not run.completions.stat().st_size:  # a run that has just begun
         return {}
-
-
-def read_written(
-    run: RunFolder, faults: list[UserError] | None
-) -> tuple[Mapping[str, Any], Mapping[CompletionKey, Completion]]:
-    """Read the run.json and the completions of a run."""
-    about = _load_or_add_fault(run.about, faults) if run.about.exists() else {}
-    completions = read_completions(run.completions, growing=True, faults=faults)
-    return about, {(sys.intern(one.task), one.prompt, one.index): one for one in completions}
-
-
-def _load_or_add_fault(path: Path, faults: list[UserError] | None) -> Mapping[str, Any]:
-    try:
-        return load_json_object(path)
-    except UserError as error:
-        add_or_raise(error, faults)
-        return {}
+    return {(sys.intern(one.task), one.prompt, one.index): one for one in run.read()}

@@ -14,6 +14,7 @@ import msgspec
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_lines, read_rows, to_line
 from codebotler.core.trace import Status
+from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of
 
 MAX_LINE_BYTES = 1_000_000_000  # enough for a row with very many worlds
 NO_ROW = "this line is not an evaluation row"
@@ -91,14 +92,7 @@ class Row(TypedDict):
     verdicts: list[WorldVerdict]
 
 
-def add_or_raise(fault: UserError, faults: list[UserError] | None) -> None:
-    """Append an error to the list, or raise it if there is no list."""
-    if faults is None:
-        raise fault from None
-    faults.append(fault)
-
-
-def key_of(row: Mapping[str, Any]) -> tuple[str, int, int]:
+def key_of(row: Mapping[str, Any]) -> CompletionKey:
     """Return the task, prompt and index of a row."""
     return row["task"], row["prompt"], row["index"]
 
@@ -156,17 +150,12 @@ class LocatedRow:
 
 
 def read_lines_of(
-    path: Path,
-    manifest: Mapping[str, Any],
-    *,
-    seal: Seal | None = None,
-    task: str | None = None,
-    faults: list[UserError] | None = None,
+    path: Path, manifest: Mapping[str, Any], *, seal: Seal | None = None, task: str | None = None
 ) -> Iterator[LocatedRow]:
-    """Read the rows of all tasks, or of one task. Ignore an incomplete last line, and add or raise faults."""
+    """Read the rows of all tasks, or of one task. Ignore an incomplete last line."""
     name = b"" if task is None else to_line(task).removesuffix(b"\n")
     seal = seal or Seal()
-    at, is_reported = 0, False
+    at = 0
     for number, line in read_lines(path, limit=MAX_LINE_BYTES):
         seal.add(line)
         try:
@@ -175,11 +164,25 @@ def read_lines_of(
         except UserError as error:
             if not line.endswith(b"\n"):
                 break
-            add_or_raise(UserError(f"{error.sentence}; --redo starts over", file=path, line=number), faults)
-            is_reported = True
+            raise UserError(f"{error.sentence}; --redo starts over", file=path, line=number) from None
         at += len(line)
-    if seal.is_broken(manifest) and not is_reported:
-        add_or_raise(UserError(f"{BROKEN}; --redo starts over", file=path), faults)
+    if seal.is_broken(manifest):
+        raise UserError(f"{BROKEN}; --redo starts over", file=path)
+
+
+def take_judged(left: dict[CompletionKey, Completion], line: LocatedRow, file: Path) -> Completion:
+    """Remove the completion that a row judges from `left`, and return it.
+
+    Raises UserError if the completion is not there, since an evaluation must fit the run's completions.
+    """
+    key = key_of(line.row)
+    completion = left.pop(key, None)
+    if completion is not None and completion.program_sha256 == line.row["program_sha256"]:
+        return completion
+    sentence = f"this row judges {name_of(key)}, which is not in the run, or which an earlier row judges"
+    if completion is not None:
+        sentence = f"the program of {name_of(key)} has changed since it was judged"
+    raise UserError(f"{sentence}; --redo starts over", file=file, line=line.number)
 
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:

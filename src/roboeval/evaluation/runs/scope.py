@@ -34,8 +34,6 @@ class Coverage:
 
     def __str__(self) -> str:
         """Format the coverage, such as `3,900 of 4,000 completions (50 missing, 50 not judged)`."""
-        if self.judged > self.total:
-            return f"{how_many(self.judged)}, but only {self.there:,} of them are still in the run"
         lacks = {"missing": self.total - self.there, "not judged": self.there - self.judged}
         said = ", ".join(f"{count:,} {what}" for what, count in lacks.items() if count > 0)
         return f"{self.judged:,} of {how_many(self.total)}{f' ({said})' if said else ''}"

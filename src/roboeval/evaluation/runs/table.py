@@ -30,7 +30,6 @@ COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "failure_kind": pl.String,
     "failure_world": pl.Int64,
     "failure_check": pl.String,
-    "stale": pl.Boolean,
     "instruction": pl.String,
     "program": pl.String,
     "no_program": pl.String,
@@ -113,10 +112,9 @@ class TableBuilder:
 
     def __init__(
         self,
-        completions: Mapping[CompletionKey, Completion] = {},  # the completions now in the run
         categories: Mapping[tuple[str, str], str] = {},  # of requirements, by task and requirement text
     ) -> None:
-        self._completions, self._categories = completions, categories
+        self._categories = categories
         self._frame = pl.DataFrame(schema={**COMPLETION_COLUMNS, **WORLD_COLUMNS})
         self._start()
 
@@ -125,18 +123,16 @@ class TableBuilder:
         self._worlds: list[tuple[Any, ...]] = []
         self._counts: list[int] = []
 
-    def add(self, row: Row) -> None:
-        """Add a completion with its verdict in each world."""
+    def add(self, row: Row, written: Completion | None = None) -> None:
+        """Add the verdict in each world on a completion, which tells more if it is given."""
         if len(self._worlds) >= CHUNK_ROWS:
             self._store()
-        key, program = key_of(row), row["program_sha256"]
-        written = self._completions.get(key)
-        is_stale = written is None or written.program_sha256 != program
-        judged = {"program_sha256": program, "passed": row["passed"], "stale": is_stale}
+        key = dict(zip(KEY, key_of(row), strict=True))
+        judged = {**key, "program_sha256": row["program_sha256"], "passed": row["passed"]}
         failure = {f"failure_{name}": value for name, value in (row["failure"] or {}).items()}
-        known = {} if written is None else _reply(written) | ({} if is_stale else _texts(written))
+        known = {} if written is None else _reply(written) | _texts(written)
         # Columns without an entry are null.
-        self._rows.append({**dict(zip(KEY, key, strict=True)), **judged, **failure, **known})
+        self._rows.append({**judged, **failure, **known})
         self._counts.append(len(row["verdicts"]))
         for number, verdict in enumerate(row["verdicts"]):
             checks, error = verdict["failed_checks"], verdict["error"]

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+
+import msgspec
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line
-from codebotler.models.base import Reply, Usage
-from codebotler.prompts.tools import ToolCall
+from codebotler.models.base import Reply
 from roboeval.evaluation.runs.completions import KEY, CompletionKey
 from roboeval.evaluation.runs.rows import key_of
 
@@ -24,8 +24,8 @@ class TurnLog:
         for number, row in read_rows(path, growing=True) if path.exists() else ():
             try:
                 if (key := key_of(row)) not in done:
-                    self._replies.setdefault(key, []).append(_reply_from(row["reply"]))
-            except (KeyError, TypeError):
+                    self._replies.setdefault(key, []).append(msgspec.convert(row["reply"], Reply))
+            except (KeyError, TypeError, msgspec.ValidationError):
                 sentence = "this line is not a turn; name another folder"
                 raise UserError(sentence, file=path, line=number) from None
         self._file = Appender(path)
@@ -47,8 +47,3 @@ class TurnLog:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-
-def _reply_from(data: Mapping[str, Any]) -> Reply:
-    calls = tuple(ToolCall(**one) for one in data["calls"])
-    return Reply(**{**data, "usage": Usage(**data["usage"]), "calls": calls})

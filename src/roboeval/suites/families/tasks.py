@@ -16,7 +16,6 @@ from pydantic import Field
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
-from codebotler.core.program import Flaw, parse_program
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.text.words import listed
 from codebotler.core.world_file import Name, YamlText
@@ -32,7 +31,6 @@ FAMILY_FOLDER = Path(__file__).parent
 TRAINING_SUITE, TRAINING_WORLDS = "training", 8
 NUMBER_WORDS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 SEVERAL_WORDS = re.compile(r"(\d+) (\w+)")  # several distinct words from a pool, such as `3 rooms`
-RESERVED_MARKS = frozenset("${}|")
 NUMBER_RANGE = re.compile(r"(\d+) to (\d+)")
 SYNONYMS = re.compile(r"\{([^{}]*\|[^{}]*)\}")  # a choice of synonyms, such as {look|see}
 
@@ -162,7 +160,6 @@ def _generate(family: str, seed: int, worlds: int) -> TrainedTask:
     path = template.path
     file = YamlFile(_fill(template.text, chosen, path), path)
     form = file.validate(FamilyFile)
-    _expect_python(form, file)
     name = f"{path.stem}-{seed}"
     content = {"name": name, **form.task}
     if isinstance(content.get("prompts"), list):  # `read_task` reports invalid prompts
@@ -207,8 +204,6 @@ def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
         if len(left) < count:
             raise file.wrong(f"only {len(left)} words are left, but {count} are needed", "choose", name)
         some = random.sample(left, count)
-        if any(RESERVED_MARKS.intersection(word) for word in some):
-            raise file.wrong("a word contains $, {, } or |, which are reserved; replace them", "choose", name)
         used.update(some)
         return some
 
@@ -254,19 +249,11 @@ def _list(name: str, words: list[str]) -> Iterator[tuple[str, str]]:
 
 def _fill(text: str, chosen: Mapping[str, str], path: Path) -> str:
     for match in Template.pattern.finditer(text):
-        name = match["named"] or match["braced"]
-        if match["escaped"] is None and name not in chosen:
-            what = "a dollar sign has no name" if name is None else f'"${name}" has no entry in choose'
+        if match["escaped"] is None and (match["named"] or match["braced"]) not in chosen:
             line = text.count("\n", 0, match.start()) + 1
-            raise UserError(f"{what}; write $$ for a dollar sign", file=path, line=line)
+            sentence = f'"{match[0]}" has no entry in choose; write $$ for a dollar sign'
+            raise UserError(sentence, file=path, line=line)
     return Template(text).substitute(chosen)
-
-
-def _expect_python(form: FamilyFile, file: YamlFile) -> None:
-    wrong = [(one.program, ("wrong", number, "program")) for number, one in enumerate(form.wrong)]
-    for program, place in ((form.solution, ("solution",)), *wrong):
-        if isinstance(flaw := parse_program(program), Flaw):
-            raise file.wrong(f"this program is not valid Python: {flaw.message}", *place)
 
 
 def _phrasings(template: _Template, chosen: Mapping[str, str], random: Random) -> Iterator[Any]:

@@ -25,7 +25,7 @@ export default {
                 <span role="cell" class="verdict-cell"><b :class="lookOf(row.one)" dir="auto">{{ verdict(row.one) }}</b></span>
                 <span role="cell" class="worlds"><span role="img" :aria-label="worlds(row.one)" :title="worlds(row.one)">
                   <i v-for="sign in signs(row.one)" :class="sign[0]">{{ sign[1] }}</i></span></span>
-                <span role="cell" class="why" dir="auto">{{ row.one.stale ? "Changed since it was judged. " : "" }}{{ row.one.why }}</span>
+                <span role="cell" class="why" dir="auto">{{ row.one.why }}</span>
               </template>
               <span v-else role="cell" class="quiet">…</span>
             </div>

@@ -276,7 +276,7 @@ def test_rows_that_judge_a_completion_again_are_refused(tmp_path: Path, paper: S
     judged(run, paper)
     path = run.rows("paper")
     path.write_bytes(2 * path.read_bytes())
-    with pytest.raises(UserError, match="a second time") as error:
+    with pytest.raises(UserError, match="an earlier row judges") as error:
         judged(run, paper)
     assert (error.value.file, error.value.line) == (path, 2)
 

@@ -52,7 +52,6 @@ def test_reply_is_told_with_its_tokens() -> None:
 def test_rows_of_earlier_versions_show_nothing_of_it(more: dict[str, Any]) -> None:
     completion = replace(WRITTEN, more=more)
     assert reply_data(completion) is None
-    assert reply_data(None) is None
     assert "--reply" not in view(completion, ("PythonError", "NameError"))
 
 

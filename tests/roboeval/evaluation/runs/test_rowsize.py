@@ -27,6 +27,7 @@ from roboeval.suites.load import Suite, load_suite
 
 WORLD = World(rooms=(Room("start"),), robot="start", about="nobody is in")
 LOUD = (Event("goto", "start"), *[Event("say", "\x00\x1b" * 4_999)] * 98)
+WRITTEN = Completion(task="T", prompt=0, index=0, program="x = 1")
 WORDY = Completion(task="T" * 250, prompt=999_999_999, index=999_999_999, program="x = 1")
 
 
@@ -107,19 +108,19 @@ def cut_row(suite: Suite) -> Row:
     verdicts = [
         Verdict(s.world.about, o, s.require, satisfied=False) for s, o in zip(scenarios, ended, strict=True)
     ]
-    return row_of(Completion(task="T", prompt=0, index=0, program="x = 1"), judgement(verdicts))
+    return row_of(WRITTEN, judgement(verdicts))
 
 
 def test_a_cut_trace_is_said_and_not_explained(suite: Suite) -> None:
     one = cut_row(suite)
-    first, second = completion_data(one, None, suite)["worlds"]
+    first, second = completion_data(one, WRITTEN, suite)["worlds"]
     assert first["cut"] == one["verdicts"][0]["cut"]
     assert "cut" not in second
     assert "too long" in first["failed_checks"][0]["explanation"]
     assert "never said" in second["failed_checks"][0]["explanation"]
     console = Console(width=100)
     with console.capture() as shown:
-        console.print(completion_view(completion_data(one, None, suite)))
+        console.print(completion_view(completion_data(one, WRITTEN, suite)))
     assert f"{first['cut']['events']} more steps" in shown.get()
 
 

@@ -77,7 +77,6 @@ def test_each_world_of_a_completion_is_a_row() -> None:
         "failure_kind": "GoToInvalidLocation",
         "failure_world": 1,
         "failure_check": None,
-        "stale": False,
         "instruction": None,
         "program": PROGRAM,
         "no_program": None,
@@ -108,20 +107,17 @@ def test_each_world_of_a_completion_is_a_row() -> None:
     assert frame["failed_checks"].to_list() == [None, None, 'visits; not greets("amy")']
 
 
-def test_replies_are_in_the_table_unless_the_program_has_changed() -> None:
+def test_replies_are_in_the_table() -> None:
     more = {"no_program": "cut-off", "finish_reason": "length", "usage": {"reasoning_tokens": 7}}
     said = replace(COMPLETION, instruction="Visit her.", more=more)
     names = ["instruction", "program", "no_program", "finish_reason", "cut_off", "reasoning_tokens"]
     (told, *_) = table([ROW], [said]).select(names).rows()
     assert told == ("Visit her.", PROGRAM, "cut-off", "length", True, 7)
-    other = {**ROW, "program_sha256": "0" * 64}
-    (told, *_) = table([other], [said]).select(names[:-1]).rows()
-    assert told == (None,) * 5
 
 
 def test_a_passed_row_without_its_completion_has_empty_cells() -> None:
     frame = table([{**row(verdict("in")), "passed": True, "failure": None}], [])
-    assert frame.select("model", "failure_class", "line", "stale").row(0) == (None, None, None, True)
+    assert frame.select("model", "failure_class", "line").row(0) == (None, None, None)
 
 
 def test_no_rows_are_an_empty_table_with_all_columns(tmp_path: Path) -> None:
@@ -149,9 +145,8 @@ def test_the_bytes_of_a_csv(tmp_path: Path) -> None:
     write_table(table([row(verdict("in"))], []), tmp_path / "t", "csv")
     (line,) = (tmp_path / "t").read_bytes().splitlines()[1:]
     assert line.startswith(b"Visit,1,2,,")
-    assert line.endswith(
-        b",false,RobotExecutionError,GoToInvalidLocation,0,,true,,,,,,,,,,,,,,,,,0,in,true,finished,,,,,,1"
-    )
+    assert b",false,RobotExecutionError,GoToInvalidLocation,0,,," in line
+    assert line.endswith(b",,program,,,1,,,,0,in,true,finished,,,,,,1")
 
 
 @pytest.mark.parametrize("message", ["=cmd()", "+1", "-1", "@x", "\t=1", "\r=1", "\n=1"])
