@@ -181,11 +181,10 @@ def connect(
         bool, typer.Option("--discover", help="Explore what the robot's nodes offer.")
     ] = False,
     out: Annotated[Path | None, typer.Option(help="Write the draft to a new file.", metavar="FILE")] = None,
-    robot: Annotated[str, typer.Option(help="The robot's version of ROS: ros2 or ros1.")] = "ros2",
     address: options.AddressOption = "",
     ros_python: options.RosPythonOption = options.DEFAULT_ROS_PYTHON,
 ) -> None:
-    """Draft a file for --connect from what a robot's nodes offer.
+    """Draft a file for --connect from a robot's nodes on ROS 2.
 
     Comments in the draft list what is missing, and what else the robot offers.
     """
@@ -197,7 +196,7 @@ def connect(
     if not discover:
         raise UserError("add --discover, which explores the robot and drafts a file for --connect")
     with busy("exploring the robot"):
-        text = draft_connection(robot, discover_offers(robot, address, ros_python))
+        text = draft_connection(discover_offers(address, ros_python))
     if out is None:
         print_source(text)
     else:
