@@ -172,7 +172,7 @@ class Motor(PathExecutor):
         speed, began = self.clock.speed, self.clock.now
         way = get_constant_speed_trajectory(path, METRES_PER_SECOND, RADIANS_PER_SECOND)
         if speed is not None:
-            way = interpolate_trajectory(way, max(STEP_SECONDS * speed, 1e-3))
+            way = interpolate_trajectory(way, max(STEP_SECONDS * speed, 0.01))
         last, due, arrived = "", 0.0, False
         self.following_path = True
         for moment, pose in zip(map(float, way.t_pts), way.poses, strict=True):
