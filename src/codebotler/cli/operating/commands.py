@@ -255,12 +255,6 @@ def serve_page(
 def virtual_robot(
     world: Annotated[Path, typer.Option(help="The world file for the simulated robot.")],
     ros: Annotated[int, typer.Option(min=1, max=2, help="The version of ROS.")] = 1,
-    port: Annotated[
-        int | None,
-        typer.Option(
-            min=1, max=65535, help="The port of the ROS master; by default that of ROS_MASTER_URI, or 11311."
-        ),
-    ] = None,
     speed: Annotated[
         float, typer.Option(help="The speed of the robot's clock as a multiple of real time, such as 20.")
     ] = 1.0,
@@ -271,7 +265,7 @@ def virtual_robot(
 ) -> None:
     """Offer a simulated robot's skills on ROS 1 or 2.
 
-    On ROS 1, it starts a master if none responds. Ctrl-C ends the command.
+    On ROS 1, it starts a master if none responds at ROS_MASTER_URI. Ctrl-C ends the command.
     """
     from contextlib import suppress
 
@@ -285,7 +279,7 @@ def virtual_robot(
 
     table = skills_from(*(skills or ()))
     known = read_world(world, table)
-    robot = VirtualRobot(known, speed=speed, ros=ros, port=port, python=ros_python, show=show, skills=table)
+    robot = VirtualRobot(known, speed=speed, ros=ros, python=ros_python, show=show, skills=table)
     try:
         started = robot.start()
         what = "a ROS master was started at" if started else "joined the ROS master at"
