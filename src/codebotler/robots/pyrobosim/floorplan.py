@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import shapely
 from shapely.geometry import LineString, MultiPoint, Point, Polygon, box
-from shapely.geometry.polygon import orient
 from shapely.ops import nearest_points
 
 from codebotler.core.world import HALLWAY, ROOM_DEPTH, World, laid_out
@@ -62,11 +61,10 @@ class Floorplan:
     tables: tuple[XY | None, ...]  # the centre of the table in each room, or None
 
     def corners(self, number: int) -> list[XY]:
-        """Return the corners of a floor's free space at which a shortest path may turn."""
+        """Return the corners of a floor's free space, at which a shortest path may turn."""
         table = self.tables[number] if number < len(self.tables) else None
-        space = orient(_without(_free(self.floors[number]), table))
-        rings = (space.exterior, *space.interiors)
-        return [corner for ring in rings for corner in _right_turns(ring.coords[:-1])]
+        space = _without(_free(self.floors[number]), table)
+        return [corner for ring in (space.exterior, *space.interiors) for corner in ring.coords[:-1]]
 
 
 def plan_floor(world: World) -> Floorplan:
@@ -133,13 +131,6 @@ def _table_area(centre: XY, margin: float = 0.0) -> Polygon:
 
 def _without(free: Polygon, table: XY | None) -> Polygon:
     return free if table is None else free.difference(_table_area(table, ROBOT_RADIUS))
-
-
-def _right_turns(ring: Sequence[XY]) -> Iterator[XY]:
-    """Yield the corners at which a ring that has the free space on its left turns right."""
-    for (ax, ay), (bx, by), (cx, cy) in zip(ring, [*ring[1:], ring[0]], [*ring[2:], *ring[:2]], strict=True):
-        if (bx - ax) * (cy - by) - (by - ay) * (cx - bx) < 0:
-            yield bx, by
 
 
 def _passages(floors: Sequence[Polygon], stands: Sequence[Point]) -> list[Passage]:
