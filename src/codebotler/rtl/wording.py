@@ -53,14 +53,12 @@ def describe_action(
     elif means is not None:
         done = f"{getattr(verb(element.kind), form)} {means}"
     elif element.mention and not is_open:
-        mentioned = _quote_choices(element.text) or _describe_thing(element.text, thing)
-        done = f"{_MENTIONS[form]} {mentioned} in a question"
-    elif verb(element.kind).object:
-        doing = verb(element.kind)
-        wanted = [_describe_part(text, thing) for text in (element.text, *element.more)]
-        done = doing.with_object(getattr(doing, form), [*wanted, *[thing] * doing.object.count("{")], "")
+        done = f"{_MENTIONS[form]} {_name_or_describe(element.text, thing)} in a question"
     else:
-        done = f"{getattr(verb(element.kind), form)} {_describe_object(element, thing)}"
+        doing = verb(element.kind)
+        more = [_name_or_describe(text, thing) for text in element.more]
+        wanted = [_describe_object(element, thing), *more, *[thing] * doing.object.count("{")]
+        done = doing.with_object(getattr(doing, form), wanted, "")
     return f"{done.rstrip()}{_describe_details(element, means)}{when}{where}"
 
 
@@ -68,8 +66,6 @@ def _describe_details(element: EventPattern, means: str | None) -> str:
     more = ""
     if element.options is not None and means is None and not is_any(element.options):
         more += f" offering an option {describe_text(element.options)}"
-    if element.more and not verb(element.kind).object:
-        more += f", {listed([*filter(None, map(describe_text, element.more))])}".rstrip(", ")
     if element.found is not None and element.kind != CHECK:
         more += f' with the result "{verb(element.kind).results[element.found]}"'
     if element.to is not None:
@@ -88,20 +84,17 @@ def is_clear(element: EventPattern) -> bool:
     return all(text is None or _UNCLEAR not in _qualities(text) for text in needed)
 
 
-def _describe_part(text: TextPattern, thing: str) -> str:
-    named = _quote_choices(text)
-    if isinstance(text, Regex) and named and text.pattern.startswith("^"):
-        return named.strip('"')
-    return named or _describe_thing(text, thing)
-
-
 def _describe_object(element: EventPattern, thing: str) -> str:
     if not element.has_text:
         return ""
     if element.kind in {GOTO, INSIDE}:
         return room(element.text, "any" if thing == "anything" else "a")
-    named = "" if is_spoken(element.kind) else _quote_choices(element.text)
-    return named or _describe_thing(element.text, thing)
+    describe = _describe_thing if is_spoken(element.kind) else _name_or_describe
+    return describe(element.text, thing)
+
+
+def _name_or_describe(text: TextPattern, thing: str) -> str:
+    return _quote_choices(text) or _describe_thing(text, thing)
 
 
 def _describe_thing(text: TextPattern, thing: str) -> str:
