@@ -70,7 +70,7 @@ def on_a_graph() -> Iterator[tuple[VirtualRobot, Robot]]:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    virtual = VirtualRobot(WORLD, speed=None, port=port)
+    virtual = VirtualRobot(WORLD, speed=None, address=f"http://localhost:{port}")
     robot = open_robot("ros1", Options(address=virtual.address))
     try:
         virtual.start()

@@ -120,7 +120,7 @@ class Server(VirtualRobot):
     heard = ended = 0.0
 
     def __init__(self, port: int) -> None:
-        super().__init__(WORLD, port=port, show=self._note)
+        super().__init__(WORLD, address=f"http://localhost:{port}", show=self._note)
         self.drives = threading.Event()
 
     def _note(self, what: str) -> None:

@@ -58,7 +58,7 @@ def table_(tmp_path: Path) -> SkillTable:
 
 @pytest.fixture(params=["ros1", "rosbridge"], name="robot")
 def robot_(request: pytest.FixtureRequest, graph: Graph, table: SkillTable) -> Iterator[RosRobot]:
-    virtual = VirtualRobot(World((Room("hall"),), "hall"), speed=None, port=graph.port, skills=table)
+    virtual = VirtualRobot(World((Room("hall"),), "hall"), speed=None, address=graph.uri, skills=table)
     virtual.start()
     waits = Timeouts(patience=10.0, silence=5.0, longest=20.0)
     if request.param == "ros1":

@@ -35,7 +35,7 @@ SPEED = 200.0  # of the virtual robot's clock, so that it drives at 100 m/s
 
 @pytest.fixture
 def virtual(graph: Graph) -> Iterator[VirtualRobot]:
-    virtual = VirtualRobot(WORLD, speed=None, port=graph.port)
+    virtual = VirtualRobot(WORLD, speed=None, address=graph.uri)
     assert not virtual.start()
     yield virtual
     virtual.stop()
@@ -59,7 +59,7 @@ def test_it_does_on_the_graph_what_the_simulated_robot_does(graph: Graph) -> Non
 
 
 def test_it_stops_and_goes_on_where_it_was(graph: Graph) -> None:
-    virtual = VirtualRobot(WORLD, speed=1.0, port=graph.port)
+    virtual = VirtualRobot(WORLD, speed=1.0, address=graph.uri)
     virtual.start()
     robot = graph.robot(skills=SKILLS)
     robot.connect()
@@ -92,7 +92,7 @@ def test_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
     simulated = list(run(zip(programs, worlds, strict=True), workers=1, settings=SIMULATION))
     assert len(tasks) == 8
 
-    virtual = VirtualRobot(worlds[0], speed=SPEED, port=graph.port)
+    virtual = VirtualRobot(worlds[0], speed=SPEED, address=graph.uri)
     virtual.start()
     robot = graph.robot(skills=SKILLS, speed=SPEED)
     worker = Worker()
@@ -115,7 +115,7 @@ def test_taken_port_and_distant_master_are_said() -> None:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
         with pytest.raises(NotReadyError, match=f"port {port} .*not a ROS master"):
-            VirtualRobot(WORLD, port=port).start()
+            VirtualRobot(WORLD, address=f"http://localhost:{port}").start()
 
 
 def test_master_elsewhere_is_never_started(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,7 +126,7 @@ def test_master_elsewhere_is_never_started(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_second_virtual_robot_is_refused(graph: Graph, virtual: VirtualRobot) -> None:
     with pytest.raises(NotReadyError, match="node /virtual_robot at http"):
-        VirtualRobot(WORLD, port=graph.port).start()
+        VirtualRobot(WORLD, address=graph.uri).start()
     assert virtual._worker is not None
     assert virtual._worker.receive(0) is None
 
@@ -143,11 +143,15 @@ def test_command_starts_a_master_that_ends_with_it(tmp_path: Path) -> None:
     world.write_text(WORLD.to_yaml())
     command = [sys.executable, "-m", "codebotler", "virtual-robot", "--world", str(world)]
     process = subprocess.Popen(
-        [*command, "--port", str(port), "--speed", "100"],
+        [*command, "--speed", "100"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2] / "src")},
+        env={
+            **os.environ,
+            "PYTHONPATH": str(Path(__file__).parents[2] / "src"),
+            "ROS_MASTER_URI": f"http://localhost:{port}",
+        },
     )
     assert process.stderr is not None
     assert re.search(rf"ROS master .*http://localhost:{port}\b.*Ctrl-C", process.stderr.readline())

@@ -28,8 +28,6 @@ def look(handle: Any) -> Any:
     label = handle.request.object
     if label == "late":
         threading.Timer(0.2, show, [8]).start()
-    elif label == "huge":
-        show(3_000_000)
     elif label == "three":
         for _ in range(3):
             show(8)

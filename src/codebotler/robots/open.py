@@ -25,8 +25,8 @@ from codebotler.robots.face import Face, RobotWithFace, without_speech
 from codebotler.robots.own import OwnRobot, is_own
 
 ROBOT_KINDS = {
-    "sim": "simulated:robot",
-    "pyrobosim": "pyrobosim.robot:robot",
+    "sim": "simulated:Simulated.open",
+    "pyrobosim": "pyrobosim.robot:Pyrobosim.open",
     "ros1": "ros.kinds:ros1",
     "rosbridge": "ros.kinds:rosbridge",
     "ros2": "ros.kinds:ros2",

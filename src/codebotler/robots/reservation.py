@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fcntl
-import json
 import os
 import socket
 import stat
@@ -73,20 +72,14 @@ class Reservation:
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
+            holder = os.pread(self._lock, 1_000, 0).decode(errors="replace")
             raise NotReadyError(
-                f"{self._holder()} is using the robot {self.robot.name}; wait until its mission has ended, "
-                "or stop it there"
+                f"another tool ({holder or 'just started'}) is using the robot {self.robot.name}; wait until "
+                "its mission has ended, or stop it there"
             ) from None
-        holder = {"process": os.getpid(), "since": f"{datetime.now().astimezone():%H:%M:%S}"}
         os.truncate(self._lock, 0)
-        os.pwrite(self._lock, json.dumps(holder).encode(), 0)
-
-    def _holder(self) -> str:
-        try:
-            holder = json.loads(os.pread(self._lock, 1_000, 0))
-            return f"another tool (process {holder['process']}, since {holder['since']})"
-        except ValueError:  # the other process is still writing its name
-            return "another tool"
+        holder = f"process {os.getpid()}, since {datetime.now().astimezone():%H:%M:%S}"
+        os.pwrite(self._lock, holder.encode(), 0)
 
 
 def robot_file(robot: str, address: str, kind: str) -> Path:

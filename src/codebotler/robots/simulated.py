@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
+from typing import Self
 
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.paper import SKILLS
@@ -47,7 +48,6 @@ class Simulated:
         world: the world that the robot works in.
         speed: the robot's clock seconds per real second, or None to skip all waits.
         skills: the skills that programs may call.
-        metres_per_second: the driving speed, above 0. Infinity makes drives instantaneous.
 
     Raises:
         UserError: the speed is out of range.
@@ -57,19 +57,18 @@ class Simulated:
     if_tool_dies, rooms_are_regexes = "the simulated robot ended as well", True
     missing: Mapping[str, str] = MappingProxyType({})
 
-    def __init__(
-        self,
-        world: World,
-        *,
-        speed: float | None = 1.0,
-        skills: SkillTable = SKILLS,
-        metres_per_second: float = METRES_PER_SECOND,
-    ) -> None:
-        self.skills, self.clock = skills, Clock(speed)
-        self._world, self._pace = world, metres_per_second
+    def __init__(self, world: World, *, speed: float | None = 1.0, skills: SkillTable = SKILLS) -> None:
+        self.skills, self.clock, self._world = skills, Clock(speed), world
         self._stands_at = {room.name: room.stand_at or (0.0, 0.0) for room in laid_out(world).rooms}
         self._robot = SimulatedRobot(world, SIMULATION, skills)
         self._place = self._stands_at[world.robot]
+
+    @classmethod
+    def open(cls, options: Options) -> Self:
+        """Create a robot, or raise UserError if the options contain no world."""
+        if options.world is None:
+            raise UserError("a simulated robot needs a world; name one with --world FILE")
+        return cls(options.world, speed=options.speed, skills=options.skills)
 
     def connect(self) -> None:
         """Reset the robot and all objects to the initial state of the world."""
@@ -116,7 +115,7 @@ class Simulated:
 
     def _drive(self, room: str, feedback: Feedback) -> None:
         start, end = self._place, self._stands_at[room]
-        takes = math.dist(start, end) / self._pace
+        takes = math.dist(start, end) / METRES_PER_SECOND
         step = takes if self.clock.speed is None else max(FEEDBACK_SECONDS * self.clock.speed, 1e-3)
         driven = 0.0
         if takes:
@@ -147,10 +146,3 @@ def perform_at_once(robot: SimulatedRobot, skill: str, arguments: Sequence[Robot
         if parameter.is_options and isinstance(argument, tuple) and isinstance(result, int):
             return argument[result]
     return result
-
-
-def robot(options: Options) -> Simulated:
-    """Create a simulated robot, or raise UserError if the options contain no world."""
-    if options.world is None:
-        raise UserError("the simulated robot needs a world; name one with --world FILE")
-    return Simulated(options.world, speed=options.speed, skills=options.skills)

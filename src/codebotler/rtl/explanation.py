@@ -21,7 +21,7 @@ from codebotler.rtl.semantics import (
     narrow,
     positions_in_scopes,
 )
-from codebotler.rtl.wording import describe_action, describe_event, is_any, is_plain, room
+from codebotler.rtl.wording import describe_action, describe_event, room, room_name
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,11 @@ def explain(formula: formulas.Formula, trace: Trace) -> Explanation | None:
 def _join_facts(facts: Sequence[_Fact]) -> str:
     if len(facts) == 1:
         return f"{facts[0].text}{facts[0].ending}{facts[0].detail}"
-    missing = [fact for fact in facts if fact.is_missing]
-    done = [fact for fact in facts if not fact.is_missing]
-    did = ", and it ".join(f"{fact.text}{fact.detail and f' ({fact.detail[2:]})'}" for fact in done)
-    if not done:
-        return f"{', and it '.join(fact.text for fact in missing)}; it had to do at least one of these"
-    if missing:
-        return f"{did}, although it {' and it '.join(fact.text for fact in missing)}"
-    return f"{did}; it must not do {'both' if len(done) == 2 else 'all'} of these"  # noqa: PLR2004 - a pair
+    done = [f"{one.text}{one.detail and f' ({one.detail[2:]})'}" for one in facts if not one.is_missing]
+    did, never = (", and it ".join(texts) for texts in (done, [one.text for one in facts if one.is_missing]))
+    if did and never:
+        return f"{did}, although it {never}"
+    return f"{did}; it must not do all of these" if did else f"{never}; it had to do at least one of these"
 
 
 def _deciding_tests(
@@ -71,7 +68,7 @@ def _deciding_tests(
 ) -> Iterator[tuple[formulas.Test, bool]]:
     """Yield the tests that decide a formula, each with its truth value."""
     mention = _as_mention(formula)
-    if mention is not None and not is_true and not holds(mention, trace):
+    if mention is not None and not is_true:
         yield mention, False
         return
     match formula:
@@ -89,16 +86,14 @@ def _deciding_tests(
 def _as_mention(formula: formulas.Formula) -> formulas.Test | None:
     """Return the test with `mention` that is equivalent to `ask(t, ".*") or ask(".*", t)`."""
     match formula:
-        case formulas.Or((one, other)) if isinstance(one, formulas.PresenceTest) and isinstance(
-            other, formulas.PresenceTest
-        ):
-            a, b = one.element, other.element
-            if a.options is None or b.options is None or (a.text, a.options) != (b.options, b.text):
-                return None
-            text = a.options if is_any(a.text) else a.text
-            mention = replace(a, text=text, options=None, mention=True)
-            if replace(one, element=b) == other and is_any(a.text) != is_any(a.options):
-                return replace(one, element=mention)
+        case formulas.Or((formulas.Exists() | formulas.ActAtFirst() | formulas.ActAtSome() as one, other)):
+            element, anything = one.element, formulas.Regex(".*")
+            text = element.options if element.text == anything else element.text
+            if text is not None:
+                pairs = ((text, anything), (anything, text))
+                asks = {replace(one, element=replace(element, text=t, options=o)) for t, o in pairs}
+                if asks == {one, other}:
+                    return replace(one, element=replace(element, text=text, options=None, mention=True))
     return None
 
 
@@ -129,17 +124,14 @@ def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
 
 def _presence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     at = next(at for at in _positions(test, trace) if is_match(test.element, trace[at], at))
-    element = replace(test.element, place=None)
-    done = f"{verb(element.kind).past} {describe_event(trace[at], element)}"
-    did = describe_action(element, "past")
-    place = "" if test.element.place is None else f" in {room(formulas.Regex(test.element.place))}"
     stay = f" in {room(test.arrival.text)}" if isinstance(test, _AtPlace) else ""
-    step = f"{place}{stay}{' last,' * isinstance(test, formulas.Last)} at step {at + 1}"
+    step = f"{stay}{' last,' * isinstance(test, formulas.Last)} at step {at + 1}"
     where = _where(test.scopes, trace, is_true=True)
-    if is_plain(element):
-        return _Fact(at, f"{done}{step}{where}", ", which it must not do")
-    text = describe_action(element, "past", when=step, where=where)
-    return _Fact(at, text, ", which it must not do", "" if done == did else f": it {done}")
+    text = describe_action(test.element, "past", when=step, where=where)
+    element = replace(test.element, place=None)  # so that the room is not repeated
+    done = describe_event(trace[at], element)
+    detail = "" if done == describe_action(element, "past") else f": it {done}"
+    return _Fact(at, text, ", which it must not do", detail)
 
 
 def _absence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
@@ -151,7 +143,9 @@ def _absence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
             event, f"never {describe_action(element, 'past', negated=True, where=where)}", detail=detail
         )
     if isinstance(test, formulas.Last):
-        return _not_last(element, where, trace, here)
+        text = f"did not {describe_action(element, 'base', negated=True, when=' last', where=where)}"
+        last = [f"{describe_event(trace[at], element)} (step {at + 1})" for at in here]
+        return _Fact(next(iter(here), None), text, detail=f": it last {last[0] if last else 'did nothing'}")
     span = positions_in_scopes(test.scopes, trace)
     arrivals = [at for at in span if is_match(test.arrival, trace[at], at)]
     if not arrivals:
@@ -167,22 +161,10 @@ def _absence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
         only = listed([verb(kind).alone for kind in kinds])
         detail = f": it only {only}" if only else ": it did nothing there"
     visits = arrivals[:1] if first else arrivals
-    rooms = dict.fromkeys(describe_event(trace[at], test.arrival) for at in visits)
+    rooms = dict.fromkeys(room_name(trace[at].text) for at in visits)
     failed = f"did not {describe_action(element, 'base', negated=True, when=f' {there}', where=where)}"
     text = f"went to {listed(elide_list([*rooms]))} at {_steps(visits)} but {failed}"
     return _Fact(arrivals[0] if event is None else event, text, detail=detail)
-
-
-def _not_last(element: formulas.EventPattern, where: str, trace: Trace, here: Sequence[int]) -> _Fact:
-    text = f"did not {describe_action(element, 'base', negated=True, when=' last', where=where)}"
-    if not here:
-        return _Fact(None, text, detail=": it did nothing")
-    (at,) = here
-    kind, event = trace[at].kind, trace[at]
-    wanted = element if kind == element.kind else formulas.EventPattern(kind, formulas.Regex(".*"))
-    return _Fact(
-        at, text, detail=f": it last {verb(kind).past} {describe_event(event, wanted)} (step {at + 1})"
-    )
 
 
 def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: bool) -> _Fact:
@@ -227,8 +209,7 @@ def _where(scopes: tuple[formulas.Scope, ...], trace: Trace, *, is_true: bool) -
         at = bounding_event(scope, trace, span)
         when = "before" if scope.is_before else "after"
         if at is not None:
-            bare = replace(scope.element, place=None, options=None, mention=False)
-            ends[when] = f"{verb(bare.kind).ing} {describe_event(trace[at], bare)} (step {at + 1})"
+            ends[when] = f"{describe_event(trace[at], scope.element, 'ing')} (step {at + 1})"
         elif not is_true and (scope.is_only or not scope.is_before):
             ends[when] = f"{describe_action(scope.element, 'ing')} (which never happened)"
         span = narrow(scope, at, span)
@@ -247,12 +228,13 @@ def _describe_instead(
     alike = [at for at in here if trace[at].kind == element.kind]
     if not alike:
         return None, "" if trace else ": it did nothing at all"
-    only = f": it only {verb(element.kind).past}"
     if element.kind == GOTO:
-        rooms = dict.fromkeys(describe_event(trace[at], element) for at in alike)
-        return None, f"{only} {listed(elide_list([*rooms]))}"
-    shown = [f"{describe_event(trace[at], element)} (step {at + 1})" for at in alike]
-    return alike[0], f"{only} {listed(elide_list(shown, _MAX_QUOTED))}"
+        rooms = dict.fromkeys(room_name(trace[at].text) for at in alike)
+        return None, f": it only went to {listed(elide_list([*rooms]))}"
+    past = verb(element.kind).past
+    objects = [describe_event(trace[at], element).removeprefix(past) for at in alike]
+    shown = [f"{each} (step {at + 1})".strip() for at, each in zip(alike, objects, strict=True)]
+    return alike[0], f": it only {past} {listed(elide_list(shown, _MAX_QUOTED))}"
 
 
 def _is_conclusive_match(element: formulas.EventPattern, trace: Trace, at: int) -> bool:

@@ -8,7 +8,7 @@ from itertools import chain
 
 from codebotler.core.skills.kinds import CHECK, GOTO, INSIDE
 from codebotler.core.skills.verbs import VerbForm
-from codebotler.core.text.phrases import has_no_text, is_spoken, result_words, verb
+from codebotler.core.text.phrases import is_spoken, phrase, verb
 from codebotler.core.text.words import brief, elide_list, listed
 from codebotler.core.trace import Event
 from codebotler.rtl.formulas import EventPattern, Regex, TextPattern, Without, Words
@@ -20,7 +20,6 @@ _LOOKS: Mapping[bool, Mapping[VerbForm, str]] = {
     False: {"base": "look in vain for", "past": "looked in vain for", "ing": "looking in vain for"},
 }
 _MENTIONS: Mapping[VerbForm, str] = {"base": "mention", "past": "mentioned", "ing": "mentioning"}
-_OFFERS: Mapping[VerbForm, str] = {"base": "offer", "past": "offered", "ing": "offering"}
 _ANSWERS: Mapping[VerbForm, str] = {"base": "get", "past": "got", "ing": "getting"}
 _CLAUSES = ("that ", "to ", "whether ", "what ", "in one ")
 _UNCLEAR = "that fits the requirement"  # for a regex whose words cannot be determined
@@ -50,25 +49,16 @@ def describe_action(
     if element.found is not None and element.kind == CHECK:
         done = f"{_LOOKS[element.found][form]} {means or _describe_object(element, thing)}"
     elif element.answer is not None:
-        answer = (
-            f"the answer {named}"
-            if (named := _quote_choices(element.answer))
-            else _describe_thing(element.answer, "an answer")
-        )
-        done = f"{_ANSWERS[form]} {means or answer}"
+        done = f"{_ANSWERS[form]} {means or _describe_thing(element.answer, 'an answer')}"
     elif means is not None:
         done = f"{getattr(verb(element.kind), form)} {means}"
     elif element.mention and not is_open:
-        mentioned = _quote_choices(element.text) or _describe_thing(element.text, thing)
-        done = f"{_MENTIONS[form]} {mentioned} in a question"
-    elif element.options is not None and is_any(element.text) and not is_open:
-        return f"{_OFFERS[form]} an option {describe_text(element.options)}{when}{where}"
-    elif verb(element.kind).object:
-        doing = verb(element.kind)
-        wanted = [_describe_part(text, thing) for text in (element.text, *element.more)]
-        done = doing.with_object(getattr(doing, form), [*wanted, *[thing] * doing.object.count("{")], "")
+        done = f"{_MENTIONS[form]} {_name_or_describe(element.text, thing)} in a question"
     else:
-        done = f"{getattr(verb(element.kind), form)} {_describe_object(element, thing)}"
+        doing = verb(element.kind)
+        more = [_name_or_describe(text, thing) for text in element.more]
+        wanted = [_describe_object(element, thing), *more, *[thing] * doing.object.count("{")]
+        done = doing.with_object(getattr(doing, form), wanted, "")
     return f"{done.rstrip()}{_describe_details(element, means)}{when}{where}"
 
 
@@ -76,8 +66,6 @@ def _describe_details(element: EventPattern, means: str | None) -> str:
     more = ""
     if element.options is not None and means is None and not is_any(element.options):
         more += f" offering an option {describe_text(element.options)}"
-    if element.more and not verb(element.kind).object:
-        more += f", {listed([*filter(None, map(describe_text, element.more))])}".rstrip(", ")
     if element.found is not None and element.kind != CHECK:
         more += f' with the result "{verb(element.kind).results[element.found]}"'
     if element.to is not None:
@@ -85,13 +73,6 @@ def _describe_details(element: EventPattern, means: str | None) -> str:
     if element.holding is not None:
         more += f" while holding something {describe_text(element.holding)}".rstrip()
     return more
-
-
-def is_plain(element: EventPattern) -> bool:
-    """Whether a description of the event already shows everything that the pattern requires."""
-    if element.is_about_more or not isinstance(element.text, Regex):
-        return False
-    return (is_any(element.text) and is_any(element.options)) or not is_spoken(element.kind)
 
 
 def is_clear(element: EventPattern) -> bool:
@@ -103,20 +84,17 @@ def is_clear(element: EventPattern) -> bool:
     return all(text is None or _UNCLEAR not in _qualities(text) for text in needed)
 
 
-def _describe_part(text: TextPattern, thing: str) -> str:
-    named = _quote_choices(text)
-    if isinstance(text, Regex) and named and text.pattern.startswith("^"):
-        return named.strip('"')
-    return named or _describe_thing(text, thing)
-
-
 def _describe_object(element: EventPattern, thing: str) -> str:
     if not element.has_text:
         return ""
     if element.kind in {GOTO, INSIDE}:
         return room(element.text, "any" if thing == "anything" else "a")
-    named = "" if is_spoken(element.kind) else _quote_choices(element.text)
-    return named or _describe_thing(element.text, thing)
+    describe = _describe_thing if is_spoken(element.kind) else _name_or_describe
+    return describe(element.text, thing)
+
+
+def _name_or_describe(text: TextPattern, thing: str) -> str:
+    return _quote_choices(text) or _describe_thing(text, thing)
 
 
 def _describe_thing(text: TextPattern, thing: str) -> str:
@@ -135,33 +113,17 @@ def _words_of(pattern: str) -> str:
     return one_of(choices(pattern) or ())
 
 
-def describe_event(event: Event, element: EventPattern) -> str:
-    """Describe the object of an event and everything else that a pattern compares."""
-    doing = verb(event.kind)
-    if doing.object:
-        thing = doing.with_object("", [brief(text) for text in (event.text, *event.more)], "").strip()
-    elif has_no_text(event.kind):
-        thing = ""
+def describe_event(event: Event, element: EventPattern, form: VerbForm = "past") -> str:
+    """Describe an event, including its room, addressee and held object if a pattern compares them."""
+    if event.kind in {GOTO, INSIDE}:
+        done = f"{getattr(verb(event.kind), form)} {room_name(event.text)}"
     else:
-        thing = room_name(event.text) if event.kind in {GOTO, INSIDE} else quoted(event.text)
-    if event.options and (element.mention or not is_any(element.options)):
-        shown = elide_list([quoted(option.text) for option in event.options])
-        thing += f" with the options {listed(shown)}"
-    if element.answer is not None:
-        thing += (
-            " and got no answer" if event.answer is None else f" and got the answer {quoted(event.answer)}"
-        )
-    if event.more and not doing.object:
-        thing += f", {', '.join(map(quoted, event.more))}"
-    if element.found is not None and event.kind != CHECK:
-        thing += f" ({result})" if (result := result_words(event)) else ""
-    elif element.found is not None:
-        thing += " in vain" if event.found is False else " and found it"
+        done = phrase(event, form)
     if element.to is not None:
-        thing += f" of {quoted(event.to or '')}"
+        done += f" of {quoted(event.to or '')}"
     if element.holding is not None:
-        thing += f" while holding {quoted(event.holding) if event.holding else 'nothing'}"
-    return f"{thing} in {room_name(event.place)}" if element.place is not None and event.place else thing
+        done += f" while holding {quoted(event.holding) if event.holding else 'nothing'}"
+    return f"{done} in {room_name(event.place)}" if element.place is not None and event.place else done
 
 
 def room(text: TextPattern, article: str = "a") -> str:

@@ -54,7 +54,10 @@ def worker() -> Iterator[Worker]:
 
 
 @pytest.mark.slow
-def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Worker) -> None:
+def test_reference_programs_leave_the_simulators_traces(
+    paper: Suite, worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("codebotler.robots.simulated.METRES_PER_SECOND", math.inf)
     as_written = replace(PAPER_SETTINGS, literals="as-written")
     model = open_recorded("recorded:careful")
     pairs = [
@@ -63,7 +66,7 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Wo
     assert len(pairs) == 16
     expected = list(run(pairs, workers=1, settings=as_written))
     for (program, world), outcome in zip(pairs, expected, strict=True):
-        robot = Simulated(world, speed=None, metres_per_second=math.inf)
+        robot = Simulated(world, speed=None)
         robot.connect()
         adapted = LiveRobot(robot, Notes(), place=world.robot, clock_starts=PAPER_SETTINGS.clock_starts)
         found = worker.run_live(program, adapted)

@@ -9,23 +9,21 @@ from typing import Any
 import pytest
 import yaml
 
-from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
-from codebotler.robots.base import ROS_PYTHON
 from codebotler.robots.ros.connections.connection_file import read_connection
-from codebotler.robots.ros.connections.discovery import discover_offers, draft_connection
+from codebotler.robots.ros.connections.discovery import draft_connection
 
 NAV2 = "action /navigate_to_pose nav2_msgs/action/NavigateToPose"
 
 
-def written(*offers: str, robot: str = "ros2") -> dict[str, Any]:
+def written(*offers: str) -> dict[str, Any]:
     """What is not in a comment."""
-    read: dict[str, Any] = yaml.safe_load(draft_connection(robot, offers))
+    read: dict[str, Any] = yaml.safe_load(draft_connection(offers))
     return read
 
 
-def comments(*offers: str, robot: str = "ros2") -> str:
-    lines = draft_connection(robot, offers).splitlines()
+def comments(*offers: str) -> str:
+    lines = draft_connection(offers).splitlines()
     return "\n".join(line.strip() for line in lines if line.lstrip().startswith("#"))
 
 
@@ -43,13 +41,6 @@ def test_drive_of_nav2_waits_for_places() -> None:
         "goal": {"pose": "$place"},
     }
     assert "places: " in comments(NAV2)
-
-
-def test_move_base_of_ros_1_is_a_drive() -> None:
-    text = draft_connection("ros1", ["action /move_base move_base_msgs/MoveBase"])
-    assert yaml.safe_load(text)["robot"] == "ros1"
-    goal = "# go_to: {action: /move_base, type: move_base_msgs/MoveBase, goal: {target_pose: $place}}"
-    assert goal in text
 
 
 def test_own_actions_are_written_with_arguments_and_results() -> None:
@@ -115,13 +106,6 @@ def test_pose_is_that_of_amcl_else_of_tf() -> None:
     assert written(ODOM)["velocity"] == {"topic": "/odom"}
 
 
-def test_services_of_unknown_type_are_listed() -> None:
-    offers = ("service /door/open unknown", "service /robot/get_loggers unknown")
-    text = comments(*offers, robot="ros1")
-    assert "/door/open unknown" in text
-    assert "get_loggers" not in text
-
-
 def test_only_the_first_of_several_is_written() -> None:
     offers = [f"hears /{name} std_msgs/msg/String" for name in ("tts", "say")]
     assert written(*offers)["skills"]["say"]["topic"] == "/say"
@@ -136,13 +120,12 @@ def test_the_rest_is_listed_once_without_what_every_graph_has() -> None:
         "service /go/_action/send_goal lab/action/Go_SendGoal",
         "service /lifecycle_manager/is_active std_srvs/srv/Trigger",
         "service /talker/get_type_description type_description_interfaces/srv/GetTypeDescription",
-        "hears /go/goal lab/GoActionGoal",
         "sends /rosout rcl_interfaces/msg/Log",
     )
     text = comments(*offers)
     assert text.count("/scan") == 1
     assert "sensor_msgs/msg/LaserScan" in text
-    for absent in ("talker", "_action", "lifecycle", "/go/goal", "rosout"):
+    for absent in ("talker", "_action", "lifecycle", "rosout"):
         assert absent not in text
 
 
@@ -161,15 +144,9 @@ def test_hostile_names_stay_out_of_the_file() -> None:
     )
 
 
-@pytest.mark.parametrize("robot", ["sim", "rosbridge"])
-def test_other_robots_cannot_be_looked_at(robot: str) -> None:
-    with pytest.raises(UserError, match=robot):
-        discover_offers(robot, "", ROS_PYTHON)
-
-
 def test_what_is_written_connects_a_robot(tmp_path: Path) -> None:
     speech, file = "hears /speech std_msgs/msg/String", tmp_path / "robot.yaml"
-    file.write_text(draft_connection("ros2", [NAV2, TF, ODOM, speech]))
+    file.write_text(draft_connection([NAV2, TF, ODOM, speech]))
     read = read_connection(file, SKILLS)
     assert (read.robot, {*read.calls}, read.velocity) == ("ros2", {"say"}, "/odom")
     (tmp_path / "places.yaml").write_text("places: {hall: {x: 1, y: 2}}")
@@ -178,8 +155,8 @@ def test_what_is_written_connects_a_robot(tmp_path: Path) -> None:
 
 
 def test_own_actions_connect_a_robot(tmp_path: Path) -> None:
-    offers = [f"action {s.ros.server} robot_actions_pkg/{s.ros.type}" for s in SKILLS.rows if s.ros]
-    (tmp_path / "robot.yaml").write_text(draft_connection("ros1", offers))
+    offers = [f"action {s.ros.server} robot_actions_pkg/action/{s.ros.type}" for s in SKILLS.rows if s.ros]
+    (tmp_path / "robot.yaml").write_text(draft_connection(offers))
     assert read_connection(tmp_path / "robot.yaml", SKILLS).calls.keys() == SKILLS.keys()
 
 
@@ -194,4 +171,4 @@ def test_example_of_the_guide() -> None:
         "sends /camera/image_raw sensor_msgs/msg/Image",
         "sends /scan sensor_msgs/msg/LaserScan",
     )
-    assert f"```yaml\n{draft_connection('ros2', offers)}```" in page
+    assert f"```yaml\n{draft_connection(offers)}```" in page

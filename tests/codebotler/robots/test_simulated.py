@@ -1,6 +1,5 @@
 """The simulated robot drives at walking pace, tells where it is, and stops in the middle of everything."""
 
-import math
 import subprocess
 import sys
 import threading
@@ -26,8 +25,8 @@ WORLD = World(
 )
 
 
-def connected(speed: float | None = None, *, metres_per_second: float = METRES_PER_SECOND) -> Simulated:
-    robot = Simulated(WORLD, speed=speed, metres_per_second=metres_per_second)
+def connected(speed: float | None = None) -> Simulated:
+    robot = Simulated(WORLD, speed=speed)
     robot.connect()
     return robot
 
@@ -39,12 +38,6 @@ def test_driving_takes_as_long_as_the_way_is() -> None:
     assert robot.perform("get_current_location", []) == "kitchen"
     robot.perform("go_to", ["the kitchen"])
     assert robot.clock.now == pytest.approx(5 / METRES_PER_SECOND)
-
-
-def test_driving_may_take_no_time() -> None:
-    robot = connected(metres_per_second=math.inf)
-    robot.perform("go_to", ["kitchen"])
-    assert robot.clock.now == 0
 
 
 def test_feedback_tells_places_on_the_way() -> None:

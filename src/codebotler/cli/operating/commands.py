@@ -181,11 +181,10 @@ def connect(
         bool, typer.Option("--discover", help="Explore what the robot's nodes offer.")
     ] = False,
     out: Annotated[Path | None, typer.Option(help="Write the draft to a new file.", metavar="FILE")] = None,
-    robot: Annotated[str, typer.Option(help="The robot's version of ROS: ros2 or ros1.")] = "ros2",
     address: options.AddressOption = "",
     ros_python: options.RosPythonOption = options.DEFAULT_ROS_PYTHON,
 ) -> None:
-    """Draft a file for --connect from what a robot's nodes offer.
+    """Draft a file for --connect from a robot's nodes on ROS 2.
 
     Comments in the draft list what is missing, and what else the robot offers.
     """
@@ -197,7 +196,7 @@ def connect(
     if not discover:
         raise UserError("add --discover, which explores the robot and drafts a file for --connect")
     with busy("exploring the robot"):
-        text = draft_connection(robot, discover_offers(robot, address, ros_python))
+        text = draft_connection(discover_offers(address, ros_python))
     if out is None:
         print_source(text)
     else:
@@ -256,12 +255,6 @@ def serve_page(
 def virtual_robot(
     world: Annotated[Path, typer.Option(help="The world file for the simulated robot.")],
     ros: Annotated[int, typer.Option(min=1, max=2, help="The version of ROS.")] = 1,
-    port: Annotated[
-        int | None,
-        typer.Option(
-            min=1, max=65535, help="The port of the ROS master; by default that of ROS_MASTER_URI, or 11311."
-        ),
-    ] = None,
     speed: Annotated[
         float, typer.Option(help="The speed of the robot's clock as a multiple of real time, such as 20.")
     ] = 1.0,
@@ -272,7 +265,7 @@ def virtual_robot(
 ) -> None:
     """Offer a simulated robot's skills on ROS 1 or 2.
 
-    On ROS 1, it starts a master if none responds. Ctrl-C ends the command.
+    On ROS 1, it starts a master if none responds at ROS_MASTER_URI. Ctrl-C ends the command.
     """
     from contextlib import suppress
 
@@ -286,7 +279,7 @@ def virtual_robot(
 
     table = skills_from(*(skills or ()))
     known = read_world(world, table)
-    robot = VirtualRobot(known, speed=speed, ros=ros, port=port, python=ros_python, show=show, skills=table)
+    robot = VirtualRobot(known, speed=speed, ros=ros, python=ros_python, show=show, skills=table)
     try:
         started = robot.start()
         what = "a ROS master was started at" if started else "joined the ROS master at"

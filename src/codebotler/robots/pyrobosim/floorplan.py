@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import shapely
 from shapely.geometry import LineString, MultiPoint, Point, Polygon, box
-from shapely.geometry.polygon import orient
 from shapely.ops import nearest_points
 
 from codebotler.core.world import HALLWAY, ROOM_DEPTH, World, laid_out
@@ -20,12 +19,20 @@ XY = tuple[float, float]
 # All lengths are in metres.
 ROBOT_RADIUS = 0.15
 WALL_THICKNESS = 0.1  # half of it on each side of a footprint's edge
-PASSAGE_WIDTHS = (0.8, 0.5)  # the planner uses the first width that fits
+PASSAGE_WIDTH = 0.5
 PASSAGE_DEPTH = 0.25  # the distance from a passage's end to the nearest wall of the room
 PASSAGE_OVERLAP = 0.1  # extra length at each end, so that the free spaces of rooms and passages overlap
 PASSAGE_STEP = 0.2  # the distance between two starting points to try for a passage
-TABLE_SIZES = ((1.2, 0.6), (0.8, 0.5), (0.4, 0.4), (0.2, 0.2), (0.1, 0.1))  # the first size that fits is used
 SLACK = 0.02  # the minimum gap between two objects
+TABLE_SIDE = 0.1  # tables are squares, small enough for any room
+TABLE_REACH = TABLE_SIDE / 2 + ROBOT_RADIUS + SLACK
+TABLE_STANDS = (
+    (-TABLE_REACH, 0.0, 0.0),
+    (TABLE_REACH, 0.0, math.pi),
+    (0.0, -TABLE_REACH, math.pi / 2),
+    (0.0, TABLE_REACH, -math.pi / 2),
+)
+"""The robot's pose at each side of a table: x and y relative to its centre, and the yaw that faces it."""
 
 MAX_LINES = 300  # the most passages to try between two rooms
 TABLE_POSITIONS = 12  # the number of positions to try along each axis of a room
@@ -37,37 +44,11 @@ class Passage:
 
     ends: tuple[int, int]  # the indices of the two floors that it connects
     line: LineString  # the centre line, which starts inside one floor and ends inside the other
-    width: float
 
     @property
     def area(self) -> Polygon:
         """The area it covers on the floor."""
-        return self.line.buffer(self.width / 2, cap_style="flat")
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table with sides parallel to the axes."""
-
-    centre: XY
-    size: XY
-
-    @property
-    def area(self) -> Polygon:
-        """The area it covers on the floor."""
-        (x, y), (width, depth) = self.centre, self.size
-        return box(x - width / 2, y - depth / 2, x + width / 2, y + depth / 2)
-
-    @property
-    def stands(self) -> list[tuple[float, float, float]]:
-        """The robot's pose at each side: x and y relative to the centre, and the yaw that faces the table."""
-        along, across = (side / 2 + ROBOT_RADIUS + SLACK for side in self.size)
-        return [
-            (-along, 0.0, 0.0),
-            (along, 0.0, math.pi),
-            (0.0, -across, math.pi / 2),
-            (0.0, across, -math.pi / 2),
-        ]
+        return self.line.buffer(PASSAGE_WIDTH / 2, cap_style="flat")
 
 
 @dataclass(frozen=True)
@@ -77,14 +58,13 @@ class Floorplan:
     floors: tuple[Polygon, ...]  # the floor of each room in the order of the world, then the corridor, if any
     stands: tuple[Point, ...]  # the robot's stopping position on each floor
     passages: tuple[Passage, ...]
-    tables: tuple[Table | None, ...]  # the table in each room, or None
+    tables: tuple[XY | None, ...]  # the centre of the table in each room, or None
 
     def corners(self, number: int) -> list[XY]:
-        """Return the corners of a floor's free space at which a shortest path may turn."""
+        """Return the corners of a floor's free space, at which a shortest path may turn."""
         table = self.tables[number] if number < len(self.tables) else None
-        space = orient(_without(_free(self.floors[number]), table))
-        rings = (space.exterior, *space.interiors)
-        return [corner for ring in rings for corner in _right_turns(ring.coords[:-1])]
+        space = _without(_free(self.floors[number]), table)
+        return [corner for ring in (space.exterior, *space.interiors) for corner in ring.coords[:-1]]
 
 
 def plan_floor(world: World) -> Floorplan:
@@ -145,15 +125,12 @@ def _free(floor: Polygon, slack: float = 0.0) -> Polygon:
     return _shrink(floor, ROBOT_RADIUS + slack)
 
 
-def _without(free: Polygon, table: Table | None) -> Polygon:
-    return free if table is None else free.difference(table.area.buffer(ROBOT_RADIUS, join_style="mitre"))
+def _table_area(centre: XY, margin: float = 0.0) -> Polygon:
+    return Point(centre).buffer(TABLE_SIDE / 2 + margin, cap_style="square")
 
 
-def _right_turns(ring: Sequence[XY]) -> Iterator[XY]:
-    """Yield the corners at which a ring that has the free space on its left turns right."""
-    for (ax, ay), (bx, by), (cx, cy) in zip(ring, [*ring[1:], ring[0]], [*ring[2:], *ring[:2]], strict=True):
-        if (bx - ax) * (cy - by) - (by - ay) * (cx - bx) < 0:
-            yield bx, by
+def _without(free: Polygon, table: XY | None) -> Polygon:
+    return free if table is None else free.difference(_table_area(table, ROBOT_RADIUS))
 
 
 def _passages(floors: Sequence[Polygon], stands: Sequence[Point]) -> list[Passage]:
@@ -187,8 +164,8 @@ def _passage(
         key=lambda line: (round(line.length, 1), sum(line.distance(stands[end]) for end in ends)),
     )
     free = shapely.union_all([_free(first), _free(second)])
-    for width, line in itertools.product(PASSAGE_WIDTHS, lines):
-        passage = Passage(ends, line, width)
+    for line in lines:
+        passage = Passage(ends, line)
         space = free.union(_shrink(passage.area, ROBOT_RADIUS)).buffer(1e-6)
         if space.covers(line) and passage.area.disjoint(blocked):
             return passage
@@ -206,28 +183,22 @@ def _lines(first: Polygon, second: Polygon) -> Iterator[LineString]:
         yield LineString([(start.x - dx, start.y - dy), (end.x + dx, end.y + dy)])
 
 
-def _table(floor: Polygon, keep_clear: Sequence[shapely.Geometry]) -> Table | None:
-    """Return the largest table that fits, as far from stops and passages as possible, or None."""
+def _table(floor: Polygon, keep_clear: Sequence[shapely.Geometry]) -> XY | None:
+    """Return where a table fits, as far from stops and passages as possible, or None."""
     left, low, right, high = floor.bounds
     width, depth = (right - left) / TABLE_POSITIONS, (high - low) / TABLE_POSITIONS
     clear = shapely.union_all(keep_clear)
-    for size in TABLE_SIZES:
-        places = [
-            Table((left + (i + 0.5) * width, low + (j + 0.5) * depth), turned)
-            for turned in dict.fromkeys((size, size[::-1]))
-            for i, j in itertools.product(range(TABLE_POSITIONS), repeat=2)
-        ]
-        for table in sorted(places, key=lambda table: -table.area.distance(clear)):
-            if _fits(table, floor, clear):
-                return table
-    return None
+    numbers = itertools.product(range(TABLE_POSITIONS), repeat=2)
+    centres = [(left + (i + 0.5) * width, low + (j + 0.5) * depth) for i, j in numbers]
+    centres.sort(key=lambda centre: -_table_area(centre).distance(clear))
+    return next((centre for centre in centres if _fits(centre, floor, clear)), None)
 
 
-def _fits(table: Table, floor: Polygon, clear: shapely.Geometry) -> bool:
+def _fits(centre: XY, floor: Polygon, clear: shapely.Geometry) -> bool:
     """Return whether a table fits and leaves room for the robot to reach it and drive around it."""
-    if not floor.contains(table.area) or table.area.distance(clear) <= ROBOT_RADIUS + SLACK:
+    table, (x, y) = _table_area(centre), centre
+    if not floor.contains(table) or table.distance(clear) <= ROBOT_RADIUS + SLACK:
         return False
-    space = _without(_free(floor), table)
-    (x, y) = table.centre
-    sides = [Point(x + dx, y + dy) for dx, dy, _ in table.stands]
+    space = _without(_free(floor), centre)
+    sides = [Point(x + dx, y + dy) for dx, dy, _ in TABLE_STANDS]
     return space.geom_type == "Polygon" and any(map(space.contains, sides))

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from copy import deepcopy
 from typing import TYPE_CHECKING
 
-from codebotler.core.errors import UserError
 from codebotler.core.trace import Trace
-from codebotler.robots.base import Feedback, Options, RobotArgument, RobotResult, ignore_feedback
+from codebotler.robots.base import Feedback, RobotArgument, RobotResult, ignore_feedback
 from codebotler.robots.simulated import Simulated, perform_at_once
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ class Pyrobosim(Simulated):
     """A simulated robot that pyrobosim drives around walls. It goes to a table to pick or place an object."""
 
     name = "pyrobosim"
-    if_tool_dies, rooms_are_regexes = "the robot in pyrobosim ended as well", True
+    if_tool_dies = "the robot in pyrobosim ended as well"
     _drivable: DrivableWorld
 
     def connect(self) -> None:
@@ -51,10 +50,3 @@ class Pyrobosim(Simulated):
 
     def _drive(self, room: str, feedback: Feedback) -> None:
         self._drivable.drive(room, feedback)
-
-
-def robot(options: Options) -> Pyrobosim:
-    """Create the robot, or raise UserError if the options contain no world."""
-    if options.world is None:
-        raise UserError("the robot in pyrobosim needs a world; name one with --world FILE")
-    return Pyrobosim(options.world, speed=options.speed, skills=options.skills)

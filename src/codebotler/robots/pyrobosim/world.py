@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
 from typing import TypeVar
 
-import numpy as np
 import shapely
 from pyrobosim.core import Entity, ObjectSpawn, Robot, Room
 from pyrobosim.core import World as Pyroworld
@@ -17,14 +15,22 @@ from pyrobosim.planning.actions import ExecutionResult, ExecutionStatus
 from pyrobosim.utils.graph_types import Node
 from pyrobosim.utils.path import Path
 from pyrobosim.utils.pose import Pose
-from pyrobosim.utils.trajectory import Trajectory, get_constant_speed_trajectory
+from pyrobosim.utils.trajectory import get_constant_speed_trajectory, interpolate_trajectory
 from shapely.geometry import LineString
 
 from codebotler.core.errors import RobotError
 from codebotler.core.world import World
 from codebotler.robots.base import CancelledError, Feedback, ignore_feedback
 from codebotler.robots.clock import Clock
-from codebotler.robots.pyrobosim.floorplan import ROBOT_RADIUS, Floorplan, Table, plan_floor
+from codebotler.robots.pyrobosim.floorplan import (
+    PASSAGE_WIDTH,
+    ROBOT_RADIUS,
+    TABLE_SIDE,
+    TABLE_STANDS,
+    XY,
+    Floorplan,
+    plan_floor,
+)
 from codebotler.robots.simulated import FEEDBACK_SECONDS, METRES_PER_SECOND
 
 RADIANS_PER_SECOND = math.pi / 2
@@ -50,9 +56,9 @@ class DrivableWorld:
         self._rooms = dict(zip(names, self._floors, strict=False))  # leaves out a corridor, which has no name
         self._stands = dict(zip(names, plan.stands, strict=False))
         self._tables = {
-            name: self._add_table(floor, table)
-            for (name, floor), table in zip(self._rooms.items(), plan.tables, strict=True)
-            if table is not None
+            name: self._add_table(floor, centre)
+            for (name, floor), centre in zip(self._rooms.items(), plan.tables, strict=True)
+            if centre is not None
         }
         for number, floor in enumerate(self._floors):
             places = [*plan.stands[number].coords, *plan.corners(number)]
@@ -108,7 +114,7 @@ class DrivableWorld:
             hallway = self._world.add_hallway(
                 room_start=start,
                 room_end=end,
-                width=passage.width,
+                width=PASSAGE_WIDTH,
                 wall_width=WALL_WIDTH,
                 conn_method="points",
                 conn_points=list(passage.line.coords),
@@ -116,15 +122,15 @@ class DrivableWorld:
             _expect_added(hallway)
         return floors
 
-    def _add_table(self, floor: Room, table: Table) -> ObjectSpawn:
+    def _add_table(self, floor: Room, centre: XY) -> ObjectSpawn:
         """Add a table to a floor, and return the surface that objects are placed on."""
         kind = f"table on {floor.name}"
         self._world.get_location_metadata().data[kind] = {
-            "footprint": {"type": "box", "dims": list(table.size)},
-            "nav_poses": [[x, y, 0.0, angle] for x, y, angle in table.stands],
+            "footprint": {"type": "box", "dims": [TABLE_SIDE, TABLE_SIDE]},
+            "nav_poses": [[x, y, 0.0, angle] for x, y, angle in TABLE_STANDS],
             "locations": [{"name": "top"}],
         }
-        added = _expect_added(self._world.add_location(category=kind, parent=floor, pose=Pose(*table.centre)))
+        added = _expect_added(self._world.add_location(category=kind, parent=floor, pose=Pose(*centre)))
         (top,) = added.children
         return top
 
@@ -163,43 +169,23 @@ class Motor(PathExecutor):
 
     def execute(self, path: Path, *_: float, **__: float) -> ExecutionResult:
         """Follow a path to its end, or until the clock is stopped."""
+        speed, began = self.clock.speed, self.clock.now
         way = get_constant_speed_trajectory(path, METRES_PER_SECOND, RADIANS_PER_SECOND)
-        corners = [float(corner) for corner in way.t_pts]
-        moment, last, due = -1.0, "", 0.0
+        if speed is not None:
+            way = interpolate_trajectory(way, max(STEP_SECONDS * speed, 0.01))
+        last, due, arrived = "", 0.0, False
         self.following_path = True
-        for moment in self._moments(corners):
-            pose = _pose_at(way, moment)
+        for moment, pose in zip(map(float, way.t_pts), way.poses, strict=True):
+            if not self.clock.wait(max(0.0, began + moment - self.clock.now)):
+                break
             self.robot.set_pose(pose)
+            arrived = pose is way.poses[-1]
             phrase, now = f"at ({pose.x:.1f}, {pose.y:.1f})", time.monotonic()
-            is_due = now >= due or moment >= corners[-1] or self.clock.speed is None
-            if is_due and phrase != last:
+            if phrase != last and (arrived or now >= due or speed is None):
                 self.feedback(phrase)
                 last, due = phrase, now + FEEDBACK_SECONDS
         self.following_path = False
-        arrived = moment >= corners[-1]
         return ExecutionResult(ExecutionStatus.SUCCESS if arrived else ExecutionStatus.CANCELED)
-
-    def _moments(self, corners: list[float]) -> Iterator[float]:
-        """Yield the elapsed seconds of a drive repeatedly, until the drive ends or is stopped."""
-        speed, began, moment = self.clock.speed, self.clock.now, 0.0
-        if speed is None:
-            for corner in corners:
-                if not self.clock.wait(corner - moment):
-                    return
-                yield (moment := corner)
-            return
-        while self.clock.wait(min(STEP_SECONDS * speed, corners[-1] - moment)):
-            yield (moment := min(self.clock.now - began, corners[-1]))
-            if moment >= corners[-1]:
-                return
-
-
-def _pose_at(way: Trajectory, moment: float) -> Pose:
-    """Interpolate the pose at a time, in seconds since the start of a drive."""
-    poses = np.array([(pose.x, pose.y, pose.get_yaw()) for pose in way.poses])
-    poses[:, 2] = np.unwrap(poses[:, 2])
-    x, y, yaw = (float(np.interp(moment, way.t_pts, axis)) for axis in poses.T)
-    return Pose(x, y, yaw=yaw)
 
 
 def _expect_added(part: T | None) -> T:

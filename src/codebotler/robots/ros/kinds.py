@@ -25,7 +25,6 @@ INSTALL_ROS1 = (
     "python3-genmsg python3-genpy python3-netifaces python3-rosmaster"
 )
 INSTALL_ROS2 = "pip install 'codebotler[ros2]'"
-USE_OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
 
 
 def ros1(options: Options, waits: Timeouts | None = None) -> RosRobot:
@@ -89,19 +88,15 @@ def ros_readiness(name: str, python: Path = ROS_PYTHON) -> Readiness:
     """Check whether an interpreter has the modules for ros1 or ros2. Message types are built later."""
     if name == "ros1":
         needs: Sequence[str] = ROS1_MODULES
-        mend = INSTALL_ROS1 if python == ROS_PYTHON else USE_OTHER_PYTHON
-        note = f"with {python}; needs a master, see ROS_MASTER_URI"
+        mend, see = INSTALL_ROS1, "needs a master, see ROS_MASTER_URI"
     else:
         python = choose_python(python)
-        needs, mend, note = ROS2_MODULES, find_fix(), f"with {python}; see ROS_DOMAIN_ID"
-    missing = find_missing(python, needs)
-    if missing is None:
-        lacking, mend = f"{python} cannot be run", USE_OTHER_PYTHON
-    elif missing:
-        lacking = f"{python} lacks {', '.join(missing)}"
-    else:
+        needs, mend, see = ROS2_MODULES, find_fix(), "see ROS_DOMAIN_ID"
+    missing, note = find_missing(python, needs), f"with {python}; {see}"
+    if missing == []:
         return Readiness(name, works=True, note=note)
-    return Readiness(name, works=False, missing=lacking, mend=mend, note=note)
+    lacking = "cannot be run" if missing is None else f"lacks {', '.join(missing)}"
+    return Readiness(name, works=False, missing=f"{python} {lacking}", mend=mend, note=note)
 
 
 def find_fix(installed: Path = Path("/opt/ros")) -> str:

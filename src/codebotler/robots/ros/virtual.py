@@ -35,13 +35,13 @@ class VirtualRobot:
         world: the world that the robot works in.
         speed: the robot's clock seconds per real second, or None to skip all waits.
         ros: the version of ROS, 1 or 2.
-        port: the port of the ROS 1 master, or None for the port in ROS_MASTER_URI.
+        address: the URI of a ROS 1 master or a ROS 2 domain number, or "" for the default.
         python: a Python interpreter with rclpy, or with rospy (and rosmaster to start a master).
         show: a callback that receives a line of text when a goal starts and when it ends.
         skills: the skills to offer.
 
     Raises:
-        UserError: the speed is out of range, or ROS_MASTER_URI or ROS_DOMAIN_ID is invalid.
+        UserError: the speed is out of range, or the address is invalid.
     """
 
     def __init__(
@@ -50,16 +50,16 @@ class VirtualRobot:
         *,
         speed: float | None = 1.0,
         ros: int = 1,
-        port: int | None = None,
+        address: str = "",
         python: Path = ROS_PYTHON,
         show: Callable[[str], None] = lambda _: None,
         skills: SkillTable = SKILLS,
     ) -> None:
         self._python, self._show = python, show
         if ros == 1:
-            self.address = master_uri(f"http://localhost:{port}" if port else "")
+            self.address = master_uri(address)
         else:
-            self.address, self._python = domain_of(), choose_python(python)
+            self.address, self._python = domain_of(address), choose_python(python)
         self._ros = ros
         self._body = Simulated(world, speed=speed, skills=skills)
         self._body.connect()
@@ -136,13 +136,9 @@ class VirtualRobot:
             self._show(f"{skill}({', '.join(map(str, arguments))})")
             with self._lock:
                 is_wanted = number not in self._cancelled
-                self._current = number if is_wanted else ""
+                self._current = number
+                self._body.clock.restart()  # the last goal may have been cancelled
             ending = self._ending(skill, arguments) if is_wanted else {"do": "cancelled"}
-            with self._lock:
-                self._current = ""
-                if number in self._cancelled:
-                    self._cancelled.remove(number)
-                    self._body.clock.restart()
             self._show("  " + " ".join(str(part) for part in ending.values()))
             worker.send({**ending, "id": number})
 

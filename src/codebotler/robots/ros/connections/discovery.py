@@ -1,4 +1,4 @@
-"""List the actions, services and topics of a robot, and draft a file for `--connect` from them."""
+"""List the actions, services and topics of a robot on ROS 2, and draft a file for `--connect` from them."""
 
 from __future__ import annotations
 
@@ -6,56 +6,45 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from codebotler.core.errors import UserError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.base import NotReadyError
 from codebotler.robots.ros.connections.connection import default_connection
-from codebotler.robots.ros.kinds import choose_python, domain_of, master_uri
+from codebotler.robots.ros.kinds import choose_python, domain_of
 from codebotler.robots.ros.worker import RosWorker
 
 
 def _own_actions() -> Iterator[tuple[str, str, str, str]]:
     for skill, call in default_connection(SKILLS).calls.items():
         text = f"{ACTION_LINE}{call.request}{', result: result' if call.result else ''}".replace("'", "")
-        yield rf"action \S+ {call.type.replace('/action/', '/')}", skill, text, ""
+        yield rf"action \S+ {call.type}", skill, text, ""
 
 
 ACTION_LINE, SERVICE_LINE = "action: NAME, type: TYPE, goal: ", "service: NAME, type: TYPE, request: "
-SAY_LINE = "topic: NAME, type: TYPE, message: {data: $message}"
+SAY_LINE, CAMERA_LINE = "topic: NAME, type: TYPE, message: {data: $message}", "detector: hf:PATH, image: NAME"
 PLACES_FIRST, DETECTOR_FIRST = "name places first", "choose a detector first"
 SKILL_FIRST = "declare this skill of yours first"
 CHECK_FRAME = "only if the places are in its frame"
 MAPPINGS = (
     *_own_actions(),
-    (r"action \S+ nav2_msgs/NavigateToPose", "go_to", ACTION_LINE + "{pose: $place}", PLACES_FIRST),
-    (r"action \S+ move_base_msgs/MoveBase", "go_to", ACTION_LINE + "{target_pose: $place}", PLACES_FIRST),
-    (r"hears \S*[/_](say|speak|speech|tts|talk)(_text|_output)? std_msgs/String", "say", SAY_LINE, ""),
-    (
-        r"sends \S+ sensor_msgs/(Compressed)?Image",
-        "is_in_room",
-        "detector: hf:PATH, image: NAME",
-        DETECTOR_FIRST,
-    ),
-    (r"service \S+ std_srvs/Trigger", "", SERVICE_LINE + "{}, success: success", SKILL_FIRST),
-    (r"service \S+ std_srvs/SetBool", "", SERVICE_LINE + "{data: $on}, success: success", SKILL_FIRST),
-    (r"sends \S*/(amcl_)?pose geometry_msgs/Pose(WithCovariance)?Stamped", "pose", "topic: NAME", ""),
-    (r"sends /tf tf2_msgs/TFMessage", "pose", "tf: {from: map, to: base_link}", ""),
-    (r"sends \S+ nav_msgs/Odometry", "pose", "topic: NAME", CHECK_FRAME),
-    (r"sends \S+ nav_msgs/Odometry", "velocity", "topic: NAME", ""),
+    (r"action \S+ nav2_msgs/action/NavigateToPose", "go_to", ACTION_LINE + "{pose: $place}", PLACES_FIRST),
+    (r"hears \S*[/_](say|speak|speech|tts|talk)(_text|_output)? std_msgs/msg/String", "say", SAY_LINE, ""),
+    (r"sends \S+ sensor_msgs/msg/(Compressed)?Image", "is_in_room", CAMERA_LINE, DETECTOR_FIRST),
+    (r"service \S+ std_srvs/srv/Trigger", "", SERVICE_LINE + "{}, success: success", SKILL_FIRST),
+    (r"service \S+ std_srvs/srv/SetBool", "", SERVICE_LINE + "{data: $on}, success: success", SKILL_FIRST),
+    (r"sends \S*/(amcl_)?pose geometry_msgs/msg/Pose(WithCovariance)?Stamped", "pose", "topic: NAME", ""),
+    (r"sends /tf tf2_msgs/msg/TFMessage", "pose", "tf: {from: map, to: base_link}", ""),
+    (r"sends \S+ nav_msgs/msg/Odometry", "pose", "topic: NAME", CHECK_FRAME),
+    (r"sends \S+ nav_msgs/msg/Odometry", "velocity", "topic: NAME", ""),
 )
 """For each regex for offers: the key in the draft (empty to derive it from the offer's name), the value, and
 a task for the user. A line with a task becomes a comment.
 """
 
 INTERNAL_OFFERS = re.compile(
-    r"\S+ \S*((lifecycle|controller)_manager|costmap|rosbag|rosbridge|rosapi|rviz|/_|/tf_static|_logger).*"
-    r"|.* (rcl_interfaces|lifecycle_msgs|\w+_interfaces|rosgraph_msgs|actionlib_msgs|bond|dynamic_reconfigure"
-    r"|diagnostic_msgs)/\w+|.*Action(Goal|Result|Feedback)"
+    r"\S+ \S*((lifecycle|controller)_manager|costmap|rosbag|rosbridge|rosapi|rviz|/_|/tf_static).*"
+    r"|.* (rcl_interfaces|lifecycle_msgs|\w+_interfaces|bond|diagnostic_msgs)/\w+/\w+"
 )
 """Matches offers that no skill can use, such as the parameter services of every node."""
-
-COMMON_PACKAGES = ("geometry_msgs", "nav_msgs", "robot_actions_pkg", "sensor_msgs", "std_msgs", "std_srvs")
-"""Packages that CodeBotler's ROS 2 includes or builds, so that the draft need not list them."""
 
 NOT_SKILLS = ("pose", "velocity")
 EXPECTED_KEYS = {
@@ -65,49 +54,41 @@ EXPECTED_KEYS = {
 }
 
 
-def discover_offers(robot: str, address: str, python: Path) -> list[str]:
+def discover_offers(address: str, python: Path) -> list[str]:
     """List the offers of a robot's nodes as strings "KIND NAME TYPE" (KIND: action, service, hears or sends).
 
     Args:
-        robot: the version of ROS, ros1 or ros2.
-        address: the URI of a ROS 1 master or a ROS 2 domain number, or "" for the default.
+        address: a ROS 2 domain number, or "" for the default.
         python: the Python interpreter of the robot's ROS installation.
 
     Raises:
-        UserError: the kind of robot or the address is invalid.
-        NotReadyError: ROS is not installed, or no master or no node was found.
+        UserError: the address is invalid.
+        NotReadyError: ROS 2 is not installed, or no node was found.
     """
-    if robot not in {"ros1", "ros2"}:
-        raise UserError(f'"{robot}" does not support discovery; use ros1 or ros2, on a machine with that ROS')
-    if robot == "ros1":
-        environment = {"ROS_MASTER_URI": master_uri(address)}
-    else:
-        environment, python = {"ROS_DOMAIN_ID": domain_of(address)}, choose_python(python)
-    worker = RosWorker(python, "discovery_worker.py", {"robot": robot}, environment)
+    domain = domain_of(address)
+    worker = RosWorker(choose_python(python), "discovery_worker.py", {}, {"ROS_DOMAIN_ID": domain})
     worker.leave()
     if not worker.about["offers"]:
-        where = " ".join(*environment.items())
-        raise NotReadyError(f"no node was found with {where}; start the robot, or give its --address")
+        raise NotReadyError(
+            f"no node was found with ROS_DOMAIN_ID {domain}; start the robot, or give its --address"
+        )
     return [" ".join(offer) for offer in worker.about["offers"]]
 
 
-def draft_connection(robot: str, offers: Iterable[str]) -> str:
+def draft_connection(offers: Iterable[str]) -> str:
     """Draft a file for `--connect`. Lines that the user must complete and unused offers become comments."""
-    by_form = {re.sub("/(action|srv|msg)/", "/", offer): offer for offer in sorted(offers)}
-    forms = [
-        form
-        for form in by_form
-        if re.fullmatch(r"\w+ [\w/]+ [\w/]+", form) and not INTERNAL_OFFERS.fullmatch(form)
+    known = [
+        offer
+        for offer in sorted(offers)
+        if re.fullmatch(r"\w+ [\w/]+ [\w/]+", offer) and not INTERNAL_OFFERS.fullmatch(offer)
     ]
-    rest = {by_form[form].partition(" ")[2] for form in forms}
+    rest = {offer.partition(" ")[2] for offer in known}
     ready: set[str] = set()
-    packages: set[str] = set()
     lines: list[tuple[bool, str]] = []  # the lines of the draft, and whether each defines a skill
     for pattern, use, text, first in MAPPINGS:
-        for form in (form for form in forms if re.fullmatch(pattern, form)):
-            _, name, kind = by_form[form].split()
+        for offer in (offer for offer in known if re.fullmatch(pattern, offer)):
+            _, name, kind = offer.split()
             key = use or "_".join(reversed(name.strip("/").lower().split("/")))
-            packages.add(kind.partition("/")[0])
             line = f"{key}: {{{text.replace('TYPE', kind).replace('NAME', name)}}}"
             why = first or "already defined above" * (key in ready)
             ready |= set() if why else {key}
@@ -115,16 +96,14 @@ def draft_connection(robot: str, offers: Iterable[str]) -> str:
             rest.discard(f"{name} {kind}")
     if "get_all_rooms" in ready:
         ready.add("places")
-    rare = sorted(packages - {*COMMON_PACKAGES}) if robot == "ros2" else []
     lacks = [what for key, what in EXPECTED_KEYS.items() if key not in ready]
     return "".join(
         f"{line}\n"
         for line in (
             "# A draft of `codebotler connect --discover`; read each line before you use it.",
             *([f"# Missing: {', '.join(lacks)}"] if lacks else []),
-            f"robot: {robot}",
+            "robot: ros2",
             *([] if "places" in ready else ["# places: places.yaml"]),
-            *([f"# packages: [{', '.join(rare)}]  # where they are not installed"] if rare else []),
             *(line for is_skill, line in lines if not is_skill),
             "skills:",
             *(f"  {line}" for is_skill, line in lines if is_skill),

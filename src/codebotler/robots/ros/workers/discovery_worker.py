@@ -1,4 +1,4 @@
-"""List the offers of a robot's nodes, under a Python that has rclpy or rospy."""
+"""List the offers of a robot's nodes on ROS 2, under a Python that has rclpy."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import time
 from contextlib import suppress
 from typing import Any, Iterator, Tuple
 
-from channel import Channel, Fields, SetupError, serve
+from channel import Channel, Fields, serve
 
 QUIET_SECONDS = 2.0  # discovery ends after this many seconds without new offers
 MAX_DISCOVERY_SECONDS = 10.0
@@ -15,17 +15,16 @@ Offer = Tuple[str, str, str]  # the kind (action, service, sends or hears), the 
 
 
 class DiscoveryWorker:
-    """Sends all offers in its first message. The message it receives says whether `robot` is ros1 or ros2."""
+    """Sends all offers in its first message."""
 
-    def __init__(self, channel: Channel, start: Fields) -> None:
-        offers = set(offers_on_ros1()) if start["robot"] == "ros1" else offers_on_ros2()
-        channel.send("ready", offers=sorted(offers))
+    def __init__(self, channel: Channel, _start: Fields) -> None:
+        channel.send("ready", offers=sorted(find_offers()))
 
     def leave(self) -> None:
         """Do nothing, because the node ends with the process."""
 
 
-def offers_on_ros2() -> set[Offer]:
+def find_offers() -> set[Offer]:
     """Collect the offers of all nodes until no new offers appear."""
     import rclpy
 
@@ -54,25 +53,6 @@ def _offers_of_others(node: Any) -> Iterator[Offer]:
         for kind, ask in questions.items() if other[0] != node.get_name() else ():
             with suppress(Exception):  # rclpy raises various errors for a node that has just left
                 yield from ((kind, name, types[0]) for name, types in ask(*other))
-
-
-def offers_on_ros1() -> Iterator[Offer]:
-    """Yield the offers registered at the master, which does not know the types of services."""
-    import rosgraph
-
-    from graph import Ros1Graph, no_master
-
-    graph = Ros1Graph("codebotler_discovers")  # asking the master does not require a registered node
-    if not graph.is_online():
-        raise SetupError(no_master(graph.uri))
-    master = rosgraph.Master(graph.node)
-    types = dict(master.getTopicTypes())
-    for kind, names in zip(("sends", "hears", "service"), master.getSystemState()):
-        for name, _ in names:
-            of = types.get(name, "unknown")
-            yield kind, name, of
-            if kind == "hears" and name.endswith("/goal") and of.endswith("ActionGoal"):
-                yield "action", name[: -len("/goal")], of[: -len("ActionGoal")]
 
 
 if __name__ == "__main__":

@@ -17,7 +17,6 @@ TOOL_SILENCE = 0.7  # the robot is stopped after this many seconds without a hea
 FEEDBACK_INTERVAL = 0.5  # the minimum time in seconds between two feedback messages to CodeBotler
 END_SECONDS = 1.0  # how long an ending worker waits for its cancelled goal to end
 PICTURE_SECONDS = 0.5  # how long to wait after a result for its picture, which comes over its own connection
-MAX_PICTURE_BYTES = 2_000_000
 
 ROS1_ENDS = {2: "cancelled", 3: "succeeded", 4: "aborted", 5: "rejected", 8: "cancelled", 9: "lost"}
 """How a goal has ended, by its status in actionlib_msgs/GoalStatus."""
@@ -249,12 +248,7 @@ class SkillWorker:
         goal = self.goal
         if goal is None or goal.server is not server or goal.sent is None or goal.is_over:
             return
-        size = len(data) * 3 // 4
-        if size > MAX_PICTURE_BYTES:
-            text = f"a picture of {size:,} bytes was left out; the limit is {MAX_PICTURE_BYTES:,} bytes"
-            self.channel.send("feedback", id=goal.number, text=text)
-        else:
-            self.channel.send("picture", id=goal.number, data=data)
+        self.channel.send("picture", id=goal.number, data=data)
         goal.picture_event.set()
 
     def _end_with_picture(self, goal: Goal, values: Fields) -> None:

@@ -89,7 +89,7 @@ def start_master(port: int | None, uri: str) -> Any:
         except OSError as error:
             raise SetupError(
                 f"port {port} is in use by something that is not a ROS master ({error}); "
-                "choose another with --port"
+                "name another in ROS_MASTER_URI"
             ) from None
     master = rosmaster.master.Master(port)
     master.start()
