@@ -23,7 +23,7 @@ def _words(text: str) -> frozenset[str]:
 CONSUMERS = _words("all any dict len list max min next sorted sum tuple")
 FUNCTIONS = CONSUMERS | _words("abs bool chr divmod float int ord pow print range repr round str")
 ITERATORS = _words("enumerate filter map reversed zip")
-DATA_CLASSES = _words("bool dict float int list str tuple")  # allowed in `isinstance` and annotations
+DATA_CLASSES = _words("bool dict float int list str tuple")  # allowed in annotations
 ERRORS = _words(
     """
     ArithmeticError AssertionError AttributeError BaseException EOFError Exception IndexError KeyError
@@ -31,26 +31,24 @@ ERRORS = _words(
     StopIteration TimeoutError TypeError UnboundLocalError ValueError ZeroDivisionError
     """
 )
-GIVEN = FUNCTIONS | ITERATORS | ERRORS | {"isinstance"}  # all builtins that a tame program can use
+GIVEN = FUNCTIONS | ITERATORS | ERRORS  # all builtins that a tame program can use
 # Names that programs may have without binding them, except `__name__`, which always holds data.
 EXISTING = frozenset({*dir(builtins), "exit", "quit", "sys", "time"}) - {"__name__"}
 
-TEXT_METHODS = _words(
+DATA_METHODS = _words(
     """
-    capitalize casefold center count endswith expandtabs find index isalnum isalpha isdecimal isdigit islower
-    isnumeric isspace istitle isupper join ljust lower lstrip partition removeprefix removesuffix replace
-    rfind rindex rjust rpartition rsplit rstrip split splitlines startswith strip swapcase title upper zfill
+    append capitalize casefold center clear copy count endswith expandtabs extend find get index insert
+    isalnum isalpha isdecimal isdigit islower isnumeric isspace istitle isupper join ljust lower lstrip
+    partition pop popitem remove removeprefix removesuffix replace reverse rfind rindex rjust rpartition
+    rsplit rstrip setdefault sort split splitlines startswith strip swapcase title update upper zfill
     """
-)
-DATA_METHODS = TEXT_METHODS | _words(
-    "append clear copy extend get insert pop popitem remove reverse setdefault sort update"
 )
 CONSUMING_METHODS = _words("extend join update")
 VIEWS = _words("items keys values")
 CLOCK = _words("asctime ctime gmtime localtime monotonic perf_counter sleep strftime time")
-PARTS_OF_TIME = _words("tm_year tm_mon tm_mday tm_hour tm_min tm_sec tm_wday tm_yday")
 PLAIN_FIELDS = re.compile(r"(?:[^{}]|\{\{|\}\}|\{\w*(?:![rsa])?(?::[^{}]*)?\})*")
 CONSTANTS = (type(None), bool, int, float, str, type(...))
+TYPE_NODES = (ast.Constant, ast.Subscript, ast.Tuple, ast.BinOp, ast.BitOr, ast.Load)
 OPERATOR_NODES = (ast.operator, ast.boolop, ast.unaryop, ast.expr_context)
 
 
@@ -143,7 +141,7 @@ class ExpressionVerifier:
                 self._check_value(node)
 
     def _check_callback(self, node: ast.expr) -> None:
-        """Allow a function, skill, builtin, method or lambda that a builtin calls immediately."""
+        """Allow a function, skill, builtin or lambda that a builtin calls immediately."""
         match node:
             case ast.Lambda(args, body):
                 if not self.special.isdisjoint(parameters_of(args)):
@@ -152,11 +150,6 @@ class ExpressionVerifier:
                 self._check_value(body)
             case ast.Name(name) if self._is_own(name) or self._is_given(name, FUNCTIONS - {"next"}):
                 pass
-            case ast.Attribute(ast.Name("str"), method) if self._is_given("str", DATA_CLASSES):
-                if method not in TEXT_METHODS:
-                    wild()
-            case ast.Attribute(of, "get" | "count" | "index"):
-                self._check_value(of)
             case _:
                 self._check_value(node)
 
@@ -169,27 +162,16 @@ class ExpressionVerifier:
                 self._check_annotation(arg.annotation)
 
     def _check_annotation(self, node: ast.expr) -> None:
-        """Allow an annotation of a usual form, since programs cannot read annotations."""
-        match node:
-            case ast.Constant(value) if value is None or value is ... or isinstance(value, str):
-                pass
-            case ast.Name(name) if name in DATA_CLASSES or self.is_data(name):
-                pass
-            case ast.Subscript(left, right) | ast.BinOp(left, ast.BitOr(), right):
-                self._check_annotation(left)
-                self._check_annotation(right)
-            case ast.Tuple(elts) | ast.List(elts):
-                for part in elts:
-                    self._check_annotation(part)
-            case _:
+        """Allow the types of data, such as `dict[str, int]`, since programs cannot read annotations."""
+        for part in ast.walk(node):
+            is_type = part.id in DATA_CLASSES if isinstance(part, ast.Name) else isinstance(part, TYPE_NODES)
+            if not is_type:
                 wild()
 
     def _check_call(self, node: ast.Call) -> None:
         match node.func:
             case ast.Name(name) if self._is_own(name) or self.is_data(name):
                 self._check_arguments(node.args, node.keywords)
-            case ast.Name("isinstance") if self._is_given("isinstance", GIVEN):
-                self._check_isinstance(node)
             case ast.Name(name) if self._is_given(name, FUNCTIONS):
                 picks = name in {"max", "min"}  # with several arguments, they return one of them
                 uses_up = name in CONSUMERS and not (picks and len(node.args) > 1)
@@ -205,16 +187,6 @@ class ExpressionVerifier:
                 uses_up, calls_key = method in CONSUMING_METHODS, method == "sort"
                 self._check_call_of_builtin(node, uses_up=uses_up, calls_key=calls_key)
             case _:
-                wild()
-
-    def _check_isinstance(self, node: ast.Call) -> None:
-        match node:
-            case ast.Call(args=[thing, kinds], keywords=[]):
-                self._check_value(thing)
-            case _:
-                wild()
-        for kind in kinds.elts if isinstance(kinds, ast.Tuple) else [kinds]:
-            if not (isinstance(kind, ast.Name) and self._is_given(kind.id, DATA_CLASSES)):
                 wild()
 
     def _check_call_of_builtin(self, node: ast.Call, *, uses_up: bool, calls_key: bool) -> None:
@@ -261,13 +233,6 @@ class ExpressionVerifier:
         for part in (node.key, node.value) if isinstance(node, ast.DictComp) else (node.elt,):
             self._check_value(part)
 
-    def _check_assignment(self, node: ast.NamedExpr) -> None:
-        """Allow `:=` unless it binds a special name, since it may belong to an outer scope."""
-        if node.target.id in self.special:
-            wild()
-        self._check_name(node.target)
-        self._check_value(node.value)
-
     def _check_comparison(self, node: ast.Compare) -> None:
         """Allow a comparison of data. `in` may also search an iterator."""
         sides = [node.left, *node.comparators]
@@ -279,11 +244,6 @@ class ExpressionVerifier:
                 self._check_iterable(right)
             else:
                 self._check_value(right)
-
-    def _check_attribute(self, node: ast.Attribute) -> None:
-        if node.attr not in PARTS_OF_TIME or type(node.ctx) is not ast.Load:
-            wild()
-        self._check_value(node.value)
 
     def _check_constant(self, node: ast.Constant) -> None:
         if type(node.value) not in CONSTANTS:
@@ -297,9 +257,7 @@ class ExpressionVerifier:
         ast.Name: _check_name,
         ast.Constant: _check_constant,
         ast.Call: _check_call,
-        ast.Attribute: _check_attribute,
         ast.Compare: _check_comparison,
-        ast.NamedExpr: _check_assignment,
     }
 
 
