@@ -124,11 +124,6 @@ class WorkerPool:
         """Call a function in a pool thread, which may be the current one, and return its result."""
         return function() if self.is_here else self.submit(function).result()
 
-    def forget(self) -> None:
-        """After a fork, close the descriptors in the child, which has neither the workers nor the threads."""
-        for worker in self._workers:
-            worker.forget()
-
     def map_distinct(
         self,
         function: Callable[[Sequence[_Key]], Sequence[_Called]],
@@ -302,13 +297,10 @@ class SharedPool:
     """Holds this process's pool once it has started. After a fork, the child starts a new one."""
 
     def __init__(self) -> None:
-        self.lock = threading.Lock()  # held during a fork, so that no child inherits half a pool
+        self.lock = threading.Lock()
         self.pool: WorkerPool | None = None
-        self._inherited: list[WorkerPool] = []  # never freed, since their threads do not exist here
         atexit.register(self.end)
-        os.register_at_fork(
-            before=self.lock.acquire, after_in_parent=self.lock.release, after_in_child=self.begin_anew
-        )
+        os.register_at_fork(after_in_child=self.begin_anew)
 
     def end(self) -> None:
         """Close the pool."""
@@ -318,12 +310,8 @@ class SharedPool:
                 self.pool = None
 
     def begin_anew(self) -> None:
-        """After a fork, release the parent's pool in the child."""
-        if self.pool is not None:
-            self.pool.forget()
-            self._inherited.append(self.pool)
-            self.pool = None
-        self.lock.release()
+        """After a fork, leave the pool to the parent, whose threads do not exist in the child."""
+        self.lock, self.pool = threading.Lock(), None
 
 
 def cores() -> int:

@@ -102,13 +102,6 @@ class Worker:
         while self._fork_servers:
             self._fork_servers.popitem()[1].close()
 
-    def forget(self) -> None:
-        """After a fork, close the descriptors in the new process, which is not the children's parent."""
-        if self._child is not None:
-            self._child.hang_up()
-        while self._fork_servers:
-            self._fork_servers.popitem()[1].forget()
-
     # --- several tame programs in one child
 
     def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:

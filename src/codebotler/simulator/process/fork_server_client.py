@@ -14,7 +14,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import message
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.isolated_process import IsolatedProcess, channel_pair
-from codebotler.simulator.process.spawn import start_fork_server, start_module
+from codebotler.simulator.process.spawn import CHANNELS, start_fork_server, start_module
 from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.skill_protocol import SkillProtocol, describe_skills
@@ -38,6 +38,7 @@ class ForkServer:
     def __init__(self, role: str) -> None:
         self._report, report = os.pipe()
         door, self._door = socket.socketpair()
+        CHANNELS.add(self._door)
         try:
             with door:
                 self._process = self._start(role, door.fileno(), report)
@@ -89,14 +90,6 @@ class ForkServer:
         """Kill the fork server and close its descriptors. Call this only while nothing is running."""
         self._process.kill()
         self._process.wait()
-        self._close_descriptors()
-
-    def forget(self) -> None:
-        """After a fork, close the descriptors in the new process, which is not the fork server's parent."""
-        self._process.returncode = 0  # stops `Popen` from waiting for it here
-        self._close_descriptors()
-
-    def _close_descriptors(self) -> None:
         os.close(self._report)
         self._door.close()
 
@@ -151,8 +144,9 @@ class BatchServer(ForkServer):
         with contextlib.suppress(LostProcessError):  # the next fork raises the error
             self._next = super().fork()
 
-    def _close_descriptors(self) -> None:
-        super()._close_descriptors()
+    def close(self) -> None:
+        """Kill the fork server, and hang up on the child that was forked in advance."""
+        super().close()
         if self._next is not None:
             self._next.hang_up()
 

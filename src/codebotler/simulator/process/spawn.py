@@ -8,6 +8,7 @@ import importlib
 import inspect
 import marshal
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -18,6 +19,7 @@ from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType
 from typing import IO
+from weakref import WeakSet
 
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.sandbox import FLAGS, WITHOUT_REFERENCES
@@ -49,7 +51,7 @@ def start_module(code: str, arguments: Sequence[str], descriptors: Sequence[int]
 
 def _start(arguments: Sequence[str], descriptors: Sequence[int]) -> subprocess.Popen[bytes]:
     with START_LOCK:
-        return subprocess.Popen(  # noqa: S603 - our own code, by the interpreter that runs us
+        process = subprocess.Popen(  # noqa: S603 - our own code, by the interpreter that runs us
             [sys.executable, *FLAGS, *arguments],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
@@ -59,15 +61,27 @@ def _start(arguments: Sequence[str], descriptors: Sequence[int]) -> subprocess.P
             pass_fds=descriptors,
             start_new_session=True,
         )
+        PROCESSES.add(process)
+        return process
 
 
+PROCESSES: WeakSet[subprocess.Popen[bytes]] = WeakSet()
+CHANNELS: WeakSet[socket.socket] = WeakSet()  # the engine's ends
 START_LOCK = threading.Lock()
 # A fork during a start would inherit a locked lock, and keep open a pipe that the start expects to close.
-os.register_at_fork(
-    before=START_LOCK.acquire,
-    after_in_parent=START_LOCK.release,
-    after_in_child=START_LOCK.release,
-)
+os.register_at_fork(before=START_LOCK.acquire, after_in_parent=START_LOCK.release)
+
+
+def leave_to_parent() -> None:
+    """After a fork, leave all isolated processes to the parent, which alone can wait for them."""
+    for process in PROCESSES:
+        process.returncode = 0
+    for channel in CHANNELS:
+        channel.close()
+    START_LOCK.release()
+
+
+os.register_at_fork(after_in_child=leave_to_parent)
 
 
 def compiled_file() -> IO[bytes]:
