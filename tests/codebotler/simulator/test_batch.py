@@ -27,8 +27,9 @@ from codebotler.simulator.batches.replay import Replay, Transcript, key_of, pars
 from codebotler.simulator.ledger import Ledger, RememberingLedger, SkillAnswer
 from codebotler.simulator.pool import MAX_BATCH_KEYS, MAX_KEYS_AHEAD, MIN_BATCH_KEYS, DistinctKeys, WorkerPool
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME
+from codebotler.simulator.sandbox import MAX_FRAME
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.worker import EngineError, Job, Worker
 from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
@@ -428,7 +429,7 @@ def test_what_a_behaviour_raises_is_raised_here(worker: Worker) -> None:
 
 
 def test_a_child_that_is_killed_costs_only_the_program_that_it_ran(worker: Worker) -> None:
-    fork_server = worker._fork_server(BATCH_SERVER).pid
+    fork_server = worker._fork_server(BatchServer).pid
     killed: list[int] = []
 
     def kill_the_child(_robot: SimulatedRobot, person: str) -> str:
@@ -454,7 +455,7 @@ def test_a_child_that_is_killed_costs_only_the_program_that_it_ran(worker: Worke
 def test_a_fork_server_that_is_killed_costs_all_of_them_nothing_but_time() -> None:
     def kill_the_server(_robot: SimulatedRobot, _person: str) -> str:
         if not killed:
-            killed.append(worker._fork_server(BATCH_SERVER).pid)
+            killed.append(worker._fork_server(BatchServer).pid)
             os.kill(killed[0], signal.SIGKILL)
         return "done"
 
@@ -818,13 +819,13 @@ def test_one_process_per_run_shares_no_process(other_worker: Worker) -> None:
         ["b"] * 3,
         ["c"] * 3,
     ]
-    assert BATCH_SERVER not in other_worker._fork_servers
-    assert FORK_SERVER in other_worker._fork_servers
+    assert BatchServer not in other_worker._fork_servers
+    assert ForkServer in other_worker._fork_servers
 
 
 @pytest.mark.slow
 def test_a_pool_hands_on_that_each_run_has_a_process() -> None:
-    for alone, role in ((False, BATCH_SERVER), (True, FORK_SERVER)):
+    for alone, role in ((False, BatchServer), (True, ForkServer)):
         with WorkerPool(1, one_process_per_run=alone) as pool:
             assert list(pool.here()._fork_servers) == [role]
 

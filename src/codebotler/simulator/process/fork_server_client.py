@@ -15,7 +15,7 @@ from codebotler.simulator.batches.replay import message
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.isolated_process import IsolatedProcess, channel_pair
 from codebotler.simulator.process.spawn import CHANNELS, start_fork_server, start_module
-from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCES
+from codebotler.simulator.sandbox import HEADER, LIVE_RUN, SIMULATED_RUN, WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.skill_protocol import SkillProtocol, describe_skills
 from codebotler.simulator.worlds.robot import SimulatedRobot
@@ -35,13 +35,13 @@ WARM_UP_RUNS = 20  # the interpreter specializes code that has run a few times
 class ForkServer:
     """Starts a fork server, and has it fork children one at a time."""
 
-    def __init__(self, role: str) -> None:
+    def __init__(self) -> None:
         self._report, report = os.pipe()
         door, self._door = socket.socketpair()
         CHANNELS.add(self._door)
         try:
             with door:
-                self._process = self._start(role, door.fileno(), report)
+                self._process = self._start(door.fileno(), report)
         except BaseException:
             os.close(self._report)
             self._door.close()
@@ -58,15 +58,15 @@ class ForkServer:
             self.close()
             raise
 
-    def _start(self, role: str, *descriptors: int) -> subprocess.Popen[bytes]:
-        return start_fork_server(role, *descriptors)
+    def _start(self, *descriptors: int) -> subprocess.Popen[bytes]:
+        return start_fork_server(*descriptors)
 
-    def fork(self) -> IsolatedProcess:
-        """Return a newly forked child."""
+    def fork(self, *, is_live: bool = False) -> IsolatedProcess:
+        """Return a newly forked child, which may use more processor time if its run is live."""
         ours, theirs = channel_pair()
         try:
             with theirs:
-                socket.send_fds(self._door, [b"x"], [theirs.fileno()])
+                socket.send_fds(self._door, [LIVE_RUN if is_live else SIMULATED_RUN], [theirs.fileno()])
         except OSError:
             ours.close()
             raise LostProcessError("the fork server has ended") from None
@@ -126,18 +126,18 @@ class BatchServer(ForkServer):
 
     def __init__(self) -> None:
         self._next: IsolatedProcess | None = None
-        super().__init__(BATCH_SERVER)
+        super().__init__()
 
-    def _start(self, _role: str, *descriptors: int) -> subprocess.Popen[bytes]:
+    def _start(self, *descriptors: int) -> subprocess.Popen[bytes]:
         return start_module(BATCH_CODE, (), descriptors)
 
-    def fork(self) -> IsolatedProcess:
-        """Return a new child, which may have been forked in advance."""
+    def fork(self, *, is_live: bool = False) -> IsolatedProcess:
+        """Return a new child, which may have been forked in advance. No batch is live."""
         child, self._next = self._next, None
         if child is not None and self.has_ended:  # another process may have the child's id now
             child.hang_up()
             child = None
-        return child or super().fork()
+        return child or super().fork(is_live=is_live)
 
     def fork_ahead(self) -> None:
         """Fork the next child in advance. The previous child must have been killed."""

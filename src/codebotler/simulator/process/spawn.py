@@ -36,10 +36,10 @@ CHILD_ENVIRONMENT = {
 }
 
 
-def start_fork_server(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
+def start_fork_server(*descriptors: int) -> subprocess.Popen[bytes]:
     """Start a fork server with fixed addresses, and pass it descriptors and the code of its modules."""
     handed = (*descriptors, compiled_file().fileno())
-    return _start([str(SANDBOX / "start.py"), role, *map(str, handed)], handed)
+    return _start([str(SANDBOX / "start.py"), *map(str, handed)], handed)
 
 
 def start_module(code: str, arguments: Sequence[str], descriptors: Sequence[int]) -> subprocess.Popen[bytes]:
