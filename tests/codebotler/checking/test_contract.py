@@ -280,8 +280,8 @@ def test_an_unknown_room_is_never_allowed_by_name() -> None:
 def test_only_an_empty_person_is_anybody() -> None:
     nothing = (TextTemplate(("",)),)
     asks = SkillBound((("person", nothing), ("question", nothing), ("options", nothing)))
-    (row,) = contract_rows(Contract({"ask": asks}), SKILLS)
-    assert row.texts == 'anybody "" with ""'
+    ((_, allowed, _),) = contract_rows(Contract({"ask": asks}), SKILLS)
+    assert allowed == 'anybody "" with ""'
 
 
 def test_a_skill_without_an_event_is_beyond_a_contract_as_well(contracts: Contracts) -> None:
