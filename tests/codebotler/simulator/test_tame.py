@@ -22,7 +22,7 @@ from codebotler.simulator.process.compiler import (
 from codebotler.simulator.process.isolated_call import IDLE_PROCESSES
 from codebotler.simulator.sandbox import tame
 from codebotler.simulator.sandbox.fuel import nodes_of
-from codebotler.simulator.sandbox.tame_expressions import GIVEN
+from codebotler.simulator.sandbox.tame import GIVEN
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.robot import SimulatedRobot

@@ -25,7 +25,7 @@ from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun
 from codebotler.simulator.sandbox.fork_server import RUN_DOOR, serve
 from codebotler.simulator.sandbox.isolation import give_up_rights, usable_filter
 from codebotler.simulator.sandbox.start import arrange, forget_the_shell
-from codebotler.simulator.sandbox.tame_expressions import GIVEN
+from codebotler.simulator.sandbox.tame import GIVEN
 from codebotler.simulator.worlds.robot import Argument, SimulatedRobot
 from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
