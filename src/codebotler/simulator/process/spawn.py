@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _imp
 import atexit
 import contextlib
 import importlib
@@ -17,7 +18,6 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
-from types import CodeType
 from typing import IO
 from weakref import WeakSet
 
@@ -143,19 +143,11 @@ def code_of(file: str, shown: str) -> bytes:
     if code is None or all(column is None for _, _, column, _ in code.co_positions()):
         # Compile again, since an interpreter that omits column numbers wrote this shorter code.
         return compiled_source(Path(file).read_text(encoding="utf-8"), shown)
-    return dumped(code, shown)
+    # As importlib does it. The length of a path would change memory addresses.
+    _imp._fix_co_filename(code, shown)  # type: ignore[attr-defined]  # noqa: SLF001 - the only way in place
+    return marshal.dumps(code, WITHOUT_REFERENCES)
 
 
 def compiled_source(source: str, shown: str) -> bytes:
     """Compile a source text."""
-    return dumped(compile(source, "", "exec", dont_inherit=True, optimize=0), shown)
-
-
-def dumped(code: CodeType, shown: str) -> bytes:
-    """Serialize code without paths, since their length would change memory addresses."""
-
-    def nameless(code: CodeType) -> CodeType:
-        parts = (nameless(part) if isinstance(part, CodeType) else part for part in code.co_consts)
-        return code.replace(co_filename=shown, co_consts=tuple(parts))
-
-    return marshal.dumps(nameless(code), WITHOUT_REFERENCES)
+    return marshal.dumps(compile(source, shown, "exec", dont_inherit=True, optimize=0), WITHOUT_REFERENCES)
