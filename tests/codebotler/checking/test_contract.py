@@ -198,7 +198,6 @@ def test_a_contract_is_read_as_it_was_written(contracts: Contracts, tmp_path: Pa
         ("version: 1\nskills:\n  say:\n    message: any\n    at most: -3", 5),
         ("version: 1\nskills:\n  say:\n    message: [3]", 4),
         ("version: 1\nskills:\n  pick: {obj: any, in: kitchen}", 3),
-        ("version: 1\nskills:\n  pick:\n    obj: any\n    in: [kitchen, ' ']", 5),
     ],
 )
 def test_a_wrong_file_is_refused_with_its_line(tmp_path: Path, text: str, line: int) -> None:

@@ -18,10 +18,6 @@ TASK_NAME = "task_program"
 PROGRAM_TOO_LARGE = "the program is too large, or nested too deeply"
 MAX_TREE_DEPTH = 250
 LEAF_FIELDS = frozenset({"ctx", "op", "ops"})  # fields that hold operators and contexts
-WITH_LEAVES = frozenset(
-    {*(ast.Name, ast.Attribute, ast.Subscript, ast.Starred, ast.List, ast.Tuple), *(ast.BinOp, ast.BoolOp)}
-    | {ast.UnaryOp, ast.Compare, ast.AugAssign}
-)
 FUELED_BLOCKS: tuple[tuple[str, str, tuple[type[ast.AST], ...]], ...] = (
     (FUEL, "body", (ast.For, ast.AsyncFor, ast.While)),
     (CAUGHT, "body", (ast.ExceptHandler,)),
@@ -60,9 +56,9 @@ def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
     waiting: list[tuple[ast.AST, int]] = [(tree, 0)]
     while waiting:
         node, depth = waiting.pop()
-        kind = type(node)
-        if depth > MAX_TREE_DEPTH - (kind in WITH_LEAVES):
+        if depth > MAX_TREE_DEPTH:
             raise MemoryError
+        kind = type(node)
         nodes[kind].append(node)
         depth += 1
         for name in kind._fields:
