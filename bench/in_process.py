@@ -18,7 +18,7 @@ from typing import IO, Any, Protocol, Self, TypeAlias
 from codebotler.core.errors import RobotError
 from codebotler.core.trace import Option, Outcome, RunError, Status
 from codebotler.core.world import World
-from codebotler.simulator.ledger import run_parameters, texts_in
+from codebotler.simulator.ledger import run_parameters
 from codebotler.simulator.process.compiler import CompiledProgram, compile_here, result_of
 from codebotler.simulator.sandbox import execution
 from codebotler.simulator.sandbox.execution import PROGRAM_RECURSION_LIMIT, LimitReachedError, ProgramRun
@@ -161,7 +161,8 @@ class Unwalled(Bare):
 
     def reached(self, arguments: list[Argument]) -> str | None:
         """Return the limit that a skill call exceeds, in words, or None."""
-        texts = [t for a in arguments for t in (texts_in(a) if isinstance(a, tuple) else [str(a)])]
+        given = [each for one in arguments for each in (one if isinstance(one, tuple) else (one,))]
+        texts = [each.text if isinstance(each, Option) else str(each) for each in given]
         if late := self.too_late():
             return late
         self.asked += 1

@@ -28,9 +28,9 @@ STARTER = [ThreadPoolExecutor(1, "starter")]  # processes of an engine end with 
 class SharedWorker(Worker):
     """A worker that waits for its next user when it is closed, unless it was stopped during a run."""
 
-    def __init__(self, *, is_live: bool = False) -> None:
+    def __init__(self, *, one_process_per_run: bool = False) -> None:
         self.is_running = self.is_leaving = self.was_stopped = False
-        super().__init__(is_live=is_live)
+        super().__init__(one_process_per_run=one_process_per_run)
 
     def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
         """Run the tame ones of some programs."""
@@ -75,25 +75,24 @@ class SharedWorker(Worker):
         """End it."""
         super().close()
 
-    def _fork_server(self, role: str) -> ForkServer:
-        if role in self._fork_servers:
-            return self._fork_servers[role]
-        return lasting(partial(super()._fork_server, role))
+    def _fork_server(self, kind: type[ForkServer]) -> ForkServer:
+        if kind in self._fork_servers:
+            return self._fork_servers[kind]
+        return lasting(partial(super()._fork_server, kind))
 
     def _expect_a_user(self) -> None:
         if self.is_leaving:
             raise EngineError("the engine was stopped")
 
 
-def worker(*, one_process_per_run: bool = False, is_live: bool = False) -> Worker:
+def worker(*, one_process_per_run: bool = False) -> Worker:
     """One that waits, or else a new one."""
-    if one_process_per_run:
-        return Worker(one_process_per_run=True)
-    if not IDLE:
-        return lasting(partial(SharedWorker, is_live=is_live))
-    found = IDLE.pop()
-    found.is_leaving = False
-    return found
+    for found in IDLE:
+        if found._one_process_per_run == one_process_per_run:
+            IDLE.remove(found)
+            found.is_leaving = False
+            return found
+    return lasting(partial(SharedWorker, one_process_per_run=one_process_per_run))
 
 
 def lasting(start: Callable[[], Started]) -> Started:

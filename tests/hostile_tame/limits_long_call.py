@@ -1,6 +1,5 @@
 """Says a string that is far too long, and catches what comes of it."""
 # tame: yes
-# decided: alone
 def task_program():
     try:
         say("x" * 60_000)

@@ -2,4 +2,4 @@
 # tame: yes
 # decided: alone
 def task_program():
-    ask("", "Which?", [str(number) for number in range(20_000)])
+    ask("", "Which?", [str(number) for number in range(100_000)])

@@ -1,5 +1,5 @@
 """Assigns within expressions, in scopes that are not what they seem."""
-# tame: yes
+# tame: no
 def task_program():
     found = [last for number in [1, 2, 3] if (last := number) > 1]
     say(str(found) + str(last) + str((y := 5) + y) + f"{(z := 6)} {z:>{(w := 9)}}")

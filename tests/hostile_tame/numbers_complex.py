@@ -2,5 +2,5 @@
 # tame: yes
 def task_program():
     root = (-8) ** (1 / 3)
-    say(str(root) + repr(abs(root)) + str(root == root) + str(isinstance(root, float)))
+    say(str(root) + repr(abs(root)) + str(root == root))
     sorted([root, root])

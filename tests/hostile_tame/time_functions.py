@@ -5,8 +5,8 @@ import time as time
 def task_program():
     import time
     now = time.localtime()
-    say(str(now) + str(now[:3]) + str(now == time.gmtime()) + str(isinstance(now, tuple)))
-    say(time.strftime("%c %Z %z %s %x %X") + time.asctime() + time.ctime(0) + str(now.tm_year))
+    say(str(now) + str(now[:3]) + str(now == time.gmtime()))
+    say(time.strftime("%c %Z %z %s %x %X") + time.asctime() + time.ctime(0) + str(now[0]))
     for seconds in (10**20, float("nan"), "x", -1e15, None):
         try:
             say(str(time.gmtime(seconds)) + time.ctime(seconds))

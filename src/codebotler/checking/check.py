@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from codebotler.checking.contracts.of_program import derive_contract
-from codebotler.checking.contracts.text import contract_clauses
+from codebotler.checking.contracts.text import contract_rows
 from codebotler.checking.exploration import explore
 from codebotler.checking.problems import CheckResult, Problem, RuleProof, RuleVerdict, Sample
 from codebotler.checking.sampled import (
@@ -206,9 +206,9 @@ def hold_within(found: CheckResult, allowed: Contract, skills: SkillTable) -> Ch
     """Return a check with a problem for each skill with which the program may do what a contract forbids."""
     if found.contract is None:
         return found
-    new = contract_clauses(found.contract.beyond(allowed), skills)
+    new = [" ".join(filter(None, row)) for row in contract_rows(found.contract.beyond(allowed), skills)]
     problems = (
-        Problem("OutsideContract", f"the program may {clause}, which the contract does not allow")
-        for clause in new
+        Problem("OutsideContract", f"the program may {what}, which the contract does not allow")
+        for what in new
     )
     return replace(found, problems=(*found.problems, *problems))

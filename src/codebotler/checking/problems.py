@@ -166,11 +166,7 @@ class CheckResult:
         return {
             "accepted": not self.problems,
             "problems": [
-                {
-                    **{name: getattr(problem, name) for name in ("kind", "message", "line", "where")},
-                    "samples": list(problem.samples),
-                    "sentence": problem.sentence,
-                }
+                asdict(problem) | {"samples": list(problem.samples), "sentence": problem.sentence}
                 for problem in self.problems
             ],
             "rooms": list(self.rooms),

@@ -12,7 +12,6 @@ from codebotler.core.skills.calling import SKILL_FAILED
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome, Status, attempted_event
 from codebotler.simulator.pool import shared_pool
-from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.fact_sampler import FactSampler
 from codebotler.simulator.worlds.robot import Argument, Result
@@ -41,8 +40,7 @@ def remaining_outcomes(
     robots: list[RepeatingRobot] = []  # of all runs, since a run is repeated if its process is lost
 
     def begin(sampler: FactSampler) -> RepeatingRobot:
-        robots.append(RepeatingRobot(room_map, sampler, settings.simulation, skills))
-        robots[-1].left = deque(event for event in room_map.past[first:] if not event.failed)
+        robots.append(RepeatingRobot(room_map, sampler, settings, first))
         return robots[-1]
 
     for sampler in first_samplers(settings):
@@ -55,11 +53,9 @@ def remaining_outcomes(
 class RepeatingRobot(SampledRobot):
     """A robot that gives a program the results in the past of its map, and then those of a sampled world."""
 
-    def __init__(
-        self, room_map: RoomMap, sampler: FactSampler, settings: SimulationSettings, skills: SkillTable
-    ) -> None:
-        super().__init__(room_map, sampler, settings, skills)
-        self.left = deque(event for event in room_map.past if not event.failed)
+    def __init__(self, room_map: RoomMap, sampler: FactSampler, how: CheckSettings, first: int) -> None:
+        super().__init__(room_map, sampler, how.simulation, how.skills)
+        self.left = deque(event for event in room_map.past[first:] if not event.failed)
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Return the result in the past. A call that is not in it failed."""

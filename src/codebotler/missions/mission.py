@@ -279,7 +279,7 @@ class Mission:
             )
 
     def _run_program(self, live: LiveRobot) -> Outcome:
-        with closing(Worker(is_live=True)) as worker:
+        with closing(Worker(one_process_per_run=True)) as worker:
             self.stop_button.on_press(worker.stop)
             if self.stop_button.ended.is_set():
                 raise StoppedError

@@ -8,7 +8,6 @@ from typing import Any, Protocol, TypeAlias
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import VIOLATION, RobotError
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.skills.values import Scalar
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
@@ -115,19 +114,21 @@ class Ledger:
         return Outcome(status, self.robot.trace, RunError(kind, message[:MAX_MESSAGE]), where)
 
     def _spend(self, arguments: Sequence[Argument]) -> None:
-        limits, size = self.limits, 0
+        limits, longest = self.limits, 0
         for argument in arguments:
             if isinstance(argument, str):
-                size += len(argument)
+                texts: Sequence[str] = (argument,)
             elif isinstance(argument, tuple):
-                size -= OPTION_OVERHEAD
-                for text in texts_in(argument):
-                    size += len(text) + OPTION_OVERHEAD
-        self.text += size
+                texts = [each.text if isinstance(each, Option) else str(each) for each in argument]
+            else:
+                continue
+            sizes = list(map(len, texts))
+            self.text += sum(sizes) + OPTION_OVERHEAD * (len(texts) - 1)
+            longest = max([longest, *sizes])
         self.calls += 1
         if self.calls > limits.calls:
             self.limit = f"{limits.calls:,} skill calls"
-        elif size + OPTION_OVERHEAD * len(arguments) > limits.text and longest(arguments) > limits.text:
+        elif longest > limits.text:
             self.limit = too_long(limits)
         elif self.text > limits.trace:
             self.limit = f"texts of more than {limits.trace:,} characters in total"
@@ -144,17 +145,6 @@ def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
 def too_long(limits: Limits) -> str:
     """Describe the limit on the length of a string."""
     return f"a text of more than {limits.text:,} characters"
-
-
-def longest(arguments: Sequence[Argument]) -> int:
-    """Return the length of the longest text among a skill's arguments, in characters."""
-    texts = [texts_in(given) if isinstance(given, tuple) else [str(given)] for given in arguments]
-    return max((len(text) for each in texts for text in each), default=0)
-
-
-def texts_in(given: tuple[Option, ...] | tuple[Scalar, ...]) -> list[str]:
-    """Return the texts of options or of other values."""
-    return [each.text if isinstance(each, Option) else str(each) for each in given]
 
 
 class RememberingLedger(Ledger):

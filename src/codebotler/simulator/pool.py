@@ -25,7 +25,6 @@ NO_SECCOMP = "programs are less isolated here: the kernel does not allow system 
 WINDOWS_UNSUPPORTED = "programs run on Linux and macOS only; on Windows, use WSL"
 
 RESULTS_IN_MEMORY = 8_000_000  # bytes of results, before they move to a file
-UNREADABLE_KEY = b""  # the name for a key that raised an error
 MIN_BATCH_KEYS, MAX_BATCH_KEYS = 16, 64  # keys per call; the first and last calls get fewer
 SIGNAL_POLL_SECONDS = 0.5  # with polars loaded, a signal does not interrupt a wait
 CALLS_PER_THREAD = 2  # submitted calls per thread, so that no thread idles
@@ -124,11 +123,6 @@ class WorkerPool:
         """Call a function in a pool thread, which may be the current one, and return its result."""
         return function() if self.is_here else self.submit(function).result()
 
-    def forget(self) -> None:
-        """After a fork, close the descriptors in the child, which has neither the workers nor the threads."""
-        for worker in self._workers:
-            worker.forget()
-
     def map_distinct(
         self,
         function: Callable[[Sequence[_Key]], Sequence[_Called]],
@@ -158,7 +152,7 @@ def map_batches(
     """Call a function on batches of keys concurrently, and yield the results in the order of the keys.
 
     Duplicate keys share one result. While one result is slow, more keys are read, so that the other workers
-    stay busy. An error from the keys or from a call is raised when its result is due.
+    stay busy. An error from the keys or from a call is raised at once.
 
     Args:
         submit: starts a call that takes a few keys and returns one result per key.
@@ -168,7 +162,7 @@ def map_batches(
         then: converts each result in the caller's thread, to a value that can be pickled.
     """
     distinct = DistinctKeys(keys, name)
-    waiting, failed = distinct.waiting, distinct.failed
+    waiting = distinct.waiting
     running: dict[Future[Sequence[_Called]], list[bytes]] = {}
     ended: SimpleQueue[Future[Sequence[_Called]]] = SimpleQueue()
     calls = CALLS_PER_THREAD * workers
@@ -176,33 +170,17 @@ def map_batches(
         at_end.callback(lambda: [future.cancel() for future in running])  # after an interrupt or an error
         while True:
             while len(running) < calls and (batch := distinct.batch(workers)):
-                try:
-                    future = submit(list(batch.values()))
-                except Exception as error:  # noqa: BLE001 - raised later, after the earlier results
-                    failed.update(dict.fromkeys(batch, error))
-                    continue
+                future = submit(list(batch.values()))
                 running[future] = list(batch)
                 future.add_done_callback(ended.put)
             if not waiting:
                 return
-            if ended.empty() and (waiting[0] in done or waiting[0] in failed):
-                named = waiting.popleft()
-                if named in failed:
-                    raise failed[named]
-                yield done[named]
+            if ended.empty() and waiting[0] in done:
+                yield done[waiting.popleft()]
                 continue
             future = _next(ended)
-            names = running.pop(future)
-            try:
-                results = future.result()
-            except Exception as error:  # noqa: BLE001 - raised in place of the result
-                failed.update(dict.fromkeys(names, error))
-                continue
-            for named, result in zip(names, results, strict=True):
-                try:
-                    done[named] = then(result)
-                except Exception as error:  # noqa: BLE001 - raised in place of this result
-                    failed[named] = error
+            for named, result in zip(running.pop(future), future.result(), strict=True):
+                done[named] = then(result)
 
 
 def _next(queue: SimpleQueue[_Value]) -> _Value:
@@ -220,14 +198,12 @@ class DistinctKeys(Generic[_Key]):
         self._new: dict[bytes, _Key] = {}  # keys not yet in a batch
         self._sent = 0
         self.waiting: deque[bytes] = deque()  # names of keys whose results are not yet used
-        self.failed: dict[bytes, BaseException] = {}
 
     def batch(self, width: int) -> dict[bytes, _Key]:
         """Return the next keys by name, for one of `width` concurrent calls.
 
         There are none at the end, or while too many keys are waiting. Batches start small so that the first
-        results come soon, and end small so that all calls end together. An error while reading the keys
-        counts as the result of the next key.
+        results come soon, and end small so that all calls end together.
         """
         size = min(MAX_BATCH_KEYS, max(MIN_BATCH_KEYS, self._sent // 2))
         self._read(size * width)
@@ -240,7 +216,7 @@ class DistinctKeys(Generic[_Key]):
         return batch
 
     def _read(self, most: int) -> None:
-        try:
+        with contextlib.suppress(StopIteration):
             while len(self._new) < most and len(self.waiting) < MAX_KEYS_AHEAD:
                 key = next(self._keys)
                 name = self._name(key)
@@ -248,12 +224,6 @@ class DistinctKeys(Generic[_Key]):
                 if name not in self._seen:
                     self._seen.add(name)
                     self._new[name] = key
-        except StopIteration:
-            pass
-        except Exception as error:  # noqa: BLE001 - raised later, after the earlier results
-            self._keys = iter(())
-            self.waiting.append(UNREADABLE_KEY)
-            self.failed[UNREADABLE_KEY] = error
 
 
 class ResultFile:
@@ -302,13 +272,10 @@ class SharedPool:
     """Holds this process's pool once it has started. After a fork, the child starts a new one."""
 
     def __init__(self) -> None:
-        self.lock = threading.Lock()  # held during a fork, so that no child inherits half a pool
+        self.lock = threading.Lock()
         self.pool: WorkerPool | None = None
-        self._inherited: list[WorkerPool] = []  # never freed, since their threads do not exist here
         atexit.register(self.end)
-        os.register_at_fork(
-            before=self.lock.acquire, after_in_parent=self.lock.release, after_in_child=self.begin_anew
-        )
+        os.register_at_fork(after_in_child=self.begin_anew)
 
     def end(self) -> None:
         """Close the pool."""
@@ -318,12 +285,8 @@ class SharedPool:
                 self.pool = None
 
     def begin_anew(self) -> None:
-        """After a fork, release the parent's pool in the child."""
-        if self.pool is not None:
-            self.pool.forget()
-            self._inherited.append(self.pool)
-            self.pool = None
-        self.lock.release()
+        """After a fork, leave the pool to the parent, whose threads do not exist in the child."""
+        self.lock, self.pool = threading.Lock(), None
 
 
 def cores() -> int:

@@ -15,7 +15,6 @@ from codebotler.simulator.process.compiler import CompiledProgram, compile_progr
 from codebotler.simulator.process.errors import EngineError, LostProcessError, ProtocolError
 from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER
 from codebotler.simulator.skill_protocol import SkillProtocol
 from codebotler.simulator.worlds.robot import SimulatedRobot
 
@@ -35,19 +34,18 @@ class Worker:
     The fork server for these runs holds the standard library, and starts when it is first needed.
 
     Args:
-        one_process_per_run: no two runs share a child.
-        is_live: the worker is for a live robot, so the fork server for live programs starts first.
+        one_process_per_run: no two runs share a child, so the fork server for single runs starts first.
     """
 
-    def __init__(self, *, one_process_per_run: bool = False, is_live: bool = False) -> None:
+    def __init__(self, *, one_process_per_run: bool = False) -> None:
         self._stopped = False
         self._child: IsolatedProcess | None = None  # the child that runs batches
         self._keeps_child = False
         self._one_process_per_run = one_process_per_run
-        self._fork_servers: dict[str, ForkServer] = {}
-        simulating = FORK_SERVER if one_process_per_run else BATCH_SERVER
+        self._fork_servers: dict[type[ForkServer], ForkServer] = {}
+        first = ForkServer if one_process_per_run else BatchServer
         try:
-            self.has_seccomp = self._fork_server(LIVE_SERVER if is_live else simulating).has_seccomp
+            self.has_seccomp = self._fork_server(first).has_seccomp
         except LostProcessError as error:
             raise EngineError(f"the engine cannot start: {error}") from None
 
@@ -79,8 +77,7 @@ class Worker:
         Any error of the robot other than `RobotError` ends the run, and is raised here.
         """
         try:
-            compiled = _compile(source, robot)
-            return compiled if isinstance(compiled, Outcome) else self._fork(LIVE_SERVER, compiled, robot)
+            return self._fork(source, robot)
         except LostProcessError as error:
             self.close()
             stopped = "the engine was stopped" if self._stopped else f"an isolated process was lost: {error}"
@@ -101,13 +98,6 @@ class Worker:
         self._end_child()
         while self._fork_servers:
             self._fork_servers.popitem()[1].close()
-
-    def forget(self) -> None:
-        """After a fork, close the descriptors in the new process, which is not the children's parent."""
-        if self._child is not None:
-            self._child.hang_up()
-        while self._fork_servers:
-            self._fork_servers.popitem()[1].forget()
 
     # --- several tame programs in one child
 
@@ -143,7 +133,7 @@ class Worker:
         known: dict[tuple[int, int], Outcome],
     ) -> list[tuple[int, bytes, list[SimulatedRobot]]]:
         """Run programs in one child, and return the programs that it did not begin before it failed."""
-        child = self._child = self._child or self._fork_server(BATCH_SERVER).fork()
+        child = self._child = self._child or self._fork_server(BatchServer).fork()
         for number, _, robots in batch:
             for _ in robots:
                 _log(jobs[number][0], "started")
@@ -181,7 +171,7 @@ class Worker:
         child, self._child = self._child, None
         if child is None:
             return
-        server = self._fork_servers.get(BATCH_SERVER)
+        server = self._fork_servers.get(BatchServer)
         if not isinstance(server, BatchServer) or server.has_ended:  # its child has ended with the server
             child.hang_up()
             return
@@ -220,25 +210,26 @@ class Worker:
     def _try(self, source: str, new_robot: NewRobot) -> Outcome:
         try:
             robot = new_robot()
-            compiled = _compile(source, robot)
-            if isinstance(compiled, Outcome):
-                return compiled
-            return judge_end(self._fork(FORK_SERVER, compiled, robot), robot)
+            return judge_end(self._fork(source, robot), robot)
         except (LostProcessError, OSError) as error:
             if self._stopped:
                 raise EngineError("the engine was stopped") from None
             self.close()
             raise LostProcessError(str(error)) from None
 
-    def _fork(self, role: str, compiled: CompiledProgram, robot: SkillPerformer) -> Outcome:
-        return SkillProtocol(self._fork_server(role).fork(), compiled.code, robot).outcome()
+    def _fork(self, source: str, robot: SkillPerformer) -> Outcome:
+        compiled = _compile(source, robot)
+        if isinstance(compiled, Outcome):
+            return compiled
+        child = self._fork_server(ForkServer).fork(is_live=robot.is_live)
+        return SkillProtocol(child, compiled.code, robot).outcome()
 
-    def _fork_server(self, role: str) -> ForkServer:
-        if role not in self._fork_servers:
-            self._fork_servers[role] = BatchServer() if role == BATCH_SERVER else ForkServer(role)
+    def _fork_server(self, kind: type[ForkServer]) -> ForkServer:
+        if kind not in self._fork_servers:
+            self._fork_servers[kind] = kind()
             if self._stopped:
-                self._fork_servers[role].kill()
-        return self._fork_servers[role]
+                self._fork_servers[kind].kill()
+        return self._fork_servers[kind]
 
 
 def _compile(source: str, robot: SkillPerformer) -> CompiledProgram | Outcome:

@@ -17,7 +17,6 @@ from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
 from codebotler.simulator.process import spawn
 from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.sandbox import BATCH_SERVER
 from codebotler.simulator.worker import Worker
 from processes import are_gone
 
@@ -32,7 +31,7 @@ def own_worker() -> Iterator[Worker]:
 
 
 def server_of(worker: Worker) -> BatchServer:
-    server = worker._fork_servers[BATCH_SERVER]
+    server = worker._fork_servers[BatchServer]
     assert isinstance(server, BatchServer)
     return server
 
@@ -45,8 +44,8 @@ def test_all_worlds_of_a_check_are_run_by_the_child_that_was_there(
     forked: list[int] = []
     fork = ForkServer.fork
 
-    def noted(server: ForkServer) -> IsolatedProcess:
-        child = fork(server)
+    def noted(server: ForkServer, *, is_live: bool = False) -> IsolatedProcess:
+        child = fork(server, is_live=is_live)
         forked.append(child.pid)
         return child
 

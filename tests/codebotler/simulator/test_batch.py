@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import closing
 from functools import partial
-from itertools import islice
 from types import MappingProxyType
 from typing import Any
 from unittest.mock import Mock
@@ -27,8 +26,9 @@ from codebotler.simulator.batches.replay import Replay, Transcript, key_of, pars
 from codebotler.simulator.ledger import Ledger, RememberingLedger, SkillAnswer
 from codebotler.simulator.pool import MAX_BATCH_KEYS, MAX_KEYS_AHEAD, MIN_BATCH_KEYS, DistinctKeys, WorkerPool
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.fork_server_client import BatchServer, ForkServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME
+from codebotler.simulator.sandbox import MAX_FRAME
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.worker import EngineError, Job, Worker
 from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
@@ -428,7 +428,7 @@ def test_what_a_behaviour_raises_is_raised_here(worker: Worker) -> None:
 
 
 def test_a_child_that_is_killed_costs_only_the_program_that_it_ran(worker: Worker) -> None:
-    fork_server = worker._fork_server(BATCH_SERVER).pid
+    fork_server = worker._fork_server(BatchServer).pid
     killed: list[int] = []
 
     def kill_the_child(_robot: SimulatedRobot, person: str) -> str:
@@ -454,7 +454,7 @@ def test_a_child_that_is_killed_costs_only_the_program_that_it_ran(worker: Worke
 def test_a_fork_server_that_is_killed_costs_all_of_them_nothing_but_time() -> None:
     def kill_the_server(_robot: SimulatedRobot, _person: str) -> str:
         if not killed:
-            killed.append(worker._fork_server(BATCH_SERVER).pid)
+            killed.append(worker._fork_server(BatchServer).pid)
             os.kill(killed[0], signal.SIGKILL)
         return "done"
 
@@ -818,13 +818,13 @@ def test_one_process_per_run_shares_no_process(other_worker: Worker) -> None:
         ["b"] * 3,
         ["c"] * 3,
     ]
-    assert BATCH_SERVER not in other_worker._fork_servers
-    assert FORK_SERVER in other_worker._fork_servers
+    assert BatchServer not in other_worker._fork_servers
+    assert ForkServer in other_worker._fork_servers
 
 
 @pytest.mark.slow
 def test_a_pool_hands_on_that_each_run_has_a_process() -> None:
-    for alone, role in ((False, BATCH_SERVER), (True, FORK_SERVER)):
+    for alone, role in ((False, BatchServer), (True, ForkServer)):
         with WorkerPool(1, one_process_per_run=alone) as pool:
             assert list(pool.here()._fork_servers) == [role]
 
@@ -876,17 +876,16 @@ def test_calls_are_given_more_and_more_keys_and_equal_ones_once() -> None:
     assert (sizes[0], max(sizes)) == (MIN_BATCH_KEYS, MAX_BATCH_KEYS)
 
 
-def test_a_result_that_cannot_be_used_takes_the_place_of_no_other() -> None:
+def test_an_error_of_a_result_that_cannot_be_used_is_raised() -> None:
     def use(number: int) -> int:
         if number == 77:
             raise ValueError("not this one")
         return number
 
     with WorkerPool(1) as pool:
-        results = pool.map_distinct(list, range(200), name=lambda number: number.to_bytes(2), then=use)
-        assert list(islice(results, 77)) == list(range(77))
         with pytest.raises(ValueError, match="not this one"):
-            next(results)
+            list(pool.map_distinct(list, range(200), name=in_two_bytes, then=use))
+        assert list(pool.map_distinct(list, range(77), name=in_two_bytes, then=use)) == list(range(77))
 
 
 def in_two_bytes(number: int) -> bytes:

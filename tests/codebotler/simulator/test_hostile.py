@@ -36,7 +36,6 @@ from codebotler.rtl import parse
 from codebotler.simulator.process.errors import PROCESSOR_TIME
 from codebotler.simulator.process.fork_server_client import BatchServer
 from codebotler.simulator.process.isolated_process import IsolatedProcess
-from codebotler.simulator.sandbox import BATCH_SERVER
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.robot import SimulatedRobot
@@ -231,7 +230,7 @@ class Reach:
 
     def ahead(self) -> list[IsolatedProcess]:
         """The child that was forked, after the run, for the next, if there is one."""
-        server = self.worker._fork_servers.get(BATCH_SERVER)
+        server = self.worker._fork_servers.get(BatchServer)
         return [server._next] if isinstance(server, BatchServer) and server._next else []
 
     def files(self) -> dict[str, object]:

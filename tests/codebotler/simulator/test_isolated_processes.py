@@ -24,7 +24,7 @@ WORLD = World((Room("start_loc"),), "start_loc")
 ROOT = os.geteuid() == 0
 USER = NOBODY if ROOT else os.geteuid()
 CLOSED = ("compiler", "child of a batch", "child")
-ROLES = (*CLOSED, "batch-fork-server", "fork-server")
+ROLES = (*CLOSED, "BatchServer", "ForkServer")
 NEVER = {"Max core file size": "0", "Max file size": "0", "Max locked memory": "0", "Max msgqueue size": "0"}
 ENVIRONMENT = {"PYTHONHASHSEED", "TZ", "LC_ALL", "PYTHONUTF8", "LD_BIND_NOW"}
 
@@ -73,8 +73,8 @@ def enclosed() -> Iterator[dict[str, Enclosed]]:
         found["compiler"] = Enclosed.of(
             IDLE_PROCESSES["codebotler.simulator.process.compiler"][-1]._process.pid
         )
-        for role, fork_server in worker._fork_servers.items():
-            found[role] = Enclosed.of(fork_server.pid)
+        for kind, fork_server in worker._fork_servers.items():
+            found[kind.__name__] = Enclosed.of(fork_server.pid)
             for pid in filter(lives, children_of(fork_server.pid)):
                 found[message] = Enclosed.of(pid)
 
@@ -91,7 +91,7 @@ def enclosed() -> Iterator[dict[str, Enclosed]]:
 
 def limits_of(role: str) -> dict[str, tuple[str, str]]:
     """What a process is limited to for ever, soft and hard."""
-    memory = 384 if "batch" in role else 512
+    memory = 384 if "batch" in role.lower() else 512
     limits = {**NEVER, "Max address space": str(memory * 1024**2)}
     return {name: (value, value) for name, value in limits.items()}
 

@@ -14,7 +14,8 @@ import pytest
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Outcome, Status, Trace
-from codebotler.simulator.sandbox import LIVE_SERVER, PROGRAM
+from codebotler.simulator.process.fork_server_client import ForkServer
+from codebotler.simulator.sandbox import PROGRAM
 from codebotler.simulator.settings import ENDLESS, PAPER_SETTINGS
 from codebotler.simulator.worker import EngineError, Worker
 from codebotler.simulator.worlds.robot import Argument, Result
@@ -59,7 +60,7 @@ def others() -> set[int]:
 
 @pytest.fixture(scope="module")
 def worker() -> Iterator[Worker]:
-    worker = Worker(is_live=True)
+    worker = Worker(one_process_per_run=True)
     yield worker
     worker.close()
 
@@ -67,7 +68,7 @@ def worker() -> Iterator[Worker]:
 @pytest.fixture
 def own_worker(others: set[int]) -> Iterator[Worker]:  # noqa: ARG001 - told before it starts
     """A worker whose processes a test ends."""
-    worker = Worker(is_live=True)
+    worker = Worker(one_process_per_run=True)
     yield worker
     worker.close()
 
@@ -200,7 +201,7 @@ def test_what_the_robot_throws_besides_ends_the_child_and_comes_through(worker: 
     with pytest.raises(StoppedError):
         worker.run_live(stubborn, machine)
     assert machine.done == ["a"]
-    assert are_gone(children_of(worker._fork_servers[LIVE_SERVER].pid))
+    assert are_gone(children_of(worker._fork_servers[ForkServer].pid))
     assert done(worker, "def task_program(): say('next')")[0] == ["next"]
 
 

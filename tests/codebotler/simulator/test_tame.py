@@ -22,7 +22,7 @@ from codebotler.simulator.process.compiler import (
 from codebotler.simulator.process.isolated_call import IDLE_PROCESSES
 from codebotler.simulator.sandbox import tame
 from codebotler.simulator.sandbox.fuel import nodes_of
-from codebotler.simulator.sandbox.tame_expressions import GIVEN
+from codebotler.simulator.sandbox.tame import GIVEN
 from codebotler.simulator.settings import Limits, SimulationSettings
 from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.robot import SimulatedRobot
@@ -109,17 +109,6 @@ RULES = [
         "def f(a): raise OSError(1)",
         "def f(OSError):\n    try: pass\n    except OSError: pass",
     ),
-    ("a hidden class is none", "def f(a): isinstance(a, str)", "def f(str): isinstance(1, str)"),
-    (
-        "a hidden check of classes is none",
-        "def f(a): isinstance(a, str)",
-        "def f(isinstance): isinstance(1, str)",
-    ),
-    (
-        "a hidden type has no methods to give",
-        "def f(a): list(map(str.lower, a))",
-        "def f(str): list(map(str.lower, 'a'))",
-    ),
     # --- statements
     ("an expression has parts", "1 + 1", "1 + print"),
     ("an assignment has a target", "x[0] = 1", "x.y = 1"),
@@ -137,8 +126,6 @@ RULES = [
     ("an assertion has a condition", "assert x", "assert b''"),
     ("an assertion has a message", "assert x, 'a'", "assert x, b''"),
     ("what is deleted is data", "del x[0]", "del x.y"),
-    ("a part of a time is not deleted", "x = y.tm_year", "del y.tm_year"),
-    ("a part of a time is not set", "x = y.tm_year", "y.tm_year = 1"),
     ("a loop may be left", "while x: break", "while x: await y"),
     ("a loop may go on", "while x: continue", "while x: yield"),
     ("there are no classes", "def f(): pass", "class A: pass"),
@@ -159,18 +146,16 @@ RULES = [
     ("one of further ones is", "def f(**a: int): pass", "def f(**a: open): pass"),
     ("a function has statements", "def f(): x", "def f(): import os"),
     # --- annotations
-    ("an annotation may be None", "x: None", "x: 1"),
-    ("an annotation may be a string", "x: 'a'", "x: b''"),
+    ("an annotation may be None", "x: None", "x: -1"),
+    ("an annotation may be a string", "x: 'a'", "x: f'{x}'"),
     ("an annotation may be a type of data", "x: int", "x: set"),
-    ("an annotation may be a variable", "x: y", "x: say"),
-    ("an annotation has a head", "x: y[int]", "x: set[int]"),
+    ("an annotation has a head", "x: list[int]", "x: set[int]"),
     ("an annotation has arguments", "x: list[int]", "x: list[set]"),
     ("an annotation has several arguments", "x: dict[str, int]", "x: dict[str, set]"),
-    ("an annotation has arguments in a list", "x: y[[int]]", "x: y[[set]]"),
-    ("an annotation has a left side", "x: y | int", "x: set | int"),
+    ("an annotation has a left side", "x: str | int", "x: set | int"),
     ("an annotation has a right side", "x: int | None", "x: int | set"),
-    ("an annotation has no other operators", "x: int | y", "x: int & y"),
-    ("an annotation calls nothing", "x: y", "x: y()"),
+    ("an annotation has no other operators", "x: int | str", "x: int & str"),
+    ("an annotation calls nothing", "x: int", "x: int()"),
     ("what is annotated is data", "x[0]: int = 1", "x.y: int = 1"),
     ("what is annotated has a value", "x: int = 1", "x: int = b''"),
     # --- declarations
@@ -267,12 +252,6 @@ RULES = [
     ("a builtin is", "list(map(len, 'a'))", "list(map(zip, 'a'))"),
     ("none that would give away an iterator is", "list(map(sum, 'a'))", "list(map(next, 'a'))"),
     ("an error is none", "list(map(str, 'a'))", "list(map(ValueError, 'a'))"),
-    ("a method of texts is", "list(map(str.lower, 'a'))", "list(map(str.encode, 'a'))"),
-    ("one of texts only", "list(map(str.lower, 'a'))", "list(map(str.append, 'a'))"),
-    ("a method of something is", "list(map(x.get, 'a'))", "list(map(x.pop, 'a'))"),
-    ("a method that counts is", "max('a', key=x.count)", "max('a', key=x.encode)"),
-    ("a method that finds is", "max('a', key=x.index)", "max('a', key=x.__len__)"),
-    ("of data only", "list(map(x.get, 'a'))", "list(map(sys.get, 'a'))"),
     ("nothing may be", "list(filter(None, 'a'))", "list(filter(b'', 'a'))"),
     ("a lambda is", "list(map(lambda a: a, 'a'))", "x = lambda a: a"),
     ("a lambda gives data", "list(map(lambda a: a, 'a'))", "list(map(lambda a: len, 'a'))"),
@@ -323,14 +302,6 @@ RULES = [
     ("only what has a name is called", "x()", "x()()"),
     ("an element is not called", "x[0]", "x[0]()"),
     ("a lambda is not called", "x()", "(lambda: 1)()"),
-    ("classes are asked for", "isinstance(x, str)", "isinstance(x, set)"),
-    ("classes of data are asked for", "isinstance(x, str)", "isinstance(b'', str)"),
-    ("classes are named", "isinstance(x, str)", "isinstance(x, y)"),
-    ("classes are no results", "isinstance(x, str)", "isinstance(x, y())"),
-    ("several classes are asked for", "isinstance(x, (str, int))", "isinstance(x, (str, object))"),
-    ("no keyword is", "isinstance(x, str)", "isinstance(x, str, a=1)"),
-    ("no further argument is", "isinstance(x, str)", "isinstance(x, str, int)"),
-    ("nothing is asked for without a class", "isinstance(x, int)", "isinstance(x)"),
     # --- other expressions
     ("constants are data", "x = 'a', 1, 1.5, None, True, ...", "x = 1j"),
     ("bytes are none", "x = 'a'", "x = b'a'"),
@@ -357,13 +328,6 @@ RULES = [
     ("the first side is data", "x == y", "b'' == y"),
     ("each side is data", "x < y < z", "x < y < b''"),
     ("a searched one is data", "x in y", "x in b''"),
-    ("what is read of a time is a part of it", "x.tm_hour", "x.tm_zone"),
-    ("parts are those of data", "x.tm_hour", "sys.tm_hour"),
-    ("an expression assigns to a variable", "(x := 1)", "(len := 1)"),
-    ("an expression assigns to what nobody finds", "(x := 1)", "def f(open):\n    (open := 1)"),
-    ("an expression assigns to no skill", "def f(a):\n    (a := 1)", "def f(say):\n    (say := 1)"),
-    ("an expression assigns to no function", "def f(): pass\n(x := 1)", "def f(): pass\n(f := 1)"),
-    ("an expression assigns data", "(x := 1)", "(x := b'')"),
     ("a comprehension has variables", "[x for x in 'a']", "[1 for x.y in 'a']"),
     ("a comprehension hides no builtin", "[x for x in 'a']", "def f(len): return [1 for len in 'a']"),
     ("a comprehension hides no skill", "[x for x in 'a']", "def f(say): return [1 for say in 'a']"),
@@ -401,7 +365,6 @@ PLACES = {
     "{}(x)": f"{CALLS} round str",
     "list({}(x))": "enumerate filter map reversed zip",
     "list(map({}, x))": CALLS.replace(" next ", " ") + " round str",
-    "isinstance(x, {})": "bool dict float int list str tuple",
     "x: {}": "bool dict float int list str tuple",
     "raise {}": """
         ArithmeticError AssertionError AttributeError BaseException EOFError Exception IndexError KeyError
@@ -409,7 +372,7 @@ PLACES = {
         RuntimeError StopIteration TimeoutError TypeError UnboundLocalError ValueError ZeroDivisionError
     """,
     "{}(zip(x))": "all any dict len list max min next sorted sum tuple",
-    "list(map(str.{}, x))": """
+    "x.{}()": """
         capitalize casefold center count endswith expandtabs find index isalnum isalpha isdecimal isdigit
         islower isnumeric isspace istitle isupper join ljust lower lstrip partition removeprefix removesuffix
         replace rfind rindex rjust rpartition rsplit rstrip split splitlines startswith strip swapcase title
@@ -420,9 +383,7 @@ PLACES = {
     """,
     "x.{}(zip(x))": "extend join update",
     "list(x.{}())": "items keys values",
-    "list(map(x.{}, x))": "get count index",
     "time.{}()": "asctime ctime gmtime localtime monotonic perf_counter sleep strftime time",
-    "x.tm_{}": "year mon mday hour min sec wday yday",
 }
 NAMED = tuple(place for place in PLACES if "." not in place)  # where the name is that of no method
 
@@ -572,7 +533,7 @@ def test_a_compiler_that_dies_at_several_programs_is_replaced(number: int) -> No
 def test_tame_programs_find_each_name_that_is_allowed() -> None:
     uses = {name: f"{name}()" for name in PLACES["{}(x)"].split()}
     uses |= {name: f"list({name}())" for name in PLACES["list({}(x))"].split()}
-    uses |= {"isinstance": "isinstance(1, int)", "__name__": "__name__"}
+    uses |= {"__name__": "__name__"}
     uses |= {f"time.{name}": f"time.{name}()" for name in PLACES["time.{}()"].split()}
     errors = [name for name in PLACES["raise {}"].split() if name not in {"MemoryError", "RecursionError"}]
     uses |= {name: f"f('{name}')" for name in errors}

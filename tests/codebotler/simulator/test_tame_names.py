@@ -13,7 +13,7 @@ import pytest
 from codebotler.core.skills.paper import SKILLS
 from codebotler.simulator.sandbox import tame
 from codebotler.simulator.sandbox.fuel import nodes_of
-from codebotler.simulator.sandbox.tame_expressions import ExpressionVerifier
+from codebotler.simulator.sandbox.tame import ProgramVerifier
 
 NAMES = frozenset(SKILLS)
 SPECIAL = ("len", "type", "list", "go_to", "time", "open", "ValueError")
@@ -135,14 +135,14 @@ def judged(source: str, monkeypatch: pytest.MonkeyPatch) -> tuple[set[Position],
     """Where the verifier takes special names for data, and where for what they name; None if it is wild."""
     data: set[Position] = set()
     called: set[Position] = set()
-    name, call = ExpressionVerifier.VALUES[ast.Name], ExpressionVerifier.VALUES[ast.Call]
+    name, call = ProgramVerifier.ALLOWED[ast.Name], ProgramVerifier.ALLOWED[ast.Call]
 
-    def watch_name(verifier: ExpressionVerifier, node: Any) -> None:  # noqa: ANN401 - as the verifier has it
+    def watch_name(verifier: ProgramVerifier, node: Any) -> None:  # noqa: ANN401 - as the verifier has it
         name(verifier, node)
         if isinstance(node.ctx, ast.Load) and node.id in verifier.special:
             data.add((node.lineno, node.col_offset))
 
-    def watch_call(verifier: ExpressionVerifier, node: Any) -> None:  # noqa: ANN401 - the same
+    def watch_call(verifier: ProgramVerifier, node: Any) -> None:  # noqa: ANN401 - the same
         call(verifier, node)
         if isinstance(node.func, ast.Name) and node.func.id in verifier.special:
             at = node.func.lineno, node.func.col_offset
@@ -150,8 +150,8 @@ def judged(source: str, monkeypatch: pytest.MonkeyPatch) -> tuple[set[Position],
 
     tree = ast.parse(source)
     with monkeypatch.context() as patch:
-        patch.setitem(ExpressionVerifier.VALUES, ast.Name, watch_name)
-        patch.setitem(ExpressionVerifier.VALUES, ast.Call, watch_call)
+        patch.setitem(ProgramVerifier.ALLOWED, ast.Name, watch_name)
+        patch.setitem(ProgramVerifier.ALLOWED, ast.Call, watch_call)
         return (data, called) if tame.is_tame(tree, nodes_of(tree), NAMES) else None
 
 

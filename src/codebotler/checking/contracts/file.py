@@ -68,13 +68,10 @@ def _read_bound(file: YamlFile, row: Skill, given: Mapping[str, Any]) -> SkillBo
         where = "skills", row.name, key
         if key not in known:
             raise file.wrong(f'{row.name} has no "{key}"; write {", ".join(known)}', *where)
-        if key == AT_MOST and not (type(value) is int and value > 0):
-            raise file.wrong(f'"{key}" must be a whole number above 0', *where)
         is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
-        if key != AT_MOST and value != ANY and not is_list:
-            raise file.wrong(f'"{key}" must be any, or a list of texts in quotes', *where)
-        if key == IN and is_list and not all(map(str.strip, value)):
-            raise file.wrong(f'"{key}" has an empty text; name a room', *where)
+        if not (type(value) is int and value > 0 if key == AT_MOST else value == ANY or is_list):
+            needed = "a whole number above 0" if key == AT_MOST else "any, or a list of texts in quotes"
+            raise file.wrong(f'"{key}" must be {needed}', *where)
     missing = [name for name in names if name not in given]
     if missing:
         sentence = f'{row.name} lacks "{missing[0]}"; write a list of texts, or any'

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 
 from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.table import Skill, SkillTable
@@ -26,35 +25,21 @@ MAX_VALUES, MAX_LONG_TEXTS = 6, 3  # shown texts in a short sentence
 LONG_TEXT = 30  # characters
 
 
-@dataclass(frozen=True)
-class ContractRow:
-    """The bound of one skill, in words.
-
-    Args:
-        what: the verb of the skill, such as `pick up`.
-        texts: the allowed texts of its arguments.
-        places: the rooms in which it may happen, or an empty string for all.
-        at_most: how often it may succeed, such as `at most 3 times`, or an empty string.
-    """
-
-    what: str
-    texts: str
-    places: str
-    at_most: str
-
-
 def contract_rows(
     contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief, *, is_short: bool = False
-) -> Iterator[ContractRow]:
-    """Yield a row for each skill of a contract, with all that it allows or, if it is short, with a part."""
+) -> Iterator[tuple[str, str, str]]:
+    """Yield the verb of each skill, what may be done with it and where, and how often if that is limited.
+
+    A short row only counts some of the texts and places.
+    """
     named = contract.skills.keys() - TELLING_SKILLS
     for row in sorted((row for row in skills.rows if row.name in named), key=lambda row: not row.is_drive):
         bound = contract.skills[row.name]
         what = row.name if row.recording is None else verb(row.recording.kind).base
-        places = _any_of(map(show, bound.places or ()), is_short=is_short)
+        places = f"in {_any_of(map(show, bound.places), is_short=is_short)}" if bound.places else ""
         often = "" if not bound.at_most else f"at most {counted(bound.at_most, 'time')}"
         texts = _texts_of(row, bound, show, is_short=is_short)
-        yield ContractRow(what, texts, f"in {places}" if places else "", often)
+        yield what, f"{texts} {places}".strip(), often
 
 
 def contract_sentence(
@@ -65,17 +50,11 @@ def contract_sentence(
     A short sentence only counts some of the texts. Show it together with a table that has them all.
     """
     rows = contract_rows(contract, skills, show, is_short=is_short)
-    may = [" ".join(filter(None, (row.what, row.texts, row.places))) for row in rows]
+    may = [f"{what} {allowed}".strip() for what, allowed, _ in rows]
     known = {row.recording.kind: row.name for row in skills.rows if row.recording is not None}
     never = [what for kind, what in NEVER.items() if known.get(kind, "") not in {"", *contract.skills}]
     parts = [f"It may {'; '.join(may)}" if may else "", f"It {listed(never)}" if never else ""]
     return " ".join(f"{part}." for part in parts if part)
-
-
-def contract_clauses(contract: Contract, skills: SkillTable) -> list[str]:
-    """Say of each skill what a program may do with it, such as `go to "kitchen" or "lab" at most 3 times`."""
-    rows = contract_rows(contract, skills)
-    return [" ".join(filter(None, (row.what, row.texts, row.places, row.at_most))) for row in rows]
 
 
 def _texts_of(row: Skill, bound: SkillBound, show: Callable[[str], str], *, is_short: bool) -> str:

@@ -1,4 +1,4 @@
-"""Static analysis: find definite, uncaught errors in reachable code, and misuse of skills.
+"""Static analysis: find definite, uncaught errors and misuse of skills.
 
 Programs are parsed in an isolated process with a time limit.
 """
@@ -11,14 +11,7 @@ from dataclasses import replace
 
 from codebotler.checking.problems import Problem, no_room
 from codebotler.checking.source.room_names import fixed_drives, lists_rooms, named_rooms
-from codebotler.core.program import (
-    TASK_FUNCTION,
-    Flaw,
-    find_tree_flaws,
-    nodes,
-    parse_leniently,
-    parse_program,
-)
+from codebotler.core.program import Flaw, find_tree_flaws, nodes, parse_leniently, parse_program
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.skills.values import ValueType
@@ -26,7 +19,6 @@ from codebotler.simulator.process.isolated_call import IsolatedCallError, isolat
 from codebotler.simulator.worlds.room_map import RoomMap
 
 EVERYTHING = frozenset({"Exception", "BaseException"})
-ENDING_NODES = (ast.Return, ast.Raise, ast.Continue, ast.Break)
 EXAMPLE_PROGRAM = "def task_program():\n    if is_in_rom('mug'):\n        say('a mug')\n"
 
 
@@ -90,38 +82,19 @@ def _definite_errors(
                 for line, request in fixed_drives(tree, skills)
                 if room_map.room(request) is None
             ]
-        never = {line for node in _unreachable(tree) for line in _lines([node])}
         caught = list(_guarded_lines(tree))
     except RecursionError:
-        never, caught = set(), []
+        caught = []
     by_line: dict[int | None, list[Flaw]] = {}
     for flaw in flaws:
         kinds = frozenset().union(*(kinds for lines, kinds in caught if flaw.line in lines))
         is_hidden = bool(kinds & EVERYTHING) and not flaw.is_misuse
-        if flaw.line not in never and flaw.kind not in kinds and not is_hidden:
+        if flaw.kind not in kinds and not is_hidden:
             by_line.setdefault(flaw.line, []).append(flaw)
     return [
         (same[0].kind, "; ".join(dict.fromkeys(flaw.message for flaw in same)), line)
         for line, same in by_line.items()
     ]
-
-
-def _unreachable(tree: ast.Module) -> Iterator[ast.stmt]:
-    """Yield statements that never run: after a return, under a false condition or in an unused function."""
-    named = {node.id for node in nodes(tree) if isinstance(node, ast.Name)} | {TASK_FUNCTION}
-    for node in nodes(tree):
-        match node:
-            case ast.FunctionDef(name, body=body, decorator_list=[]) if name not in named:
-                yield from body
-            case ast.If(ast.Constant(value), body, orelse):
-                yield from orelse if value else body
-            case ast.While(ast.Constant(value), body) if not value:
-                yield from body
-        for block in ("body", "orelse", "finalbody"):
-            statements = getattr(node, block, [])
-            if isinstance(statements, list):
-                ends = (i for i, statement in enumerate(statements) if isinstance(statement, ENDING_NODES))
-                yield from statements[next(ends, len(statements)) + 1 :]
 
 
 def _guarded_lines(tree: ast.Module) -> Iterator[tuple[range, frozenset[str]]]:

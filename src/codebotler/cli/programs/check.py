@@ -135,9 +135,9 @@ def contract_view(contract: Contract, skills: SkillTable) -> Group:
     """Show what a program may do at most: in a sentence or two, and in a table with a row for each skill."""
     sentence = contract_sentence(contract, skills, shortened)
     head = Text.assemble(("\nwhat it may do at most", "bold"), f"\n{sentence}\n")
-    table = grid("left", "left", "left", "left")
-    for row in contract_rows(contract, skills, shortened):
-        table.add_row(Text(row.what, "bold"), Text(row.texts), Text(row.places), Text(row.at_most, "dim"))
+    table = grid("left", "left", "left")
+    for what, allowed, often in contract_rows(contract, skills, shortened):
+        table.add_row(Text(what, "bold"), Text(allowed), Text(often, "dim"))
     return Group(head, table)
 
 

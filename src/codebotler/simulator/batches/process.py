@@ -25,7 +25,7 @@ from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun
 from codebotler.simulator.sandbox.fork_server import RUN_DOOR, serve
 from codebotler.simulator.sandbox.isolation import give_up_rights, usable_filter
 from codebotler.simulator.sandbox.start import arrange, forget_the_shell
-from codebotler.simulator.sandbox.tame_expressions import GIVEN
+from codebotler.simulator.sandbox.tame import GIVEN
 from codebotler.simulator.worlds.robot import Argument, SimulatedRobot
 from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
@@ -41,8 +41,7 @@ if TYPE_CHECKING:
 
 # A run that recurses too deep here is repeated in its own process, where it may recurse far deeper.
 BATCH_RECURSION_LIMIT = 400
-MAX_CALL_BYTES = 50_000  # bytes of a skill's arguments, which must fit into a frame
-SURROGATE_ESCAPE = b"\\ud"  # start of a surrogate in JSON
+MAX_TRANSCRIPT = MAX_FRAME // 3  # bytes; as ASCII, as in its own process, each call of it fits into a frame
 UNDECIDED_RUN = b"null"  # replaces a transcript if the run must be repeated in its own process
 
 
@@ -116,7 +115,7 @@ class TranscribedRun(ProgramRun):
         sys.setrecursionlimit(BATCH_RECURSION_LIMIT)
         end = self.execute(code, run_parameters(self.ledger.robot))
         data = UNDECIDED_RUN if self.is_undecided else self._written(end)
-        return UNDECIDED_RUN if self.is_undecided or len(data) > MAX_FRAME else data
+        return UNDECIDED_RUN if self.is_undecided else data
 
     def _reset(self, robot: SimulatedRobot) -> None:
         self.ledger = RememberingLedger(robot)
@@ -185,11 +184,11 @@ class TranscribedRun(ProgramRun):
         return super().ended_by(error)
 
     def _written(self, end: str) -> bytes:
-        data = f"[{encoded([self._calls, self.now])[1:-1]},{end}]".encode("ascii")
-        if len(data) > MAX_CALL_BYTES or SURROGATE_ESCAPE in data:
-            self.is_undecided = self.is_undecided or not all(
-                _is_plain(each) for _, given, *_ in self._calls for each in given
-            )
+        try:
+            data = f"[{encoded([self._calls, self.now])[1:-1]},{end}]".encode()
+        except UnicodeEncodeError:  # there are lone surrogates
+            data = b""
+        self.is_undecided = self.is_undecided or not 0 < len(data) <= MAX_TRANSCRIPT
         return data
 
     def _ask_engine(self, name: str, given: list[Argument]) -> Any:  # noqa: ANN401 - a skill may return any type
@@ -216,17 +215,5 @@ def _robot_argument(kind: str, value: Any) -> Argument:  # noqa: ANN401 - a skil
     return tuple(value) if type(value) is list else value
 
 
-def _is_plain(given: Argument) -> bool:
-    """Return whether the argument's text is short and without lone surrogates, which JSON could join."""
-    if isinstance(given, tuple):
-        text = "".join([str(each[0] if isinstance(each, Option) else each) for each in given])
-    else:
-        text = str(given)
-    try:
-        return len(text.encode()) <= MAX_CALL_BYTES
-    except UnicodeEncodeError:
-        return False
-
-
 ROBOTS: dict[str, type[SimulatedRobot]] = {"simulated": SimulatedRobot, "sampled": SampledRobot}
-encoded = json.JSONEncoder(separators=(",", ":")).encode
+encoded = json.JSONEncoder(ensure_ascii=False, separators=(",", ":")).encode

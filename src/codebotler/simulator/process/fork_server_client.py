@@ -14,8 +14,8 @@ from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import message
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.isolated_process import IsolatedProcess, channel_pair
-from codebotler.simulator.process.spawn import start_fork_server, start_module
-from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCES
+from codebotler.simulator.process.spawn import CHANNELS, start_fork_server, start_module
+from codebotler.simulator.sandbox import HEADER, LIVE_RUN, SIMULATED_RUN, WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.skill_protocol import SkillProtocol, describe_skills
 from codebotler.simulator.worlds.robot import SimulatedRobot
@@ -35,12 +35,13 @@ WARM_UP_RUNS = 20  # the interpreter specializes code that has run a few times
 class ForkServer:
     """Starts a fork server, and has it fork children one at a time."""
 
-    def __init__(self, role: str) -> None:
+    def __init__(self) -> None:
         self._report, report = os.pipe()
         door, self._door = socket.socketpair()
+        CHANNELS.add(self._door)
         try:
             with door:
-                self._process = self._start(role, door.fileno(), report)
+                self._process = self._start(door.fileno(), report)
         except BaseException:
             os.close(self._report)
             self._door.close()
@@ -57,15 +58,15 @@ class ForkServer:
             self.close()
             raise
 
-    def _start(self, role: str, *descriptors: int) -> subprocess.Popen[bytes]:
-        return start_fork_server(role, *descriptors)
+    def _start(self, *descriptors: int) -> subprocess.Popen[bytes]:
+        return start_fork_server(*descriptors)
 
-    def fork(self) -> IsolatedProcess:
-        """Return a newly forked child."""
+    def fork(self, *, is_live: bool = False) -> IsolatedProcess:
+        """Return a newly forked child, which may use more processor time if its run is live."""
         ours, theirs = channel_pair()
         try:
             with theirs:
-                socket.send_fds(self._door, [b"x"], [theirs.fileno()])
+                socket.send_fds(self._door, [LIVE_RUN if is_live else SIMULATED_RUN], [theirs.fileno()])
         except OSError:
             ours.close()
             raise LostProcessError("the fork server has ended") from None
@@ -89,14 +90,6 @@ class ForkServer:
         """Kill the fork server and close its descriptors. Call this only while nothing is running."""
         self._process.kill()
         self._process.wait()
-        self._close_descriptors()
-
-    def forget(self) -> None:
-        """After a fork, close the descriptors in the new process, which is not the fork server's parent."""
-        self._process.returncode = 0  # stops `Popen` from waiting for it here
-        self._close_descriptors()
-
-    def _close_descriptors(self) -> None:
         os.close(self._report)
         self._door.close()
 
@@ -133,26 +126,27 @@ class BatchServer(ForkServer):
 
     def __init__(self) -> None:
         self._next: IsolatedProcess | None = None
-        super().__init__(BATCH_SERVER)
+        super().__init__()
 
-    def _start(self, _role: str, *descriptors: int) -> subprocess.Popen[bytes]:
+    def _start(self, *descriptors: int) -> subprocess.Popen[bytes]:
         return start_module(BATCH_CODE, (), descriptors)
 
-    def fork(self) -> IsolatedProcess:
-        """Return a new child, which may have been forked in advance."""
+    def fork(self, *, is_live: bool = False) -> IsolatedProcess:
+        """Return a new child, which may have been forked in advance. No batch is live."""
         child, self._next = self._next, None
         if child is not None and self.has_ended:  # another process may have the child's id now
             child.hang_up()
             child = None
-        return child or super().fork()
+        return child or super().fork(is_live=is_live)
 
     def fork_ahead(self) -> None:
         """Fork the next child in advance. The previous child must have been killed."""
         with contextlib.suppress(LostProcessError):  # the next fork raises the error
             self._next = super().fork()
 
-    def _close_descriptors(self) -> None:
-        super()._close_descriptors()
+    def close(self) -> None:
+        """Kill the fork server, and hang up on the child that was forked in advance."""
+        super().close()
         if self._next is not None:
             self._next.hang_up()
 

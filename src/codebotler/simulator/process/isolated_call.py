@@ -136,11 +136,6 @@ class ClosedProcess:
         """Kill the process, even during a call."""
         self._channel.end()
 
-    def forget(self) -> None:
-        """After a fork, close the channel in the new process, which is not the closed process's parent."""
-        self._process.returncode = 0
-        self._channel.hang_up()
-
 
 IDLE_PROCESSES: dict[str, list[ClosedProcess]] = {}
 """Idle processes by the module whose functions they call."""
@@ -153,15 +148,8 @@ def end_all() -> None:
             processes.pop().end()
 
 
-def forget_all() -> None:
-    """After a fork, release the parent's processes in the child."""
-    for processes in IDLE_PROCESSES.values():
-        while processes:
-            processes.pop().forget()
-
-
 atexit.register(end_all)
-os.register_at_fork(after_in_child=forget_all)
+os.register_at_fork(after_in_child=IDLE_PROCESSES.clear)
 
 
 # --- in the closed process

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.simulator.process.errors import LostProcessError, ProtocolError
+from codebotler.simulator.process.spawn import CHANNELS
 from codebotler.simulator.sandbox import HEADER, MAX_FRAME, WITHOUT_REFERENCES
 
 PROCESS_WAIT_SECONDS = 60.0  # total time to wait for a process; no computation takes this long
@@ -153,6 +154,7 @@ def channel_pair() -> tuple[socket.socket, socket.socket]:
     sizes of what it reads change its heap, which wild programs can observe.
     """
     ours, theirs = socket.socketpair()
+    CHANNELS.add(ours)
     theirs.setsockopt(socket.SOL_SOCKET, socket.SO_RCVLOWAT, WHOLE_MESSAGE)
     return ours, theirs
 

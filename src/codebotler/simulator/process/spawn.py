@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import _imp
 import atexit
 import contextlib
 import importlib
 import inspect
 import marshal
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -16,8 +18,8 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
-from types import CodeType
 from typing import IO
+from weakref import WeakSet
 
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.sandbox import FLAGS, WITHOUT_REFERENCES
@@ -34,10 +36,10 @@ CHILD_ENVIRONMENT = {
 }
 
 
-def start_fork_server(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
+def start_fork_server(*descriptors: int) -> subprocess.Popen[bytes]:
     """Start a fork server with fixed addresses, and pass it descriptors and the code of its modules."""
     handed = (*descriptors, compiled_file().fileno())
-    return _start([str(SANDBOX / "start.py"), role, *map(str, handed)], handed)
+    return _start([str(SANDBOX / "start.py"), *map(str, handed)], handed)
 
 
 def start_module(code: str, arguments: Sequence[str], descriptors: Sequence[int]) -> subprocess.Popen[bytes]:
@@ -49,7 +51,7 @@ def start_module(code: str, arguments: Sequence[str], descriptors: Sequence[int]
 
 def _start(arguments: Sequence[str], descriptors: Sequence[int]) -> subprocess.Popen[bytes]:
     with START_LOCK:
-        return subprocess.Popen(  # noqa: S603 - our own code, by the interpreter that runs us
+        process = subprocess.Popen(  # noqa: S603 - our own code, by the interpreter that runs us
             [sys.executable, *FLAGS, *arguments],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
@@ -59,15 +61,27 @@ def _start(arguments: Sequence[str], descriptors: Sequence[int]) -> subprocess.P
             pass_fds=descriptors,
             start_new_session=True,
         )
+        PROCESSES.add(process)
+        return process
 
 
+PROCESSES: WeakSet[subprocess.Popen[bytes]] = WeakSet()
+CHANNELS: WeakSet[socket.socket] = WeakSet()  # the engine's ends
 START_LOCK = threading.Lock()
 # A fork during a start would inherit a locked lock, and keep open a pipe that the start expects to close.
-os.register_at_fork(
-    before=START_LOCK.acquire,
-    after_in_parent=START_LOCK.release,
-    after_in_child=START_LOCK.release,
-)
+os.register_at_fork(before=START_LOCK.acquire, after_in_parent=START_LOCK.release)
+
+
+def leave_to_parent() -> None:
+    """After a fork, leave all isolated processes to the parent, which alone can wait for them."""
+    for process in PROCESSES:
+        process.returncode = 0
+    for channel in CHANNELS:
+        channel.close()
+    START_LOCK.release()
+
+
+os.register_at_fork(after_in_child=leave_to_parent)
 
 
 def compiled_file() -> IO[bytes]:
@@ -129,19 +143,11 @@ def code_of(file: str, shown: str) -> bytes:
     if code is None or all(column is None for _, _, column, _ in code.co_positions()):
         # Compile again, since an interpreter that omits column numbers wrote this shorter code.
         return compiled_source(Path(file).read_text(encoding="utf-8"), shown)
-    return dumped(code, shown)
+    # As importlib does it. The length of a path would change memory addresses.
+    _imp._fix_co_filename(code, shown)  # type: ignore[attr-defined]  # noqa: SLF001 - the only way in place
+    return marshal.dumps(code, WITHOUT_REFERENCES)
 
 
 def compiled_source(source: str, shown: str) -> bytes:
     """Compile a source text."""
-    return dumped(compile(source, "", "exec", dont_inherit=True, optimize=0), shown)
-
-
-def dumped(code: CodeType, shown: str) -> bytes:
-    """Serialize code without paths, since their length would change memory addresses."""
-
-    def nameless(code: CodeType) -> CodeType:
-        parts = (nameless(part) if isinstance(part, CodeType) else part for part in code.co_consts)
-        return code.replace(co_filename=shown, co_consts=tuple(parts))
-
-    return marshal.dumps(nameless(code), WITHOUT_REFERENCES)
+    return marshal.dumps(compile(source, shown, "exec", dont_inherit=True, optimize=0), WITHOUT_REFERENCES)

@@ -8,11 +8,9 @@ this runs in a bare interpreter with few imports, since every page of memory slo
 # Interpreter options: no site module, no user site folder, no unsafe path, no bytecode files, no warnings.
 FLAGS = ("-S", "-s", "-P", "-B", "-W", "ignore")
 
-# The roles of a fork server: for batches, for single runs, for live runs.
-BATCH_SERVER, FORK_SERVER, LIVE_SERVER = "batch-fork-server", "fork-server", "live-fork-server"
-
 CHANNEL = 3  # the descriptor that connects a closed process to the engine
 HEADER, MAX_FRAME = 4, 1_000_000  # bytes of the length that precedes a frame, and of the frame
+SIMULATED_RUN, LIVE_RUN = b"s", b"l"  # requests to a fork server for a child
 READY = '"ready"'  # the first message of a child, once it is isolated
 WITHOUT_REFERENCES = 2  # marshal format; the output of later formats depends on reference counts
 

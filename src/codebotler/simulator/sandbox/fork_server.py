@@ -9,7 +9,7 @@ from _socket import CMSG_SPACE, socket
 from marshal import loads
 from posix import getpid, getppid
 
-from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, LIVE_CPU_SECONDS, LIVE_SERVER, READY
+from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, LIVE_CPU_SECONDS, LIVE_RUN, READY
 from codebotler.simulator.sandbox.channel import receive, send
 from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import ProgramRun
@@ -30,11 +30,8 @@ PID_BYTES = 8  # size of a process id as bytes; the size of an int object would 
 DESCRIPTOR_BYTES = 4  # size of a descriptor in a message
 
 
-def get_ready(
-    role: str,
-) -> tuple[socket, ProgramRun, Callable[[ProgramRun], None], Filter | None, int]:
+def get_ready() -> tuple[socket, ProgramRun, Callable[[ProgramRun], None], Filter | None, int]:
     """Prepare everything that runs share, and return the arguments for `serve`."""
-    seconds = LIVE_CPU_SECONDS if role == LIVE_SERVER else CPU_SECONDS
     door = socket(fileno=RUN_DOOR)
     run = ProgramRun()
     simulate_environment(run)
@@ -50,7 +47,7 @@ def get_ready(
                 module.__spec__.submodule_search_locations = module.__path__
     sys.meta_path[:] = [_NothingMore()]
     give_up_rights()
-    return door, run, execute, usable_filter(), seconds
+    return door, run, execute, usable_filter(), CPU_SECONDS
 
 
 def serve(
@@ -78,14 +75,14 @@ def _one_run(
 
     The dead child is reaped when the next run is requested, so that its process id is not reused earlier.
     """
-    line = _asked_for(door)
+    line, is_live = _asked_for(door)
     if line < 0:
         return False
     parent = getpid().to_bytes(PID_BYTES, "big")
     pid = os.fork()
     if pid == 0:
         try:
-            isolate(line, seccomp, seconds, parent)
+            isolate(line, seccomp, LIVE_CPU_SECONDS if is_live else seconds, parent)
             execute(run)
             os._exit(0)
         finally:
@@ -96,16 +93,16 @@ def _one_run(
     return True
 
 
-def _asked_for(door: socket) -> int:
-    """Wait for the next request, and reap the last child. Return the new child's socket, or -1 at the end."""
-    ancillary = door.recvmsg(1, CMSG_SPACE(DESCRIPTOR_BYTES))[1]
+def _asked_for(door: socket) -> tuple[int, bool]:
+    """Reap the last child at the next request. Return its socket, or -1 at the end, and if it is live."""
+    request, ancillary, _, _ = door.recvmsg(1, CMSG_SPACE(DESCRIPTOR_BYTES))
     if not ancillary:
-        return -1
+        return -1, False
     try:  # noqa: SIM105 - contextlib is too large to import
         os.waitpid(-1, 0)
     except ChildProcessError:
         pass
-    return int.from_bytes(ancillary[0][2][:DESCRIPTOR_BYTES], sys.byteorder)
+    return int.from_bytes(ancillary[0][2][:DESCRIPTOR_BYTES], sys.byteorder), request == LIVE_RUN
 
 
 def _end_of(pid: int) -> int:

@@ -1,4 +1,4 @@
-"""Starts each fork server for wild programs: fixes its memory layout and limits, then serves in a role."""
+"""Starts each fork server for wild programs: fixes its memory layout and limits, then serves."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ STACK = 8 * 1024 * 1024
 ADDR_NO_RANDOMIZE = 0x0040000
 
 
-def main(role: str, descriptors: list[str]) -> None:
-    """Restart the interpreter if descriptors are given, else serve in a role."""
+def main(descriptors: list[str]) -> None:
+    """Restart the interpreter if descriptors are given, else serve."""
     if descriptors:
         start_again(list(map(int, descriptors)))
     sys.pycache_prefix = os.devnull  # a bytecode file that may or may not exist would move the heap
@@ -28,7 +28,7 @@ def main(role: str, descriptors: list[str]) -> None:
     os.close(CODES)
     from codebotler.simulator.sandbox.fork_server import get_ready, serve  # noqa: PLC0415 - found by `modules`
 
-    ready = get_ready(role)
+    ready = get_ready()
     modules.codes.clear()  # there are no more imports
     serve(*ready)
 
@@ -107,4 +107,4 @@ def forget_the_shell() -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2:])
+    main(sys.argv[1:])

@@ -48,8 +48,8 @@ class ContractPane:
 
     def _table(self, contract: Contract) -> None:
         with ui.element("table"), ui.element("tbody"):
-            for row in contract_rows(contract, self._skills, shortened):
+            for what, allowed, often in contract_rows(contract, self._skills, shortened):
                 with ui.element("tr"):
-                    PlainText("th", row.what).props("scope=row")
-                    PlainText("td", f"{row.texts} {row.places}".strip())
-                    PlainText("td", row.at_most, "quiet")
+                    PlainText("th", what).props("scope=row")
+                    PlainText("td", allowed)
+                    PlainText("td", often, "quiet")
