@@ -117,6 +117,7 @@ def test_every_message_is_as_its_schema_says(mission: tuple[MissionSummary, list
     assert asked["options"] == {"type": "array", "items": {"type": "string"}}
     assert topics["/skill/is_in_room"]["result"] == {"type": "boolean"}
     assert "result" not in topics["/skill/go_to"]
+    assert topics["/robot/pose"]["timestamp"]["title"] == "time"
 
 
 def test_log_lines_have_a_level_and_the_line_of_the_program(
