@@ -19,7 +19,7 @@ from codebotler.checking.contracts.file import contract_from
 from codebotler.checking.contracts.text import contract_sentence
 from codebotler.core.errors import UserError
 from codebotler.core.program import MAX_PROGRAM_LENGTH
-from codebotler.core.text.words import brief, listed
+from codebotler.core.text.words import brief
 from codebotler.missions.authoring import ModelAuthor
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.display.wording import event_text
@@ -50,7 +50,7 @@ class Gatekeeper:
         console: the robot and its current mission.
         asks_client: whether a client may ask its person, in a dialog that its agent cannot answer.
         writes: whether a model is configured that can write programs.
-        page: the address of the page, without its token; empty without a page.
+        page: the address of the page, without its token; empty before it is served.
     """
 
     console: Console
@@ -239,7 +239,7 @@ class Gatekeeper:
             return view.error or "The program is not ready: call follow_mission, or propose another one."
         if not view.can_run:
             return "This program cannot run. Mend it, and propose it again."
-        dialog = ["in the dialog that run_mission opens, if this client has dialogs"]
-        page = [f"on the page {self.page}, whose link with its token was printed at the start"]
-        where = listed(dialog * self.may_ask_client(view) + page * bool(self.page), "or")
+        where = f"on the page {self.page}, whose link with its token was printed at the start"
+        if self.may_ask_client(view):
+            where = f"in the dialog that run_mission opens, if this client has dialogs, or {where}"
         return f"A person must approve this program {where}. Then call run_mission with its digest."
