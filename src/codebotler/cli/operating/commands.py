@@ -77,16 +77,6 @@ def continue_mission(
     program: Annotated[
         str, typer.Argument(metavar="[PROGRAM]", help="A program for the rest; by default a model writes it.")
     ] = "",
-    happened: Annotated[
-        bool | None,
-        typer.Option(
-            "--happened/--not-happened",
-            help="Whether the last step happened, if the log does not say so; by default you are asked.",
-        ),
-    ] = None,
-    answer: Annotated[
-        str, typer.Option(help="With --happened: the answer to the question, if you know it.")
-    ] = "",
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Do the rest of a mission that ended early.
@@ -97,7 +87,7 @@ def continue_mission(
 
     request, open_console = run_settings(**shared)
     console = open_console()
-    past = choose_past(console, mission, happened=happened, answer=answer)
+    past = choose_past(console, mission)
     raise typer.Exit(run(console, request(program or past.instruction, past=past)))
 
 
