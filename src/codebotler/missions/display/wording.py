@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from codebotler.core.skills.declaration import by_name
@@ -16,12 +15,7 @@ from codebotler.missions.storage.log import LogLine, MissionState, MissionSummar
 from codebotler.simulator.guard.contract import CONTRACT
 
 BY_PAGE = "the page"  # the source of a stop from the page, as it appears in the log
-_TITLE_CALLS = 2
-_TITLE_SOURCE = 2_000  # characters in which calls are looked for
-_TITLE_TOKEN = re.compile(
-    r"""#.*|(?P<quote>\'{3}|"{3}|['"])(?s:\\.|(?!(?P=quote)).)*+(?P=quote)?"""  # comments and strings
-    r"""|(?:def +|\.)\w+|(?P<name>\w*+) ?\(|\w+|\)"""
-)
+_TITLE_SOURCE = 1_000  # characters of a program that its title may need
 _STATE_TITLES: Mapping[str, str] = {MissionState.DRAFTING: "program written", MissionState.RUNNING: "started"}
 """The titles of states in a timeline. Other states keep their own names."""
 
@@ -93,26 +87,12 @@ def capitalize(words: str) -> str:
 
 
 def title(summary: MissionSummary) -> str:
-    """Return the title of a mission: its instruction, or else the first skills that its program calls."""
+    """Return the title of a mission: its instruction, or else the beginning of its program's steps."""
     if summary.instruction:
         return summary.instruction
-    calls = sorted(_skill_calls(summary.program[:_TITLE_SOURCE]))
-    shown = [brief(summary.program[begin:end]) for begin, end in calls[:_TITLE_CALLS]]
-    more = ["…"] * (len(calls) > _TITLE_CALLS)
-    begin = "calls" if summary.model else "typed"
-    return f"{begin}: {', '.join([*shown, *more])}" if calls else "a program without an instruction"
-
-
-def _skill_calls(source: str) -> Iterator[tuple[int, int]]:
-    """Yield where calls of skills begin and end, without parsing, which takes long and keeps STOP waiting."""
-    opened: list[tuple[str, int]] = []  # the name before each open bracket, and where it begins
-    for token in _TITLE_TOKEN.finditer(source):
-        if token["name"] is not None:
-            opened.append((token["name"], token.start()))
-        elif token[0] == ")" and opened:
-            name, begin = opened.pop()
-            if by_name(name):
-                yield begin, token.end()
+    steps = brief(summary.program.rpartition("def task_program():")[2][:_TITLE_SOURCE])
+    begin = "program" if summary.model else "typed"
+    return f"{begin}: {steps}" if steps else "a program without an instruction"
 
 
 def _skill(line: LogLine) -> str:
