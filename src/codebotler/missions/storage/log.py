@@ -6,11 +6,13 @@ import json
 import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, TypeAlias
+
+import msgspec
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line, write_whole
@@ -20,10 +22,6 @@ EVENTS_FILE, SUMMARY_FILE = "events.jsonl", "mission.json"
 LogLine: TypeAlias = dict[str, Any]
 """An event: `time` (seconds since 1970), `clock` (seconds on the robot's clock), `event` (kind), and data."""
 
-_TEXT_FIELDS = (
-    *("id", "robot", "instruction", "model", "program", "reason", "if_tool_dies"),
-    *("place", "continues"),
-)
 _REQUIRED_KEYS: Mapping[str, frozenset[str]] = {
     "state": frozenset({"state"}),
     "skill": frozenset({"number", "skill", "arguments"}),
@@ -113,12 +111,9 @@ class MissionSummary:
         """Read the summary of a mission, or raise UserError if it is damaged."""
         path = folder / SUMMARY_FILE
         try:
-            data = json.loads(path.read_bytes())
-            summary = cls(**{field.name: data[field.name] for field in fields(cls) if field.name in data})
-            summary.state, summary.problems = MissionState(summary.state), tuple(summary.problems)
+            summary = msgspec.convert(json.loads(path.read_bytes()), cls)
             datetime.fromtimestamp(summary.created, UTC)
-            "".join((*summary.problems, *(getattr(summary, name) for name in _TEXT_FIELDS)))
-        except (ValueError, TypeError, OverflowError, RecursionError):
+        except (ValueError, OverflowError, RecursionError, msgspec.ValidationError):
             raise UserError("this is not a valid mission summary; remove its folder", file=path) from None
         return summary
 
