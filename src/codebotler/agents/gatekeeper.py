@@ -180,16 +180,13 @@ class Gatekeeper:
         self._under_way.add(kind)
         made = Future[_Made]()
         made.set_running_or_notify_cancel()
+        made.add_done_callback(lambda _: self._under_way.discard(kind))  # before the result is awaited
 
         def run() -> None:
             try:
-                result = work()
+                made.set_result(work())
             except BaseException as error:  # noqa: BLE001 - raised again where the result is awaited
-                self._under_way.discard(kind)
                 made.set_exception(error)
-            else:
-                self._under_way.discard(kind)
-                made.set_result(result)
 
         Thread(target=run, daemon=True).start()
         return await asyncio.wrap_future(made)
