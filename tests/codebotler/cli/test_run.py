@@ -209,9 +209,9 @@ def test_one_course_is_shown_or_all_of_them(folder: Path) -> None:
     assert "--all" not in both
 
 
-def test_a_typed_program_is_listed_by_its_first_skills(folder: Path) -> None:
+def test_a_typed_program_is_listed_by_its_first_steps(folder: Path) -> None:
     run(folder, "good.py", "--yes")
-    assert 'typed: go_to("kitchen"), is_in_room("mug"), …' in ended(folder, "missions")[1]
+    assert 'typed: go_to("kitchen") if is_in_room("mug"):' in ended(folder, "missions")[1]
 
 
 @pytest.mark.slow

@@ -154,8 +154,8 @@ def test_a_stop_is_one_event() -> None:
             "stopped from the page",
         ]
         states = [line("state", state=state, reason="stopped by x") for state in ("stopping", "stopped")]
-        words = [text for _, text in timeline([*events, *states])]
-        assert words == ['drives to "supply room"', "stopped from the page"]
+        words = [text for _, text in timeline([line("state", state="drafting"), *events, *states])]
+        assert words == ["mission created", 'drives to "supply room"', "stopped from the page"]
 
 
 def test_the_line_is_the_one_that_the_program_says() -> None:

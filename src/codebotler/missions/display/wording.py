@@ -15,9 +15,9 @@ from codebotler.missions.storage.log import LogLine, MissionState, MissionSummar
 from codebotler.simulator.guard.contract import CONTRACT
 
 BY_PAGE = "the page"  # the source of a stop from the page, as it appears in the log
-_TITLE_SOURCE = 1_000  # characters of a program that its title may need
+_TITLE_SOURCE, _TITLE_STEPS = 1_000, 40  # how many characters of a program to read for a title, and to show
 _STATE_TITLES: Mapping[str, str] = {MissionState.DRAFTING: "program written", MissionState.RUNNING: "started"}
-"""The titles of states in a timeline. Other states keep their own names."""
+"""The titles of states. Other states keep their own names."""
 
 _STATES_IMPLIED_BY_STOP = frozenset({MissionState.STOPPING, MissionState.STOPPED})
 """The states that a timeline hides after a stop."""
@@ -33,18 +33,17 @@ def timeline(events: Iterable[LogLine]) -> Iterator[tuple[LogLine, str]]:
     """Yield events with their descriptions, without feedback, repeated states, and what a stop implies."""
     before, is_stopped = "", False
     for number, line in enumerate(events):
-        is_state = line["event"] == "state"
-        words = _step_text(line, is_first=number == 0) if is_state else event_text(line)
+        words = event_text(line) if number else "mission created"
         is_stopped = is_stopped or line["event"] == "stop"
         is_implied = is_stopped and line.get("state") in _STATES_IMPLIED_BY_STOP
         if words and words != before and not is_implied and line["event"] not in {"feedback", "cancelled"}:
             yield line, words
-        before = words if is_state else ""  # each edit of a draft logs the same state again
+        before = words if line["event"] == "state" else ""  # each edit of a draft logs the same state again
 
 
-def _step_text(line: LogLine, *, is_first: bool) -> str:
+def _state(line: LogLine) -> str:
     state, reason = line["state"], shortened(line.get("reason", ""))
-    step = "mission created" if is_first else _STATE_TITLES.get(state, visible(state))
+    step = _STATE_TITLES.get(state, visible(state))
     if state == MissionState.CHECKED:
         problems = len(line.get("problems", ()))
         step = f"checked: {counted(problems, 'problem') if problems else 'no problems'}"
@@ -69,13 +68,6 @@ def stop_text(by: str) -> str:
     return f"stopped {'from' if by == BY_PAGE else 'by'} {visible(by)}"
 
 
-def state_text(state: str, reason: str) -> str:
-    """Describe a state and its reason, as in `stopped by rule vault` or `failed: the door is shut`."""
-    if not reason or reason.startswith(state):
-        return shortened(reason) or state
-    return f"{state}: {shortened(reason)}"
-
-
 def reason_text(reason: str, line: int | None) -> str:
     """Return the reason, preceded by the program's line, if known."""
     return reason if line is None else f"line {line}: {reason}"
@@ -90,7 +82,7 @@ def title(summary: MissionSummary) -> str:
     """Return the title of a mission: its instruction, or else the beginning of its program's steps."""
     if summary.instruction:
         return summary.instruction
-    steps = brief(summary.program.rpartition("def task_program():")[2][:_TITLE_SOURCE])
+    steps = brief(summary.program.rpartition("def task_program():")[2][:_TITLE_SOURCE], _TITLE_STEPS)
     begin = "program" if summary.model else "typed"
     return f"{begin}: {steps}" if steps else "a program without an instruction"
 
@@ -127,7 +119,7 @@ def _rule(line: LogLine) -> str:
 _EVENT_WORDERS: Mapping[str, Callable[[LogLine], str]] = {
     "skill": _skill,
     "result": _result,
-    "state": lambda line: state_text(line["state"], line.get("reason", "")),
+    "state": _state,
     "feedback": lambda line: shortened(line["text"]),
     "picture": lambda line: shortened(line.get("text") or f"picture: {line.get('file')}"),
     "error": lambda line: f"{visible(line['kind'])}: {shortened(line['message'])}",
