@@ -79,7 +79,7 @@ class Request:
         program = read_program(self.what) if self.is_program else ""
         if self.past is not None:
             return console.rest_of(self.past, program)
-        asks = line_reader(is_allowed=not self.yes) is not None
+        asks = not self.yes and line_reader() is not None
         return MissionOrder("" if program else self.what, program=program, asks=asks)
 
     @property
