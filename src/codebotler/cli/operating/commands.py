@@ -114,7 +114,6 @@ def missions(
     from codebotler.core.terminal import print_found
     from codebotler.missions.storage import store
     from codebotler.missions.storage.log import MissionSummary, read_events
-    from codebotler.missions.storage.pictures import PICTURE_FOLDER, read_picture
 
     if mcap is not None and mission is None:
         raise UserError("--mcap writes one mission; give its ID, or `last`")
@@ -122,8 +121,6 @@ def missions(
         raise UserError("--mcap and --json cannot be used together")
     if clock not in {"wall", "robot"}:
         raise UserError(f'unknown clock "{clock}"; use wall or robot')
-    if mcap is not None:
-        from codebotler.missions.storage.mcap import export_mcap  # fails first if its package is missing
 
     skills_from(*(skills or ()))  # registers the verbs that describe the skills
     store.recover_missions(home())
@@ -134,9 +131,9 @@ def missions(
     folder = store.find_mission(home(), mission)
     summary, events = MissionSummary.read(folder), read_events(folder)
     if mcap is not None:
-        export_mcap(  # type: ignore[possibly-undefined]  # imported above
-            mcap, summary, events, "robot" if clock == "robot" else "wall", folder
-        )
+        from codebotler.missions.storage.mcap import export_mcap
+
+        export_mcap(mcap, summary, events, "robot" if clock == "robot" else "wall", folder)
         note(f"wrote {len(events):,} events of mission {summary.id} to {mcap}")
         return
     print_found(
@@ -144,8 +141,6 @@ def missions(
         lambda: {**asdict(summary), "events": events},
         as_json=json,
     )
-    if not json and any(read_picture(folder, line) for line in events):
-        note(f"the pictures are in {folder / PICTURE_FOLDER}")
 
 
 def robots(
