@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.skills.values import written_call
-from codebotler.core.skills.verbs import VerbForm
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.text.phrases import phrase
 from codebotler.core.text.words import brief, counted
@@ -50,19 +49,6 @@ def _state(line: LogLine) -> str:
     return f"{step}: {reason.removeprefix(f'{state} ')}" if reason else step
 
 
-def skill_text(line: LogLine, form: VerbForm) -> str:
-    """Describe the call of a skill. Return an empty string if the skill has no verb."""
-    skill = by_name(line["skill"])
-    if skill is None or skill.verb is None:
-        return ""
-    given = zip(skill.parameters, line["arguments"].values(), strict=True)
-    arguments = [to_options(value) if parameter.is_options else value for parameter, value in given]
-    event = attempted_event(skill, arguments, place="", time=0.0)
-    if event is None:
-        return str(getattr(skill.verb, form))
-    return phrase(event, form, show=shortened)
-
-
 def stop_text(by: str) -> str:
     """Describe a stop."""
     return f"stopped {'from' if by == BY_PAGE else 'by'} {visible(by)}"
@@ -88,8 +74,13 @@ def title(summary: MissionSummary) -> str:
 
 
 def _skill(line: LogLine) -> str:
-    arguments = list(line["arguments"].values())
-    return skill_text(line, "third") or shortened(written_call(line["skill"], arguments))
+    skill, values = by_name(line["skill"]), list(line["arguments"].values())
+    if skill is None or skill.verb is None:
+        return shortened(written_call(line["skill"], values))
+    given = zip(skill.parameters, values, strict=True)
+    arguments = [to_options(value) if parameter.is_options else value for parameter, value in given]
+    event = attempted_event(skill, arguments, place="", time=0.0)
+    return skill.verb.third if event is None else phrase(event, "third", show=shortened)
 
 
 def _result(line: LogLine) -> str:

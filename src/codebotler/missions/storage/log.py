@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -167,12 +167,7 @@ def find_skill_end(events: Sequence[LogLine], number: int) -> LogLine | None:
     return next((line for line in later if line["event"] in SKILL_END_EVENTS), None)
 
 
-def find_unfinished_skill(events: Iterable[LogLine]) -> LogLine | None:
+def find_unfinished_skill(events: Sequence[LogLine]) -> LogLine | None:
     """Return the event that started an unfinished skill, or None if all skills have ended."""
-    going: LogLine | None = None
-    for line in events:
-        if line["event"] == "skill":
-            going = line
-        elif line["event"] in SKILL_END_EVENTS:
-            going = None
-    return going
+    last = next((at for at in reversed(range(len(events))) if events[at]["event"] == "skill"), None)
+    return None if last is None or find_skill_end(events, last) else events[last]
