@@ -454,7 +454,7 @@ def test_long_lines_of_programs_are_shown_whole(folder: Path) -> None:
 def test_mission_is_written_as_mcap(folder: Path) -> None:
     run(folder, "good.py", "--yes")
     for clock in ("wall", "robot"):
-        status, out, err = ended(folder, "missions", "last", "--mcap", "one.mcap", "--clock", clock)
+        status, out, err = ended(folder, "missions", "--mcap", "one.mcap", "--clock", clock)
         assert (status, out) == (0, "")
         assert err.startswith("wrote ")
         with (folder / "one.mcap").open("rb") as file:
@@ -485,7 +485,7 @@ def test_mission_tells_each_state_once(folder: Path) -> None:
     ("arguments", "named"),
     [
         (["none"], ['"none"', "`codebotler missions`"]),
-        (["--mcap", "x.mcap"], ["--mcap", "`last`"]),
+        (["--mcap", "x.mcap"], ['"last"', "`codebotler missions`"]),
         (["last", "--mcap", "x.mcap"], ['"last"']),
         (["last", "--clock", "sun"], ['"sun"', "wall or robot"]),
     ],

@@ -96,7 +96,7 @@ def missions(
         str | None, typer.Argument(metavar="ID", help="The mission to show; `last` for the most recent.")
     ] = None,
     mcap: Annotated[
-        Path | None, typer.Option(help="Write the mission and its program to an MCAP file for Foxglove.")
+        Path | None, typer.Option(help="Write the mission, or the last one, to an MCAP file for Foxglove.")
     ] = None,
     clock: Annotated[
         str, typer.Option(help="The time for --mcap: wall, or robot for simulated time.")
@@ -115,20 +115,16 @@ def missions(
     from codebotler.missions.storage import store
     from codebotler.missions.storage.log import MissionSummary, read_events
 
-    if mcap is not None and mission is None:
-        raise UserError("--mcap writes one mission; give its ID, or `last`")
-    if mcap is not None and json:
-        raise UserError("--mcap and --json cannot be used together")
     if clock not in {"wall", "robot"}:
         raise UserError(f'unknown clock "{clock}"; use wall or robot')
 
     skills_from(*(skills or ()))  # registers the verbs that describe the skills
     store.recover_missions(home())
-    if mission is None:
+    if mission is None and mcap is None:
         known = store.read_missions(home())
         print_found(lambda: list_view(known), lambda: list(map(asdict, known)), as_json=json)
         return
-    folder = store.find_mission(home(), mission)
+    folder = store.find_mission(home(), mission or "last")
     summary, events = MissionSummary.read(folder), read_events(folder)
     if mcap is not None:
         from codebotler.missions.storage.mcap import export_mcap
