@@ -89,15 +89,11 @@ def recover_missions(home: Path) -> list[MissionSummary]:
 
 
 def find_interrupted(home: Path) -> list[MissionSummary]:
-    """Close missions whose process died. Return them, and the last one if it was interrupted before.
-
-    So is the last one that ran, since later ones that did not run changed nothing.
-    """
+    """Close missions whose process died. Return them, and the last that ran if it was interrupted before."""
     found = recover_missions(home)
     with suppress(UserError):
-        known = read_missions(home, RECENT_MISSIONS)
-        for last in (known, [one for one in known if one.if_tool_dies]):
-            found += [one for one in last[-1:] if one.state is MissionState.INTERRUPTED and one not in found]
+        ran = [one for one in read_missions(home, RECENT_MISSIONS) if one.if_tool_dies]
+        found += [one for one in ran[-1:] if one.state is MissionState.INTERRUPTED and one not in found]
     return found
 
 
