@@ -19,7 +19,7 @@ from mcp_types import ElicitRequestParams, ElicitResult
 OFFICE = Path(__file__).parent / "office.yaml"
 SERVER = StdioServerParameters(
     command=sys.executable,
-    args=["-m", "codebotler", "mcp", "--no-page", "--world", str(OFFICE), "--speed", "20"],
+    args=["-m", "codebotler", "mcp", "--world", str(OFFICE), "--speed", "20"],
     env=dict(os.environ),  # for CODEBOTLER_HOME and the keys of models
 )
 PROGRAM = """

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from codebotler.core.world import Person, Room, World
-from codebotler.missions.storage.log import MissionState
+from codebotler.missions.storage.log import MissionState, MissionSummary
 from ended import cut, failed_mission, line_of
 from pageserver import PageServer
 from viewing import DESK, PHONE, SCREENS, OpenPage, Screen, Shoot, expect_no_grave_fault, write
@@ -128,11 +128,17 @@ def test_missions_link_to_those_they_continue(
         expect(page.locator(".rows .outcome").first).to_contain_text(f"continues mission {first}")
         expect(page.locator(".rows .outcome").last).not_to_contain_text("continued by")  # it did not run
         look(page, shoot, f"continue-list-{size[0]}")
-        page.locator(".rows a").last.click()
-        page.locator(".chain a", has_text=second).click()
+        page.locator(".rows a").first.click()
         expect(page.locator(".chain")).to_have_count(1)
         look(page, shoot, f"continue-link-{size[0]}")
         page.locator(".chain a", has_text=first).click()
+        expect(page.get_by_role("button", name="Continue")).to_be_visible()
+        expect(page.locator(".chain")).to_have_count(0)
+        folder = tmp_path / "home" / "missions" / second
+        summary = MissionSummary.read(folder)
+        summary.if_tool_dies = "the robot stops"  # as if it had run
+        summary.write(folder)
+        page.reload()
         expect(page.locator(".chain")).to_contain_text(second)
         page.close()
 

@@ -68,8 +68,7 @@ async def find_question(ctx: AgentContext) -> OpenQuestion:
     session = gatekeeper_of(ctx).console.session
     view = None if session is None else session.view
     if session is None or view is None or view.question is None or not view.waits_for_answer:
-        with as_tool_errors():
-            raise MissionError("no mission waits for such an answer")
+        raise ToolError("no mission waits for such an answer")
     return OpenQuestion(session, view.question)
 
 

@@ -19,7 +19,7 @@ from codebotler.checking.contracts.file import contract_from
 from codebotler.checking.contracts.text import contract_sentence
 from codebotler.core.errors import UserError
 from codebotler.core.program import MAX_PROGRAM_LENGTH
-from codebotler.core.text.words import brief, listed
+from codebotler.core.text.words import brief
 from codebotler.missions.authoring import ModelAuthor
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.display.wording import event_text
@@ -50,7 +50,7 @@ class Gatekeeper:
         console: the robot and its current mission.
         asks_client: whether a client may ask its person, in a dialog that its agent cannot answer.
         writes: whether a model is configured that can write programs.
-        page: the address of the page, without its token; empty without a page.
+        page: the address of the page, without its token; empty before it is served.
     """
 
     console: Console
@@ -81,8 +81,6 @@ class Gatekeeper:
         self, purpose: str, bounds: Mapping[str, Any], author: str
     ) -> tuple[MissionSession, Steps]:
         """Propose a mission in which the agent calls skills one at a time, within these bounds."""
-        if self.console.view.is_running:
-            raise MissionError("a mission is running; wait until it is over, or stop it")
         if len(json.dumps(bounds)) > MAX_CONTRACT_CHARACTERS:
             raise UserError(TOO_LONG)
         known = self.console.robot.skills.without(self.console.robot.missing)
@@ -179,16 +177,13 @@ class Gatekeeper:
         self._under_way.add(kind)
         made = Future[_Made]()
         made.set_running_or_notify_cancel()
+        made.add_done_callback(lambda _: self._under_way.discard(kind))  # before the result is awaited
 
         def run() -> None:
             try:
-                result = work()
+                made.set_result(work())
             except BaseException as error:  # noqa: BLE001 - raised again where the result is awaited
-                self._under_way.discard(kind)
                 made.set_exception(error)
-            else:
-                self._under_way.discard(kind)
-                made.set_result(result)
 
         Thread(target=run, daemon=True).start()
         return await asyncio.wrap_future(made)
@@ -238,7 +233,7 @@ class Gatekeeper:
             return view.error or "The program is not ready: call follow_mission, or propose another one."
         if not view.can_run:
             return "This program cannot run. Mend it, and propose it again."
-        dialog = ["in the dialog that run_mission opens, if this client has dialogs"]
-        page = [f"on the page {self.page}, whose link with its token was printed at the start"]
-        where = listed(dialog * self.may_ask_client(view) + page * bool(self.page), "or")
+        where = f"on the page {self.page}, whose link with its token was printed at the start"
+        if self.may_ask_client(view):
+            where = f"in the dialog that run_mission opens, if this client has dialogs, or {where}"
         return f"A person must approve this program {where}. Then call run_mission with its digest."

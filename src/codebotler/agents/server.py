@@ -6,10 +6,9 @@ import asyncio
 import json
 import logging
 import os
-import signal
 import stat
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from dataclasses import asdict
 from functools import partial
 from io import BufferedWriter, FileIO, TextIOWrapper
@@ -30,10 +29,9 @@ from codebotler.agents.tools import ACTING, READING
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
 from codebotler.core.terminal import shortened
-from codebotler.missions.mission import BY_SHUTDOWN, MissionError
+from codebotler.missions.mission import MissionError
 from codebotler.missions.storage.log import EVENTS_FILE, SUMMARY_FILE
 from codebotler.missions.storage.store import RECENT_MISSIONS, find_mission, read_missions
-from codebotler.web.console import Console
 from codebotler.web.security.access import AGENT_PATH
 from codebotler.web.server import Companion
 
@@ -208,28 +206,6 @@ async def _open_output(sent: BufferedWriter) -> Any:  # noqa: ANN401 - the SDK w
     except ValueError:  # a file, which is never full of unread answers
         return anyio.wrap_file(TextIOWrapper(sent, encoding="utf-8"))
     return _Output(asyncio.StreamWriter(transport, protocol, None, loop))
-
-
-def serve_without_page(companion: Companion, console: Console) -> None:
-    """Serve agents until their input ends or a signal arrives, which also stops a running robot."""
-
-    async def main() -> None:
-        task = asyncio.ensure_future(companion.run())
-
-        def end() -> None:
-            console.stop(BY_SHUTDOWN)
-            task.cancel()
-
-        for number in (signal.SIGINT, signal.SIGTERM):
-            asyncio.get_running_loop().add_signal_handler(number, end)
-        try:
-            with suppress(asyncio.CancelledError):
-                await task
-        finally:  # before the event loop waits for its threads
-            console.stop(BY_SHUTDOWN)
-
-    with console:
-        asyncio.run(main())
 
 
 def take_streams() -> Streams:

@@ -136,7 +136,7 @@ async def choose_behaviour(
     gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors():
         if not isinstance(answer, AcceptedElicitation) or isinstance(answer.data, NotAsked):
-            raise MissionError(f"a person must choose on the page {gatekeeper.page}".rstrip())
+            raise MissionError(f"a person must choose on the page {gatekeeper.page}")
         given = answer.data
         question.session.answer(question.asked, question.asked.parse(given.answer), given.more)
         with gatekeeper.waiting():

@@ -31,7 +31,6 @@ def generate(
     retries: options.RetriesOption = None,
     repair: options.RepairOption = False,
     candidates: options.CandidatesOption = 1,
-    yes: options.TakeLargestOption = False,
     show_prompt: options.ShowPromptOption = False,
     base_url: options.BaseUrlOption = None,
     rules: options.RulesOption = None,
@@ -71,9 +70,8 @@ def generate(
     how = CheckSettings(skills=table, house_rules=house_rules)
     with suggesting_here(room_map):
         if candidates > 1:
-            ask = programs.line_reader(is_allowed=not yes)
             given = (lambda: open_model(chosen.name, settings)), make_prompt, instruction, how, room_map
-            program = programs.choose_candidate(*given, count=candidates, ask=ask)
+            program = programs.choose_candidate(*given, count=candidates, ask=programs.line_reader())
             accepted = program is not None and programs.print_checked(program, how, room_map)
         else:
             tries, prompt = int(repair) if retries is None else retries, make_prompt(instruction)

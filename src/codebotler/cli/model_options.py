@@ -54,7 +54,7 @@ PresetOption = Annotated[
     str | None,
     typer.Option(
         "--settings",
-        help=f"`paper` sets temperature 0.2, top-p 0.95 and a limit of {PAPER_MAX_TOKENS} tokens.",
+        help=f"`paper` sets temperature 0.2, top-p 0.95 and {PAPER_MAX_TOKENS} tokens, unless you set them.",
         metavar="NAME",
     ),
 ]
@@ -78,11 +78,7 @@ def model_settings(
     """Return the settings from the options, or raise UserError if two options contradict each other."""
     if settings not in {None, "paper"}:
         raise UserError(f'unknown settings "{settings}"; use --settings paper, or leave it out')
-    if settings is not None and (
-        no_temperature or no_top_p or (temperature, top_p, max_tokens) != (None,) * 3
-    ):
-        raise UserError("--settings paper sets temperature, top-p and the token limit; leave out your own")
-    if settings is not None:
+    if settings is not None and max_tokens is None:  # the paper's temperature and top-p are the defaults
         max_tokens = PAPER_MAX_TOKENS
     return SamplingSettings(
         temperature=_choose("temperature", temperature, is_left_out=no_temperature),

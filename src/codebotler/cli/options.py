@@ -20,19 +20,9 @@ if TYPE_CHECKING:
     from codebotler.simulator.guard.house_rule import Rule
 
 
-def robot_names(incomplete: str) -> list[str]:
-    """Return the kinds of robots that start with a string, for shell completion."""
-    from codebotler.robots.open import ROBOT_KINDS
-
-    return [name for name in ROBOT_KINDS if name.startswith(incomplete)]
-
-
 RobotOption = Annotated[
     str | None,
-    typer.Option(
-        help="The robot: sim by default, a kind from `codebotler robots`, or FILE.py:CLASS.",
-        autocompletion=robot_names,
-    ),
+    typer.Option(help="The robot: sim by default, a kind from `codebotler robots`, or FILE.py:CLASS."),
 ]
 AllOption = Annotated[
     bool, typer.Option("--all", help="Show all different outcomes in imagined worlds, not just one.")
@@ -61,9 +51,6 @@ CandidatesOption = Annotated[
         "behave alike. The rest of a mission is always one program.",
         metavar="K",
     ),
-]
-TakeLargestOption = Annotated[
-    bool, typer.Option("--yes", help="With --candidates: take the most frequent behaviour without asking.")
 ]
 WorldOption = Annotated[Path | None, typer.Option(help="The world file that defines the rooms.")]
 RulesOption = Annotated[

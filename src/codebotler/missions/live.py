@@ -95,26 +95,22 @@ class LiveRobot:
 
     def sleep_until(self, now: float) -> None:
         """Wait until a time on the robot's clock, or raise StoppedError if the mission is stopped."""
-        self._check_end()
+        self.check_end()
         seconds = max(0.0, now - self.now)
         at = {} if self.line is None else {"line": self.line}
         if seconds >= MIN_LOGGED_SECONDS:
             self._write_event("sleep", seconds=round(seconds, 3), **at)
         self.robot.clock.wait(seconds)
-        self._check_end()
+        self.check_end()
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill. Raise RobotError, StoppedError, RobotLostError, or OSError if logging fails."""
-        self._check_end()
+        self.check_end()
         try:
             return self._execute(self.skills[skill], arguments)
         finally:
             if skill not in SKILLS:  # a custom skill may have moved the robot
                 self._room, self._has_asked = None, False
-
-    def check_end(self) -> None:
-        """Raise an error if the mission must end. The first call starts the program's clock."""
-        self._check_end()
 
     def _execute(self, row: Skill, arguments: Sequence[Argument]) -> Result:
         is_drive = row.is_drive
@@ -248,7 +244,7 @@ class LiveRobot:
             self._button.press(f"rule {broken.rule.name}")
         else:
             self._write_event("rule", **entry)
-        self._check_end()
+        self.check_end()
 
     def report_unkept(self) -> str:
         """Log the first rule that is broken at the end, and return its sentence, or "" if all are kept."""
@@ -296,14 +292,14 @@ class LiveRobot:
                 _chosen_option(result, event)
         except RobotError as error:
             self._write_event("error", **which, kind=error.kind, message=str(error))
-            self._check_end()
+            self.check_end()
             raise
         except CancelledError:
             self._write_event("cancelled", **which, seconds=round(self.now - started, 3))
-            self._check_end()
+            self.check_end()
             raise RobotLostError("another client stopped the robot") from None
         self._write_event("late" if self._stopped.is_set() else "result", **which, result=result)
-        self._check_end()
+        self.check_end()
         return result
 
     def _call_robot(
@@ -327,7 +323,7 @@ class LiveRobot:
             raise RobotError("AskEmptyOptions", f'the question "{event.text}" offers no options')
         return check_answer(skill, self.robot.perform(skill.name, given, on_feedback))
 
-    def _check_end(self) -> None:
+    def check_end(self) -> None:
         """Raise an error if the program must end. The first call starts the program's clock."""
         if self._began is None:
             self._began = self.robot.clock.now

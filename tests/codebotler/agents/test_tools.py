@@ -221,7 +221,11 @@ def test_nothing_runs_until_a_person_approves_on_the_page(gatekeeper: Gatekeeper
         assert (proposed["state"], proposed["check"]["accepted"]) == ("checked", True)
         assert "http://localhost:1/" in proposed["next"]
         waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
-        assert (waiting["state"], waiting["events"][-1], waiting["is_over"]) == ("checked", "checked", False)
+        assert (waiting["state"], waiting["events"][-1], waiting["is_over"]) == (
+            "checked",
+            "checked: no problems",
+            False,
+        )
         running = asyncio.create_task(agent.call("run_mission", digest=proposed["digest"]))
         await asyncio.sleep(0.05)
         approve(gatekeeper)

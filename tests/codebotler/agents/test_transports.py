@@ -10,7 +10,6 @@ import re
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, closing
@@ -25,16 +24,10 @@ from mcp.client.session import ClientRequestContext
 from mcp.client.streamable_http import streamable_http_client
 from mcp_types import ElicitRequestParams, ElicitResult
 
-from codebotler.agents.server import serve_without_page
 from codebotler.cli.operating.mcp import serve_agents
 from codebotler.core.errors import UserError
-from codebotler.core.world import Room, World
 from codebotler.missions.storage.store import read_missions
-from codebotler.models.recorded import open_recorded
-from codebotler.robots.simulated import Simulated
-from codebotler.web.console import Console
 from codebotler.web.security.access import Access, Role
-from codebotler.web.server import Companion
 from pageserver import WORLD, PageServer
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
@@ -284,9 +277,9 @@ def variables(folder: Path) -> dict[str, str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("mode", "page"), [("auto", "--page"), ("legacy", "--no-page")])
-def test_all_tools_work_over_stdio(folder: Path, mode: str, page: str) -> None:
-    program, *arguments = command("--speed", "0", page)
+@pytest.mark.parametrize("mode", ["auto", "legacy"])
+def test_all_tools_work_over_stdio(folder: Path, mode: str) -> None:
+    program, *arguments = command("--speed", "0")
     started = StdioServerParameters(command=program, args=arguments, env=variables(folder), cwd=folder)
     questions: list[str] = []
 
@@ -303,7 +296,7 @@ def test_all_tools_work_over_stdio(folder: Path, mode: str, page: str) -> None:
             assert (await call(client, "read_robot"))["rooms"] == ["hall", "kitchen", "study"]
             assert (await call(client, "check_program", program=HELLO))["accepted"]
             proposed = await call(client, "propose_mission", instruction="hello", program=HELLO)
-            assert ("http://localhost:" in proposed["next"]) == (page == "--page")
+            assert "http://localhost:" in proposed["next"]
             done = await call(client, "run_mission", digest=proposed["digest"])
             assert (done["state"], len(questions)) == ("done", 1)
             stepwise = await call(
@@ -365,11 +358,10 @@ def test_only_the_event_loop_closes_the_descriptors_of_the_streams() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", ["--page", "--no-page"])
-def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path, page: str) -> None:
+def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path) -> None:
     (folder / "skills.py").write_text(NOISY)
     with subprocess.Popen(
-        command(page, "--skills", "skills.py", "--speed", "0"),
+        command("--skills", "skills.py", "--speed", "0"),
         cwd=folder,
         env=variables(folder),
         stdin=subprocess.PIPE,
@@ -390,17 +382,16 @@ def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path, page: st
         assert answers[3]["result"]["structuredContent"]["state"] == "checked"
         rest, said = running.communicate(timeout=SOON)
         assert (rest, running.returncode) == (b"", 0)
-        assert (b"?token=" in said) == (page == "--page")
+        assert b"?token=" in said
     (summary,) = read_missions(folder / "home")
     assert summary.state == "stopped"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", ["--page", "--no-page"])
 @pytest.mark.parametrize("ending", ["signal", "early signal", "closed input", "closed input, nothing read"])
-def test_a_running_robot_stops_with_the_server(folder: Path, page: str, ending: str) -> None:
+def test_a_running_robot_stops_with_the_server(folder: Path, ending: str) -> None:
     with subprocess.Popen(
-        command(page),
+        command(),
         cwd=folder,
         env=variables(folder),
         stdin=subprocess.PIPE,
@@ -437,24 +428,6 @@ def test_a_running_robot_stops_with_the_server(folder: Path, page: str, ending: 
     assert summary.state == "stopped"
 
 
-@pytest.mark.parametrize("ending", ["signal", "closed input"])
-def test_the_robot_stops_before_the_server_waits_for_its_threads(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
-) -> None:
-    console = Console(Simulated(World((Room("hall"),), "hall")), tmp_path, open_recorded)
-    stopped, was_stopped = threading.Event(), list[bool]()
-    monkeypatch.setattr(console, "stop", lambda _: stopped.set())
-
-    async def run() -> None:
-        asyncio.get_running_loop().run_in_executor(None, lambda: was_stopped.append(stopped.wait(1.0)))
-        if ending == "signal":
-            signal.raise_signal(signal.SIGTERM)
-            await asyncio.sleep(SOON)
-
-    serve_without_page(Companion((), run, lambda _: None), console)
-    assert was_stopped == [True]
-
-
 def wait_for(folder: Path, event: str) -> None:
     """Wait until the log of a mission has an event or a state."""
     ends = time.monotonic() + SOON
@@ -480,18 +453,9 @@ def test_a_person_who_starts_it_is_told_what_it_needs(folder: Path) -> None:
     assert len(ended.stderr.splitlines()) == 1
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("options", "advice"),
-    [
-        ({"http": True, "page": False}, "--no-page"),
-        ({"page": False, "ask_client": False}, "nobody could approve"),
-        ({"agent_token": "0123456789abcdef"}, "--http"),
-    ],
-)
-def test_options_that_contradict_each_other_are_refused(options: dict[str, Any], advice: str) -> None:
-    with pytest.raises(UserError, match=advice):
-        serve_agents(**options)
+def test_an_agents_token_is_refused_without_http() -> None:
+    with pytest.raises(UserError, match="--http"):
+        serve_agents(agent_token="0123456789abcdef")
 
 
 def test_an_agents_token_is_long_and_differs_from_the_others() -> None:

@@ -104,7 +104,7 @@ def test_the_person_may_give_up() -> None:
 
 
 def test_the_end_of_the_input_is_no_answer() -> None:
-    with pytest.raises(UserError, match="--yes"):
+    with pytest.raises(UserError, match="you decide"):
         Terminal([ONE, TWO], "").chosen()
 
 
@@ -114,7 +114,7 @@ def test_replies_without_a_program_do_not_count() -> None:
 
 
 def test_nobody_is_asked_without_a_terminal() -> None:
-    assert line_reader(is_allowed=True) is None
+    assert line_reader() is None
 
 
 def codebotler(*words: str, cwd: Path) -> Ended:

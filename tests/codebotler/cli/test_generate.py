@@ -147,14 +147,6 @@ def test_the_prompt_is_shown_without_a_key_or_a_server() -> None:
     assert base.out.endswith("# Instruction: Go to the kitchen.\ndef task_program():\n")
 
 
-def test_the_prompt_for_a_local_model_says_which_form_it_is() -> None:
-    ended = codebotler("generate", "Go to the kitchen.", "--model", "hf:no/such", "--show-prompt")
-    assert ended.status == 0
-    assert ended.out.startswith("--- system\n")
-    assert "hf:no/such" in ended.err
-    assert "--model completions:NAME" in ended.err
-
-
 @pytest.mark.parametrize(
     ("model", "named"),
     [

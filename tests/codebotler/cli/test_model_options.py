@@ -19,6 +19,7 @@ def test_nothing_named_is_the_default() -> None:
 def test_settings_of_the_paper_have_its_limit() -> None:
     paper = model_settings(settings="paper", seed=3)
     assert paper == SamplingSettings(temperature=0.2, top_p=0.95, max_tokens=512, seed=3)
+    assert model_settings(settings="paper", max_tokens=9).max_tokens == 9
 
 
 def test_what_is_left_out_is_none() -> None:
@@ -32,7 +33,6 @@ def test_what_is_left_out_is_none() -> None:
         ({"temperature": 0.5, "no_temperature": True}, "--no-temperature"),
         ({"top_p": 0.5, "no_top_p": True}, "--no-top-p"),
         ({"settings": "papers"}, '"papers"'),
-        ({"settings": "paper", "max_tokens": 9}, "--settings paper"),
         ({"extra_body": "[1]"}, "--extra-body"),
         ({"extra_body": "{"}, "--extra-body"),
     ],

@@ -209,9 +209,9 @@ def test_one_course_is_shown_or_all_of_them(folder: Path) -> None:
     assert "--all" not in both
 
 
-def test_a_typed_program_is_listed_by_its_first_skills(folder: Path) -> None:
+def test_a_typed_program_is_listed_by_its_first_steps(folder: Path) -> None:
     run(folder, "good.py", "--yes")
-    assert 'typed: go_to("kitchen"), is_in_room("mug"), …' in ended(folder, "missions")[1]
+    assert 'typed: go_to("kitchen") if is_in_room("mug"):' in ended(folder, "missions")[1]
 
 
 @pytest.mark.slow
@@ -454,7 +454,7 @@ def test_long_lines_of_programs_are_shown_whole(folder: Path) -> None:
 def test_mission_is_written_as_mcap(folder: Path) -> None:
     run(folder, "good.py", "--yes")
     for clock in ("wall", "robot"):
-        status, out, err = ended(folder, "missions", "last", "--mcap", "one.mcap", "--clock", clock)
+        status, out, err = ended(folder, "missions", "--mcap", "one.mcap", "--clock", clock)
         assert (status, out) == (0, "")
         assert err.startswith("wrote ")
         with (folder / "one.mcap").open("rb") as file:
@@ -470,7 +470,7 @@ def test_mcap_that_cannot_be_written_is_named(folder: Path) -> None:
     program = (folder / "good.py").read_bytes()
     status, _, err = ended(folder, "missions", "last", "--mcap", "good.py")
     assert status == 2
-    assert err.startswith(f"codebotler: {folder / 'good.py'}: ")
+    assert err.startswith("codebotler: good.py: ")
     assert "unexpected content" in err
     assert (folder / "good.py").read_bytes() == program
 
@@ -485,7 +485,7 @@ def test_mission_tells_each_state_once(folder: Path) -> None:
     ("arguments", "named"),
     [
         (["none"], ['"none"', "`codebotler missions`"]),
-        (["--mcap", "x.mcap"], ["--mcap", "`last`"]),
+        (["--mcap", "x.mcap"], ['"last"', "`codebotler missions`"]),
         (["last", "--mcap", "x.mcap"], ['"last"']),
         (["last", "--clock", "sun"], ['"sun"', "wall or robot"]),
     ],

@@ -117,6 +117,7 @@ def test_every_message_is_as_its_schema_says(mission: tuple[MissionSummary, list
     assert asked["options"] == {"type": "array", "items": {"type": "string"}}
     assert topics["/skill/is_in_room"]["result"] == {"type": "boolean"}
     assert "result" not in topics["/skill/go_to"]
+    assert topics["/robot/pose"]["timestamp"]["title"] == "time"
 
 
 def test_log_lines_have_a_level_and_the_line_of_the_program(
@@ -295,6 +296,11 @@ def test_link_and_pipe_stay_what_they_are(
         export_mcap(pipe, *mission, "wall")
         assert got.result(30) == written(mission)
     assert pipe.is_fifo()
+    read, write = os.pipe()
+    export_mcap(Path(f"/dev/fd/{write}"), *mission, "wall")
+    os.close(write)
+    with os.fdopen(read, "rb") as output:
+        assert output.read() == written(mission)
 
 
 def test_file_is_written_whole_or_not_at_all(

@@ -77,16 +77,6 @@ def continue_mission(
     program: Annotated[
         str, typer.Argument(metavar="[PROGRAM]", help="A program for the rest; by default a model writes it.")
     ] = "",
-    happened: Annotated[
-        bool | None,
-        typer.Option(
-            "--happened/--not-happened",
-            help="Whether the last step happened, if the log does not say so; by default you are asked.",
-        ),
-    ] = None,
-    answer: Annotated[
-        str, typer.Option(help="With --happened: the answer to the question, if you know it.")
-    ] = "",
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Do the rest of a mission that ended early.
@@ -97,7 +87,7 @@ def continue_mission(
 
     request, open_console = run_settings(**shared)
     console = open_console()
-    past = choose_past(console, mission, happened=happened, answer=answer)
+    past = choose_past(console, mission)
     raise typer.Exit(run(console, request(program or past.instruction, past=past)))
 
 
@@ -106,7 +96,7 @@ def missions(
         str | None, typer.Argument(metavar="ID", help="The mission to show; `last` for the most recent.")
     ] = None,
     mcap: Annotated[
-        Path | None, typer.Option(help="Write the mission and its program to an MCAP file for Foxglove.")
+        Path | None, typer.Option(help="Write the mission, or the last one, to an MCAP file for Foxglove.")
     ] = None,
     clock: Annotated[
         str, typer.Option(help="The time for --mcap: wall, or robot for simulated time.")
@@ -124,29 +114,22 @@ def missions(
     from codebotler.core.terminal import print_found
     from codebotler.missions.storage import store
     from codebotler.missions.storage.log import MissionSummary, read_events
-    from codebotler.missions.storage.pictures import PICTURE_FOLDER, read_picture
 
-    if mcap is not None and mission is None:
-        raise UserError("--mcap writes one mission; give its ID, or `last`")
-    if mcap is not None and json:
-        raise UserError("--mcap and --json cannot be used together")
     if clock not in {"wall", "robot"}:
         raise UserError(f'unknown clock "{clock}"; use wall or robot')
-    if mcap is not None:
-        from codebotler.missions.storage.mcap import export_mcap  # fails first if its package is missing
 
     skills_from(*(skills or ()))  # registers the verbs that describe the skills
     store.recover_missions(home())
-    if mission is None:
+    if mission is None and mcap is None:
         known = store.read_missions(home())
         print_found(lambda: list_view(known), lambda: list(map(asdict, known)), as_json=json)
         return
-    folder = store.find_mission(home(), mission)
+    folder = store.find_mission(home(), mission or "last")
     summary, events = MissionSummary.read(folder), read_events(folder)
     if mcap is not None:
-        export_mcap(  # type: ignore[possibly-undefined]  # imported above
-            mcap, summary, events, "robot" if clock == "robot" else "wall", folder
-        )
+        from codebotler.missions.storage.mcap import export_mcap
+
+        export_mcap(mcap, summary, events, "robot" if clock == "robot" else "wall", folder)
         note(f"wrote {len(events):,} events of mission {summary.id} to {mcap}")
         return
     print_found(
@@ -154,8 +137,6 @@ def missions(
         lambda: {**asdict(summary), "events": events},
         as_json=json,
     )
-    if not json and any(read_picture(folder, line) for line in events):
-        note(f"the pictures are in {folder / PICTURE_FOLDER}")
 
 
 def robots(

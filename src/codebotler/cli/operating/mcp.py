@@ -14,9 +14,6 @@ from codebotler.core.errors import UserError
 HttpOption = Annotated[
     bool, typer.Option("--http", help="Serve agents over HTTP on the page's port, not over standard input.")
 ]
-PageOption = Annotated[
-    bool, typer.Option("--page/--no-page", help="Also serve the page, on which a person approves missions.")
-]
 AskClientOption = Annotated[
     bool | None,
     typer.Option(
@@ -29,18 +26,10 @@ AgentTokenOption = Annotated[
 ]
 
 
-def _expect_approval(*, http: bool, page: bool, can_approve: bool) -> None:
-    if http and not page:
-        raise UserError("--http uses the page's port; leave out --no-page")
-    if not can_approve:
-        raise UserError("nobody could approve a mission; leave out --no-page or --page-only, or add --within")
-
-
 @inherit_options(options.robot_settings)
 @inherit_options(model_settings)
 def serve_agents(
     http: HttpOption = False,
-    page: PageOption = True,
     ask_client: AskClientOption = None,
     port: options.PortOption = None,
     token: options.TokenOption = None,
@@ -63,7 +52,6 @@ def serve_agents(
     from codebotler.web.server import serve
 
     asks = not http if ask_client is None else ask_client
-    _expect_approval(http=http, page=page, can_approve=page or asks or shared.get("within") is not None)
     if agent_token is not None and not http:
         raise UserError("--agent-token is for --http; leave it out")
     streams = None if http else server.take_streams()
@@ -83,7 +71,4 @@ def serve_agents(
         companion = server.over_http(agents, announce)
     else:
         companion = server.over_stdio(agents, streams, announce)
-    if page:
-        serve(console, PageAddress(port=port), access, companion=companion)
-    else:
-        server.serve_without_page(companion, console)
+    serve(console, PageAddress(port=port), access, companion=companion)

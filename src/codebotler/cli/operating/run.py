@@ -18,7 +18,6 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import (
     busy,
     confirm,
-    is_interactive,
     note,
     print_rich,
     read_line,
@@ -80,7 +79,7 @@ class Request:
         program = read_program(self.what) if self.is_program else ""
         if self.past is not None:
             return console.rest_of(self.past, program)
-        asks = line_reader(is_allowed=not self.yes) is not None
+        asks = not self.yes and line_reader() is not None
         return MissionOrder("" if program else self.what, program=program, asks=asks)
 
     @property
@@ -243,32 +242,27 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
 # --- the rest of a mission
 
 
-def choose_past(console: Console, name: str, *, happened: bool | None, answer: str = "") -> MissionPast:
+def choose_past(console: Console, name: str) -> MissionPast:
     """Read the past of a mission, show it, and ask whether an unsure step happened.
 
     Args:
         console: the console with the robot, which is asked where it is if a step is unsure.
         name: the ID of the mission, or `last`.
-        happened: whether the unsure step happened, or None to ask.
-        answer: its answer, if it is a question.
 
     Raises:
-        UserError: there is no such mission, it cannot be continued, or nobody can answer.
+        UserError: there is no such mission, it cannot be continued, or nobody answers.
     """
     recover_missions(console.home)
     past = console.past_of(name)
     print_rich(past_view(past))
     if past.unsure is None:
         return past
-    if happened is None:
-        if not is_interactive():
-            raise UserError(f"{past.question}; add --happened or --not-happened")
-        for sentence in (past.question, *ask_evidence(console.robot, console.home, past, note)):
-            note(sentence)
-        happened = _ask_whether(past)
-        if happened and past.answers:
-            known = " | ".join(map(shortened, past.answers))
-            answer = read_line(f"what was the answer [{known}]? (Enter if you do not know) ").strip()
+    for sentence in (past.question, *ask_evidence(console.robot, console.home, past, note)):
+        note(sentence)
+    happened, answer = _ask_whether(past), ""
+    if happened and past.answers:
+        known = " | ".join(map(shortened, past.answers))
+        answer = read_line(f"what was the answer [{known}]? (Enter if you do not know) ").strip()
     return past.resolve(happened=happened, answer=answer)
 
 
@@ -279,7 +273,7 @@ def _ask_whether(past: MissionPast) -> bool:
         if word in {"y", "yes", "n", "no"}:
             return word.startswith("y")
         note("answer y or n, or press Ctrl-C to end here")
-    raise UserError(f"{past.question}; add --happened or --not-happened")
+    raise UserError(f"{past.question}; a person must answer y or n")
 
 
 def past_view(past: MissionPast) -> Group:

@@ -19,7 +19,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_FILE_BYTES, decode_text, read_text
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.terminal import note, shortened, visible
-from codebotler.core.text.words import counted
+from codebotler.core.text.words import counted, elide_list
 from codebotler.core.trace import RunError
 from codebotler.prompts.extract import program_in
 from codebotler.simulator.guard.contract import Contract
@@ -90,9 +90,7 @@ def _problem(problem: Problem, lines: list[str]) -> Iterator[RenderableType]:
 
 
 def _rooms(found: CheckResult) -> Text:
-    shown = [f'"{shortened(room, 60)}"' for room in found.rooms[:MAX_ROOMS_SHOWN]]
-    left = len(found.rooms) - len(shown)
-    rooms = ", ".join([*shown, *([f"and {left} more"] if left > 0 else [])])
+    rooms = ", ".join(elide_list([f'"{shortened(room, 60)}"' for room in found.rooms], MAX_ROOMS_SHOWN))
     if not found.rooms_are_guessed:
         return Text(f"rooms: {rooms}", "dim")
     return Text(f"rooms named by the program: {rooms}\nto find misspelled rooms, add --world FILE", "yellow")

@@ -92,24 +92,18 @@ def note_programless(none: ProgramlessReply, which: str = "") -> None:
 
 def print_prompt(prompt: Prompt, model: str) -> None:
     """Print a prompt as the model receives it: as chat messages, or as text for a base model to continue."""
-    kind = kind_of(model)
-    if kind == "completions":
+    if kind_of(model) == "completions":
         print_source(prompt.text)
     else:
         print_source("\n\n".join(f"--- {message.role}\n{message.text}" for message in prompt.messages))
-    if kind == "hf":
-        note(
-            f"{model} gets these messages if its tokenizer has a chat template, or else the text "
-            "that --model completions:NAME shows"
-        )
 
 
 # --- several programs
 
 
-def line_reader(*, is_allowed: bool) -> Callable[[str], str] | None:
-    """Return a function that asks on the terminal, or None if that is not allowed or there is no terminal."""
-    return read_line if is_allowed and is_interactive() else None
+def line_reader() -> Callable[[str], str] | None:
+    """Return a function that asks on the terminal, or None if there is no terminal."""
+    return read_line if is_interactive() else None
 
 
 def choose_candidate(
@@ -198,7 +192,7 @@ def ask_which(question: ClarifyingQuestion, read_line: Callable[[str], str]) -> 
     while True:
         line = read_line(f"Answer {numbers}, none, or you decide: ")
         if not line:
-            raise UserError("no answer; --yes takes the most frequent behaviour without a question")
+            raise UserError("no answer; `you decide` takes the most frequent behaviour")
         try:
             return question.parse(line)
         except UserError as error:

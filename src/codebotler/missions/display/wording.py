@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.skills.values import written_call
-from codebotler.core.skills.verbs import VerbForm
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.text.phrases import phrase
 from codebotler.core.text.words import brief, counted
@@ -16,14 +14,9 @@ from codebotler.missions.storage.log import LogLine, MissionState, MissionSummar
 from codebotler.simulator.guard.contract import CONTRACT
 
 BY_PAGE = "the page"  # the source of a stop from the page, as it appears in the log
-_TITLE_CALLS = 2
-_TITLE_SOURCE = 2_000  # characters in which calls are looked for
-_TITLE_TOKEN = re.compile(
-    r"""#.*|(?P<quote>\'{3}|"{3}|['"])(?s:\\.|(?!(?P=quote)).)*+(?P=quote)?"""  # comments and strings
-    r"""|(?:def +|\.)\w+|(?P<name>\w*+) ?\(|\w+|\)"""
-)
+_TITLE_SOURCE, _TITLE_STEPS = 1_000, 40  # how many characters of a program to read for a title, and to show
 _STATE_TITLES: Mapping[str, str] = {MissionState.DRAFTING: "program written", MissionState.RUNNING: "started"}
-"""The titles of states in a timeline. Other states keep their own names."""
+"""The titles of states. Other states keep their own names."""
 
 _STATES_IMPLIED_BY_STOP = frozenset({MissionState.STOPPING, MissionState.STOPPED})
 """The states that a timeline hides after a stop."""
@@ -39,47 +32,26 @@ def timeline(events: Iterable[LogLine]) -> Iterator[tuple[LogLine, str]]:
     """Yield events with their descriptions, without feedback, repeated states, and what a stop implies."""
     before, is_stopped = "", False
     for number, line in enumerate(events):
-        is_state = line["event"] == "state"
-        words = _step_text(line, is_first=number == 0) if is_state else event_text(line)
+        words = event_text(line) if number else "mission created"
         is_stopped = is_stopped or line["event"] == "stop"
         is_implied = is_stopped and line.get("state") in _STATES_IMPLIED_BY_STOP
         if words and words != before and not is_implied and line["event"] not in {"feedback", "cancelled"}:
             yield line, words
-        before = words if is_state else ""  # each edit of a draft logs the same state again
+        before = words if line["event"] == "state" else ""  # each edit of a draft logs the same state again
 
 
-def _step_text(line: LogLine, *, is_first: bool) -> str:
+def _state(line: LogLine) -> str:
     state, reason = line["state"], shortened(line.get("reason", ""))
-    step = "mission created" if is_first else _STATE_TITLES.get(state, visible(state))
+    step = _STATE_TITLES.get(state, visible(state))
     if state == MissionState.CHECKED:
         problems = len(line.get("problems", ()))
         step = f"checked: {counted(problems, 'problem') if problems else 'no problems'}"
     return f"{step}: {reason.removeprefix(f'{state} ')}" if reason else step
 
 
-def skill_text(line: LogLine, form: VerbForm) -> str:
-    """Describe the call of a skill. Return an empty string if the skill has no verb."""
-    skill = by_name(line["skill"])
-    if skill is None or skill.verb is None:
-        return ""
-    given = zip(skill.parameters, line["arguments"].values(), strict=True)
-    arguments = [to_options(value) if parameter.is_options else value for parameter, value in given]
-    event = attempted_event(skill, arguments, place="", time=0.0)
-    if event is None:
-        return str(getattr(skill.verb, form))
-    return phrase(event, form, show=shortened)
-
-
 def stop_text(by: str) -> str:
     """Describe a stop."""
     return f"stopped {'from' if by == BY_PAGE else 'by'} {visible(by)}"
-
-
-def state_text(state: str, reason: str) -> str:
-    """Describe a state and its reason, as in `stopped by rule vault` or `failed: the door is shut`."""
-    if not reason or reason.startswith(state):
-        return shortened(reason) or state
-    return f"{state}: {shortened(reason)}"
 
 
 def reason_text(reason: str, line: int | None) -> str:
@@ -93,31 +65,22 @@ def capitalize(words: str) -> str:
 
 
 def title(summary: MissionSummary) -> str:
-    """Return the title of a mission: its instruction, or else the first skills that its program calls."""
+    """Return the title of a mission: its instruction, or else the beginning of its program's steps."""
     if summary.instruction:
         return summary.instruction
-    calls = sorted(_skill_calls(summary.program[:_TITLE_SOURCE]))
-    shown = [brief(summary.program[begin:end]) for begin, end in calls[:_TITLE_CALLS]]
-    more = ["…"] * (len(calls) > _TITLE_CALLS)
-    begin = "calls" if summary.model else "typed"
-    return f"{begin}: {', '.join([*shown, *more])}" if calls else "a program without an instruction"
-
-
-def _skill_calls(source: str) -> Iterator[tuple[int, int]]:
-    """Yield where calls of skills begin and end, without parsing, which takes long and keeps STOP waiting."""
-    opened: list[tuple[str, int]] = []  # the name before each open bracket, and where it begins
-    for token in _TITLE_TOKEN.finditer(source):
-        if token["name"] is not None:
-            opened.append((token["name"], token.start()))
-        elif token[0] == ")" and opened:
-            name, begin = opened.pop()
-            if by_name(name):
-                yield begin, token.end()
+    steps = brief(summary.program.rpartition("def task_program():")[2][:_TITLE_SOURCE], _TITLE_STEPS)
+    begin = "program" if summary.model else "typed"
+    return f"{begin}: {steps}" if steps else "a program without an instruction"
 
 
 def _skill(line: LogLine) -> str:
-    arguments = list(line["arguments"].values())
-    return skill_text(line, "third") or shortened(written_call(line["skill"], arguments))
+    skill, values = by_name(line["skill"]), list(line["arguments"].values())
+    if skill is None or skill.verb is None:
+        return shortened(written_call(line["skill"], values))
+    given = zip(skill.parameters, values, strict=True)
+    arguments = [to_options(value) if parameter.is_options else value for parameter, value in given]
+    event = attempted_event(skill, arguments, place="", time=0.0)
+    return skill.verb.third if event is None else phrase(event, "third", show=shortened)
 
 
 def _result(line: LogLine) -> str:
@@ -147,7 +110,7 @@ def _rule(line: LogLine) -> str:
 _EVENT_WORDERS: Mapping[str, Callable[[LogLine], str]] = {
     "skill": _skill,
     "result": _result,
-    "state": lambda line: state_text(line["state"], line.get("reason", "")),
+    "state": _state,
     "feedback": lambda line: shortened(line["text"]),
     "picture": lambda line: shortened(line.get("text") or f"picture: {line.get('file')}"),
     "error": lambda line: f"{visible(line['kind'])}: {shortened(line['message'])}",

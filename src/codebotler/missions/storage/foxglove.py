@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import base64
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any, TypeAlias
 
 from codebotler.core.world import Point, Room
 
-Schema: TypeAlias = Mapping[str, Any]
 Message: TypeAlias = dict[str, Any]
 
 MAP_FRAME, ROBOT_FRAME = "map", "robot"
@@ -21,55 +19,6 @@ _LINE_LOOP = 1  # the line type for a closed outline
 _LINE_WIDTH, _LETTER_HEIGHT = 0.05, 0.4  # metres
 _OUTLINE_COLOR = {"r": 0.35, "g": 0.55, "b": 0.8, "a": 1.0}
 _IMAGE_FORMATS = {"jpg": "jpeg", "png": "png"}
-
-TEXT: Schema = {"type": "string"}
-FLOAT: Schema = {"type": "number"}
-INTEGER: Schema = {"type": "integer"}
-BOOLEAN: Schema = {"type": "boolean"}
-
-
-def _object(title: str = "", **properties: Schema) -> Schema:
-    return {"type": "object", **({"title": title} if title else {}), "properties": properties}
-
-
-def _array(items: Schema) -> Schema:
-    return {"type": "array", "items": items}
-
-
-_TIME = _object("time", sec=INTEGER, nsec=INTEGER)
-_DURATION = _object("duration", sec=INTEGER, nsec=INTEGER)
-_VECTOR = _object(x=FLOAT, y=FLOAT, z=FLOAT)
-_QUATERNION = _object(x=FLOAT, y=FLOAT, z=FLOAT, w=FLOAT)
-_POSE = _object(position=_VECTOR, orientation=_QUATERNION)
-_RGBA = _object(r=FLOAT, g=FLOAT, b=FLOAT, a=FLOAT)
-_LINE = _object(
-    type=INTEGER, pose=_POSE, thickness=FLOAT, scale_invariant=BOOLEAN, points=_array(_VECTOR), color=_RGBA
-)
-_LABEL = _object(
-    pose=_POSE, billboard=BOOLEAN, font_size=FLOAT, scale_invariant=BOOLEAN, color=_RGBA, text=TEXT
-)
-_ENTITY = _object(
-    timestamp=_TIME,
-    frame_id=TEXT,
-    id=TEXT,
-    lifetime=_DURATION,
-    frame_locked=BOOLEAN,
-    lines=_array(_LINE),
-    texts=_array(_LABEL),
-)
-
-SCHEMAS: Mapping[str, Schema] = {
-    "foxglove.PoseInFrame": _object(timestamp=_TIME, frame_id=TEXT, pose=_POSE),
-    "foxglove.FrameTransform": _object(
-        timestamp=_TIME, parent_frame_id=TEXT, child_frame_id=TEXT, translation=_VECTOR, rotation=_QUATERNION
-    ),
-    "foxglove.SceneUpdate": _object(entities=_array(_ENTITY)),
-    "foxglove.Log": _object(timestamp=_TIME, level=INTEGER, message=TEXT, name=TEXT, file=TEXT, line=INTEGER),
-    "foxglove.CompressedImage": _object(
-        timestamp=_TIME, frame_id=TEXT, data={**TEXT, "contentEncoding": "base64"}, format=TEXT
-    ),
-}
-"""Foxglove's schemas by name, reduced to the fields that we write."""
 
 
 def pose_in_frame(at: Point, heading: float, time: int) -> Message:
@@ -102,8 +51,7 @@ def log_line(level: int, message: str, name: str, line: int | None, time: int) -
 
 def compressed_image(kind: str, data: bytes, time: int) -> Message:
     """Build an image message. `kind` is `jpg` or `png`, and `time` is in ns since 1970."""
-    encoded = base64.b64encode(data).decode()
-    return {"timestamp": _time(time), "frame_id": "", "data": encoded, "format": _IMAGE_FORMATS[kind]}
+    return {"timestamp": _time(time), "frame_id": "", "data": data, "format": _IMAGE_FORMATS[kind]}
 
 
 def _time(time: int) -> Message:
@@ -142,7 +90,6 @@ def _entity(room: Room, time: int) -> Message:
         "timestamp": _time(time),
         "frame_id": MAP_FRAME,
         "id": room.name,
-        "lifetime": {"sec": 0, "nsec": 0},  # show the room until it is replaced
         "frame_locked": True,
         "lines": [outline],
         "texts": [label],

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, TypeAlias
+
+import msgspec
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line, write_whole
@@ -20,10 +22,6 @@ EVENTS_FILE, SUMMARY_FILE = "events.jsonl", "mission.json"
 LogLine: TypeAlias = dict[str, Any]
 """An event: `time` (seconds since 1970), `clock` (seconds on the robot's clock), `event` (kind), and data."""
 
-_TEXT_FIELDS = (
-    *("id", "robot", "instruction", "model", "program", "reason", "if_tool_dies"),
-    *("place", "continues"),
-)
 _REQUIRED_KEYS: Mapping[str, frozenset[str]] = {
     "state": frozenset({"state"}),
     "skill": frozenset({"number", "skill", "arguments"}),
@@ -113,12 +111,9 @@ class MissionSummary:
         """Read the summary of a mission, or raise UserError if it is damaged."""
         path = folder / SUMMARY_FILE
         try:
-            data = json.loads(path.read_bytes())
-            summary = cls(**{field.name: data[field.name] for field in fields(cls) if field.name in data})
-            summary.state, summary.problems = MissionState(summary.state), tuple(summary.problems)
+            summary = msgspec.convert(json.loads(path.read_bytes()), cls)
             datetime.fromtimestamp(summary.created, UTC)
-            "".join((*summary.problems, *(getattr(summary, name) for name in _TEXT_FIELDS)))
-        except (ValueError, TypeError, OverflowError, RecursionError):
+        except (ValueError, OverflowError, RecursionError, msgspec.ValidationError):
             raise UserError("this is not a valid mission summary; remove its folder", file=path) from None
         return summary
 
@@ -172,12 +167,7 @@ def find_skill_end(events: Sequence[LogLine], number: int) -> LogLine | None:
     return next((line for line in later if line["event"] in SKILL_END_EVENTS), None)
 
 
-def find_unfinished_skill(events: Iterable[LogLine]) -> LogLine | None:
+def find_unfinished_skill(events: Sequence[LogLine]) -> LogLine | None:
     """Return the event that started an unfinished skill, or None if all skills have ended."""
-    going: LogLine | None = None
-    for line in events:
-        if line["event"] == "skill":
-            going = line
-        elif line["event"] in SKILL_END_EVENTS:
-            going = None
-    return going
+    last = next((at for at in reversed(range(len(events))) if events[at]["event"] == "skill"), None)
+    return None if last is None or find_skill_end(events, last) else events[last]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import math
@@ -19,7 +20,7 @@ from codebotler.core.world import Point, World
 from codebotler.missions.display.progress import Progress, position_on_map
 from codebotler.missions.display.wording import event_text
 from codebotler.missions.storage import foxglove
-from codebotler.missions.storage.foxglove import FLOAT, INTEGER, SECOND_NS, TEXT, Message, Schema
+from codebotler.missions.storage.foxglove import SECOND_NS, Message
 from codebotler.missions.storage.log import LogLine, MissionSummary
 from codebotler.missions.storage.map_event import map_from
 from codebotler.missions.storage.pictures import read_picture
@@ -36,16 +37,23 @@ _LOG_LEVELS = {
     **dict.fromkeys(("rule", "stop", "cancelled", "late"), foxglove.LEVEL_WARNING),
 }
 """The log levels by kind of event. All other kinds have level INFO."""
-_STATE_SCHEMA: Schema = {"type": "object", "properties": {"state": TEXT, "reason": TEXT, "clock": FLOAT}}
-_JSON_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
+_JSON_TYPES = {
+    dict: "object",
+    list: "array",
+    bytes: "bytes",
+    bool: "boolean",
+    int: "integer",
+    float: "number",
+    str: "string",
+}
 
 
 class TopicMessage(NamedTuple):
-    """A message and its topic. `schema` is either the name of a Foxglove schema or a schema of our own."""
+    """A message, its topic, and the name of its schema if it is one of Foxglove's."""
 
     topic: str
     message: Message
-    schema: Schema | str
+    schema: str = ""
 
 
 def write_mcap(
@@ -62,46 +70,47 @@ def write_mcap(
     then starts when the mission was created. Pictures are read from `folder`, unless it is None.
     """
     began = round(min(summary.created * SECOND_NS, MAX_TIME_NS))
+    path = _RobotPath()
+    written: list[tuple[int, TopicMessage]] = []
+    for line in events:
+        seconds: float = line["time"] if clock == "wall" else summary.created + line["clock"]
+        at = round(min(seconds * SECOND_NS, MAX_TIME_NS))
+        found = (*_about_event(line, at), *_about_picture(line, folder, at), *path.messages(line, at))
+        written += [(at, one) for one in found]
     writer = Writer(file)
     writer.start(profile="", library=f"codebotler {__version__}")
-    channels: dict[str, int] = {}
-    skills, path = _SkillMessages(events), _RobotPath()
-
-    def time(line: LogLine) -> int:
-        seconds: float = line["time"] if clock == "wall" else summary.created + line["clock"]
-        return round(min(seconds * SECOND_NS, MAX_TIME_NS))
-
-    def add(topic: str, message: Message, schema: Schema | str, at: int) -> None:
-        if topic not in channels:
-            name = "codebotler." + topic.strip("/").replace("/", ".")
-            name, data = (schema, foxglove.SCHEMAS[schema]) if isinstance(schema, str) else (name, schema)
-            number = writer.register_schema(name, "jsonschema", json.dumps(data).encode())
-            channels[topic] = writer.register_channel(topic, "json", number)
-        writer.add_message(channels[topic], at, json.dumps(message).encode(), at)
-
-    for line in events:
-        at = time(line)
-        for item in (
-            *_about_event(line, skills, at),
-            *_about_picture(line, folder, at),
-            *path.messages(line, at),
-        ):
-            add(*item, at)
-    last = time(events[-1]) if events else began
+    _write_messages(writer, written)
+    last = written[-1][0] if written else began
     program = summary.program.encode(errors="surrogatepass")
     writer.add_attachment(began, last, "program.py", "text/x-python", program)
     writer.add_metadata("mission", _metadata(summary))
     writer.finish()  # type: ignore[no-untyped-call]  # untyped in the library
 
 
-def _about_event(line: LogLine, skills: _SkillMessages, at: int) -> Iterator[TopicMessage]:
+def _write_messages(writer: Writer, written: Sequence[tuple[int, TopicMessage]]) -> None:
+    """Write messages with their times, and for each topic a schema that fits all of its messages."""
+    topics: dict[str, list[TopicMessage]] = {}
+    for _, one in written:
+        topics.setdefault(one.topic, []).append(one)
+    schemas = {topic: schema_of([one.message for one in some]) for topic, some in topics.items()}
+    channels: dict[str, int] = {}
+    for topic, (first, *_) in topics.items():
+        name = first.schema or "codebotler." + topic.strip("/").replace("/", ".")
+        number = writer.register_schema(name, "jsonschema", json.dumps(schemas[topic]).encode())
+        channels[topic] = writer.register_channel(topic, "json", number)
+    for at, one in written:
+        data = json.dumps(_fit_schema(one.message, schemas[one.topic])).encode()
+        writer.add_message(channels[one.topic], at, data, at)
+
+
+def _about_event(line: LogLine, at: int) -> Iterator[TopicMessage]:
     """Yield the messages for an event: its skill, its state, and a log line."""
     event = line["event"]
     if "skill" in line:
-        yield skills.message(line)
+        yield TopicMessage(f"/skill/{line['skill']}", _skill_message(line))
     if event == "state":
         message = {"state": line["state"], "reason": line.get("reason", ""), "clock": line["clock"]}
-        yield TopicMessage("/mission/state", message, _STATE_SCHEMA)
+        yield TopicMessage("/mission/state", message)
     text = event_text(line)
     if not text or (event == "sleep" and not line["seconds"]):
         return
@@ -110,51 +119,19 @@ def _about_event(line: LogLine, skills: _SkillMessages, at: int) -> Iterator[Top
     yield TopicMessage("/mission/log", message, "foxglove.Log")
 
 
+def _skill_message(line: LogLine) -> Message:
+    message: Message = {name: line[name] for name in ("number", "event", "clock")}
+    message |= {name: line[name] for name in ("arguments", "result") if line.get(name) is not None}
+    text = next((str(line[key]) for key in _TEXT_KEYS if key in line), None)
+    if text is not None:
+        message["text"] = f"{line['kind']}: {text}" if "kind" in line else text
+    return message
+
+
 def _about_picture(line: LogLine, folder: Path | None, at: int) -> Iterator[TopicMessage]:
     if folder is not None and (picture := read_picture(folder, line)) is not None:
         image = foxglove.compressed_image(*picture, at)
         yield TopicMessage(f"/skill/{line['skill']}/picture", image, "foxglove.CompressedImage")
-
-
-class _SkillMessages:
-    """Creates messages for skills, with schemas inferred from all their arguments and results."""
-
-    def __init__(self, events: Sequence[LogLine]) -> None:
-        arguments: dict[str, dict[str, list[object]]] = {}
-        results: dict[str, list[object]] = {}
-        for line in events:
-            for name, value in line.get("arguments", {}).items():
-                arguments.setdefault(line["skill"], {}).setdefault(name, []).append(value)
-            if line.get("result") is not None:
-                results.setdefault(line["skill"], []).append(line["result"])
-        self._arguments = {
-            skill: {name: schema_of(values) for name, values in given.items()}
-            for skill, given in arguments.items()
-        }
-        self._results = {skill: schema_of(values) for skill, values in results.items()}
-
-    def message(self, line: LogLine) -> TopicMessage:
-        """Return the message for an event of a skill."""
-        skill = line["skill"]
-        arguments, result = self._arguments.get(skill, {}), self._results.get(skill)
-        message = {"number": line["number"], "event": line["event"], "clock": line["clock"]}
-        if "arguments" in line:
-            given = line["arguments"].items()
-            message["arguments"] = {name: _fit_schema(value, arguments[name]) for name, value in given}
-        if result is not None and line.get("result") is not None:
-            message["result"] = _fit_schema(line["result"], result)
-        text = next((str(line[key]) for key in _TEXT_KEYS if key in line), None)
-        if text is not None:
-            message["text"] = f"{line['kind']}: {text}" if "kind" in line else text
-        properties = {
-            "number": INTEGER,
-            "event": TEXT,
-            "clock": FLOAT,
-            "text": TEXT,
-            "arguments": {"type": "object", "properties": arguments},
-            **({} if result is None else {"result": result}),
-        }
-        return TopicMessage(f"/skill/{skill}", message, {"type": "object", "properties": properties})
 
 
 class _RobotPath:
@@ -186,30 +163,34 @@ class _RobotPath:
         return position_on_map(self._progress, self._world, RoomMap.of(self._world))
 
 
-def schema_of(values: Sequence[object]) -> dict[str, Any]:
+def schema_of(values: Sequence[Any]) -> dict[str, Any]:
     """Infer a JSON schema from values. Mixed types become text, because Foxglove has no union types."""
-    lists = [value for value in values if isinstance(value, list)]
-    if len(lists) == len(values):
-        return {"type": "array", "items": {"type": _json_type([one for each in lists for one in each])}}
-    return {"type": _json_type(values)}
+    types = {_json_type(value) for value in values}
+    kind = types.pop() if len(types) == 1 else "number" if types == {"integer", "number"} else "string"
+    if kind == "object":
+        names = dict.fromkeys(name for value in values for name in value)
+        title = {"title": "time"} if names.keys() == {"sec", "nsec"} else {}  # as in Foxglove's schemas
+        found = {name: schema_of([value[name] for value in values if name in value]) for name in names}
+        return {"type": kind, **title, "properties": found}
+    if kind == "array":
+        return {"type": kind, "items": schema_of([item for value in values for item in value])}
+    return {"type": "string", "contentEncoding": "base64"} if kind == "bytes" else {"type": kind}
 
 
-def _json_type(values: Sequence[object]) -> str:
-    types = {_json_type_of(value) for value in values}
-    if types == {"integer", "number"}:
-        return "number"
-    return types.pop() if len(types) == 1 else "string"
-
-
-def _json_type_of(value: object) -> str:
+def _json_type(value: object) -> str:
     is_infinite = isinstance(value, float) and not math.isfinite(value)  # JSON has neither inf nor nan
     return "string" if is_infinite else _JSON_TYPES.get(type(value), "string")
 
 
-def _fit_schema(value: object, schema: Mapping[str, Any]) -> object:
-    """Convert a value to text where the schema requires it."""
-    if schema["type"] == "array" and isinstance(value, list):
-        return [_fit_schema(one, schema["items"]) for one in value]
+def _fit_schema(value: Any, schema: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any value of a message
+    """Convert a value to what JSON can hold, and to text where the schema requires it."""
+    match schema:
+        case {"type": "object"}:
+            return {name: _fit_schema(one, schema["properties"][name]) for name, one in value.items()}
+        case {"type": "array"}:
+            return [_fit_schema(one, schema["items"]) for one in value]
+        case {"contentEncoding": "base64"}:
+            return base64.b64encode(value).decode()
     return value if schema["type"] != "string" or isinstance(value, str) else str(value)
 
 
@@ -229,14 +210,14 @@ def export_mcap(
     folder: Path | None = None,
 ) -> None:
     """Write an MCAP file atomically. Raise UserError instead of overwriting a file of another kind."""
-    path = path.resolve()
     expect_replaceable(path, b"\x89MCAP")
-    path.parent.stat()  # fail instead of creating folders for a mistyped path
     whole = io.BytesIO()
     write_mcap(whole, summary, events, folder=folder, clock=clock)
-    if path.exists() and not path.is_file():
+    if path.exists() and not path.is_file():  # such as a pipe, whose link /dev/stdout leads to no file
         path.write_bytes(whole.getvalue())
         return
+    path = path.resolve()
+    path.parent.stat()  # fail instead of creating folders for a mistyped path
     temporary = path.with_name(f".{uuid4().hex}.mcap")
     with open_replacement(path, temporary) as file:
         file.write(whole.getvalue())

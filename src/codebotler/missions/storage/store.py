@@ -49,22 +49,13 @@ def find_mission(home: Path, name: str) -> Path:
     return folder
 
 
-def find_continuations(folder: Path) -> list[MissionSummary]:
-    """Return the missions that continue the mission in a folder, oldest first, without damaged ones."""
-    return [one for one in _read_undamaged(folder.parent) if one.continues == folder.name]
-
-
 def find_rest(folder: Path) -> MissionSummary | None:
-    """Return the `last_rest` of the mission in a folder."""
-    return last_rest(folder.name, _read_undamaged(folder.parent))
-
-
-def _read_undamaged(missions: Path) -> list[MissionSummary]:
-    found: list[MissionSummary] = []
-    for path in sorted(missions.glob(f"*/{SUMMARY_FILE}")):
+    """Return the `last_rest` of the mission in a folder, without damaged missions."""
+    known: list[MissionSummary] = []
+    for path in sorted(folder.parent.glob(f"*/{SUMMARY_FILE}")):
         with suppress(UserError, OSError):
-            found.append(MissionSummary.read(path.parent))
-    return found
+            known.append(MissionSummary.read(path.parent))
+    return last_rest(folder.name, known)
 
 
 def last_rest(mission: str, known: Sequence[MissionSummary]) -> MissionSummary | None:
@@ -98,15 +89,11 @@ def recover_missions(home: Path) -> list[MissionSummary]:
 
 
 def find_interrupted(home: Path) -> list[MissionSummary]:
-    """Close missions whose process died. Return them, and the last one if it was interrupted before.
-
-    So is the last one that ran, since later ones that did not run changed nothing.
-    """
+    """Close missions whose process died. Return them, and the last that ran if it was interrupted before."""
     found = recover_missions(home)
     with suppress(UserError):
-        known = read_missions(home, RECENT_MISSIONS)
-        for last in (known, [one for one in known if one.if_tool_dies]):
-            found += [one for one in last[-1:] if one.state is MissionState.INTERRUPTED and one not in found]
+        ran = [one for one in read_missions(home, RECENT_MISSIONS) if one.if_tool_dies]
+        found += [one for one in ran[-1:] if one.state is MissionState.INTERRUPTED and one not in found]
     return found
 
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
-from typing import NamedTuple
 
 from nicegui import html, ui
 
@@ -15,7 +14,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.missions.display.wording import capitalize, reason_text, timeline, title
 from codebotler.missions.storage.log import LogLine, MissionSummary, read_events
-from codebotler.missions.storage.store import find_continuations, find_mission, find_rest
+from codebotler.missions.storage.store import find_mission, find_rest
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText, outside
 from codebotler.web.live import follow
@@ -33,18 +32,18 @@ def add(console: Console, frame: Frame) -> None:
         frame("Mission", "/missions")
         with ui.element("div").classes("past"):
             try:
-                summary, events, chain = await asyncio.to_thread(_read, console, mission)
+                summary, events, rest = await asyncio.to_thread(_read, console, mission)
             except UserError as error:
                 PlainText("p", error.sentence, "trouble")
                 return
             page = _MissionPage(console, summary)
-            page.show(summary, events, chain)
+            page.show(summary, events, rest)
             if summary.state in EARLY_ENDS and can_be_continued(summary):
                 obstacle = await asyncio.to_thread(console.obstacle_to, mission)
                 with page.rest:
                     if not obstacle:
                         ContinueButton(console, summary.id)
-                    elif not chain.later:  # the link to a later mission says enough
+                    elif rest is None:  # the link to a later mission says enough
                         PlainText("p", f"It cannot be continued here: {obstacle}.", "quiet")
             if not summary.has_ended:
                 await follow(console.notifier, partial(_update, console, page))
@@ -56,16 +55,10 @@ async def _update(console: Console, page: _MissionPage) -> None:
         page.show(*await asyncio.to_thread(_read, console, page.mission))
 
 
-class _Chain(NamedTuple):
-    later: list[MissionSummary]  # the missions that continue a mission
-    last: MissionSummary | None  # the last one that did its rest, directly or after others
-
-
-def _read(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine], _Chain]:
-    """Return the summary and the events of a mission, and what became of its rest."""
+def _read(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine], MissionSummary | None]:
+    """Return the summary and the events of a mission, and the mission that did its rest."""
     folder = find_mission(console.home, mission)
-    chain = _Chain(find_continuations(folder), find_rest(folder))
-    return MissionSummary.read(folder), read_events(folder), chain
+    return MissionSummary.read(folder), read_events(folder), find_rest(folder)
 
 
 class _MissionPage:
@@ -82,15 +75,15 @@ class _MissionPage:
         PlainText("h2", "Program")
         self._source = ui.element("pre").classes("source").props("tabindex=0 dir=auto")
 
-    def show(self, summary: MissionSummary, events: Sequence[LogLine], chain: _Chain) -> None:
-        """Show a mission, including new events, and links to the missions that continue it."""
+    def show(self, summary: MissionSummary, events: Sequence[LogLine], rest: MissionSummary | None) -> None:
+        """Show a mission, including new events, and a link to the mission that did its rest."""
         self.has_ended = summary.has_ended
         state = state_words(summary, self._console.view)
         if (summary, state) != self._shown:
             self._shown = (replace(summary), state)
             self._head.clear()
             with self._head:
-                _draw_header(summary, state, chain)
+                _draw_header(summary, state, rest)
             self._source.clear()
             with self._source:
                 _draw_source(summary)
@@ -103,7 +96,7 @@ class _MissionPage:
         self._more.say(f"Download the events to see {more:,} more." if more > 0 else "")
 
 
-def _draw_header(summary: MissionSummary, state: str, chain: _Chain) -> None:
+def _draw_header(summary: MissionSummary, state: str, rest: MissionSummary | None) -> None:
     began = datetime.fromtimestamp(summary.created).astimezone()
     PlainText("h1", shortened(title(summary), 300))
     with ui.element("div").classes(f"ending ending-{summary.state}"):
@@ -118,10 +111,8 @@ def _draw_header(summary: MissionSummary, state: str, chain: _Chain) -> None:
     PlainText("p", f"mission {summary.id} · {began:%d %b %Y, %H:%M:%S} · {robot}", "facts")
     if summary.continues:
         _draw_link("Continues", summary.continues, "")
-    for one in chain.later:
-        _draw_link("Continued by", one.id, one.state if one.if_tool_dies else "did not run")
-    if chain.last is not None and chain.last not in chain.later:
-        _draw_link("In the end continued by", chain.last.id, chain.last.state)
+    if rest is not None:
+        _draw_link("Continued by", rest.id, rest.state)
     with ui.element("p").classes("downloads"):
         for kind, name in (("jsonl", "Events (JSON lines)"), ("mcap", "MCAP, for Foxglove")):
             html.a(name, href=outside(f"/api/missions/{summary.id}/events.{kind}")).props("download")
