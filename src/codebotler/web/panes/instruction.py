@@ -10,7 +10,6 @@ from codebotler.core.errors import UserError
 from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.missions.display.view import MissionOrder, SessionView
-from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import known_instructions
 from codebotler.missions.storage.log import MissionSummary
 from codebotler.missions.storage.store import read_missions
@@ -18,7 +17,7 @@ from codebotler.models.recorded import is_recorded
 from codebotler.models.usable import MODEL_HINT
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.web.console import Console
-from codebotler.web.frame import Button, PlainText, scroll_to, scroll_up, warn
+from codebotler.web.frame import Button, PlainText, scroll_to, scroll_up, warned
 
 _NO_RECORDED_PROGRAM = "There is no recorded program for this instruction."
 _HOW_TO_ADD_MODEL = (
@@ -95,11 +94,8 @@ class InstructionPane:
         self._suggest(view.suggestions or ())
 
     def _ask(self) -> None:
-        try:
+        with warned():
             self._console.begin(MissionOrder(self._text.value or "", self._model.value or ""))
-        except (MissionError, UserError) as error:
-            warn(error.sentence)
-        else:
             scroll_up()
 
     def _about_model(self) -> None:
