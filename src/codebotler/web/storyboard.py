@@ -10,10 +10,9 @@ from nicegui import ui
 
 from codebotler.checking.problems import CheckResult, Sample
 from codebotler.checking.storyboard import event_from_step, select_steps, steps_of
-from codebotler.core.skills.kinds import CHECK, GOTO
+from codebotler.core.skills.kinds import GOTO
 from codebotler.core.terminal import shortened
 from codebotler.core.text.phrases import NO_ANSWER, is_question, is_spoken, phrase
-from codebotler.core.trace import Event
 from codebotler.web.frame import PlainText
 
 _MAX_STEP_TEXT, _MAX_WORLD_TEXT, MAX_STRIPS = 300, 800, 6
@@ -61,28 +60,20 @@ class RouteProgress:
     """The progress of a robot along a strip."""
 
     visited: tuple[str, ...] = ()  # the rooms of completed drives
-    looks: tuple[tuple[str, bool], ...] = ()  # objects that were looked for, and whether they were found
-    answers: tuple[str | None, ...] = ()  # the answers to questions; None for a question that failed
     end: str = ""  # how the mission ended early after that: a key of `SCENE_MARKS`
 
 
-NO_PROGRESS = RouteProgress()
-_NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which are only examples."
-
-
-def draw_strips(
-    check: CheckResult, reached: RouteProgress = NO_PROGRESS, title: str = "What the robot would do"
-) -> None:
+def draw_strips(check: CheckResult, reached: RouteProgress, title: str) -> None:
     """Draw what a robot would do in each kind of world, according to a check.
 
-    Visited rooms are ticked off, and strips that the actual run contradicts are collapsed.
+    Visited rooms are ticked off. Once some routes differ from the actual one, their strips are collapsed.
     """
     shown = strips(check)
     PlainText("h3", title if shown else "")
-    numbers = [scenes_reached(strip, reached) for strip in shown]
-    if shown and all(number is None for number in numbers):
-        PlainText("p", _NO_STRIP_FITS, "quiet unsure")
-    for strip, number_reached, is_folded in zip(shown, numbers, folded(numbers), strict=True):
+    numbers = [scenes_reached(strip, reached.visited) for strip in shown]
+    is_among_them = any(number is not None for number in numbers)
+    for strip, number_reached in zip(shown, numbers, strict=True):
+        is_folded = is_among_them and number_reached is None
         with ui.element("article").classes("strip other" if is_folded else "strip"):
             if strip.world:
                 PlainText("p", f"{strip.world}:", "world")
@@ -95,37 +86,15 @@ def draw_strips(
             PlainText("p", strip.ending, "ending quiet" if reached.end else f"ending {quality}")
 
 
-def folded(numbers: Sequence[int | None]) -> list[bool]:
-    """Return for each strip whether to collapse it. If no strip matches the run, show all strips."""
-    is_among_them = any(number is not None for number in numbers)
-    return [is_among_them and number is None for number in numbers]
-
-
-def scenes_reached(strip: Strip, reached: RouteProgress) -> int | None:
-    """Return how many drives of a strip the robot has completed, or None if its run differs from it."""
-    is_whole = all(scene.room != _LEFT_OUT for scene in strip.scenes)
-    seen = [look_text(*look) for look in reached.looks]
-    has_seen = _texts(strip, CHECK)[: len(seen)] == seen
-    if is_whole and not (has_seen and _has_heard(strip, reached.answers)):
-        return None
-    for number, room in enumerate(reached.visited, start=1):
+def scenes_reached(strip: Strip, visited: Sequence[str]) -> int | None:
+    """Return how many drives of a strip the robot has completed, or None if its route differs from it."""
+    for number, room in enumerate(visited, start=1):
         scene = strip.scenes[number] if number < len(strip.scenes) else None
         if scene is not None and scene.room == _LEFT_OUT:
             return number
         if scene is None or scene.room != shortened(room, _MAX_STEP_TEXT):
             return None
-    return len(reached.visited)
-
-
-def _has_heard(strip: Strip, answers: Sequence[str | None]) -> bool:
-    # Speech recognition may change the case of an option and add spaces.
-    heard = [NO_ANSWER if answer is None else shortened(answer, _MAX_STEP_TEXT) for answer in answers]
-    expected = _texts(strip, "answer")[: len(answers)]
-    return [text.strip().casefold() for text in expected] == [text.strip().casefold() for text in heard]
-
-
-def _texts(strip: Strip, kind: str) -> list[str]:
-    return [deed.text for scene in strip.scenes for deed in scene.deeds if deed.kind == kind]
+    return len(visited)
 
 
 def draw_scene(
@@ -214,17 +183,10 @@ def _actions(step: Mapping[str, Any]) -> Sequence[Action]:
     kind, text, number = step["kind"], shortened(step["text"], _MAX_STEP_TEXT), step["step"]
     is_repeated = bool(step.get("is_repeated"))
     if not is_question(kind) and not is_spoken(kind):
-        return (Action(kind, _phrase(event_from_step(step)), number, is_repeated),)
+        event = event_from_step(step)
+        words = phrase(event, "third", show=lambda text: shortened(text, _MAX_STEP_TEXT), quote="")
+        return (Action(kind, words, number, is_repeated),)
     if "answer" not in step:
         return (Action(kind, text, number, is_repeated),)
     heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), _MAX_STEP_TEXT)
     return (Action(kind, text, number, is_repeated), Action("answer", heard))
-
-
-def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the trace
-    """Describe a look for an object and its result."""
-    return _phrase(Event(CHECK, what, found=is_found))
-
-
-def _phrase(event: Event) -> str:
-    return phrase(event, "third", show=lambda text: shortened(text, _MAX_STEP_TEXT), quote="")

@@ -55,8 +55,6 @@ class Progress:
     is_driving: bool = False  # whether the robot is driving to `room`
     is_between: bool = False  # whether a cancelled drive left the robot between rooms
     visited: tuple[str, ...] = ()  # the destinations of completed drives, as named in the program
-    looks: tuple[tuple[str, bool], ...] = ()  # objects that were looked for, and whether they were found
-    answers: tuple[str | None, ...] = ()  # the answers to questions; None for a question that failed
     trail: tuple[Point, ...] = ()  # the latest positions, in metres
     finds: tuple[Find, ...] = ()  # objects seen and people asked, each listed once
     held: str = ""  # the object in the robot's hand
@@ -125,10 +123,8 @@ class Progress:
                 now = replace(self, held="")
             case kinds.CHECK:
                 now = self._with_find(Find(self.room, self.subject)) if result is True else self
-                now = replace(now, looks=(*self.looks, (self.subject, result is True))[:_MAX_STEPS])
             case kinds.ASK:
                 now = self._with_find(Find(self.room, self.subject)) if self.subject else self
-                now = replace(now, answers=(*now.answers, str(result))[:_MAX_STEPS])
         return now
 
     def with_failure(self, event: str) -> Progress:
@@ -136,8 +132,6 @@ class Progress:
         recording = _recording(self.skill)
         if recording is not None and recording.is_drive and event != "late":
             return replace(self, room=self.left, is_between=self.is_between or event == "cancelled")
-        if recording is not None and recording.options and event == "error":
-            return replace(self, answers=(*self.answers, None)[:_MAX_STEPS])
         return self
 
     def _with_find(self, find: Find) -> Progress:

@@ -245,7 +245,7 @@ def route_progress(view: SessionView) -> RouteProgress:
     end = ""
     if view.is_over and view.state in EARLY_ENDS:
         end = "failed" if view.state is MissionState.FAILED else "stopped"
-    return RouteProgress(visited, view.progress.looks, view.progress.answers, end)
+    return RouteProgress(visited, end)
 
 
 def _author_text(view: SessionView) -> str:
