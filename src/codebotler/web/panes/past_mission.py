@@ -39,13 +39,9 @@ def add(console: Console, frame: Frame) -> None:
                 return
             page = _MissionPage(console, summary)
             page.show(summary, events, chain)
-            if summary.state in EARLY_ENDS and can_be_continued(summary):
-                obstacle = await asyncio.to_thread(console.obstacle_to, mission)
+            if summary.state in EARLY_ENDS and can_be_continued(summary) and chain.last is None:
                 with page.rest:
-                    if not obstacle:
-                        ContinueButton(console, summary.id)
-                    elif not chain.later:  # the link to a later mission says enough
-                        PlainText("p", f"It cannot be continued here: {obstacle}.", "quiet")
+                    ContinueButton(console, summary.id)
             if not summary.has_ended:
                 await follow(console.notifier, partial(_update, console, page))
 

@@ -111,11 +111,7 @@ class RobotPane:
         for summary in summaries:
             what = shortened(title(summary), _MAX_TITLE)
             PlainText("p", f"Mission {summary.id} ({what}) was interrupted: {summary.reason}")
-            if not can_be_continued(summary):
-                continue
-            if obstacle := self._console.obstacles[summary.id]:
-                PlainText("p", f"It cannot be continued here: {obstacle}.", "quiet")
-            else:
+            if can_be_continued(summary):
                 button = ContinueButton(self._console, summary.id)
                 button.props(f'aria-label="Continue mission {summary.id}"')
         Button("Dismiss", self._console.dismiss, "plain")
