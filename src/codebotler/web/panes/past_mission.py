@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from typing import NamedTuple
@@ -17,7 +16,7 @@ from codebotler.missions.display.wording import capitalize, reason_text, timelin
 from codebotler.missions.storage.log import LogLine, MissionSummary, read_events
 from codebotler.missions.storage.store import find_continuations, find_mission, find_rest
 from codebotler.web.console import Console
-from codebotler.web.frame import Frame, PlainText, outside
+from codebotler.web.frame import DrawnBox, Frame, PlainText, outside
 from codebotler.web.live import follow
 from codebotler.web.panes.continuing import EARLY_ENDS, ContinueButton, can_be_continued
 from codebotler.web.panes.mission_list import state_words
@@ -68,28 +67,20 @@ class _MissionPage:
     def __init__(self, console: Console, summary: MissionSummary) -> None:
         self.mission, self.has_ended = summary.id, False
         self._console = console
-        self._shown: object = None
         self._count = 0
-        self._head = ui.element("div").classes("mission-head")
+        self._head = DrawnBox("mission-head", _draw_header)
         self.rest = ui.element("div").classes("mission-rest")
         PlainText("h2", "What happened")
         self._timeline = ui.element("ol").classes("timeline")
         self._more = PlainText("p", "", "quiet")
         PlainText("h2", "Program")
-        self._source = ui.element("pre").classes("source").props("tabindex=0 dir=auto")
+        self._source = DrawnBox("source", _draw_source, "pre").props("tabindex=0 dir=auto")
 
     def show(self, summary: MissionSummary, events: Sequence[LogLine], chain: _Chain) -> None:
         """Show a mission, including new events, and links to the missions that continue it."""
         self.has_ended = summary.has_ended
-        state = state_words(summary, self._console.view)
-        if (summary, state) != self._shown:
-            self._shown = (replace(summary), state)
-            self._head.clear()
-            with self._head:
-                _draw_header(summary, state, chain)
-            self._source.clear()
-            with self._source:
-                _draw_source(summary)
+        self._head.show((summary, state_words(summary, self._console.view), chain))
+        self._source.show(summary)
         steps = list(timeline(events[:MAX_LISTED_EVENTS]))
         with self._timeline:
             for line, words in steps[self._count :]:
@@ -99,7 +90,8 @@ class _MissionPage:
         self._more.say(f"Download the events to see {more:,} more." if more > 0 else "")
 
 
-def _draw_header(summary: MissionSummary, state: str, chain: _Chain) -> None:
+def _draw_header(mission: tuple[MissionSummary, str, _Chain]) -> None:
+    summary, state, chain = mission
     began = datetime.fromtimestamp(summary.created).astimezone()
     PlainText("h1", shortened(title(summary), 300))
     with ui.element("div").classes(f"ending ending-{summary.state}"):
