@@ -203,10 +203,7 @@ def export(
     from roboeval.evaluation.runs.table import TABLE_BEGINNINGS, Price, kind_of, with_cost, write_table
 
     kind = format or kind_of(out)
-    try:
-        cost = None if price is None else Price.read(price)
-    except ValueError:
-        fail(f'"{price}" is not a price; write INPUT/OUTPUT, the prices per million tokens')
+    cost = None if price is None else Price.read(price)
     results = open_current(run, suite, ablated=ablation)
     table = results.table if cost is None else with_cost(results.table, cost)
     path = out or results.run.rows(str(results.key)).with_suffix(f".{kind}")
