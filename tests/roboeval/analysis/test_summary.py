@@ -131,7 +131,7 @@ def test_tasks_without_a_score_are_told_apart() -> None:
     text = printed(summary_view(counted, title="x"))
     assert "\n4 of 11 completions (7 not judged), 2 prompts of 1 task\n" in text
     assert re.search(r"\nVisit +4 of 9 ", text)
-    assert re.search(r"no completions .*A\nnot judged.* B\nnot selected.* C\n", text)
+    assert re.search(r"no completions .*1 task\nnot judged.* 1 task\nnot selected.* 1 task\n", text)
     with pytest.raises(UserError, match=r"^0 of 11 completions "):
         summary([], suite, scope=scope)
 

@@ -22,8 +22,6 @@ from roboeval.evaluation.runs.completions import how_many, recorded_suffix
 if TYPE_CHECKING:
     from roboeval.analysis.counting.broken_rules import BrokenRules
 
-MAX_TASKS_NAMED = 3  # for more tasks, only their number is shown
-
 
 def ruled(*heads: str, first: JustifyMethod = "left") -> Table:
     """Create a table with a line below its header. All columns but the first are right-aligned."""
@@ -79,12 +77,7 @@ MISSING_REASONS = {
 def _missed(missing: Mapping[str, Sequence[str]]) -> Iterator[Text]:
     for reason, tasks in missing.items():
         if tasks:
-            named = (
-                ", ".join(map(visible, tasks))
-                if len(tasks) <= MAX_TASKS_NAMED
-                else counted(len(tasks), "task")
-            )
-            yield Text(f"{MISSING_REASONS[reason]} {named}", style="dim")
+            yield Text(f"{MISSING_REASONS[reason]} {counted(len(tasks), 'task')}", style="dim")
 
 
 def _task_table(summary: EvaluationSummary) -> Table:
