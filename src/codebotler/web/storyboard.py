@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from nicegui import ui
 
@@ -55,22 +55,23 @@ class Strip:
     ends_well: bool
 
 
-@dataclass(frozen=True)
-class RouteProgress:
-    """The progress of a robot along a strip."""
+class Storyboard(NamedTuple):
+    """What a robot would do according to a check, and how far it has come."""
 
-    visited: tuple[str, ...] = ()  # the rooms of completed drives
-    end: str = ""  # how the mission ended early after that: a key of `SCENE_MARKS`
+    check: CheckResult
+    title: str
+    visited: tuple[str, ...]  # the rooms of completed drives
+    end: str  # how the mission ended early after that: a key of `SCENE_MARKS`
 
 
-def draw_strips(check: CheckResult, reached: RouteProgress, title: str) -> None:
-    """Draw what a robot would do in each kind of world, according to a check.
+def draw_strips(board: Storyboard) -> None:
+    """Draw what a robot would do in each kind of world.
 
     Visited rooms are ticked off. Once some routes differ from the actual one, their strips are collapsed.
     """
-    shown = strips(check)
-    PlainText("h3", title if shown else "")
-    numbers = [scenes_reached(strip, reached.visited) for strip in shown]
+    shown = strips(board.check)
+    PlainText("h3", board.title if shown else "")
+    numbers = [scenes_reached(strip, board.visited) for strip in shown]
     is_among_them = any(number is not None for number in numbers)
     for strip, number_reached in zip(shown, numbers, strict=True):
         is_folded = is_among_them and number_reached is None
@@ -79,11 +80,11 @@ def draw_strips(check: CheckResult, reached: RouteProgress, title: str) -> None:
                 PlainText("p", f"{strip.world}:", "world")
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
                 for number, scene in enumerate(strip.scenes):
-                    is_reached = bool(reached.visited and number_reached) and number <= (number_reached or 0)
-                    end = reached.end if number == number_reached else ""
+                    is_reached = number <= (number_reached or -1)
+                    end = board.end if number == number_reached else ""
                     draw_scene(scene, mark=end or ("reached" if is_reached else ""))
             quality = "good" if strip.ends_well else "bad"
-            PlainText("p", strip.ending, "ending quiet" if reached.end else f"ending {quality}")
+            PlainText("p", strip.ending, "ending quiet" if board.end else f"ending {quality}")
 
 
 def scenes_reached(strip: Strip, visited: Sequence[str]) -> int | None:

@@ -33,7 +33,7 @@ from codebotler.web.panes.continuing import (
 from codebotler.web.panes.contract import draw_contract
 from codebotler.web.panes.reply import ReplyPane
 from codebotler.web.panes.rules import RulesPane
-from codebotler.web.storyboard import RouteProgress, draw_strips
+from codebotler.web.storyboard import Storyboard, draw_strips
 
 _CALL = re.compile(r"\b([^\W\d]\w*)(?=\s*\()")
 _MAX_MARKS, _MAX_ESCAPES = 400, 2_000
@@ -75,7 +75,7 @@ class ProgramPane:
                 self._repair = Button("Repair", lambda: self._again(repair=True), "plain")
                 self._again_button = Button("Ask again", lambda: self._again(repair=False), "plain")
             self._past = DrawnBox("done-before", draw_past)
-            self._board = DrawnBox("storyboard", _draw_board)
+            self._board = DrawnBox("storyboard", draw_strips)
         self._view = console.view
         self._shown = self._typed_here = (console.view.number, console.view.program)
         self._review_until = 0.0
@@ -106,8 +106,7 @@ class ProgramPane:
         self._rules.show(view)
         self._show_approval(view)
         self._problems.show((view.problems, view.unknown_rooms))
-        drawn = None if view.check is None else (view.check, route_progress(view), storyboard_title(view))
-        self._board.show(drawn)
+        self._board.show(None if view.check is None else storyboard_of(view, view.check))
 
     def _send(self, view: SessionView, shown: str, *, force: bool = False) -> None:
         """Send a program and its marks to the browser, which keeps its own text if that is newer."""
@@ -232,20 +231,14 @@ def _draw_problems(found: tuple[Sequence[str], Sequence[str]]) -> None:
         PlainText("li", shortened(sentence), "problem" if sentence in problems else "unsure")
 
 
-def _draw_board(content: tuple[CheckResult, RouteProgress, str]) -> None:
-    draw_strips(*content)
-
-
-def route_progress(view: SessionView) -> RouteProgress:
-    """Return the robot's progress, with rooms named as in the check."""
-    named = view.room_map or (view.check and view.check.room_map)
-    if not named:
-        return RouteProgress()
-    visited = tuple(named.room(words) or words for words in view.progress.visited)
+def storyboard_of(view: SessionView, check: CheckResult) -> Storyboard:
+    """Return what the check expects, and how far the robot has come, with rooms named as in the check."""
+    room_map = view.room_map or check.room_map
+    visited = tuple(room_map.room(words) or words for words in view.progress.visited)
     end = ""
     if view.is_over and view.state in EARLY_ENDS:
         end = "failed" if view.state is MissionState.FAILED else "stopped"
-    return RouteProgress(visited, end)
+    return Storyboard(check, storyboard_title(view), visited, end)
 
 
 def _author_text(view: SessionView) -> str:
