@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -10,9 +10,11 @@ from nicegui import ui
 
 from codebotler.checking.problems import CheckResult, Sample
 from codebotler.checking.storyboard import event_from_step, select_steps, steps_of
-from codebotler.core.skills.kinds import GOTO
+from codebotler.core.skills.kinds import CHECK, GOTO
 from codebotler.core.terminal import shortened
 from codebotler.core.text.phrases import NO_ANSWER, is_question, is_spoken, phrase
+from codebotler.core.trace import Event
+from codebotler.missions.display.progress import ANSWER
 from codebotler.web.frame import PlainText
 
 _MAX_STEP_TEXT, _MAX_WORLD_TEXT, MAX_STRIPS = 300, 800, 6
@@ -23,13 +25,14 @@ SCENE_MARKS = {
 }
 """The sign of a room for how far a mission came, and its meaning."""
 _LEFT_OUT = "…"  # replaces rooms in a shortened strip
+_NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which are only examples."
 
 
 @dataclass(frozen=True)
 class Action:
     """An action of the robot in a room."""
 
-    kind: str  # the kind of event, or `answer`
+    kind: str  # the kind of event, or `ANSWER`
     text: str
     step: int = field(default=0, compare=False)  # the position in the trace, from 1; 0 for an answer
     is_repeated: bool = False  # whether an earlier mission has done the same
@@ -61,18 +64,21 @@ class Storyboard(NamedTuple):
     check: CheckResult
     title: str
     visited: tuple[str, ...]  # the rooms of completed drives
+    learned: tuple[Event, ...]  # looks and questions, with what came of them
     end: str  # how the mission ended early after that: a key of `SCENE_MARKS`
 
 
 def draw_strips(board: Storyboard) -> None:
     """Draw what a robot would do in each kind of world.
 
-    Visited rooms are ticked off. Once some routes differ from the actual one, their strips are collapsed.
+    Visited rooms are ticked off, and strips that the actual run contradicts are collapsed.
     """
     shown = strips(board.check)
     PlainText("h3", board.title if shown else "")
-    numbers = [scenes_reached(strip, board.visited) for strip in shown]
+    numbers = [scenes_reached(strip, board.visited, board.learned) for strip in shown]
     is_among_them = any(number is not None for number in numbers)
+    if shown and not is_among_them:
+        PlainText("p", _NO_STRIP_FITS, "quiet unsure")
     for strip, number_reached in zip(shown, numbers, strict=True):
         is_folded = is_among_them and number_reached is None
         with ui.element("article").classes("strip other" if is_folded else "strip"):
@@ -87,8 +93,14 @@ def draw_strips(board: Storyboard) -> None:
             PlainText("p", strip.ending, "ending quiet" if board.end else f"ending {quality}")
 
 
-def scenes_reached(strip: Strip, visited: Sequence[str]) -> int | None:
-    """Return how many drives of a strip the robot has completed, or None if its route differs from it."""
+def scenes_reached(strip: Strip, visited: Sequence[str], learned: Sequence[Event]) -> int | None:
+    """Return how many drives of a strip the robot has completed, or None if its run differs from it."""
+    is_whole = all(scene.room != _LEFT_OUT for scene in strip.scenes)
+    expected = [deed.text for scene in strip.scenes for deed in scene.deeds if deed.kind in {CHECK, ANSWER}]
+    actual = [_learned_text(event) for event in learned]
+    # Speech recognition may change the case of an option and add spaces.
+    if is_whole and _spoken(expected[: len(actual)]) != _spoken(actual):
+        return None
     for number, room in enumerate(visited, start=1):
         scene = strip.scenes[number] if number < len(strip.scenes) else None
         if scene is not None and scene.room == _LEFT_OUT:
@@ -96,6 +108,10 @@ def scenes_reached(strip: Strip, visited: Sequence[str]) -> int | None:
         if scene is None or scene.room != shortened(room, _MAX_STEP_TEXT):
             return None
     return len(visited)
+
+
+def _spoken(texts: Iterable[str]) -> list[str]:
+    return [text.strip().casefold() for text in texts]
 
 
 def draw_scene(
@@ -119,7 +135,7 @@ def draw_scene(
         if not scene.is_found:
             PlainText("span", "there is no such room", "deed missing")
         for deed in scene.deeds:
-            look = f"deed deed-{deed.kind}" if deed.kind == "answer" or is_spoken(deed.kind) else "deed"
+            look = f"deed deed-{deed.kind}" if deed.kind == ANSWER or is_spoken(deed.kind) else "deed"
             shown = PlainText("span", deed.text, f"{look} wrong" if deed.step in wrong else look)
             _number(shown, deed.step, anchor)
             if deed.is_repeated:
@@ -184,10 +200,19 @@ def _actions(step: Mapping[str, Any]) -> Sequence[Action]:
     kind, text, number = step["kind"], shortened(step["text"], _MAX_STEP_TEXT), step["step"]
     is_repeated = bool(step.get("is_repeated"))
     if not is_question(kind) and not is_spoken(kind):
-        event = event_from_step(step)
-        words = phrase(event, "third", show=lambda text: shortened(text, _MAX_STEP_TEXT), quote="")
-        return (Action(kind, words, number, is_repeated),)
+        return (Action(kind, _phrase(event_from_step(step)), number, is_repeated),)
     if "answer" not in step:
         return (Action(kind, text, number, is_repeated),)
-    heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), _MAX_STEP_TEXT)
-    return (Action(kind, text, number, is_repeated), Action("answer", heard))
+    return (Action(kind, text, number, is_repeated), Action(ANSWER, _answer_text(step["answer"])))
+
+
+def _learned_text(event: Event) -> str:
+    return _phrase(event) if event.kind == CHECK else _answer_text(event.answer)
+
+
+def _answer_text(answer: object) -> str:
+    return NO_ANSWER if answer is None else shortened(str(answer), _MAX_STEP_TEXT)
+
+
+def _phrase(event: Event) -> str:
+    return phrase(event, "third", show=lambda text: shortened(text, _MAX_STEP_TEXT), quote="")

@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 
 from codebotler.checking.check import check
+from codebotler.core.trace import Event
 from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
-from codebotler.missions.display.progress import _MAX_MOMENTS, Find, Moment, Progress
+from codebotler.missions.display.progress import _MAX_MOMENTS, _MAX_STEPS, Find, Moment, Progress
 from codebotler.missions.display.view import SessionView
 from codebotler.missions.display.wording import timeline, title
 from codebotler.missions.storage.log import MissionState, MissionSummary
@@ -165,7 +166,7 @@ def test_the_line_is_the_one_that_the_program_says() -> None:
 def test_a_robot_that_looks_for_ever_fills_no_memory() -> None:
     looks = [call("is_in_room", entity=" mug "), done("is_in_room", result=True)] * 200
     now = after(*looks, call("go_to", location="hall"), line("feedback", text=f"at ({'9' * 400}, 1)"))
-    assert now.finds == (Find("", "mug"),)
+    assert now.learned == (Event("check", "mug", found=True),) * _MAX_STEPS
     assert now.at is None
 
 
@@ -258,8 +259,37 @@ def test_strips_show_each_kind_of_world_once() -> None:
 def test_rooms_are_ticked_off_as_they_are_reached(visited: tuple[str, ...], reached: int | None) -> None:
     rooms = ("start_loc", "kitchen", "hall", _LEFT_OUT, "study")
     strip = Strip("", tuple(map(Scene, rooms)), "Done.", ends_well=True)
-    assert scenes_reached(strip, visited) == reached
-    assert scenes_reached(Strip("", (Scene("hall"),), "Done.", ends_well=True), ("kitchen",)) is None
+    assert scenes_reached(strip, visited, ()) == reached
+    assert scenes_reached(Strip("", (Scene("hall"),), "Done.", ends_well=True), ("kitchen",), ()) is None
+
+
+def test_a_strip_in_which_something_else_is_found_is_no_longer_possible() -> None:
+    program = "def task_program():\n    go_to('kitchen')\n    say('yes' if is_in_room('mug') else 'no')\n"
+    shown = strips(check(program, rooms=["hall", "kitchen"]))
+    assert len(shown) == 2
+    said = {}
+    for found in (True, False):
+        looked = after(call("is_in_room", entity=" mug "), done("is_in_room", result=found)).learned
+        possible = [one for one in shown if scenes_reached(one, ("kitchen",), looked)]
+        said[found] = [one.scenes[-1].deeds[-1].text for one in possible]
+    assert said == {True: ["yes"], False: ["no"]}
+
+
+def test_a_strip_in_which_something_else_is_answered_is_no_longer_possible() -> None:
+    program = "def task_program():\n    go_to('kitchen')\n    ask('ann', 'Tea?', ['Yes', 'No'])\n"
+    shown = strips(check(program, rooms=["hall", "kitchen"], samples=20))
+    answers = [one.scenes[-1].deeds[-1].text for one in shown]
+    assert sorted(answers) == ["No", "Yes"]
+
+    def possible(*ends: dict[str, Any]) -> list[str]:
+        asked = [call("ask", person="ann", question="Tea?", options=["Yes", "No"])] * bool(ends)
+        learned = after(*asked, *ends).learned
+        each = zip(answers, shown, strict=True)
+        return [text for text, one in each if scenes_reached(one, ("kitchen",), learned) is not None]
+
+    assert sorted(possible()) == ["No", "Yes"]
+    assert possible(done("ask", result=" yes")) == ["Yes"]
+    assert possible(line("error", number=1, skill="ask", kind="E", message="m")) == []
 
 
 @pytest.mark.parametrize(

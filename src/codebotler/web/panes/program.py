@@ -238,7 +238,7 @@ def storyboard_of(view: SessionView, check: CheckResult) -> Storyboard:
     end = ""
     if view.is_over and view.state in EARLY_ENDS:
         end = "failed" if view.state is MissionState.FAILED else "stopped"
-    return Storyboard(check, storyboard_title(view), visited, end)
+    return Storyboard(check, storyboard_title(view), visited, view.progress.learned, end)
 
 
 def _author_text(view: SessionView) -> str:
