@@ -107,14 +107,6 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
         )
 
 
-def nearest_fix(results: Results, key: CompletionKey) -> Fix | None:
-    """Find the smallest fix for a completion, or None if its program was removed or no program passes."""
-    program = results.programs.get(key)
-    if program is None:
-        return None
-    return shortest_fix(program, _passing_in(results, key[0], results.completions[key].more.get("world")))
-
-
 def _passing_in(results: Results, task: str, world: int | None) -> dict[ProgramLines, str]:
     """Return the passing programs of a task or, for missions of an agent, those in one world."""
     programs = results.programs

@@ -479,19 +479,6 @@ def test_other_completions_are_refused_with_both_ways_out(tmp_path: Path) -> Non
     assert roboeval(*shlex.split(again)[1:], cwd=tmp_path).status == 0
 
 
-def test_a_failure_names_the_nearest_program_that_passes(tmp_path: Path) -> None:
-    made = roboeval("evaluate", "recorded:hasty", "--tasks", "SayGoodDay", "--out", "run", cwd=tmp_path)
-    assert made.status == 0, made.err
-    passed = load_results(tmp_path / "run").filter(pl.col("world_number") == 0)["passed"].to_list()
-    assert False in passed
-    (first,) = re.findall(r"`roboeval show run (SayGoodDay/\d/\d)`", made.err)
-    failed = roboeval("show", "run", first, cwd=tmp_path)
-    (again,) = re.findall(r"the nearest passing program differs in \d+ lines?: `roboeval (.*)`", failed.err)
-    shown = roboeval(*shlex.split(again), cwd=tmp_path)
-    assert re.match(r"SayGoodDay/\d/\d  passed\n", shown.out)
-    assert "nearest" not in shown.err
-
-
 def test_a_run_that_was_judged_by_another_suite(tmp_path: Path) -> None:
     roboeval("tasks", "--new", "MakeTea", "--suite", "mine", cwd=tmp_path)
     (tmp_path / "a.jsonl").write_text(row(task="MakeTea"))

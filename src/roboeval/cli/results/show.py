@@ -18,7 +18,6 @@ from codebotler.cli.options import (
 )
 from codebotler.core.errors import UserError
 from roboeval.cli.inputs import (
-    command,
     expect_judged,
     find_gaps,
     load,
@@ -83,7 +82,7 @@ def show(
         expect_judged(part, judged.places)
         if is_one:
             key = task, numbers[0], numbers[1]
-            show_completion(judged, key, suite, in_full=in_full, with_reply=with_reply, as_json=json)
+            show_completion(judged, key, in_full=in_full, with_reply=with_reply, as_json=json)
         else:
             show_part(judged, task, numbers[0] if numbers else None, as_json=json)
     outdated, unjudged = find_gaps(judged, suite, rules)
@@ -155,20 +154,11 @@ def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool)
 
 
 def show_completion(
-    judged: Results,
-    key: CompletionKey,
-    suite: str,
-    *,
-    in_full: bool,
-    with_reply: bool,
-    as_json: bool,
+    judged: Results, key: CompletionKey, *, in_full: bool, with_reply: bool, as_json: bool
 ) -> None:
-    """Print a completion. If it fails, also print the command that shows the nearest passing program."""
-    from codebotler.core.text.words import counted
-    from roboeval.analysis.failure_groups import nearest_fix
+    """Print a completion with the reasons of its verdict."""
     from roboeval.cli.views.completions import completion_view
     from roboeval.evaluation.judging.explanation import completion_data
-    from roboeval.evaluation.judging.failures import NO_PROGRAM_CLASS
 
     written = None if key in judged.stale else judged.completions.get(key)
     data = completion_data(judged.row(key), written, judged.suite, ablated=judged.is_ablated)
@@ -176,11 +166,6 @@ def show_completion(
         print_json({**data, "ablation": judged.is_ablated})
     else:
         print_rich(completion_view(data, in_full=in_full, with_reply=with_reply))
-    if data["passed"] or data["failure"]["class"] == NO_PROGRAM_CLASS:
-        return
-    if (fix := nearest_fix(judged, key)) is not None:
-        again = command("show", judged.run.path, fix.name, suite=suite, ablated=judged.is_ablated)
-        note(f"the nearest passing program differs in {counted(fix.changed, 'line')}: `{again}`")
 
 
 def export(
