@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
+from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import aclosing, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -68,7 +68,6 @@ class Console:
         if face is not None:
             face.changed = self.notifier.change
         self.interrupted: tuple[MissionSummary, ...] = ()
-        self.obstacles: Mapping[str, str] = {}  # why interrupted missions cannot be continued, by mission
         self.open_model, self.recoveries = open_model, recoveries
         self._lock = threading.RLock()  # held briefly, and again by a signal handler
         self.session: MissionSession | None = None  # the current session, or else the last one
@@ -79,7 +78,6 @@ class Console:
 
     def __enter__(self) -> Self:
         self.interrupted = tuple(find_interrupted(self.home))
-        self.obstacles = {one.id: self.obstacle_to(one.id) for one in self.interrupted}
         make_folder(self.home / "missions")
         return self
 
@@ -165,14 +163,6 @@ class Console:
     def past_of(self, mission: str) -> MissionPast:
         """Read what a mission did and saw, given its ID or `last`. Raise UserError if it has no rest."""
         return read_past(find_mission(self.home, mission), self.robot.skills, self.robot.name, self.world)
-
-    def obstacle_to(self, mission: str) -> str:
-        """Say why this robot cannot do the rest of a mission, or return an empty string."""
-        try:
-            self.past_of(mission)
-        except UserError as error:
-            return error.sentence
-        return ""
 
     def rest_of(self, past: MissionPast, program: str = "", author: str = "") -> MissionOrder:
         """Return the order for the rest of a mission: its own program, if nothing was done."""

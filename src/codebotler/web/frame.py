@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import entry_points
+from inspect import isawaitable
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from fastapi import FastAPI
 from nicegui import html, ui
+from nicegui.element import Element
 from nicegui.elements.mixins.text_element import TextElement
 
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import note, visible_lines
+from codebotler.missions.mission import MissionError
+from codebotler.robots.base import AnswerError
 from codebotler.web.security.proxy import prefix_of
 
 _STYLESHEET_HTML = '<link rel="stylesheet" href="{prefix}/static/page.css">'
@@ -106,13 +112,28 @@ def warn(sentence: str, seconds: float = 5.0) -> None:
     ui.notify(visible_lines(sentence), type="warning", position="bottom", timeout=1000 * seconds)
 
 
-class Button(PlainText):
-    """A button that calls a function."""
+@contextmanager
+def warned() -> Iterator[None]:
+    """End the block at an error that people can cause, and show its sentence as a warning."""
+    try:
+        yield
+    except (AnswerError, MissionError, UserError) as error:
+        warn(error.sentence)
 
-    def __init__(self, text: str, pressed: Callable[..., Any], kind: str = "") -> None:
+
+class Button(PlainText):
+    """A button that calls a function, and shows the sentence of its error as a warning."""
+
+    def __init__(self, text: str, pressed: Callable[[], Any], kind: str = "") -> None:
+        async def press() -> None:
+            with warned():
+                result = pressed()
+                if isawaitable(result):
+                    await result
+
         super().__init__("button", text, kind)
         self.props("type=button")
-        self.on("click", pressed)
+        self.on("click", press)
 
     def allow(self, may: bool) -> None:  # noqa: FBT001 - the only argument
         """Enable or disable the button."""
@@ -120,6 +141,30 @@ class Button(PlainText):
             self.props(remove="disabled")
         else:
             self.props("disabled")
+
+
+Content = TypeVar("Content")
+
+
+class DrawnBox(Element, Generic[Content]):
+    """An element whose inside is drawn again when what it shows has changed."""
+
+    def __init__(self, kind: str, draw: Callable[[Content], None], tag: str = "div") -> None:
+        super().__init__(tag)
+        self.classes(kind)
+        self.set_visibility(False)
+        self._draw = draw
+        self.content: Content | None = None
+
+    def show(self, content: Content | None) -> None:
+        """Draw the content, unless it is drawn already, or hide the element if the content is None."""
+        self.set_visibility(content is not None)
+        is_same, self.content = content == self.content, content
+        if not is_same:
+            self.clear()
+            if content is not None:
+                with self:
+                    self._draw(content)
 
 
 # --- pages of other packages

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from nicegui import ui
 
@@ -14,6 +14,7 @@ from codebotler.core.skills.kinds import CHECK, GOTO
 from codebotler.core.terminal import shortened
 from codebotler.core.text.phrases import NO_ANSWER, is_question, is_spoken, phrase
 from codebotler.core.trace import Event
+from codebotler.missions.display.progress import ANSWER
 from codebotler.web.frame import PlainText
 
 _MAX_STEP_TEXT, _MAX_WORLD_TEXT, MAX_STRIPS = 300, 800, 6
@@ -24,13 +25,14 @@ SCENE_MARKS = {
 }
 """The sign of a room for how far a mission came, and its meaning."""
 _LEFT_OUT = "…"  # replaces rooms in a shortened strip
+_NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which are only examples."
 
 
 @dataclass(frozen=True)
 class Action:
     """An action of the robot in a room."""
 
-    kind: str  # the kind of event, or `answer`
+    kind: str  # the kind of event, or `ANSWER`
     text: str
     step: int = field(default=0, compare=False)  # the position in the trace, from 1; 0 for an answer
     is_repeated: bool = False  # whether an earlier mission has done the same
@@ -56,76 +58,60 @@ class Strip:
     ends_well: bool
 
 
-@dataclass(frozen=True)
-class RouteProgress:
-    """The progress of a robot along a strip."""
+class Storyboard(NamedTuple):
+    """What a robot would do according to a check, and how far it has come."""
 
-    visited: tuple[str, ...] = ()  # the rooms of completed drives
-    looks: tuple[tuple[str, bool], ...] = ()  # objects that were looked for, and whether they were found
-    answers: tuple[str | None, ...] = ()  # the answers to questions; None for a question that failed
-    end: str = ""  # how the mission ended early after that: a key of `SCENE_MARKS`
-
-
-NO_PROGRESS = RouteProgress()
-_NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which are only examples."
+    check: CheckResult
+    title: str
+    visited: tuple[str, ...]  # the rooms of completed drives
+    learned: tuple[Event, ...]  # looks and questions, with what came of them
+    end: str  # how the mission ended early after that: a key of `SCENE_MARKS`
 
 
-def draw_strips(
-    check: CheckResult, reached: RouteProgress = NO_PROGRESS, title: str = "What the robot would do"
-) -> None:
-    """Draw what a robot would do in each kind of world, according to a check.
+def draw_strips(board: Storyboard) -> None:
+    """Draw what a robot would do in each kind of world.
 
     Visited rooms are ticked off, and strips that the actual run contradicts are collapsed.
     """
-    shown = strips(check)
-    PlainText("h3", title if shown else "")
-    numbers = [scenes_reached(strip, reached) for strip in shown]
-    if shown and all(number is None for number in numbers):
+    shown = strips(board.check)
+    PlainText("h3", board.title if shown else "")
+    numbers = [scenes_reached(strip, board.visited, board.learned) for strip in shown]
+    is_among_them = any(number is not None for number in numbers)
+    if shown and not is_among_them:
         PlainText("p", _NO_STRIP_FITS, "quiet unsure")
-    for strip, number_reached, is_folded in zip(shown, numbers, folded(numbers), strict=True):
+    for strip, number_reached in zip(shown, numbers, strict=True):
+        is_folded = is_among_them and number_reached is None
         with ui.element("article").classes("strip other" if is_folded else "strip"):
             if strip.world:
                 PlainText("p", f"{strip.world}:", "world")
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
                 for number, scene in enumerate(strip.scenes):
-                    is_reached = bool(reached.visited and number_reached) and number <= (number_reached or 0)
-                    end = reached.end if number == number_reached else ""
+                    is_reached = number <= (number_reached or -1)
+                    end = board.end if number == number_reached else ""
                     draw_scene(scene, mark=end or ("reached" if is_reached else ""))
             quality = "good" if strip.ends_well else "bad"
-            PlainText("p", strip.ending, "ending quiet" if reached.end else f"ending {quality}")
+            PlainText("p", strip.ending, "ending quiet" if board.end else f"ending {quality}")
 
 
-def folded(numbers: Sequence[int | None]) -> list[bool]:
-    """Return for each strip whether to collapse it. If no strip matches the run, show all strips."""
-    is_among_them = any(number is not None for number in numbers)
-    return [is_among_them and number is None for number in numbers]
-
-
-def scenes_reached(strip: Strip, reached: RouteProgress) -> int | None:
+def scenes_reached(strip: Strip, visited: Sequence[str], learned: Sequence[Event]) -> int | None:
     """Return how many drives of a strip the robot has completed, or None if its run differs from it."""
     is_whole = all(scene.room != _LEFT_OUT for scene in strip.scenes)
-    seen = [look_text(*look) for look in reached.looks]
-    has_seen = _texts(strip, CHECK)[: len(seen)] == seen
-    if is_whole and not (has_seen and _has_heard(strip, reached.answers)):
+    expected = [deed.text for scene in strip.scenes for deed in scene.deeds if deed.kind in {CHECK, ANSWER}]
+    actual = [_learned_text(event) for event in learned]
+    # Speech recognition may change the case of an option and add spaces.
+    if is_whole and _spoken(expected[: len(actual)]) != _spoken(actual):
         return None
-    for number, room in enumerate(reached.visited, start=1):
+    for number, room in enumerate(visited, start=1):
         scene = strip.scenes[number] if number < len(strip.scenes) else None
         if scene is not None and scene.room == _LEFT_OUT:
             return number
         if scene is None or scene.room != shortened(room, _MAX_STEP_TEXT):
             return None
-    return len(reached.visited)
+    return len(visited)
 
 
-def _has_heard(strip: Strip, answers: Sequence[str | None]) -> bool:
-    # Speech recognition may change the case of an option and add spaces.
-    heard = [NO_ANSWER if answer is None else shortened(answer, _MAX_STEP_TEXT) for answer in answers]
-    expected = _texts(strip, "answer")[: len(answers)]
-    return [text.strip().casefold() for text in expected] == [text.strip().casefold() for text in heard]
-
-
-def _texts(strip: Strip, kind: str) -> list[str]:
-    return [deed.text for scene in strip.scenes for deed in scene.deeds if deed.kind == kind]
+def _spoken(texts: Iterable[str]) -> list[str]:
+    return [text.strip().casefold() for text in texts]
 
 
 def draw_scene(
@@ -149,7 +135,7 @@ def draw_scene(
         if not scene.is_found:
             PlainText("span", "there is no such room", "deed missing")
         for deed in scene.deeds:
-            look = f"deed deed-{deed.kind}" if deed.kind == "answer" or is_spoken(deed.kind) else "deed"
+            look = f"deed deed-{deed.kind}" if deed.kind == ANSWER or is_spoken(deed.kind) else "deed"
             shown = PlainText("span", deed.text, f"{look} wrong" if deed.step in wrong else look)
             _number(shown, deed.step, anchor)
             if deed.is_repeated:
@@ -217,13 +203,15 @@ def _actions(step: Mapping[str, Any]) -> Sequence[Action]:
         return (Action(kind, _phrase(event_from_step(step)), number, is_repeated),)
     if "answer" not in step:
         return (Action(kind, text, number, is_repeated),)
-    heard = NO_ANSWER if step["answer"] is None else shortened(str(step["answer"]), _MAX_STEP_TEXT)
-    return (Action(kind, text, number, is_repeated), Action("answer", heard))
+    return (Action(kind, text, number, is_repeated), Action(ANSWER, _answer_text(step["answer"])))
 
 
-def look_text(what: str, is_found: bool) -> str:  # noqa: FBT001 - as in the trace
-    """Describe a look for an object and its result."""
-    return _phrase(Event(CHECK, what, found=is_found))
+def _learned_text(event: Event) -> str:
+    return _phrase(event) if event.kind == CHECK else _answer_text(event.answer)
+
+
+def _answer_text(answer: object) -> str:
+    return NO_ANSWER if answer is None else shortened(str(answer), _MAX_STEP_TEXT)
 
 
 def _phrase(event: Event) -> str:

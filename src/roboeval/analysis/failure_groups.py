@@ -107,12 +107,6 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
         )
 
 
-def nearest_fix(results: Results, key: CompletionKey) -> Fix | None:
-    """Find the smallest fix for a completion, or None if no program passes."""
-    written = results.completions[key]
-    return shortest_fix(written.program, _passing_in(results, key[0], written.more.get("world")))
-
-
 def _passing_in(results: Results, task: str, world: int | None) -> dict[ProgramLines, str]:
     """Return the passing programs of a task or, for missions of an agent, those in one world."""
     programs = results.programs

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboeval.cli.inputs import load
-from roboeval.cli.options import MutantWorldsOption, ProcessOption, SuiteOption, WorkersOption, path_to
+from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, WorldsOption, path_to
 from roboeval.cli.output import note, print_rich, show_progress
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def mutate(
             "`roboeval evaluate` reads; may be given several times."
         ),
     ] = None,
-    worlds: MutantWorldsOption = None,
+    worlds: WorldsOption = None,
     seed: Annotated[int, typer.Option(min=0, help="Random seed for mutants and worlds.")] = 1,
     most: Annotated[
         int,

@@ -133,7 +133,3 @@ BesideOption = Annotated[
 CheckOption = Annotated[
     bool, typer.Option(help="Run the check on programs not checked yet, for rejection sampling.")
 ]
-MutantWorldsOption = Annotated[
-    int | None,
-    typer.Option(min=1, max=10_000, help="Number of worlds to try mutants in, if the suite samples worlds."),
-]

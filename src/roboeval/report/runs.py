@@ -144,13 +144,9 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
     prices: dict[str, Price] = {}
     for text in texts:
         model, _, numbers = text.rpartition("=")
-        try:
-            price = Price.read(numbers)
-        except ValueError:
-            price = None
-        if price is None or not model:
-            raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, per million tokens')
-        prices[model] = price
+        if not model:
+            raise UserError(f'"{text}" names no model; write MODEL=INPUT/OUTPUT, per million tokens')
+        prices[model] = Price.read(numbers)
     return prices
 
 

@@ -17,7 +17,6 @@ from codebotler.core.world import World
 from codebotler.web.floorplan import MapState, floorplan
 from codebotler.web.frame import PlainText, outside
 from codebotler.web.storyboard import draw_scene, scenes
-from roboeval.analysis.failure_groups import Fix, nearest_fix
 from roboeval.evaluation.judging.explanation import (
     LOWERCASED_NOTE,
     cut_sentence,
@@ -44,25 +43,18 @@ async def draw_completion(
     store: RunStore, run: str, name: str, chosen: CompletionFilter, evaluation: str | None
 ) -> None:
     """Draw a completion with links to the previous and next completions in the filtered list."""
-    snapshot, data, fix = await asyncio.to_thread(_read, store, run, name, evaluation)
-    _draw_head(snapshot, data, fix, chosen, chosen.query(evaluation))
+
+    def read() -> tuple[Snapshot, dict[str, Any]]:
+        snapshot = store.open(run, evaluation)
+        return snapshot, completion_details(snapshot, name)
+
+    snapshot, data = await asyncio.to_thread(read)
+    _draw_head(snapshot, data, chosen, chosen.query(evaluation))
     with ui.element("div").classes("one-program"):
         with ui.element("div").classes("program-and-reply"):
             _draw_program(data)
             _draw_reply(data["reply"])
         _draw_worlds(data, _worlds(snapshot, data["task"]))
-
-
-def _read(
-    store: RunStore, run: str, name: str, evaluation: str | None
-) -> tuple[Snapshot, dict[str, Any], Fix | None]:
-    """Read a run and one of its completions, and find the smallest fix if the completion failed."""
-    snapshot = store.open(run, evaluation)
-    data = completion_details(snapshot, name)
-    key: CompletionKey = data["task"], data["prompt"], data["index"]
-    has_failed = data["passed"] is False and _no_program_sentence(data) is None
-    fix = nearest_fix(snapshot.results, key) if has_failed else None
-    return snapshot, data, fix
 
 
 def _worlds(run: Snapshot, task: str) -> dict[str, World]:
@@ -73,9 +65,7 @@ def _worlds(run: Snapshot, task: str) -> dict[str, World]:
     return {scenario.world.about: scenario.world for scenario in scenarios}
 
 
-def _draw_head(
-    run: Snapshot, data: Mapping[str, Any], fix: Fix | None, chosen: CompletionFilter, query: str
-) -> None:
+def _draw_head(run: Snapshot, data: Mapping[str, Any], chosen: CompletionFilter, query: str) -> None:
     key: CompletionKey = data["task"], data["prompt"], data["index"]
     with ui.element("nav").classes("trail").props('aria-label="Breadcrumb"'):
         html.a(
@@ -95,9 +85,6 @@ def _draw_head(
         PlainText("small", verdict, f"state state-{state}")
         if data["model"] is not None:
             PlainText("span", f"written by {shortened(data['model'], 200)}{recorded_suffix([data['model']])}")
-        if fix is not None:
-            text = f"Most similar program that passes: {counted(fix.changed, 'line')} changed"
-            html.a(text, href=outside(f"{run_address(run.name)}/{quote(fix.name, errors='replace')}{query}"))
     origin, instruction = instruction_shown(data["instruction"], data["suite_instruction"])
     if origin is not None:
         PlainText("p", origin[0].upper() + origin[1:], "quiet")

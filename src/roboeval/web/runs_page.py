@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from codebotler.web.frame import Button, PlainText, outside
+from codebotler.web.frame import PlainText, outside
 from roboeval.analysis.metrics import Estimate
 from roboeval.web.heat_map import MAX_NAME, MISSING, run_address
 from roboeval.web.serializers import RunList
@@ -19,13 +19,6 @@ from roboeval.web.widgets import REFRESH_SECONDS, count_text, date_text, show_st
 
 MAX_READ_SECONDS = 0.5  # seconds to wait before the page shows runs that are not read yet
 
-SortKey: TypeAlias = Callable[[Mapping[str, Any]], Any]
-SORT_ORDERS: Mapping[str, tuple[str, SortKey]] = {
-    "Run": ("ascending", lambda run: run["run"].lower()),
-    "pass@1": ("descending", lambda run: (run.get("pass@1") or {"mean": -1})["mean"]),
-    "Started": ("descending", lambda run: run.get("date") or ""),
-    "Completions": ("descending", lambda run: run.get("completions", 0)),
-}
 TABLE_HEADS = ("Run", "Suite", "Tasks", "State", "Completions", "pass@1", "Started")
 TABLE_NOTE = "pass@1 with its 95% confidence interval over tasks; times are in UTC."
 NO_RUNS_SENTENCE = "There are no runs yet. This command creates one without an API key or a network:"
@@ -44,9 +37,6 @@ async def draw_runs(folder: Path, runs: RunList) -> None:
 class _Table:
     def __init__(self, runs: RunList) -> None:
         self._runs = runs
-        self._order = "Run"
-        self._heads: dict[str, ui.element] = {}
-        self._data: list[dict[str, Any]] = []
         self._rows: list[_RunRow] = []
         self._error = PlainText("p", "", "trouble").props("role=alert")
         self._empty = ui.element("div").classes("first-run")
@@ -61,18 +51,10 @@ class _Table:
                     with html.th().props("scope=col").classes("tick"):
                         PlainText("span", "Side by side", "unseen")
                     for name in TABLE_HEADS:
-                        self._draw_head(name)
+                        PlainText("th", name).props("scope=col")
                 self._body = html.tbody()
             PlainText("p", TABLE_NOTE, "quiet")
             html.button("Show side by side", type="submit").classes("plain")
-
-    def _draw_head(self, name: str) -> None:
-        with html.th().props("scope=col") as head:
-            if name in SORT_ORDERS:
-                Button(name, lambda: self._show(self._data, name), "sort")
-                self._heads[name] = head
-            else:
-                PlainText("span", name)
 
     async def refresh(self) -> None:
         try:
@@ -81,21 +63,16 @@ class _Table:
             self._error.say(str(error))
         else:
             self._error.say("")
-            self._show(data, self._order)
+            self._show(data)
 
-    def _show(self, data: list[dict[str, Any]], order: str) -> None:
-        direction, key = SORT_ORDERS[order]
-        by_name = sorted(data, key=lambda run: run["run"])
-        self._data, self._order = sorted(by_name, key=key, reverse=direction == "descending"), order
-        for name, head in self._heads.items():
-            head.props(f"aria-sort={SORT_ORDERS[name][0] if name == order else 'none'}")
+    def _show(self, data: list[dict[str, Any]]) -> None:
         self._empty.set_visibility(not data)
         self._form.set_visibility(bool(data))
-        if [row.name for row in self._rows] != [run["run"] for run in self._data]:
+        if [row.name for row in self._rows] != [run["run"] for run in data]:
             self._body.clear()
             with self._body:
-                self._rows = [_RunRow(run["run"]) for run in self._data]
-        for row, run in zip(self._rows, self._data, strict=True):
+                self._rows = [_RunRow(run["run"]) for run in data]
+        for row, run in zip(self._rows, data, strict=True):
             row.show(run)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -19,8 +18,7 @@ from codebotler.missions import recovery
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.recovery import ask_evidence, is_recoverable
 from codebotler.missions.session import MissionSession
-from codebotler.missions.storage.log import MissionState, MissionSummary, add_event, open_log
-from codebotler.missions.storage.map_event import map_data
+from codebotler.missions.storage.log import MissionState, MissionSummary
 from codebotler.missions.storage.past import MissionPast
 from codebotler.models.base import Model, ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.sampling import SamplingSettings
@@ -170,17 +168,6 @@ def test_an_unsure_step_is_a_persons_to_decide(tmp_path: Path) -> None:
         view = until(console, lambda view: view.check is not None)
         assert view.past is not None
         assert view.past.trace[-1].text == "hello"
-
-
-def test_a_mission_on_another_map_has_an_obstacle(tmp_path: Path) -> None:
-    elsewhere = World((Room("hall"), Room("cellar")), "hall")
-    same, other = (failed_mission(tmp_path, TYPED, WORLD, "") for _ in range(2))
-    for folder, world in ((same, WORLD), (other, elsewhere)):
-        cut(folder, line_of(folder, "say", "result"), MissionState.RUNNING)
-        with closing(open_log(folder)) as log:
-            add_event(log, "map", 0.0, **map_data(world))
-    with desk_of(tmp_path, Author()) as console:
-        assert [bool(console.obstacles[folder.name]) for folder in (same, other)] == [False, True]
 
 
 def test_a_new_mission_removes_the_notice_of_another_one(tmp_path: Path) -> None:

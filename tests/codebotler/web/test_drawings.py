@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from codebotler.checking.check import check
+from codebotler.core.trace import Event
 from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
 from codebotler.missions.display.progress import _MAX_MOMENTS, _MAX_STEPS, Find, Moment, Progress
@@ -23,10 +24,8 @@ from codebotler.web.storyboard import (
     _LEFT_OUT,
     MAX_STRIPS,
     Action,
-    RouteProgress,
     Scene,
     Strip,
-    folded,
     scenes_reached,
     strips,
 )
@@ -167,7 +166,7 @@ def test_the_line_is_the_one_that_the_program_says() -> None:
 def test_a_robot_that_looks_for_ever_fills_no_memory() -> None:
     looks = [call("is_in_room", entity=" mug "), done("is_in_room", result=True)] * 200
     now = after(*looks, call("go_to", location="hall"), line("feedback", text=f"at ({'9' * 400}, 1)"))
-    assert now.looks == (("mug", True),) * _MAX_STEPS
+    assert now.learned == (Event("check", "mug", found=True),) * _MAX_STEPS
     assert now.at is None
 
 
@@ -260,16 +259,8 @@ def test_strips_show_each_kind_of_world_once() -> None:
 def test_rooms_are_ticked_off_as_they_are_reached(visited: tuple[str, ...], reached: int | None) -> None:
     rooms = ("start_loc", "kitchen", "hall", _LEFT_OUT, "study")
     strip = Strip("", tuple(map(Scene, rooms)), "Done.", ends_well=True)
-    assert scenes_reached(strip, RouteProgress(visited)) == reached
-    assert (
-        scenes_reached(Strip("", (Scene("hall"),), "Done.", ends_well=True), RouteProgress(("kitchen",)))
-        is None
-    )
-
-
-def test_strips_are_folded_only_beside_one_that_fits() -> None:
-    assert folded([2, None, 0]) == [False, True, False]
-    assert folded([None, None]) == [False, False]
+    assert scenes_reached(strip, visited, ()) == reached
+    assert scenes_reached(Strip("", (Scene("hall"),), "Done.", ends_well=True), ("kitchen",), ()) is None
 
 
 def test_a_strip_in_which_something_else_is_found_is_no_longer_possible() -> None:
@@ -278,9 +269,8 @@ def test_a_strip_in_which_something_else_is_found_is_no_longer_possible() -> Non
     assert len(shown) == 2
     said = {}
     for found in (True, False):
-        possible = [
-            one for one in shown if scenes_reached(one, RouteProgress(("kitchen",), (("mug", found),)))
-        ]
+        looked = after(call("is_in_room", entity=" mug "), done("is_in_room", result=found)).learned
+        possible = [one for one in shown if scenes_reached(one, ("kitchen",), looked)]
         said[found] = [one.scenes[-1].deeds[-1].text for one in possible]
     assert said == {True: ["yes"], False: ["no"]}
 
@@ -291,16 +281,15 @@ def test_a_strip_in_which_something_else_is_answered_is_no_longer_possible() -> 
     answers = [one.scenes[-1].deeds[-1].text for one in shown]
     assert sorted(answers) == ["No", "Yes"]
 
-    def possible(*heard: str | None) -> list[str]:
-        reached = RouteProgress(("kitchen",), answers=heard)
-        return [a for a, one in zip(answers, shown, strict=True) if scenes_reached(one, reached) is not None]
+    def possible(*ends: dict[str, Any]) -> list[str]:
+        asked = [call("ask", person="ann", question="Tea?", options=["Yes", "No"])] * bool(ends)
+        learned = after(*asked, *ends).learned
+        each = zip(answers, shown, strict=True)
+        return [text for text, one in each if scenes_reached(one, ("kitchen",), learned) is not None]
 
     assert sorted(possible()) == ["No", "Yes"]
-    assert possible(" yes") == ["Yes"]
-    assert possible(None) == []
-    asked = call("ask", person="ann", question="Tea?", options=["Yes", "No"])
-    assert after(asked, done("ask", result="No")).answers == ("No",)
-    assert after(asked, line("error", number=1, skill="ask", kind="E", message="m")).answers == (None,)
+    assert possible(done("ask", result=" yes")) == ["Yes"]
+    assert possible(line("error", number=1, skill="ask", kind="E", message="m")) == []
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from typing import Any, cast
 
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 from made_results import results_of
-from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures, nearest_fix
+from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures
 from roboeval.cli.views.groups import failure_group_view
 from roboeval.evaluation.runs.completions import CompletionKey
 from roboeval.evaluation.runs.rows import Failure, Row, WorldVerdict, key_of
@@ -96,19 +96,6 @@ def test_groups_of_one_size_take_turns_by_task() -> None:
     found = [(those[0]["task"], those[0]["prompt"]) for those in group_failures(rows, programs)]
     tasks = ("FindBook", "Visit")
     assert found == [("Visit", 9), *((task, n) for n in range(3) for task in tasks)]
-
-
-def test_the_nearest_program_that_passes() -> None:
-    programs = {("Visit", 0, 0): GOES.format("lab"), ("Visit", 4, 0): RIGHT, ("Visit", 5, 0): "pass"}
-    programs["FindBook", 0, 0] = GOES.format("lab")
-    right = [{**row(prompt, 0), "passed": True} for prompt in (4, 5)]
-    right.append({**row(0, 0), "task": "FindBook", "passed": True})
-    results = results_of([failed(0, 0), *right], SUITE, programs)
-    fix = nearest_fix(results, ("Visit", 0, 0))
-    assert fix is not None
-    assert (fix.name, fix.changed) == ("Visit/4/0", 4)
-    alone = results_of([failed(0, 0)], SUITE, programs)
-    assert nearest_fix(alone, ("Visit", 0, 0)) is None
 
 
 def told(program: str = GOES.format("lab")) -> Any:  # noqa: ANN401 - one group

@@ -10,6 +10,7 @@ from codebotler.core.skills import kinds
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.skills.table import Recording
 from codebotler.core.terminal import shortened
+from codebotler.core.trace import Event
 from codebotler.core.world import Point, World, laid_out
 from codebotler.missions.display.wording import event_text
 from codebotler.missions.storage.log import SKILL_END_EVENTS, LogLine, MissionState
@@ -55,8 +56,7 @@ class Progress:
     is_driving: bool = False  # whether the robot is driving to `room`
     is_between: bool = False  # whether a cancelled drive left the robot between rooms
     visited: tuple[str, ...] = ()  # the destinations of completed drives, as named in the program
-    looks: tuple[tuple[str, bool], ...] = ()  # objects that were looked for, and whether they were found
-    answers: tuple[str | None, ...] = ()  # the answers to questions; None for a question that failed
+    learned: tuple[Event, ...] = ()  # looks and questions, with what came of them
     trail: tuple[Point, ...] = ()  # the latest positions, in metres
     finds: tuple[Find, ...] = ()  # objects seen and people asked, each listed once
     held: str = ""  # the object in the robot's hand
@@ -125,10 +125,12 @@ class Progress:
                 now = replace(self, held="")
             case kinds.CHECK:
                 now = self._with_find(Find(self.room, self.subject)) if result is True else self
-                now = replace(now, looks=(*self.looks, (self.subject, result is True))[:_MAX_STEPS])
+                look = Event(kinds.CHECK, self.subject, found=result is True)
+                now = replace(now, learned=(*self.learned, look)[:_MAX_STEPS])
             case kinds.ASK:
                 now = self._with_find(Find(self.room, self.subject)) if self.subject else self
-                now = replace(now, answers=(*now.answers, str(result))[:_MAX_STEPS])
+                answered = Event(kinds.ASK, "", answer=str(result))
+                now = replace(now, learned=(*self.learned, answered)[:_MAX_STEPS])
         return now
 
     def with_failure(self, event: str) -> Progress:
@@ -137,7 +139,7 @@ class Progress:
         if recording is not None and recording.is_drive and event != "late":
             return replace(self, room=self.left, is_between=self.is_between or event == "cancelled")
         if recording is not None and recording.options and event == "error":
-            return replace(self, answers=(*self.answers, None)[:_MAX_STEPS])
+            return replace(self, learned=(*self.learned, Event(kinds.ASK, ""))[:_MAX_STEPS])
         return self
 
     def _with_find(self, find: Find) -> Progress:

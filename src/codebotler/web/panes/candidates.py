@@ -11,9 +11,8 @@ from codebotler.core.terminal import shortened
 from codebotler.core.text.words import counted, listed
 from codebotler.missions.display.view import SessionView
 from codebotler.missions.display.wording import capitalize
-from codebotler.missions.mission import MissionError
 from codebotler.web.console import Console
-from codebotler.web.frame import Button, PlainText, scroll_up, warn
+from codebotler.web.frame import Button, DrawnBox, PlainText, scroll_up, warn
 from codebotler.web.storyboard import draw_scene, scenes
 
 _MAX_DIFFERENCE, _MAX_SENTENCE = 400, 500
@@ -24,20 +23,11 @@ class CandidatesPane:
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._drawn: ClarifyingQuestion | None = None
-        self._box = ui.element("div").classes("which")
-        self._box.set_visibility(False)
+        self._box = DrawnBox("which", self._draw)
 
     def show(self, view: SessionView) -> None:
         """Update the pane for a view."""
-        question = view.question if view.waits_for_answer else None
-        self._box.set_visibility(question is not None)
-        if question is not self._drawn:
-            self._drawn = question
-            self._box.clear()
-            with self._box:
-                if question is not None:
-                    self._draw(question)
+        self._box.show(view.question if view.waits_for_answer else None)
 
     def _draw(self, question: ClarifyingQuestion) -> None:
         PlainText("h3", "Which did you mean?")
@@ -80,9 +70,6 @@ class CandidatesPane:
 
     async def _answer(self, answer: ClarifyingAnswer, more: str = "") -> None:
         session = self._console.session
-        if session is not None and self._drawn is not None:
-            try:
-                scroll_up()  # before the answer, which removes the question from the page
-                await asyncio.to_thread(session.answer, self._drawn, answer, more)
-            except MissionError as error:
-                warn(error.sentence)
+        if session is not None:
+            scroll_up()  # before the answer, which removes the question from the page
+            await asyncio.to_thread(session.answer, self._box.content, answer, more)

@@ -8,7 +8,6 @@ from functools import partial
 
 from nicegui import html, ui
 
-from codebotler.core.errors import UserError
 from codebotler.core.terminal import note, shortened
 from codebotler.core.text.words import counted
 from codebotler.core.trace import Event
@@ -19,7 +18,7 @@ from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.storage.log import MissionState, MissionSummary
 from codebotler.missions.storage.past import MissionPast
 from codebotler.web.console import Console
-from codebotler.web.frame import Button, PlainText, outside, scroll_up, warn
+from codebotler.web.frame import Button, PlainText, outside, scroll_up
 
 MAX_OPEN_STEPS = 12
 _MAX_STEPS, _MAX_STEP_CHARACTERS, _MAX_ANSWERS = 500, 300, 8
@@ -44,15 +43,11 @@ class ContinueButton(Button):
 
     async def _continue(self) -> None:
         console = self._console
-        try:
-            past = await asyncio.to_thread(console.past_of, self._mission)
-            if past.unsure is None:
-                _begin(console, past)
-                return
-            evidence = await asyncio.to_thread(ask_evidence, console.robot, console.home, past, note)
-        except (UserError, MissionError) as error:
-            warn(error.sentence)
+        past = await asyncio.to_thread(console.past_of, self._mission)
+        if past.unsure is None:
+            _begin(console, past)
             return
+        evidence = await asyncio.to_thread(ask_evidence, console.robot, console.home, past, note)
         if not self.is_deleted:
             with self:
                 _ask(console, past, evidence)
@@ -82,12 +77,8 @@ def _ask(console: Console, past: MissionPast, evidence: list[str]) -> None:
     def answer(*, happened: bool, answer: str = "") -> None:
         dialog.close()
         if console.session is not before:
-            warn("another mission has begun meanwhile")
-            return
-        try:
-            _begin(console, past.resolve(happened=happened, answer=answer))
-        except (UserError, MissionError) as error:
-            warn(error.sentence)
+            raise MissionError("another mission has begun meanwhile")
+        _begin(console, past.resolve(happened=happened, answer=answer))
 
     with ui.dialog() as dialog, ui.card().classes("pane"):
         PlainText("h3", "Did this happen?")
@@ -114,33 +105,18 @@ def _begin(console: Console, past: MissionPast) -> None:
         ui.navigate.to(outside("/"))
 
 
-class PastPane:
-    """Shows what was done before the mission that a session continues."""
-
-    def __init__(self) -> None:
-        self._drawn: MissionPast | None = None
-        self._box = ui.element("div").classes("done-before")
-        self._box.set_visibility(False)
-
-    def show(self, view: SessionView) -> None:
-        """Update the pane for a view."""
-        past = view.past
-        self._box.set_visibility(past is not None)
-        if past is None or past is self._drawn:
-            return
-        self._drawn = past
-        self._box.clear()
-        with self._box:
-            PlainText("h3", "Done so far")
-            steps = [*zip(past.steps, past.trace, strict=True)]
-            if earlier := steps[-_MAX_STEPS:-MAX_OPEN_STEPS]:
-                with html.details():
-                    PlainText("summary", counted(len(earlier), "earlier step"))
-                    _draw_steps(earlier)
-            _draw_steps(steps[-MAX_OPEN_STEPS:])
-            if not steps:
-                PlainText("p", "No step was finished.")
-            PlainText("p", capitalize(past.testimony), "quiet")
+def draw_past(past: MissionPast) -> None:
+    """Draw what was done before the mission that a session continues."""
+    PlainText("h3", "Done so far")
+    steps = [*zip(past.steps, past.trace, strict=True)]
+    if earlier := steps[-_MAX_STEPS:-MAX_OPEN_STEPS]:
+        with html.details():
+            PlainText("summary", counted(len(earlier), "earlier step"))
+            _draw_steps(earlier)
+    _draw_steps(steps[-MAX_OPEN_STEPS:])
+    if not steps:
+        PlainText("p", "No step was finished.")
+    PlainText("p", capitalize(past.testimony), "quiet")
 
 
 def _draw_steps(steps: Sequence[tuple[str, Event]]) -> None:

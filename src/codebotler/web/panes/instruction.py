@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 
 from nicegui import html, ui
 
@@ -10,7 +11,6 @@ from codebotler.core.errors import UserError
 from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.missions.display.view import MissionOrder, SessionView
-from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import known_instructions
 from codebotler.missions.storage.log import MissionSummary
 from codebotler.missions.storage.store import read_missions
@@ -18,7 +18,7 @@ from codebotler.models.recorded import is_recorded
 from codebotler.models.usable import MODEL_HINT
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.web.console import Console
-from codebotler.web.frame import Button, PlainText, scroll_to, scroll_up, warn
+from codebotler.web.frame import Button, DrawnBox, PlainText, scroll_to, scroll_up, warned
 
 _NO_RECORDED_PROGRAM = "There is no recorded program for this instruction."
 _HOW_TO_ADD_MODEL = (
@@ -39,7 +39,6 @@ class InstructionPane:
         self._console = console
         self._number = -1
         self._asked = ""
-        self._suggested: tuple[str, ...] = ()
         self._ended = ""
         with ui.element("section").classes("pane instruct").props('aria-labelledby="h-instruct"'):
             PlainText("h2", "Instruct").props("id=h-instruct")
@@ -55,9 +54,9 @@ class InstructionPane:
             self._about = PlainText("p", f"{_ABOUT_RECORDED}.", "quiet")
             self._write = Button("Write the program", self._ask, "primary")
             self._error = PlainText("p", "", "trouble").props("role=alert")
-            self._similar = ui.element("div").classes("picks")
-            self._examples = ui.element("div").classes("picks")
-            self._recent = ui.element("div").classes("picks")
+            self._similar = DrawnBox("picks", partial(self._draw_picks, "Similar instructions"))
+            self._examples = DrawnBox("picks", partial(self._draw_picks, "Examples"))
+            self._recent = DrawnBox("picks", partial(self._draw_picks, "Recent"))
         self._about_model()
         self._error.say("")
 
@@ -67,7 +66,7 @@ class InstructionPane:
         if not self._examples.is_deleted:  # the page may have been closed in the meantime
             some = ", such as the examples below." if shown else ", and none of them fits these rooms."
             self._about.text = _ABOUT_RECORDED + some
-            self._fill(self._examples, "Examples", [(text, "") for text in shown])
+            self._examples.show([(text, "") for text in shown] or None)
         await self._load_recent()
 
     async def follow(self, view: SessionView) -> None:
@@ -80,7 +79,7 @@ class InstructionPane:
         recent = await asyncio.to_thread(_recent, self._console)
         if not self._recent.is_deleted:
             texts = [(one.instruction, one.state if one.has_ended else "") for one in recent]
-            self._fill(self._recent, "Recent", texts)
+            self._recent.show(texts or None)
 
     def show(self, view: SessionView) -> None:
         """Update the pane for a view."""
@@ -92,14 +91,11 @@ class InstructionPane:
         self._write.allow(not view.is_written and not view.is_running)
         self._write.say("Writing …" if view.is_written else "Write the program")
         self._error.say(view.error if view.suggestions is None else self._unknown(view.suggestions))
-        self._suggest(view.suggestions or ())
+        self._similar.show([(text, "") for text in view.suggestions or ()] or None)
 
     def _ask(self) -> None:
-        try:
+        with warned():
             self._console.begin(MissionOrder(self._text.value or "", self._model.value or ""))
-        except (MissionError, UserError) as error:
-            warn(error.sentence)
-        else:
             scroll_up()
 
     def _about_model(self) -> None:
@@ -111,22 +107,13 @@ class InstructionPane:
         how = _HOW_TO_ADD_MODEL if has_only_recorded else "You can also choose another model."
         return f"{_NO_RECORDED_PROGRAM} {choose}{how}"
 
-    def _suggest(self, known: tuple[str, ...]) -> None:
-        if known != self._suggested:
-            self._suggested = known
-            self._fill(self._similar, "Similar instructions", [(text, "") for text in known])
-
-    def _fill(self, where: ui.element, title: str, texts: list[tuple[str, str]]) -> None:
-        where.clear()
-        if not texts:
-            return
-        with where:
-            PlainText("h3", title)
-            for text, state in texts:
-                with html.button(type="button").classes("pick").on("click", lambda t=text: self._copy(t)):
-                    PlainText("span", shortened(text, _MAX_PICK_CHARACTERS))
-                    if state:
-                        PlainText("small", state, f"state state-{state}")
+    def _draw_picks(self, title: str, texts: list[tuple[str, str]]) -> None:
+        PlainText("h3", title)
+        for text, state in texts:
+            with html.button(type="button").classes("pick").on("click", partial(self._copy, text)):
+                PlainText("span", shortened(text, _MAX_PICK_CHARACTERS))
+                if state:
+                    PlainText("small", state, f"state state-{state}")
 
     def _copy(self, text: str) -> None:
         self._text.value = visible_lines(text)

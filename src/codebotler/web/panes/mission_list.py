@@ -17,7 +17,7 @@ from codebotler.missions.display.wording import reason_text, title
 from codebotler.missions.storage.log import MissionState, MissionSummary
 from codebotler.missions.storage.store import last_rest, read_missions, rest_text
 from codebotler.web.console import Console
-from codebotler.web.frame import Frame, PlainText, outside
+from codebotler.web.frame import DrawnBox, Frame, PlainText, outside
 from codebotler.web.live import follow
 
 _MISSIONS_PATH = "/missions"
@@ -46,13 +46,12 @@ class _MissionList:
         self._console = console
         self._known: list[MissionSummary] = []
         self._seen: object = None
-        self._rows: dict[str, _MissionRow] = {}
         with ui.element("div").classes("filters").props("role=search"):
             self._text = ui.input("Search", value=text, on_change=self._search)
             self._text.props("outlined dense clearable debounce=300 dir=auto maxlength=200")
         self._count = PlainText("p", "", "quiet").props("role=status")
         self._error = PlainText("p", "", "trouble").props("role=alert")
-        self._list = ui.element("ol").classes("rows")
+        self._list = DrawnBox("rows", _draw_missions, "ol")
 
     async def update(self) -> None:
         """Reload the list if the state of the current mission has changed."""
@@ -81,16 +80,9 @@ class _MissionList:
         found = [one for one in reversed(self._known) if has_words(one, state_words(one, view), words)]
         self._count.say(_count_text(len(found), len(self._known)))
         found = found[:MAX_LISTED_MISSIONS]
-        for gone in self._rows.keys() - {summary.id for summary in found}:
-            self._rows.pop(gone).element.delete()
-        for position, summary in enumerate(found):
-            row = self._rows.get(summary.id)
-            if row is None:
-                with self._list:
-                    row = self._rows[summary.id] = _MissionRow(summary.id)
-                row.element.move(self._list, position)
-            rest = rest_text(last_rest(summary.id, self._known))
-            row.show(summary, state_words(summary, self._console.view), rest)
+        self._list.show(
+            [(one, state_words(one, view), rest_text(last_rest(one.id, self._known))) for one in found]
+        )
 
 
 def state_words(summary: MissionSummary, view: SessionView) -> str:
@@ -114,26 +106,15 @@ def _count_text(found: int, known: int) -> str:
     return f"{counted(known, 'mission') if found == known else f'{found:,} of {known:,} missions'}{last}"
 
 
-class _MissionRow:
-    """An entry in the list of missions."""
-
-    def __init__(self, mission: str) -> None:
-        with ui.element("li") as self.element, html.a(href=outside(f"{_MISSIONS_PATH}/{mission}")):
-            self._time = PlainText("time")
-            with ui.element("span").classes("about"):
-                self._title = PlainText("span", "", "text")
-                self._outcome = PlainText("span", "", "outcome")
-            self._state = PlainText("small")
-
-    def show(self, summary: MissionSummary, state: str, rest: str) -> None:
-        """Update the entry for a mission, where `rest` says what became of its rest."""
-        self._time.say(f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
-        self._title.say(shortened(title(summary), _MAX_TITLE))
-        reason = (
-            shortened(reason_text(summary.reason, summary.line), _MAX_LISTED_REASON) if summary.reason else ""
-        )
+def _draw_missions(missions: Sequence[tuple[MissionSummary, str, str]]) -> None:
+    """Draw missions with their state, and with what became of their rest."""
+    for summary, state, rest in missions:
+        reason = shortened(reason_text(summary.reason, summary.line), _MAX_LISTED_REASON)
         before = f"continues mission {summary.continues}" if summary.continues else ""
         parts = (f"mission {summary.id}", f"robot: {summary.robot}", reason, before, rest)
-        self._outcome.say(" · ".join(filter(None, parts)))
-        self._state.say(state)
-        self._state.classes(replace=f"state state-{summary.state}")
+        with ui.element("li"), html.a(href=outside(f"{_MISSIONS_PATH}/{summary.id}")):
+            PlainText("time", f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
+            with ui.element("span").classes("about"):
+                PlainText("span", shortened(title(summary), _MAX_TITLE), "text")
+                PlainText("span", " · ".join(filter(None, parts)), "outcome")
+            PlainText("small", state, f"state state-{summary.state}")

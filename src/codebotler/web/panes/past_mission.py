@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from dataclasses import replace
 from datetime import datetime
 from functools import partial
 
@@ -16,7 +15,7 @@ from codebotler.missions.display.wording import capitalize, reason_text, timelin
 from codebotler.missions.storage.log import LogLine, MissionSummary, read_events
 from codebotler.missions.storage.store import find_mission, find_rest
 from codebotler.web.console import Console
-from codebotler.web.frame import Frame, PlainText, outside
+from codebotler.web.frame import DrawnBox, Frame, PlainText, outside
 from codebotler.web.live import follow
 from codebotler.web.panes.continuing import EARLY_ENDS, ContinueButton, can_be_continued
 from codebotler.web.panes.mission_list import state_words
@@ -38,13 +37,9 @@ def add(console: Console, frame: Frame) -> None:
                 return
             page = _MissionPage(console, summary)
             page.show(summary, events, rest)
-            if summary.state in EARLY_ENDS and can_be_continued(summary):
-                obstacle = await asyncio.to_thread(console.obstacle_to, mission)
+            if summary.state in EARLY_ENDS and can_be_continued(summary) and rest is None:
                 with page.rest:
-                    if not obstacle:
-                        ContinueButton(console, summary.id)
-                    elif rest is None:  # the link to a later mission says enough
-                        PlainText("p", f"It cannot be continued here: {obstacle}.", "quiet")
+                    ContinueButton(console, summary.id)
             if not summary.has_ended:
                 await follow(console.notifier, partial(_update, console, page))
 
@@ -65,28 +60,20 @@ class _MissionPage:
     def __init__(self, console: Console, summary: MissionSummary) -> None:
         self.mission, self.has_ended = summary.id, False
         self._console = console
-        self._shown: object = None
         self._count = 0
-        self._head = ui.element("div").classes("mission-head")
+        self._head = DrawnBox("mission-head", _draw_header)
         self.rest = ui.element("div").classes("mission-rest")
         PlainText("h2", "What happened")
         self._timeline = ui.element("ol").classes("timeline")
         self._more = PlainText("p", "", "quiet")
         PlainText("h2", "Program")
-        self._source = ui.element("pre").classes("source").props("tabindex=0 dir=auto")
+        self._source = DrawnBox("source", _draw_source, "pre").props("tabindex=0 dir=auto")
 
     def show(self, summary: MissionSummary, events: Sequence[LogLine], rest: MissionSummary | None) -> None:
         """Show a mission, including new events, and a link to the mission that did its rest."""
         self.has_ended = summary.has_ended
-        state = state_words(summary, self._console.view)
-        if (summary, state) != self._shown:
-            self._shown = (replace(summary), state)
-            self._head.clear()
-            with self._head:
-                _draw_header(summary, state, rest)
-            self._source.clear()
-            with self._source:
-                _draw_source(summary)
+        self._head.show((summary, state_words(summary, self._console.view), rest))
+        self._source.show(summary)
         steps = list(timeline(events[:MAX_LISTED_EVENTS]))
         with self._timeline:
             for line, words in steps[self._count :]:
@@ -96,7 +83,8 @@ class _MissionPage:
         self._more.say(f"Download the events to see {more:,} more." if more > 0 else "")
 
 
-def _draw_header(summary: MissionSummary, state: str, rest: MissionSummary | None) -> None:
+def _draw_header(mission: tuple[MissionSummary, str, MissionSummary | None]) -> None:
+    summary, state, rest = mission
     began = datetime.fromtimestamp(summary.created).astimezone()
     PlainText("h1", shortened(title(summary), 300))
     with ui.element("div").classes(f"ending ending-{summary.state}"):

@@ -6,7 +6,8 @@ import asyncio
 import json
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Sequence
+from functools import partial
 from itertools import islice
 from typing import Any
 
@@ -14,21 +15,25 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from codebotler.checking.problems import CheckResult
-from codebotler.core.errors import UserError
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.display.view import SessionView
-from codebotler.missions.mission import MissionError
 from codebotler.missions.storage.log import MissionState
 from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
-from codebotler.web.frame import Button, PlainText, script, scroll_up, warn
+from codebotler.web.frame import Button, DrawnBox, PlainText, script, scroll_up, warn, warned
 from codebotler.web.panes.candidates import CandidatesPane
-from codebotler.web.panes.continuing import EARLY_ENDS, PastPane, is_unfinished, origin_text, storyboard_title
-from codebotler.web.panes.contract import ContractPane
+from codebotler.web.panes.continuing import (
+    EARLY_ENDS,
+    draw_past,
+    is_unfinished,
+    origin_text,
+    storyboard_title,
+)
+from codebotler.web.panes.contract import draw_contract
 from codebotler.web.panes.reply import ReplyPane
 from codebotler.web.panes.rules import RulesPane
-from codebotler.web.storyboard import RouteProgress, draw_strips
+from codebotler.web.storyboard import Storyboard, draw_strips
 
 _CALL = re.compile(r"\b([^\W\d]\w*)(?=\s*\()")
 _MAX_MARKS, _MAX_ESCAPES = 400, 2_000
@@ -44,7 +49,6 @@ class ProgramPane:
         self._console = console
         self._received = 0  # the number of the last text received from this browser
         self._sent: dict[str, object] = {}
-        self._drawn: tuple[object, ...] = ()
         script("editor.js")
         ui.on("program-typed", self._typed)
         with ui.element("section").classes("pane program").props("aria-labelledby=h-program"):
@@ -59,8 +63,8 @@ class ProgramPane:
             self._editor = ui.codemirror("", language="Python", line_wrapping=False).classes("editor")
             self._editor.on("update:value", js_handler="() => programEditor.typed()")
             self._verdict = PlainText("p", "", "verdict").props("role=status")
-            self._problems = ui.element("ul").classes("problems")
-            self._contract = ContractPane(console.robot.skills)
+            self._problems = DrawnBox("problems", _draw_problems, "ul")
+            self._contract = DrawnBox("contract", partial(draw_contract, console.robot.skills))
             self._rules = RulesPane(console)
             self._instruction = PlainText("p", "")
             self._approval = ui.element("div").classes("word")
@@ -70,8 +74,8 @@ class ProgramPane:
                 self._raise = Button("", self._raise_limit, "plain")
                 self._repair = Button("Repair", lambda: self._again(repair=True), "plain")
                 self._again_button = Button("Ask again", lambda: self._again(repair=False), "plain")
-            self._past = PastPane()
-            self._board = ui.element("div").classes("storyboard")
+            self._past = DrawnBox("done-before", draw_past)
+            self._board = DrawnBox("storyboard", draw_strips)
         self._view = console.view
         self._shown = self._typed_here = (console.view.number, console.view.program)
         self._review_until = 0.0
@@ -90,7 +94,7 @@ class ProgramPane:
         shown = _for_editor(view.arriving.code if view.is_written else view.program)
         self._send(view, shown)
         self._origin.say(origin_text(view))
-        self._past.show(view)
+        self._past.show(view.past)
         self._reply.show(view)
         self._candidates.show(view)
         self._editor.set_visibility(not view.waits_for_answer)
@@ -98,14 +102,11 @@ class ProgramPane:
         self._writer.say(_author_text(view) if view.program and not view.is_written else "")
         self._show_verdict(view)
         self._instruction.say(_instruction_text(view) if view.program else "")
-        self._contract.show(view)
+        self._contract.show(None if view.contract is None else (view.contract, view.earlier))
         self._rules.show(view)
         self._show_approval(view)
-        reached = route_progress(view)
-        drawn = (view.check, view.problems, view.unknown_rooms, shown, reached, storyboard_title(view))
-        if drawn != self._drawn:
-            self._drawn = drawn
-            self._draw(view, reached)
+        self._problems.show((view.problems, view.unknown_rooms))
+        self._board.show(None if view.check is None else storyboard_of(view, view.check))
 
     def _send(self, view: SessionView, shown: str, *, force: bool = False) -> None:
         """Send a program and its marks to the browser, which keeps its own text if that is newer."""
@@ -136,11 +137,9 @@ class ProgramPane:
         elif event.args["base"] != current:
             self._restore("Someone else changed the program; your last edit was discarded.")
         elif typed != current:
-            self._try(lambda: self._edit(typed))
+            with warned():
+                self._typed_here = self._console.edit(typed).view.number, typed
         self.show(self._console.view)
-
-    def _edit(self, typed: str) -> None:
-        self._typed_here = self._console.edit(typed).view.number, typed
 
     def _restore(self, why: str) -> None:
         """Show the console's program again, with a warning."""
@@ -196,17 +195,13 @@ class ProgramPane:
     async def _approve(self) -> None:
         session, view = self._console.session, self._view
         if self._may_rerun(view):
-            self._try(lambda: self._console.edit(view.program))
+            self._console.edit(view.program)
         elif time.monotonic() < self._review_until:
             warn("The program has changed; review it again.")
         elif session is not None and await self._is_seen(view):
-            try:
-                despite = bool(self._despite.value)
-                await asyncio.to_thread(session.approve, view.digest, despite_problems=despite)
-            except MissionError as error:
-                warn(error.sentence)
-            else:
-                scroll_up()
+            despite = bool(self._despite.value)
+            await asyncio.to_thread(session.approve, view.digest, despite_problems=despite)
+            scroll_up()
 
     async def _is_seen(self, view: SessionView) -> bool:
         """Whether this browser shows exactly the view's program, since two people may type at once."""
@@ -222,41 +217,28 @@ class ProgramPane:
     def _again(self, *, repair: bool, max_tokens: int | None = None) -> None:
         session = self._console.session
         if session is not None:
-            self._try(lambda: session.ask_again(repair=repair, max_tokens=max_tokens))
+            session.ask_again(repair=repair, max_tokens=max_tokens)
 
     def _raise_limit(self) -> None:
         none = self._console.view.programless
         if none is not None:
             self._again(repair=False, max_tokens=none.higher_limit)
 
-    def _try(self, do: Callable[[], object]) -> None:
-        try:
-            do()
-        except (MissionError, UserError) as error:
-            warn(error.sentence)
 
-    def _draw(self, view: SessionView, reached: RouteProgress) -> None:
-        self._problems.clear()
-        with self._problems:
-            for sentence in (*view.problems, *view.unknown_rooms)[:_MAX_PROBLEMS]:
-                kind = "problem" if sentence in view.problems else "unsure"
-                PlainText("li", shortened(sentence), kind)
-        self._board.clear()
-        if view.check is not None:
-            with self._board:
-                draw_strips(view.check, reached, storyboard_title(view))
+def _draw_problems(found: tuple[Sequence[str], Sequence[str]]) -> None:
+    problems, unknown_rooms = found
+    for sentence in (*problems, *unknown_rooms)[:_MAX_PROBLEMS]:
+        PlainText("li", shortened(sentence), "problem" if sentence in problems else "unsure")
 
 
-def route_progress(view: SessionView) -> RouteProgress:
-    """Return the robot's progress, with rooms named as in the check."""
-    named = view.room_map or (view.check and view.check.room_map)
-    if not named:
-        return RouteProgress()
-    visited = tuple(named.room(words) or words for words in view.progress.visited)
+def storyboard_of(view: SessionView, check: CheckResult) -> Storyboard:
+    """Return what the check expects, and how far the robot has come, with rooms named as in the check."""
+    room_map = view.room_map or check.room_map
+    visited = tuple(room_map.room(words) or words for words in view.progress.visited)
     end = ""
     if view.is_over and view.state in EARLY_ENDS:
         end = "failed" if view.state is MissionState.FAILED else "stopped"
-    return RouteProgress(visited, view.progress.looks, view.progress.answers, end)
+    return Storyboard(check, storyboard_title(view), visited, view.progress.learned, end)
 
 
 def _author_text(view: SessionView) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from nicegui import ui
 
 from codebotler.core.terminal import shortened
 from codebotler.core.text.words import counted
-from codebotler.robots.base import AnswerError
 from codebotler.robots.face import Face, FaceQuestion
-from codebotler.web.frame import Button, PlainText, warn
+from codebotler.web.frame import Button, DrawnBox, PlainText
 
 _MAX_OPTIONS, _MAX_OPTION_CHARACTERS = 50, 200
 
@@ -18,9 +19,9 @@ class QuestionPane:
 
     def __init__(self, face: Face) -> None:
         self._face = face
-        self._drawn: FaceQuestion | None = None
         self._screens = PlainText("p", "", "quiet")
-        self._box = ui.element("div").classes("asking").props('role=group aria-label="What the robot asks"')
+        self._box = DrawnBox("asking", self._draw)
+        self._box.props('role=group aria-label="What the robot asks"')
 
     def show(self, *, is_over: bool) -> None:
         """Show the current question. During a mission, recommend opening the face if no screen shows it."""
@@ -29,14 +30,7 @@ class QuestionPane:
         nobody = "" if is_over else "Open the robot's face so people can see what it says and asks."
         self._screens.say(shown if screens else nobody)
         self._screens.classes(add="" if screens else "unsure", remove="unsure" if screens else "")
-        question = self._face.shown.question
-        self._box.set_visibility(question is not None)
-        if question is not self._drawn:
-            self._drawn = question
-            self._box.clear()
-            if question is not None:
-                with self._box:
-                    self._draw(question)
+        self._box.show(self._face.shown.question)
 
     def _draw(self, question: FaceQuestion) -> None:
         PlainText(
@@ -46,10 +40,4 @@ class QuestionPane:
         with ui.element("div").classes("word"):
             for position, option in enumerate(question.options[:_MAX_OPTIONS]):
                 words = shortened(option, _MAX_OPTION_CHARACTERS).strip() or "(blank)"
-                Button(words, lambda at=position: self._answer(question, at), "plain")
-
-    def _answer(self, question: FaceQuestion, position: int) -> None:
-        try:
-            self._face.answer(question.number, position)
-        except AnswerError as error:
-            warn(error.sentence)
+                Button(words, partial(self._face.answer, question.number, position), "plain")

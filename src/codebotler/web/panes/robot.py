@@ -17,7 +17,7 @@ from codebotler.missions.storage.log import MissionState, MissionSummary
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.floorplan import MapState, floorplan, room_at
-from codebotler.web.frame import Button, PlainText, script
+from codebotler.web.frame import Button, DrawnBox, PlainText, script
 from codebotler.web.panes.continuing import ContinueButton, can_be_continued
 from codebotler.web.panes.question import QuestionPane
 
@@ -45,7 +45,7 @@ class RobotPane:
             with ui.element("div").classes("head"):
                 PlainText("h2", "Status").props("id=h-status")
                 PlainText("span", console.robot.name, "robot-name")
-            self._interrupted = ui.element("div").classes("interrupted")
+            self._interrupted = DrawnBox("interrupted", self._draw_interrupted)
             self._state = PlainText("p", "", "headline").props("role=status aria-live=polite")
             self._doing = PlainText("p", "", "doing")
             self._where = PlainText("p", "", "quiet")
@@ -54,12 +54,10 @@ class RobotPane:
             self._continue = ContinueButton(console)
             self._map = ui.html("", sanitize=False).classes("map")
             self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')
-        self._shown_interrupted: tuple[MissionSummary, ...] = ()
-        self._interrupted.set_visibility(False)
 
     def show(self, view: SessionView) -> None:
         """Update the pane for a view."""
-        self._show_interrupted(self._console.interrupted)
+        self._interrupted.show(self._console.interrupted or None)
         progress = view.progress
         self._state.say(_headline(view))
         self._state.classes(replace=f"headline {view.phase or 'none'}")
@@ -109,24 +107,14 @@ class RobotPane:
                     PlainText("span", moment.text, "text")
         ui.run_javascript(f"moments.follow({self._log.id})")
 
-    def _show_interrupted(self, summaries: tuple[MissionSummary, ...]) -> None:
-        if summaries == self._shown_interrupted:
-            return
-        self._shown_interrupted = summaries
-        self._interrupted.clear()
-        self._interrupted.set_visibility(bool(summaries))
-        with self._interrupted:
-            for summary in summaries:
-                what = shortened(title(summary), _MAX_TITLE)
-                PlainText("p", f"Mission {summary.id} ({what}) was interrupted: {summary.reason}")
-                if not can_be_continued(summary):
-                    continue
-                if obstacle := self._console.obstacles[summary.id]:
-                    PlainText("p", f"It cannot be continued here: {obstacle}.", "quiet")
-                else:
-                    button = ContinueButton(self._console, summary.id)
-                    button.props(f'aria-label="Continue mission {summary.id}"')
-            Button("Dismiss", self._console.dismiss, "plain")
+    def _draw_interrupted(self, summaries: tuple[MissionSummary, ...]) -> None:
+        for summary in summaries:
+            what = shortened(title(summary), _MAX_TITLE)
+            PlainText("p", f"Mission {summary.id} ({what}) was interrupted: {summary.reason}")
+            if can_be_continued(summary):
+                button = ContinueButton(self._console, summary.id)
+                button.props(f'aria-label="Continue mission {summary.id}"')
+        Button("Dismiss", self._console.dismiss, "plain")
 
 
 def _headline(view: SessionView) -> str:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Container, Iterable
+from functools import partial
 
 from nicegui import ui
 
+from codebotler.checking.problems import RuleProof
 from codebotler.core.terminal import shortened
 from codebotler.missions.display.view import SessionView
-from codebotler.missions.mission import MissionError
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.web.console import Console
-from codebotler.web.frame import Button, PlainText, warn
+from codebotler.web.frame import Button, DrawnBox, PlainText
 
 _MAX_RULES, _MAX_RULE_CHARACTERS, _MAX_SWITCH_OFF_REASON = 100, 300, 500
 
@@ -21,26 +23,21 @@ class RulesPane:
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._drawn: tuple[object, ...] = ()
-        self._box = ui.element("div").classes("house-rules")
-        self._box.set_visibility(bool(console.rules))
+        self._box = DrawnBox("house-rules", self._draw)
 
     def show(self, view: SessionView) -> None:
         """Show which rules are in force."""
         proofs = () if view.check is None else view.check.proofs
-        drawn = (view.disabled_rules, view.may_be_approved, proofs)
-        if self._console.rules and drawn != self._drawn:
-            self._drawn = drawn
-            self._box.clear()
-            with self._box:
-                self._draw(view)
+        if self._console.rules:
+            self._box.show((view.disabled_rules, view.may_be_approved, proofs))
 
-    def _draw(self, view: SessionView) -> None:
+    def _draw(self, content: tuple[Container[str], bool, Iterable[RuleProof]]) -> None:
+        disabled, may_be_approved, found = content
         PlainText("h3", "House rules")
-        proofs = {} if view.check is None else {proof.rule: proof for proof in view.check.proofs}
+        proofs = {proof.rule: proof for proof in found}
         with ui.element("ul"):
             for rule in self._console.rules[:_MAX_RULES]:
-                is_off = rule.name in view.disabled_rules
+                is_off = rule.name in disabled
                 with ui.element("li").classes("off" if is_off else ""):
                     with ui.element("div"):
                         PlainText("span", shortened(rule.says, _MAX_RULE_CHARACTERS))
@@ -48,8 +45,8 @@ class RulesPane:
                             PlainText("small", f"It {proofs[rule.name].words}.", "quiet")
                     if is_off:
                         PlainText("small", "switched off for this program", "quiet")
-                    elif view.may_be_approved:
-                        off = Button("Switch off …", lambda rule=rule: self._ask_why(rule), "plain small")
+                    elif may_be_approved:
+                        off = Button("Switch off …", partial(self._ask_why, rule), "plain small")
                         off.props(f'aria-label="Switch off the rule {rule.name} for this program"')
 
     def _ask_why(self, rule: Rule) -> None:
@@ -64,12 +61,9 @@ class RulesPane:
 
             async def switch_off() -> None:
                 session = self._console.session
-                try:
-                    if session is not None:
-                        await asyncio.to_thread(session.switch_off, rule.name, reason.value or "")
-                    dialog.close()
-                except MissionError as error:
-                    warn(error.sentence)
+                if session is not None:
+                    await asyncio.to_thread(session.switch_off, rule.name, reason.value or "")
+                dialog.close()
 
             with ui.element("div").classes("word"):
                 Button("Switch it off", switch_off, "risky go")

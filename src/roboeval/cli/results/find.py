@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from codebotler.core.errors import UserError
-from roboeval.cli.inputs import load, open_current
+from roboeval.cli.inputs import open_current
 from roboeval.cli.options import (
     AblationOption,
     InWorldOption,
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from codebotler.rtl import Formula
     from roboeval.analysis.search import TraceMatch
     from roboeval.evaluation.runs.completions import CompletionKey
-    from roboeval.suites.load import Suite
 
 
 def find(
@@ -50,18 +49,19 @@ def find(
     from roboeval.analysis.search import TraceQuery, match_row
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
-    from roboeval.evaluation.runs.folder import RunFolder, with_judged_worlds
 
     if negated and formula is None:
         fail("--not needs a formula; add one, or leave out --not")
-    known = with_judged_worlds(RunFolder(run), load(suite), ablated=ablation)
-    task = None if task is None else known.task(task).name
-    query = TraceQuery(None if formula is None else parse_formula(formula), negated, task, world)
-    if world is not None:
-        expect_world(world, known, task, ablated=ablation)
+    parsed = None if formula is None else parse_formula(formula)
     results = open_current(run, suite, ablated=ablation)
+    task = None if task is None else results.known_suite.task(task).name
+    query = TraceQuery(parsed, negated, task, world)
     matches = (match_row(results.row(key), query) for key in results.places)
     every = list(show_progress(matches, "searching", len(results.places)))
+    total = sum(one.is_in_scope for one in every)
+    if world is not None and not total:
+        of = "" if task is None else f" of {task}"
+        fail(f'no completion{of} was judged in a world "{world}"; `roboeval tasks TASK` lists the worlds')
     found = [one for one in every if one.worlds]
     passed = {*results.passed}
     failed = [results.row(one.key) for one in found if one.key not in passed]
@@ -71,7 +71,6 @@ def find(
     undecided = [one for one in every if one.cut]
     if undecided:
         note(f"undecided because their traces were too long to save: {how_many(len(undecided))}")
-    total = sum(one.is_in_scope for one in every)
     if json:
         data = {
             "looked_at": total,
@@ -92,17 +91,6 @@ def parse_formula(text: str) -> Formula:
         return parse(text)
     except RtlSyntaxError as error:
         raise UserError(f"the formula is not valid: {error}") from None
-
-
-def expect_world(world: str, suite: Suite, task: str | None, *, ablated: bool) -> None:
-    """Exit with status 2 if no task, or not the given task, has a world with this number or description."""
-    tasks = [suite.tasks[task]] if task else list(suite.tasks.values())
-    scenarios = [one.judged_in(ablated=ablated) for one in tasks]
-    abouts = {scenario.world.about.lower() for those in scenarios for scenario in those}
-    numbers = {str(n) for n in range(1, max(map(len, scenarios)) + 1)}
-    if world.lower() not in abouts | numbers:
-        where = task or f'the suite "{suite.name}"'
-        fail(f'{where} has no world "{world}"; `roboeval tasks TASK` lists the worlds of a task')
 
 
 def found_data(

@@ -17,7 +17,6 @@ from codebotler.cli.options import (
 )
 from codebotler.core.errors import UserError
 from roboeval.cli.inputs import (
-    command,
     expect_judged,
     find_gap,
     load,
@@ -82,7 +81,7 @@ def show(
         expect_judged(part, judged.places)
         if is_one:
             key = task, numbers[0], numbers[1]
-            show_completion(judged, key, suite, in_full=in_full, with_reply=with_reply, as_json=json)
+            show_completion(judged, key, in_full=in_full, with_reply=with_reply, as_json=json)
         else:
             show_part(judged, task, numbers[0] if numbers else None, as_json=json)
     if not is_one and (unjudged := find_gap(judged, suite, rules)) is not None:
@@ -150,20 +149,11 @@ def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool)
 
 
 def show_completion(
-    judged: Results,
-    key: CompletionKey,
-    suite: str,
-    *,
-    in_full: bool,
-    with_reply: bool,
-    as_json: bool,
+    judged: Results, key: CompletionKey, *, in_full: bool, with_reply: bool, as_json: bool
 ) -> None:
-    """Print a completion. If it fails, also print the command that shows the nearest passing program."""
-    from codebotler.core.text.words import counted
-    from roboeval.analysis.failure_groups import nearest_fix
+    """Print a completion with the reasons of its verdict."""
     from roboeval.cli.views.completions import completion_view
     from roboeval.evaluation.judging.explanation import completion_data
-    from roboeval.evaluation.judging.failures import NO_PROGRAM_CLASS
 
     written = judged.completions[key]
     data = completion_data(judged.row(key), written, judged.suite, ablated=judged.is_ablated)
@@ -171,11 +161,6 @@ def show_completion(
         print_json({**data, "ablation": judged.is_ablated})
     else:
         print_rich(completion_view(data, in_full=in_full, with_reply=with_reply))
-    if data["passed"] or data["failure"]["class"] == NO_PROGRAM_CLASS:
-        return
-    if (fix := nearest_fix(judged, key)) is not None:
-        again = command("show", judged.run.path, fix.name, suite=suite, ablated=judged.is_ablated)
-        note(f"the nearest passing program differs in {counted(fix.changed, 'line')}: `{again}`")
 
 
 def export(
@@ -198,10 +183,7 @@ def export(
     from roboeval.evaluation.runs.table import TABLE_BEGINNINGS, Price, kind_of, with_cost, write_table
 
     kind = format or kind_of(out)
-    try:
-        cost = None if price is None else Price.read(price)
-    except ValueError:
-        fail(f'"{price}" is not a price; write INPUT/OUTPUT, the prices per million tokens')
+    cost = None if price is None else Price.read(price)
     results = open_current(run, suite, ablated=ablation)
     table = results.table if cost is None else with_cost(results.table, cost)
     path = out or results.run.rows(str(results.key)).with_suffix(f".{kind}")

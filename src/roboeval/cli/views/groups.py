@@ -91,8 +91,6 @@ def resample_view(
     for limit in (resample(prompts, retries) for retries in limits):
         shares = (*limit.prompts.values(), limit.accepted, limit.ran)
         table.add_row(f"{limit.retries}", f"{limit.passed.mean:.3f}", *(f"{share:.1%}" for share in shares))
-    hopeless = sum(not prompt.accepted for prompt in prompts)
-    of = "prompt" if hopeless == 1 else "prompts"
     return Group(
         Text(visible(title), style="bold"),
         Text("results if each program that the check rejects is regenerated:"),
@@ -106,5 +104,4 @@ def resample_view(
             "run at all: the share of programs that run without an error in all worlds of their task",
             style="dim",
         ),
-        *([Text(f"no completion of {hopeless} {of} is accepted")] if hopeless else []),
     )

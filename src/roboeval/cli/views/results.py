@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.columns import Columns
-from rich.console import Console, ConsoleOptions, Group, JustifyMethod, RenderableType
+from rich.console import Group, JustifyMethod, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -22,8 +21,6 @@ from roboeval.evaluation.runs.completions import how_many, recorded_suffix
 
 if TYPE_CHECKING:
     from roboeval.analysis.counting.broken_rules import BrokenRules
-
-MAX_TASKS_NAMED = 3  # for more tasks, only their number is shown
 
 
 def ruled(*heads: str, first: JustifyMethod = "left") -> Table:
@@ -40,7 +37,7 @@ def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
     if summary.ablated:
         head.append(" (ablation: only common sense was required)", style="not bold")
     n, failed = summary.judged, sum(each.count for each in summary.failures)
-    parts: list[RenderableType] = [head, Text(), _TaskTable(summary), Text()]
+    parts: list[RenderableType] = [head, Text(), _task_table(summary), Text()]
     parts += [*_overall(summary), *_missed(summary.missing)]
     if (warning := summary.scope.cut_off_warning) is not None:
         parts.append(Text(warning, style="yellow"))
@@ -80,47 +77,20 @@ MISSING_REASONS = {
 def _missed(missing: Mapping[str, Sequence[str]]) -> Iterator[Text]:
     for reason, tasks in missing.items():
         if tasks:
-            named = (
-                ", ".join(map(visible, tasks))
-                if len(tasks) <= MAX_TASKS_NAMED
-                else counted(len(tasks), "task")
-            )
-            yield Text(f"{MISSING_REASONS[reason]} {named}", style="dim")
+            yield Text(f"{MISSING_REASONS[reason]} {counted(len(tasks), 'task')}", style="dim")
 
 
-@dataclass(frozen=True)
-class _TaskTable:
-    """A table of task scores, with fewer columns if task names would not fit otherwise."""
-
-    summary: EvaluationSummary
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Table]:
-        boundless = options.update(max_width=10_000)
-        tables = list(self._tables())
-        fitting = (t for t in tables if console.measure(t, options=boundless).maximum <= options.max_width)
-        yield next(fitting, tables[-1])
-
-    def _tables(self) -> Iterator[Table]:
-        passes = [f"pass@{k}" for k in self.summary.k]
-        yield self._table("completions", *passes, "worst prompt", "best prompt")
-        yield self._table("completions", *passes, "worst\nprompt", "best\nprompt")
-        yield self._table("completions", *passes)
-        for count in range(len(passes), 0, -1):
-            yield self._table(*passes[:count])
-
-    def _table(self, *columns: str) -> Table:
-        table = ruled("task", *columns)
-        first = self.summary.k[0]
-        for task in self.summary.tasks:
-            shares = {f"pass@{k}": task.pass_at(k).mean for k in self.summary.k}
-            shares |= {"worst prompt": task.lowest(first), "best prompt": task.highest(first)}
-            styles: dict[float, str] = {0: "red", 1: "green"}
-            cells = {name: Text(f"{share:.2f}", styles.get(share, "")) for name, share in shares.items()}
-            coverage = self.summary.scope.coverage(task.n, task.task)
-            of = "" if coverage.is_whole else f" of {coverage.total:,}"
-            cells["completions"] = Text(f"{coverage.judged:,}{of}")
-            table.add_row(Text(visible(task.task)), *(cells[name.replace("\n", " ")] for name in columns))
-        return table
+def _task_table(summary: EvaluationSummary) -> Table:
+    table = ruled("task", "completions", *(f"pass@{k}" for k in summary.k), "worst prompt", "best prompt")
+    styles: dict[float, str] = {0: "red", 1: "green"}
+    for task in summary.tasks:
+        ends = task.lowest(summary.k[0]), task.highest(summary.k[0])
+        shares = (*(task.pass_at(k).mean for k in summary.k), *ends)
+        coverage = summary.scope.coverage(task.n, task.task)
+        of = "" if coverage.is_whole else f" of {coverage.total:,}"
+        cells = (Text(f"{share:.2f}", styles.get(share, "")) for share in shares)
+        table.add_row(Text(visible(task.task)), f"{coverage.judged:,}{of}", *cells)
+    return table
 
 
 def _overall(summary: EvaluationSummary) -> list[Text]:

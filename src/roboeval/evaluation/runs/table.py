@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -72,14 +73,12 @@ class Price(NamedTuple):
 
     @classmethod
     def read(cls, text: str) -> Price:
-        """Parse `INPUT/OUTPUT`. Raise ValueError unless both are numbers from 0 to a million."""
-        try:
+        """Parse `INPUT/OUTPUT`. Raise UserError unless both are numbers from 0 to a million."""
+        with suppress(TypeError, ValueError):
             price = cls(*map(float, text.split("/")))
-        except TypeError as error:
-            raise ValueError(text) from error
-        if not all(0 <= number < MILLION for number in price):
-            raise ValueError(text)
-        return price
+            if all(0 <= number < MILLION for number in price):
+                return price
+        raise UserError(f'"{text}" is not a price; write INPUT/OUTPUT, the prices per million tokens')
 
     def of(self, input_tokens: Tokens, output_tokens: Tokens) -> Tokens:
         """Compute the cost of tokens, given as numbers or as columns."""

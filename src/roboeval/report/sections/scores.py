@@ -22,7 +22,7 @@ from roboeval.analysis.metrics import (
     share_at_least,
     threshold_curve,
 )
-from roboeval.analysis.statistics import MIN_CLUSTERS, by_bootstrap
+from roboeval.analysis.statistics import by_bootstrap
 from roboeval.report import paper
 from roboeval.report.figures import bars as figures
 from roboeval.report.figures.curves import draw_thresholds
@@ -51,24 +51,7 @@ def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         counts = coverage.judged, coverage.total, len(run.by_prompt), len(tasks)
         rows.append([run.name, *counts, found[0].mean, *ends])
     missions = [note("missions")] if any(has_missions(run.table) for run in runs) else []
-    return sheet("overall", rows, notes=[*missions, *_few_tasks(runs), *_unfinished(runs)])
-
-
-def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
-    few = [run.name for run in runs if len(run.scores) < MIN_CLUSTERS]
-    if not few:
-        return []
-    of_which = "" if len(few) == len(runs) else f" of {', '.join(few)}"
-    few_tasks = f"The bootstrap interval{of_which} is too narrow with fewer than {MIN_CLUSTERS} tasks"
-    return [f"{few_tasks}; quote the interval over tasks."]
-
-
-def _unfinished(runs: Sequence[JudgedRun]) -> list[str]:
-    return [
-        f"{run.name}: {run.results.coverage}; only judged completions count."
-        for run in runs
-        if not run.results.coverage.is_whole
-    ]
+    return sheet("overall", rows, notes=missions)
 
 
 def task_sheet(runs: Sequence[JudgedRun]) -> Sheet:
