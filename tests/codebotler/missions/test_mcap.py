@@ -296,6 +296,11 @@ def test_link_and_pipe_stay_what_they_are(
         export_mcap(pipe, *mission, "wall")
         assert got.result(30) == written(mission)
     assert pipe.is_fifo()
+    read, write = os.pipe()
+    export_mcap(Path(f"/dev/fd/{write}"), *mission, "wall")
+    os.close(write)
+    with os.fdopen(read, "rb") as output:
+        assert output.read() == written(mission)
 
 
 def test_file_is_written_whole_or_not_at_all(

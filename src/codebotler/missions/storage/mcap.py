@@ -210,14 +210,14 @@ def export_mcap(
     folder: Path | None = None,
 ) -> None:
     """Write an MCAP file atomically. Raise UserError instead of overwriting a file of another kind."""
-    path = path.resolve()
     expect_replaceable(path, b"\x89MCAP")
-    path.parent.stat()  # fail instead of creating folders for a mistyped path
     whole = io.BytesIO()
     write_mcap(whole, summary, events, folder=folder, clock=clock)
-    if path.exists() and not path.is_file():
+    if path.exists() and not path.is_file():  # such as a pipe, whose link /dev/stdout leads to no file
         path.write_bytes(whole.getvalue())
         return
+    path = path.resolve()
+    path.parent.stat()  # fail instead of creating folders for a mistyped path
     temporary = path.with_name(f".{uuid4().hex}.mcap")
     with open_replacement(path, temporary) as file:
         file.write(whole.getvalue())
