@@ -27,14 +27,9 @@ STATE_STYLES: Mapping[MissionState, str] = {
     MissionState.INTERRUPTED: "bold red",
 }
 EVENT_STYLES: Mapping[str, str] = {
-    "feedback": "dim",
-    "picture": "dim",
     "error": "red",
-    "rule": "yellow",
-    "stop": "yellow",
-    "cancelled": "yellow",
-    "late": "yellow",
-    "log": "yellow",
+    **dict.fromkeys(("feedback", "picture"), "dim"),
+    **dict.fromkeys(("rule", "stop", "cancelled", "late", "log"), "yellow"),
 }
 MAX_PLAIN_SECONDS = 999_999.95  # longer times are shown with an exponent, to fit into ten characters
 CLEAR_LINE = "\r\x1b[2K"
