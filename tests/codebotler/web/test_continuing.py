@@ -330,12 +330,10 @@ def test_a_key_pressed_while_the_recovery_is_approved_stops_the_robot(
     back = "def task_program():\n    go_to('hall')\n    go_to('study')\n"
     with desk_of(tmp_path, Author(far, back), 1, speed=50.0) as console:
 
-        def approve_and_press(session: MissionSession, seen: str, *, by: str = "") -> None:
-            console.stop("a test", only_moving=True)
-            approve(session, seen, by=by)
-
-        def watch(session: MissionSession, seen: str, *, by: str = "") -> None:
-            (approve_and_press if by else approve)(session, seen, by=by)
+        def watch(session: MissionSession, seen: str, *, by: str = "", is_person: bool = True) -> None:
+            if by:
+                console.stop("a test", only_moving=True)
+            approve(session, seen, by=by, is_person=is_person)
 
         monkeypatch.setattr(MissionSession, "approve", watch)
         fetch(console)
