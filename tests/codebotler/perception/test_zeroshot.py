@@ -89,7 +89,7 @@ def test_label_of_too_many_words_is_refused(detector: Detector) -> None:
     detector.look(PICTURE, "x" * (TOKENS - 2))
     with pytest.raises(UserError, match=rf"{TOKENS + 1} tokens; .* {TOKENS} .*hf:"):
         detector.look(PICTURE, "x" * (TOKENS - 1))
-    with pytest.raises(UserError, match="empty"):
+    with pytest.raises(UserError, match="printable characters"):
         detector.look(PICTURE, " ")
 
 
