@@ -92,7 +92,7 @@ def printed(renderable: RenderableType, width: int = 80, *, colour: bool = False
 
 
 def completion_view(
-    row: Mapping[str, Any], written: Completion | None, suite: Suite, *, in_full: bool = False
+    row: Mapping[str, Any], written: Completion, suite: Suite, *, in_full: bool = False
 ) -> RenderableType:
     return view_of_completion(completion_data(row, written, suite), in_full=in_full)
 
