@@ -9,7 +9,6 @@ from copy import deepcopy
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from functools import cache, partial
-from itertools import count
 from typing import Any, TypeAlias
 
 from codebotler.core.program import TASK_FUNCTION, all_bound_names, parse_program
@@ -70,8 +69,7 @@ class FailureGroup:
 def group_failures(failed: Iterable[Row], programs: Mapping[CompletionKey, str]) -> list[list[Row]]:
     """Group failing completions, with the largest groups first.
 
-    Groups of equal size alternate between tasks. Replies without a program form one group for each task and
-    kind of failure.
+    Replies without a program form one group for each task and kind of failure.
     """
     causes: defaultdict[Cause, list[Row]] = defaultdict(list)
     for row in failed:
@@ -79,10 +77,7 @@ def group_failures(failed: Iterable[Row], programs: Mapping[CompletionKey, str])
         causes[row["task"], why["class"], why["kind"], why["check"]].append(row)
     shape_of = cache(normalised_lines)
     found = (group for rows in causes.values() for group in _group_similar(rows, programs, shape_of))
-    turns: defaultdict[tuple[int, str], Iterator[int]] = defaultdict(count)
-    ordered = sorted(found, key=lambda rows: key_of(rows[0]))
-    placed = [(-len(rows), next(turns[len(rows), rows[0]["task"]]), rows) for rows in ordered]
-    return [rows for _, _, rows in sorted(placed, key=lambda one: one[:2])]
+    return sorted(found, key=lambda rows: (-len(rows), key_of(rows[0])))
 
 
 def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[FailureGroup]:

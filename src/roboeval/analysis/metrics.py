@@ -87,10 +87,6 @@ class PromptScore:
 
     def pass_at(self, k: int) -> float:
         """Return pass@k of the prompt. Raise ValueError if it has fewer than k completions."""
-        if k > self.n:
-            raise ValueError(
-                f"{self.task}, prompt {self.prompt}: pass@{k} cannot be estimated from {self.n} completions"
-            )
         return pass_at_k(self.n, self.c, k)
 
 

@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import visible
 from roboeval.analysis.counting.counts import Tally, scores_of
 from roboeval.analysis.metrics import Estimate, PromptScore, TaskScore, overall, prompts_of
 from roboeval.evaluation.judging.failures import AGENT_ERROR_CLASS, FAILURE_CLASSES
@@ -66,7 +65,7 @@ def summarise(
         estimates = tuple(overall(tasks, tries) for tries in k)
     except ValueError as error:
         fewest = min(prompt.n for prompt in prompts_of(tasks))
-        raise UserError(f"{visible(str(error))}; choose k from 1 to {fewest}") from None
+        raise UserError(f"{error}; choose k from 1 to {fewest}") from None
     scored = {score.task for score in tasks}
     expected = [n for n, task in suite.tasks.items() if task.ablation is not None or not ablated]
     missing = _missing([name for name in expected if name not in scored], scope)

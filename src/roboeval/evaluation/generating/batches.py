@@ -27,7 +27,7 @@ from codebotler.models.servers.batch import BatchModel
 from roboeval.evaluation.generating.generate import reply_of_refusal
 from roboeval.evaluation.generating.requests import GenerationPlan, batches, begin_batch
 from roboeval.evaluation.runs.completions import CompletionKey, how_many, row_for
-from roboeval.evaluation.runs.folder import RunFolder, load_json_object
+from roboeval.evaluation.runs.folder import RunFolder, about_of
 from roboeval.evaluation.runs.source import MAX_ANSWER_BYTES
 from roboeval.suites.load import Suite
 
@@ -136,13 +136,11 @@ def _row(
 
 
 def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:
-    if not run.about.is_file():
+    about = about_of(run)
+    if not batches(about):
         raise UserError(
             "was not started by `roboeval generate --requests`; name the run that was", file=run.path
         )
-    about = load_json_object(run.about)
-    if not isinstance(about.get("settings"), dict) or not batches(about):
-        raise UserError("holds imported completions; name the run that the requests belong to", file=run.path)
     if about.get("suite") != suite.name:
         raise UserError(
             f'belongs to the suite "{about.get("suite")}"; select that suite with --suite', file=run.path

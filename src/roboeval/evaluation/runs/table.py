@@ -107,12 +107,12 @@ def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequenc
 
 
 class TableBuilder:
-    """Builds the table that `load_results` describes from the rows of an evaluation."""
+    """Builds the table that `load_results` describes from the rows of an evaluation.
 
-    def __init__(
-        self,
-        categories: Mapping[tuple[str, str], str] = {},  # of requirements, by task and requirement text
-    ) -> None:
+    `categories` are those of requirements, by task and text.
+    """
+
+    def __init__(self, categories: Mapping[tuple[str, str], str] = {}) -> None:
         self._categories = categories
         self._frame = pl.DataFrame(schema={**COMPLETION_COLUMNS, **WORLD_COLUMNS})
         self._start()
@@ -129,7 +129,7 @@ class TableBuilder:
         key = dict(zip(KEY, key_of(row), strict=True))
         judged = {**key, "program_sha256": row["program_sha256"], "passed": row["passed"]}
         failure = {f"failure_{name}": value for name, value in (row["failure"] or {}).items()}
-        known = {} if written is None else _reply(written) | _texts(written)
+        known = {} if written is None else _known_of(written)
         # Columns without an entry are null.
         self._rows.append({**judged, **failure, **known})
         self._counts.append(len(row["verdicts"]))
@@ -163,29 +163,25 @@ class TableBuilder:
         self._start()
 
 
-def _reply(written: Completion) -> dict[str, Any]:
-    """Return how a model was used, and what it took; of an agent, also where and how its mission ended."""
-    used = {"mode": written.mode, "turns": 1, **reply_numbers(written)}
-    if written.model is not None:
-        used["model"] = storable(written.model)
-    if (acted := written.acted) is None:
-        return used
-    counts = written.more.get("tool_errors")
-    errors = [number_or_none(one, int) or 0 for one in counts.values()] if isinstance(counts, dict) else []
-    mission = {"ending": acted.ending, "mission_world": acted.world, "turns": written.turns}
-    return {**used, **mission, "tool_errors": sum(errors)}
-
-
-def _texts(written: Completion) -> dict[str, str | bool]:
-    """Return what is known of the program and of its reply."""
+def _known_of(written: Completion) -> dict[str, Any]:
+    """Return the texts of a completion, how its model was used, and what the reply or the mission took."""
     texts = {
+        "model": written.model,
         "instruction": written.instruction,
         "program": written.program,
         NO_PROGRAM_COLUMN: written.more.get(NO_PROGRAM_COLUMN),
         "finish_reason": written.finish_reason,
     }
-    known: dict[str, str | bool] = {name: storable(text) for name, text in texts.items() if text is not None}
-    return known if written.finish_reason is None else {**known, "cut_off": written.is_cut_off}
+    known: dict[str, Any] = {name: storable(text) for name, text in texts.items() if text is not None}
+    if written.finish_reason is not None:
+        known["cut_off"] = written.is_cut_off
+    known |= {"mode": written.mode, "turns": 1, **reply_numbers(written)}
+    if (acted := written.acted) is None:
+        return known
+    counts = written.more.get("tool_errors")
+    errors = [number_or_none(one, int) or 0 for one in counts.values()] if isinstance(counts, dict) else []
+    mission = {"ending": acted.ending, "mission_world": acted.world, "turns": written.turns}
+    return {**known, **mission, "tool_errors": sum(errors)}
 
 
 def storable(text: str) -> str:
