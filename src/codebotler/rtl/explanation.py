@@ -172,12 +172,9 @@ def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: b
     exactly = isinstance(test, formulas.Count)
     span = positions_in_scopes(test.scopes, trace)
     found = [at for at in span if _is_conclusive_match(test.element, trace, at)]
-    if found:
-        text = describe_action(
-            test.element, "past", when=f" {times(len(found))} ({_steps(found)})", where=where
-        )
-    else:
-        text = f"never {describe_action(test.element, 'past', negated=True, where=where)}"
+    when = f" {times(len(found))} ({_steps(found)})" if found else ""
+    text = describe_action(test.element, "past", negated=not found, when=when, where=where)
+    text = text if found else f"never {text}"
     if is_true:
         limit = f"not do so exactly {times(number)}" if exactly else f"do so {times(number - 1)} at most"
         return _Fact(found[-1] if found else None, text, f", but {'must' if exactly else 'may'} {limit}")
