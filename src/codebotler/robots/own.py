@@ -82,10 +82,7 @@ class OwnRobot:
 
     def _method(self, skill: str) -> Callable[..., Any] | None:
         """Return the method for a skill, or None. If there is no `get_all_rooms`, use `rooms` instead."""
-        try:
-            method = getattr(self._body, skill, None)
-        except Exception as error:
-            raise UserError(f"{self.name}.{skill} cannot be read: {_describe(error)}") from error
+        method = getattr(self._body, skill, None)
         if method is None and skill == "get_all_rooms":
             method = self._body.rooms
         return method if callable(method) else None

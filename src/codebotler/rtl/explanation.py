@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -14,11 +14,10 @@ from codebotler.rtl import formulas
 from codebotler.rtl.semantics import (
     Inconclusive,
     bounding_event,
-    during_stays,
-    first_stay,
     holds,
     is_match,
     narrow,
+    positions,
     positions_in_scopes,
 )
 from codebotler.rtl.wording import describe_action, describe_event, room, room_name
@@ -123,7 +122,7 @@ def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
 
 
 def _presence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
-    at = next(at for at in _positions(test, trace) if is_match(test.element, trace[at], at))
+    at = next(at for at in positions(test, trace) if is_match(test.element, trace[at], at))
     stay = f" in {room(test.arrival.text)}" if isinstance(test, _AtPlace) else ""
     step = f"{stay}{' last,' * isinstance(test, formulas.Last)} at step {at + 1}"
     where = _where(test.scopes, trace, is_true=True)
@@ -136,7 +135,7 @@ def _presence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
 
 def _absence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     element, where = test.element, _where(test.scopes, trace, is_true=False)
-    here = [*_positions(test, trace)]
+    here = [*positions(test, trace)]
     if isinstance(test, formulas.Exists):
         event, detail = _describe_instead(element, trace, here)
         return _Fact(
@@ -172,12 +171,9 @@ def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: b
     exactly = isinstance(test, formulas.Count)
     span = positions_in_scopes(test.scopes, trace)
     found = [at for at in span if _is_conclusive_match(test.element, trace, at)]
-    if found:
-        text = describe_action(
-            test.element, "past", when=f" {times(len(found))} ({_steps(found)})", where=where
-        )
-    else:
-        text = f"never {describe_action(test.element, 'past', negated=True, where=where)}"
+    when = f" {times(len(found))} ({_steps(found)})" if found else ""
+    text = describe_action(test.element, "past", negated=not found, when=when, where=where)
+    text = text if found else f"never {text}"
     if is_true:
         limit = f"not do so exactly {times(number)}" if exactly else f"do so {times(number - 1)} at most"
         return _Fact(found[-1] if found else None, text, f", but {'must' if exactly else 'may'} {limit}")
@@ -185,18 +181,6 @@ def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: b
     ending = f" instead of {wanted}" if found else f", but should have {wanted}"
     detail = "" if found else _describe_instead(test.element, trace, span)[1]
     return _Fact(found[number] if len(found) > number else None, text, ending, detail, is_missing=True)
-
-
-def _positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
-    span = positions_in_scopes(test.scopes, trace)
-    match test:
-        case formulas.Exists():
-            return span
-        case formulas.Last():
-            return span[-1:]
-        case formulas.ActAtSome():
-            return during_stays(test, trace, span)
-    return first_stay(test, trace, span) or ()
 
 
 def _where(scopes: tuple[formulas.Scope, ...], trace: Trace, *, is_true: bool) -> str:

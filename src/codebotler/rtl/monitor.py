@@ -27,7 +27,7 @@ class Monitor:
 
     def __init__(self, formula: formulas.Formula, events: Iterable[Event] | None = None) -> None:
         self.formula = formula
-        self._machine = machine = _Machine.of(formula)
+        self._machine = machine = _shared_machine(formula)
         self._state: Any = machine.start
         self.holds = machine.accepts(self._state)
         self._seen = 0
@@ -86,11 +86,6 @@ class _Machine:
         self.start, self.accepts = self._machine.start, self._machine.accepts
         self.steps: dict[tuple[Any, int], tuple[Any, bool]] = {}
 
-    @classmethod
-    @lru_cache(maxsize=256)
-    def of(cls, formula: formulas.Formula) -> _Machine:
-        return cls(formula)
-
     def mask(self, event: Event, at: int) -> int:
         wanted = self._by_kind.get(event.kind)
         if wanted is None:  # the usual case
@@ -112,3 +107,6 @@ class _Machine:
         if len(self.steps) < MAX_CACHED_STEPS:
             self.steps[state, mask] = found
         return found
+
+
+_shared_machine = lru_cache(maxsize=256)(_Machine)  # monitors of the same formula share its cached steps

@@ -5,9 +5,8 @@ A scope is a range of positions. A test reads the events once, in order, and sto
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import islice
-from typing import assert_never
 
 from codebotler.core.trace import Event, Option, Trace
 from codebotler.rtl import formulas
@@ -56,22 +55,25 @@ def visible(trace: Trace) -> tuple[object, ...]:
 
 
 def _test_holds(test: formulas.Test, trace: Trace) -> bool:
+    match test:
+        case formulas.AtLeast(element, number):
+            return at_least(element, number, trace, positions_in_scopes(test.scopes, trace)) == number
+        case formulas.Count(element, number):
+            return at_least(element, number + 1, trace, positions_in_scopes(test.scopes, trace)) == number
+    return first(test.element, trace, positions(test, trace)) is not None
+
+
+def positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
+    """Return the positions at which a matching event makes a test hold."""
     span = positions_in_scopes(test.scopes, trace)
     match test:
-        case formulas.Exists(element):
-            return first(element, trace, span) is not None
-        case formulas.Last(element):
-            return len(span) > 0 and is_match(element, trace[span[-1]], span[-1])
-        case formulas.ActAtFirst(_, element):
-            stay = first_stay(test, trace, span)
-            return stay is not None and first(element, trace, stay) is not None
-        case formulas.ActAtSome(_, element):
-            return any(is_match(element, trace[at], at) for at in during_stays(test, trace, span))
-        case formulas.AtLeast(element, number):
-            return at_least(element, number, trace, span) == number
-        case formulas.Count(element, number):
-            return at_least(element, number + 1, trace, span) == number
-    assert_never(test)
+        case formulas.Exists():
+            return span
+        case formulas.Last():
+            return span[-1:]
+        case formulas.ActAtSome():
+            return during_stays(test, trace, span)
+    return first_stay(test, trace, span) or ()
 
 
 def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
@@ -115,8 +117,8 @@ def _offers(element: formulas.EventPattern, event: Event, at: int) -> bool:
     return False
 
 
-def occurrences(element: formulas.EventPattern, trace: Trace, span: range) -> Iterator[int]:
-    """Yield the positions of all matching events in a span."""
+def occurrences(element: formulas.EventPattern, trace: Trace, span: Iterable[int]) -> Iterator[int]:
+    """Yield those of the positions in a span whose events match."""
     kind = element.kind  # compared first, since most events have another kind
     for at in span:
         event = trace[at]
@@ -124,7 +126,7 @@ def occurrences(element: formulas.EventPattern, trace: Trace, span: range) -> It
             yield at
 
 
-def first(element: formulas.EventPattern, trace: Trace, span: range) -> int | None:
+def first(element: formulas.EventPattern, trace: Trace, span: Iterable[int]) -> int | None:
     """Return the position of the first matching event in a span, or None."""
     return next(occurrences(element, trace, span), None)
 

@@ -9,6 +9,7 @@ from difflib import get_close_matches
 
 from codebotler.core.skills.kinds import INSIDE
 from codebotler.core.skills.paper import SKILLS
+from codebotler.core.text.words import brief
 
 SKILL_KINDS = {skill.name: skill.recording.kind for skill in SKILLS.rows if skill.recording}
 _MAX_SHOWN_LENGTH = 40
@@ -51,8 +52,7 @@ class FormulaSource:
 
     def expected(self, what: str, node: ast.expr) -> RtlSyntaxError:
         """Return the error for a node of the wrong kind."""
-        found = ast.get_source_segment(self.text, node) or "something else"
-        found = found if len(found) <= _MAX_SHOWN_LENGTH else found[: _MAX_SHOWN_LENGTH - 3] + "..."
+        found = brief(ast.get_source_segment(self.text, node) or "something else", _MAX_SHOWN_LENGTH)
         hint = "; put quotes around it" if "string" in what and isinstance(node, ast.Name) else ""
         return self.error(node.col_offset, f"expected {what}, found {found}{hint}")
 

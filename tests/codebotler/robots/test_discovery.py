@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +54,6 @@ def test_own_actions_are_written_with_arguments_and_results() -> None:
     }
     assert skills["is_in_room"]["result"] == "result"
     assert skills["get_all_rooms"]["goal"] == {}
-    assert "# places" not in comments(*offers)
 
 
 @pytest.mark.parametrize("name", ["/speech", "/robot/say", "/robot_tts", "/tts/say_text"])
@@ -127,14 +125,6 @@ def test_the_rest_is_listed_once_without_what_every_graph_has() -> None:
     assert "sensor_msgs/msg/LaserScan" in text
     for absent in ("talker", "_action", "lifecycle", "rosout"):
         assert absent not in text
-
-
-def test_head_names_what_is_missing() -> None:
-    text = comments("hears /say std_msgs/msg/String")
-    (missing,) = re.findall("Missing: (.*)", text)
-    assert [what.split()[0] for what in missing.split(", ")] == [
-        *("places", "pose", "is_in_room", "go_to", "ask", "pick", "place")
-    ]
 
 
 def test_hostile_names_stay_out_of_the_file() -> None:

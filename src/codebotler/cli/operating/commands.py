@@ -172,7 +172,7 @@ def connect(
 ) -> None:
     """Draft a file for --connect from a robot's nodes on ROS 2.
 
-    Comments in the draft list what is missing, and what else the robot offers.
+    Comments in the draft say what is left to decide, and what else the robot offers.
     """
     from codebotler.cli.programs.skills import write_new
     from codebotler.core.errors import UserError
@@ -187,7 +187,7 @@ def connect(
         print_source(text)
     else:
         write_new(out, text)
-        note(f"wrote {out}; read it, and add what its first lines list as missing")
+        note(f"wrote {out}; read it, and complete what its comments say")
 
 
 @inherit_options(options.robot_settings)

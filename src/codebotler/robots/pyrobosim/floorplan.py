@@ -137,13 +137,9 @@ def _passages(floors: Sequence[Polygon], stands: Sequence[Point]) -> list[Passag
     """Connect floors, nearest first, until all can be reached or no further passage fits."""
     joined = list(range(len(floors)))
     found: list[Passage] = []
-
-    def distance(pair: tuple[int, int]) -> tuple[float, int]:
-        """Return a sort key that prefers near floors, then the corridor, which is the last floor."""
-        first, second = pair
-        return round(floors[first].distance(floors[second]), 3), -second
-
-    for a, b in sorted(itertools.combinations(range(len(floors)), 2), key=distance):
+    pairs = itertools.combinations(range(len(floors)), 2)
+    # Among floors that are equally near, prefer the corridor, which is the last floor.
+    for a, b in sorted(pairs, key=lambda ab: (round(floors[ab[0]].distance(floors[ab[1]]), 3), -ab[1])):
         passage = _passage((a, b), floors, stands, found) if joined[a] != joined[b] else None
         if passage is not None:
             found.append(passage)

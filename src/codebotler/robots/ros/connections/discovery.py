@@ -47,11 +47,6 @@ INTERNAL_OFFERS = re.compile(
 """Matches offers that no skill can use, such as the parameter services of every node."""
 
 NOT_SKILLS = ("pose", "velocity")
-EXPECTED_KEYS = {
-    "places": "places (name a file of them)",
-    "pose": "pose (a topic that says where the robot is)",
-    **{skill: skill for skill in SKILLS if skill not in {"get_all_rooms", "get_current_location"}},
-}
 
 
 def discover_offers(address: str, python: Path) -> list[str]:
@@ -94,16 +89,12 @@ def draft_connection(offers: Iterable[str]) -> str:
             ready |= set() if why else {key}
             lines.append((key not in NOT_SKILLS, f"# {line}  # {why}" if why else line))
             rest.discard(f"{name} {kind}")
-    if "get_all_rooms" in ready:
-        ready.add("places")
-    lacks = [what for key, what in EXPECTED_KEYS.items() if key not in ready]
     return "".join(
         f"{line}\n"
         for line in (
             "# A draft of `codebotler connect --discover`; read each line before you use it.",
-            *([f"# Missing: {', '.join(lacks)}"] if lacks else []),
             "robot: ros2",
-            *([] if "places" in ready else ["# places: places.yaml"]),
+            "# places: places.yaml",
             *(line for is_skill, line in lines if not is_skill),
             "skills:",
             *(f"  {line}" for is_skill, line in lines if is_skill),

@@ -66,8 +66,6 @@ def message_types(
     wanted: dict[str, Definitions] = {}
     for name in names:
         package, _, kind = name.partition("/")
-        if kind.count("/") != 1:
-            raise SetupError(f"{name} is not the name of a ROS 2 type; write PACKAGE/msg/NAME, srv or action")
         wanted.setdefault(package, {})[kind] = texts.get(name, "")
     for package, definitions in wanted.items():
         if _is_installed(package):

@@ -52,16 +52,14 @@ class Ros1Protocol:
     def opening(self, server: str, action: str) -> Iterator[Fields]:
         """Yield messages that advertise goals and cancels, and subscribe to the server's other topics."""
         kind = "/".join(parts_of(action)) + "Action"
-        ours = {"goal": f"{kind}Goal", "cancel": "actionlib_msgs/GoalID"}
-        theirs = {
-            "result": f"{kind}Result",
-            "feedback": f"{kind}Feedback",
-            "status": "actionlib_msgs/GoalStatusArray",  # last, because it shows that the others are set up
-        }
-        for name, of in ours.items():
-            yield {"op": "advertise", "topic": f"{server}/{name}", "type": of}
-        for name, of in theirs.items():
-            yield {"op": "subscribe", "topic": f"{server}/{name}", "type": of}
+        for op, name, of in (
+            ("advertise", "goal", f"{kind}Goal"),
+            ("advertise", "cancel", "actionlib_msgs/GoalID"),
+            ("subscribe", "result", f"{kind}Result"),
+            ("subscribe", "feedback", f"{kind}Feedback"),
+            ("subscribe", "status", "actionlib_msgs/GoalStatusArray"),  # it shows that the others are set up
+        ):
+            yield {"op": op, "topic": f"{server}/{name}", "type": of}
 
     def goal(self, server: str, _action: str, goal: str, fields: Fields) -> Fields:
         """Return the message for a goal, which may be sent again because servers accept an id only once."""
