@@ -17,6 +17,7 @@ from tenacity import (
     wait_exponential_jitter,
 )
 
+from codebotler.core.errors import UserError
 from codebotler.models.base import (
     BudgetSpentError,
     Model,
@@ -48,6 +49,9 @@ class RateLimited:
         token_budget: the number of tokens after which no request starts. Running requests complete. If the
             model does not count tokens, three characters are assumed per token. None for no limit.
         first_wait: about how many seconds to wait before the second try. The wait doubles each time.
+
+    Raises:
+        UserError: a limit is out of range.
     """
 
     model: Model
@@ -66,6 +70,9 @@ class RateLimited:
     _deferred_until: float = field(default=-math.inf, init=False, repr=False)
 
     def __post_init__(self) -> None:
+        limits = self.concurrency, self.requests_per_minute, self.token_budget
+        if self.retries < 0 or any(limit is not None and not limit > 0 for limit in limits):
+            raise UserError("each limit for requests must be above 0")
         self._free = asyncio.Semaphore(self.concurrency)
 
     async def reply(

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 import pytest
 
+from codebotler.core.errors import UserError
 from codebotler.models.base import BudgetSpentError, ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
@@ -369,3 +370,13 @@ def test_every_reply_comes_once_through_many_faults(name: str, server: Server) -
     assert paced.retry_count > 5
     asked = Counter(request.body["seed"] for request in server.requests)
     assert set(asked) == set(range(100))
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [{"concurrency": 0}, {"requests_per_minute": 0.0}, {"retries": -1}, {"token_budget": 0}],
+    ids=str,
+)
+def test_limits_out_of_range_are_refused(limits: dict[str, Any]) -> None:
+    with pytest.raises(UserError):
+        RateLimited(open_model("recorded", SamplingSettings()), **limits)
