@@ -18,7 +18,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from ros2_types import message_types
+from ros2_types import fields_of, message_types
 
 REFUSES = "never, whatever you say"
 NEVER = ("never", REFUSES, "late", "slow", "by somebody else")
@@ -34,11 +34,8 @@ def resolve(end: Any) -> None:
 
 
 class Server:
-    def __init__(self, kind: str, name: str) -> None:
-        self.spec = SPECS[kind]
-        self.goal_fields, self.feedback_fields = (
-            list(part.get_fields_and_field_types()) for part in (self.spec.Goal, self.spec.Feedback)
-        )
+    def __init__(self, kind: str, name: str, definition: str) -> None:
+        self.spec, self.fields = SPECS[kind], fields_of(definition)
         self.ends: dict[bytes, Any] = {}
         self.cancels = node.create_client(CancelGoal, f"{name}/_action/cancel_goal")
         self.server = rclpy.action.ActionServer(
@@ -46,7 +43,7 @@ class Server:
         )
 
     def text_of(self, goal: Any) -> str:
-        return str(getattr(goal, self.goal_fields[0])) if self.goal_fields else ""
+        return str(getattr(goal, self.fields[0][0])) if self.fields[0] else ""
 
     def accept(self, goal: Any) -> GoalResponse:
         text = self.text_of(goal)
@@ -70,7 +67,7 @@ class Server:
         else:
             if text == "feedback":
                 feedback = self.spec.Feedback()
-                setattr(feedback, self.feedback_fields[0], "the hall")
+                setattr(feedback, self.fields[2][0], "the hall")
                 handle.publish_feedback(feedback)
             handle.succeed()
         return self.spec.Result()
@@ -103,7 +100,7 @@ rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
 node = rclpy.create_node(f"servers_{os.getpid()}")
 TEXTS = {kind: text for kind, _, text in actions}
 SPECS = message_types([*TEXTS], [], actions=TEXTS)
-servers = [Server(kind, name) for kind, name, _ in actions]
+servers = [Server(*action) for action in actions]
 executor = SingleThreadedExecutor()
 executor.add_node(node)
 threading.Thread(target=executor.spin, daemon=True).start()

@@ -57,10 +57,10 @@ def message_types(
         names: all types that the process needs, since a package is built with these types only.
         folders: the folders of packages to build if they are not installed, with action/, msg/ or srv/.
         tell: a callback that receives a sentence before a slow step.
-        actions: the texts of .action files by type name, for packages that are not installed.
+        actions: the texts of .action files by type name. An installed type must have the same fields.
 
     Raises:
-        SetupError: a package or definition is missing or cannot be built.
+        SetupError: a package or definition is missing or cannot be built, or an action's fields differ.
     """
     sources, texts = {folder.name: folder for folder in folders}, actions or {}
     wanted: dict[str, Definitions] = {}
@@ -78,7 +78,15 @@ def message_types(
             definitions.update(_definitions(sources[package], [*definitions]))
         sys.path.insert(0, str(build_package(package, definitions, tell)))
         importlib.invalidate_caches()
-    return {name: _import_class(name) for name in names}
+    return {
+        name: _check_action(name, texts[name]) if name in texts else _import_class(name) for name in names
+    }
+
+
+def fields_of(definition: str) -> list[list[str]]:
+    """Return the field names of the goal, the result and the feedback in the text of an .action file."""
+    parts = (definition + "\n").split("---\n")
+    return [[line.split()[1] for line in part.splitlines() if line.strip()] for part in parts]
 
 
 def fill(message: Any, values: Fields, where: str = "") -> Any:
@@ -147,6 +155,18 @@ def _import_class(name: str) -> Any:
         raise SetupError(
             f"{package} in {where} has no {kind} {plain}; add {plain}.{kind} and build it again"
         ) from None
+
+
+def _check_action(name: str, definition: str) -> Any:
+    spec = _import_class(name)
+    for part, fields in zip((spec.Goal, spec.Result), fields_of(definition)):
+        installed = list(part.get_fields_and_field_types())
+        if installed != fields:
+            raise SetupError(
+                f"{name} has the fields {', '.join(installed) or 'none'}, "
+                f"but {', '.join(fields) or 'none'} are needed; build it again"
+            )
+    return spec
 
 
 def build_package(package: str, definitions: Definitions, tell: ProgressListener = lambda _: None) -> Path:
