@@ -185,7 +185,7 @@ def test_a_survivor_on_the_list_is_equivalent(suite: Suite, task: Task, pool: Wo
 @pytest.mark.parametrize(
     ("text", "line", "named"),
     [
-        (to_yaml([Mutant("detour", RIGHT, program("go_to('kitchen')"))]), 9, '"because" is empty'),
+        (to_yaml([Mutant("detour", RIGHT, program("go_to('kitchen')"))]), 9, '"because" is ""'),
         ("equivalent_mutants: [{operator: x, diff: y, because: z, why: w}]", 1, '"why"'),
     ],
     ids=["without a reason", "unknown key"],
