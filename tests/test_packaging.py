@@ -137,7 +137,6 @@ def test_the_wheel_judges_where_it_is_installed(wheel: Path, tmp_path: Path) -> 
         ("roboeval", "roboeval mu", ["mutate"]),
         ("roboeval", "roboeval tasks --li", ["--lint"]),
         ("codebotler", "codebotler virt", ["virtual-robot"]),
-        ("codebotler", "codebotler run p.py --robot ros", ["ros1", "rosbridge", "ros2"]),
         ("roboeval", "roboeval evaluate runs/a --engine r", ["ray"]),
     ],
 )

@@ -479,7 +479,7 @@ FAILS: dict[str, tuple[str, object]] = {
     "nested too deeply": ("x = " + "[" * 150 + "-" * 150 + "1" + "]" * 150, (P, "MemoryError", TOO_DEEP)),
     "nested far too deeply": ("x = " + "-" * 100_000 + "1", (P, "MemoryError", TOO_DEEP)),
     "too many blocks": (
-        "".join(" " * n + "while 1:\n" for n in range(45)) + " " * 45 + "pass\n",
+        "".join(" " * n + "while 1:\n" for n in range(21)) + " " * 21 + "pass\n",
         (P, "SyntaxError", "too many statically nested blocks"),
     ),
     "imports what is ours": (
@@ -567,7 +567,7 @@ LINES: dict[str, tuple[str, object]] = {
     "in a loop without end": (task("\n\nwhile True:\n    x = 1"), ("TimeoutError", 5)),
     "null character": ("x = 1\ny = '\0'\n", ("SyntaxError", 2)),
     "too many blocks": (
-        "".join(" " * n + "while 1:\n" for n in range(45)) + " " * 45 + "pass\n",
+        "".join(" " * n + "while 1:\n" for n in range(21)) + " " * 21 + "pass\n",
         ("SyntaxError", 21),
     ),
     "nowhere": ("def main(): pass\n", ("NameError", None)),

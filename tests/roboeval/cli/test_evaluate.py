@@ -14,6 +14,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+import shared_workers
 from codebotler.simulator.worker import Worker
 from command_line import ENVIRONMENT, Ended, refused, roboeval
 from forked import Forked
@@ -776,6 +777,7 @@ def test_a_user_can_give_each_run_a_process_of_its_own(
     if command.startswith("resample"):
         (tmp_path / "a.jsonl").write_text(row())
         assert roboeval("evaluate", "a.jsonl", "--out", "judged", cwd=tmp_path).status == 0
+    shared_workers.end_all()
     monkeypatch.setattr(Worker, "__init__", started)
     ended = roboeval(*command.split(), "--one-process-per-run", cwd=tmp_path)
     assert (ended.status, alone[0], all(alone)) == (0, True, True), ended.err

@@ -14,6 +14,7 @@ from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.task import check_label
 
 REGEX = re.compile(r"\\[bBdDsSwW]|\.[*+]|\(\?|\||\[[^\]]*\]|\w[?*+]")
+OPTIONS = re.compile(r"\[[ |]*\]")  # of a question, without their texts
 SUITES = ("paper", "plus")
 
 
@@ -25,7 +26,7 @@ def said_in(trace: Trace) -> Iterator[str]:
 def without_what_was_said(sentence: str, trace: Trace) -> str:
     for text in sorted(map(brief, said_in(trace)), key=len, reverse=True):
         sentence = sentence.replace(text, "")
-    return sentence
+    return OPTIONS.sub("", sentence)
 
 
 def explanations(task: Task, suite: Suite) -> Iterator[str]:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 TASK_NAME = "task_program"
 PROGRAM_TOO_LARGE = "the program is too large, or nested too deeply"
 MAX_TREE_DEPTH = 250
+MAX_NESTED_BLOCKS = 20
+BLOCK_NODES = (ast.For, ast.AsyncFor, ast.While, ast.With, ast.AsyncWith, ast.Try, ast.TryStar)
 LEAF_FIELDS = frozenset({"ctx", "op", "ops"})  # fields that hold operators and contexts
 FUELED_BLOCKS: tuple[tuple[str, str, tuple[type[ast.AST], ...]], ...] = (
     (FUEL, "body", (ast.For, ast.AsyncFor, ast.While)),
@@ -50,24 +52,31 @@ def prepared(
 def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
     """Return the nodes of a tree by type, without operators and contexts.
 
-    Raise MemoryError if it is nested too deeply, since Python's own limit depends on the version.
+    Raise MemoryError or SyntaxError if it is nested too deeply, since Python's own limits depend on the
+    version.
     """
     nodes: defaultdict[type[ast.AST], list[Any]] = defaultdict(list)
-    waiting: list[tuple[ast.AST, int]] = [(tree, 0)]
+    waiting: list[tuple[ast.AST, int, int]] = [(tree, 0, 0)]
     while waiting:
-        node, depth = waiting.pop()
+        node, depth, blocks = waiting.pop()
+        kind = type(node)
         if depth > MAX_TREE_DEPTH:
             raise MemoryError
-        kind = type(node)
+        if kind in SCOPE_NODES:
+            blocks = 0
+        elif kind in BLOCK_NODES:
+            blocks += 1
+            if blocks > MAX_NESTED_BLOCKS:
+                raise SyntaxError("too many statically nested blocks", (PROGRAM, node.lineno, 1, None))  # type: ignore[attr-defined]  # all block nodes have it
         nodes[kind].append(node)
         depth += 1
         for name in kind._fields:
             if name not in LEAF_FIELDS:
                 child = getattr(node, name, None)
                 if type(child) is list:
-                    waiting += [(each, depth) for each in child if isinstance(each, ast.AST)]
+                    waiting += [(each, depth, blocks) for each in child if isinstance(each, ast.AST)]
                 elif isinstance(child, ast.AST):
-                    waiting.append((child, depth))
+                    waiting.append((child, depth, blocks))
     return nodes
 
 
