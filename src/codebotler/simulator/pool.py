@@ -25,6 +25,7 @@ NO_SECCOMP = "programs are less isolated here: the kernel does not allow system 
 WINDOWS_UNSUPPORTED = "programs run on Linux and macOS only; on Windows, use WSL"
 
 RESULTS_IN_MEMORY = 8_000_000  # bytes of results, before they move to a file
+UNREADABLE_KEY = b""  # the name for a key that raised an error
 MIN_BATCH_KEYS, MAX_BATCH_KEYS = 16, 64  # keys per call; the first and last calls get fewer
 SIGNAL_POLL_SECONDS = 0.5  # with polars loaded, a signal does not interrupt a wait
 CALLS_PER_THREAD = 2  # submitted calls per thread, so that no thread idles
@@ -152,7 +153,7 @@ def map_batches(
     """Call a function on batches of keys concurrently, and yield the results in the order of the keys.
 
     Duplicate keys share one result. While one result is slow, more keys are read, so that the other workers
-    stay busy. An error from the keys or from a call is raised at once.
+    stay busy. An error from the keys or from a call is raised when its result is due.
 
     Args:
         submit: starts a call that takes a few keys and returns one result per key.
@@ -162,7 +163,7 @@ def map_batches(
         then: converts each result in the caller's thread, to a value that can be pickled.
     """
     distinct = DistinctKeys(keys, name)
-    waiting = distinct.waiting
+    waiting, failed = distinct.waiting, distinct.failed
     running: dict[Future[Sequence[_Called]], list[bytes]] = {}
     ended: SimpleQueue[Future[Sequence[_Called]]] = SimpleQueue()
     calls = CALLS_PER_THREAD * workers
@@ -170,17 +171,33 @@ def map_batches(
         at_end.callback(lambda: [future.cancel() for future in running])  # after an interrupt or an error
         while True:
             while len(running) < calls and (batch := distinct.batch(workers)):
-                future = submit(list(batch.values()))
+                try:
+                    future = submit(list(batch.values()))
+                except Exception as error:  # noqa: BLE001 - raised later, after the earlier results
+                    failed.update(dict.fromkeys(batch, error))
+                    continue
                 running[future] = list(batch)
                 future.add_done_callback(ended.put)
             if not waiting:
                 return
-            if ended.empty() and waiting[0] in done:
-                yield done[waiting.popleft()]
+            if ended.empty() and (waiting[0] in done or waiting[0] in failed):
+                named = waiting.popleft()
+                if named in failed:
+                    raise failed[named]
+                yield done[named]
                 continue
             future = _next(ended)
-            for named, result in zip(running.pop(future), future.result(), strict=True):
-                done[named] = then(result)
+            names = running.pop(future)
+            try:
+                results = future.result()
+            except Exception as error:  # noqa: BLE001 - raised in place of the result
+                failed.update(dict.fromkeys(names, error))
+                continue
+            for named, result in zip(names, results, strict=True):
+                try:
+                    done[named] = then(result)
+                except Exception as error:  # noqa: BLE001 - raised in place of this result
+                    failed[named] = error
 
 
 def _next(queue: SimpleQueue[_Value]) -> _Value:
@@ -198,12 +215,14 @@ class DistinctKeys(Generic[_Key]):
         self._new: dict[bytes, _Key] = {}  # keys not yet in a batch
         self._sent = 0
         self.waiting: deque[bytes] = deque()  # names of keys whose results are not yet used
+        self.failed: dict[bytes, BaseException] = {}
 
     def batch(self, width: int) -> dict[bytes, _Key]:
         """Return the next keys by name, for one of `width` concurrent calls.
 
         There are none at the end, or while too many keys are waiting. Batches start small so that the first
-        results come soon, and end small so that all calls end together.
+        results come soon, and end small so that all calls end together. An error while reading the keys
+        counts as the result of the next key.
         """
         size = min(MAX_BATCH_KEYS, max(MIN_BATCH_KEYS, self._sent // 2))
         self._read(size * width)
@@ -216,7 +235,7 @@ class DistinctKeys(Generic[_Key]):
         return batch
 
     def _read(self, most: int) -> None:
-        with contextlib.suppress(StopIteration):
+        try:
             while len(self._new) < most and len(self.waiting) < MAX_KEYS_AHEAD:
                 key = next(self._keys)
                 name = self._name(key)
@@ -224,6 +243,12 @@ class DistinctKeys(Generic[_Key]):
                 if name not in self._seen:
                     self._seen.add(name)
                     self._new[name] = key
+        except StopIteration:
+            pass
+        except Exception as error:  # noqa: BLE001 - raised later, after the earlier results
+            self._keys = iter(())
+            self.waiting.append(UNREADABLE_KEY)
+            self.failed[UNREADABLE_KEY] = error
 
 
 class ResultFile:

@@ -86,6 +86,8 @@ class RayCluster:
                     shards[shard] = list(batch)
                 if not waiting:
                     return
+                if waiting[0] in distinct.failed:
+                    raise distinct.failed[waiting[0]]
                 if waiting[0] in done:
                     yield done[waiting.popleft()]
                     continue
