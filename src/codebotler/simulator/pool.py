@@ -297,10 +297,12 @@ class SharedPool:
     """Holds this process's pool once it has started. After a fork, the child starts a new one."""
 
     def __init__(self) -> None:
-        self.lock = threading.Lock()
+        self.lock = threading.Lock()  # held during a fork, so that no child inherits half a pool
         self.pool: WorkerPool | None = None
         atexit.register(self.end)
-        os.register_at_fork(after_in_child=self.begin_anew)
+        os.register_at_fork(
+            before=self.lock.acquire, after_in_parent=self.lock.release, after_in_child=self.begin_anew
+        )
 
     def end(self) -> None:
         """Close the pool."""
@@ -311,7 +313,8 @@ class SharedPool:
 
     def begin_anew(self) -> None:
         """After a fork, leave the pool to the parent, whose threads do not exist in the child."""
-        self.lock, self.pool = threading.Lock(), None
+        self.pool = None
+        self.lock.release()
 
 
 def cores() -> int:

@@ -242,6 +242,16 @@ def test_how_deep_data_may_be_nested_is_decided_alone(
             assert (depth, all_of(outcome)) == (depth, all_of(other_worker.run(nested(depth), new_robot)))
 
 
+@pytest.mark.parametrize("character", ["a", "\x7f", "é", "\U0001f600"])
+def test_a_long_transcript_ends_as_in_a_process_of_its_own(
+    worker: Worker, other_worker: Worker, character: str
+) -> None:
+    """Alone, each call is written as ASCII, where some characters take twelve bytes."""
+    program = task(f"x = {character!r} * 9000", "ask('', 'q', [x for n in range(30)])")
+    alone = other_worker.run(program, lambda: robot(WORLD, SimulationSettings()))
+    assert worker.run(program, lambda: robot(WORLD, SimulationSettings())) == alone
+
+
 @pytest.mark.slow
 def test_what_computes_too_long_in_a_batch_costs_those_after_it_nothing(worker: Worker) -> None:
     computes = task("say('a')", "pow(3, 10 ** 9)")

@@ -830,6 +830,16 @@ def test_a_limit_on_the_size_of_files_ends_in_a_sentence(monkeypatch: pytest.Mon
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
+def test_a_forked_process_holds_no_channel_of_its_parents_workers() -> None:
+    before = set(links_in(Path("/proc/self/fd")))
+    with WorkerPool(1):
+        pid = os.fork()
+        if pid == 0:
+            new = {link.readlink().name for link in set(links_in(Path("/proc/self/fd"))) - before}
+            os._exit(sum(name.startswith(("pipe:", "socket:")) for name in new))
+        assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
+
+
 def test_an_interrupted_start_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(_: BatchServer) -> None:
         raise KeyboardInterrupt

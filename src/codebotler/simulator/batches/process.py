@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 # A run that recurses too deep here is repeated in its own process, where it may recurse far deeper.
 BATCH_RECURSION_LIMIT = 400
-MAX_TRANSCRIPT = MAX_FRAME // 3  # bytes; as ASCII, as in its own process, each call of it fits into a frame
+MAX_TRANSCRIPT = MAX_FRAME // 6  # bytes; as ASCII, as in its own process, each call of it fits into a frame
 UNDECIDED_RUN = b"null"  # replaces a transcript if the run must be repeated in its own process
 
 

@@ -8,6 +8,7 @@ import os
 import socket
 import subprocess
 import sys
+from io import FileIO
 from pathlib import Path
 
 from codebotler.core.world import Person, Room, World
@@ -36,14 +37,15 @@ class ForkServer:
     """Starts a fork server, and has it fork children one at a time."""
 
     def __init__(self) -> None:
-        self._report, report = os.pipe()
+        ours, report = os.pipe()
+        self._report = FileIO(ours)
         door, self._door = socket.socketpair()
-        CHANNELS.add(self._door)
+        CHANNELS.update((self._door, self._report))
         try:
             with door:
                 self._process = self._start(door.fileno(), report)
         except BaseException:
-            os.close(self._report)
+            self._report.close()
             self._door.close()
             raise
         finally:
@@ -90,7 +92,7 @@ class ForkServer:
         """Kill the fork server and close its descriptors. Call this only while nothing is running."""
         self._process.kill()
         self._process.wait()
-        os.close(self._report)
+        self._report.close()
         self._door.close()
 
     def _set_up(self) -> None:
@@ -115,7 +117,7 @@ class ForkServer:
         return self._read_report()
 
     def _read_report(self) -> int:
-        data = os.read(self._report, REPORT_BYTES)
+        data = self._report.read(REPORT_BYTES)
         if not data:
             raise LostProcessError("the fork server has ended")
         return int.from_bytes(data, sys.byteorder, signed=True)

@@ -17,6 +17,7 @@ import threading
 from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.machinery import SourceFileLoader
+from io import FileIO
 from pathlib import Path
 from typing import IO
 from weakref import WeakSet
@@ -66,7 +67,7 @@ def _start(arguments: Sequence[str], descriptors: Sequence[int]) -> subprocess.P
 
 
 PROCESSES: WeakSet[subprocess.Popen[bytes]] = WeakSet()
-CHANNELS: WeakSet[socket.socket] = WeakSet()  # the engine's ends
+CHANNELS: WeakSet[socket.socket | FileIO] = WeakSet()  # the engine's ends
 START_LOCK = threading.Lock()
 # A fork during a start would inherit a locked lock, and keep open a pipe that the start expects to close.
 os.register_at_fork(before=START_LOCK.acquire, after_in_parent=START_LOCK.release)
