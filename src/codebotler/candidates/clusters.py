@@ -85,6 +85,8 @@ class CandidateClusters:
             return f"the check rejected all of {every}; took the first"
         rejected = f"; the check rejected {self.rejected}" if self.rejected else ""
         rejected += f"; {self.unwanted} would do what was not meant" if self.unwanted else ""
+        if self.unwanted and len(self.clusters) == 1:
+            return f"took the only behaviour that was not refused: {largest.size} of {total}{rejected}"
         if any(other.size == largest.size for other in self.clusters[1:]):
             return f"took the first of the most frequent behaviours: {largest.size} of {total}{rejected}"
         return f"took the most frequent behaviour: {largest.size} of {total}{rejected}"

@@ -12,7 +12,7 @@ from codebotler.candidates.clusters import CandidateCluster, CandidateClusters
 from codebotler.checking.problems import Sample
 from codebotler.checking.storyboard import steps_of
 from codebotler.core.errors import UserError
-from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE
+from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE, SAY
 from codebotler.core.text.phrases import phrase
 from codebotler.core.text.words import brief, counted, listed
 from codebotler.core.trace import Event
@@ -25,6 +25,8 @@ DOMINANT_SHARE = 0.75
 MAX_CANDIDATE_OPTIONS, MAX_QUESTION_FACTS, MAX_SHOWN_DIFFERENCES = 3, 4, 3
 NOTICED_FIRST = frozenset({"said", "moved", "asked", "room"})
 """The differences that a person cares about most."""
+
+NOTICED_KINDS = frozenset({SAY, ASK, PICK, PLACE})
 
 ClarifyingAnswer: TypeAlias = int | Literal["none", "decide"]
 """The position of an option, none of them, or the tool's choice."""
@@ -104,7 +106,7 @@ class ClarifyingQuestion:
         if text in {"you decide", "decide"}:
             return "decide"
         numbers = ", ".join(str(number) for number in range(1, len(self.options) + 1))
-        raise UserError(f'"{brief(line)}" is not an answer; write {numbers}, none, or you decide')
+        raise UserError(f'"{brief(line)}" is not an answer; write {numbers}, "none" or "you decide"')
 
 
 def question_about(
@@ -148,12 +150,16 @@ def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> lis
     return [*different.values()][:MAX_CANDIDATE_OPTIONS]
 
 
-def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, int, int, int]:
-    """Rank a world: by the number of options, their candidates, what a person cares about, and brevity."""
+def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, int, int, int, int]:
+    """Rank a world: by the number of options, their candidates, what a person cares about, and brevity.
+
+    Where the largest cluster does more, a person sees better what it is for: it finds what it looks for.
+    """
     first, *others = (one.behaviours[number] for one in shown)
     cares = sum(bool(first.differences(other) & NOTICED_FIRST) for other in others)
+    deeds = sum(one.kind in NOTICED_KINDS for one in shown[0].samples[number].outcome.trace)
     length = sum(len(one.samples[number].outcome.trace) for one in shown)
-    return len(shown), sum(one.size for one in shown), cares, -length
+    return len(shown), sum(one.size for one in shown), cares, deeds, -length
 
 
 def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[str, ...]:
@@ -172,13 +178,7 @@ def describe_differences(samples: Sequence[Sample], behaviours: Sequence[Behavio
     """Return a sentence for each run in one world that says only what differs from the other runs."""
     seen = [_aspects(behaviour) for behaviour in behaviours]
     differing = _telling_first(seen)
-    sentences = []
-    for sample in samples:
-        parts = [_words(key, sample) for key in differing]
-        left = len(parts) - MAX_SHOWN_DIFFERENCES
-        more = ["does other things differently, too"] if left > 0 else []
-        sentences.append(listed([*parts[:MAX_SHOWN_DIFFERENCES], *more]))
-    return sentences
+    return [listed([_words(key, sample) for key in differing[:MAX_SHOWN_DIFFERENCES]]) for sample in samples]
 
 
 def _telling_first(seen: Sequence[Mapping[Aspect, object]]) -> list[Aspect]:

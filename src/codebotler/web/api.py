@@ -270,6 +270,8 @@ async def _stream(console: Console, session: MissionSession, known: int) -> Asyn
         if session.view.is_over and not session.events(known):
             return
         if not await console.notifier.until(has_more, MAX_WAIT_SECONDS):
+            if console.notifier.is_closed:
+                return
             yield ": still there\n\n"
 
 

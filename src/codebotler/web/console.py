@@ -245,6 +245,7 @@ class Notifier:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._wakes: list[Callable[[], None]] = []
+        self.is_closed = False
 
     def change(self) -> None:
         """Wake all viewers, from any thread."""
@@ -253,8 +254,13 @@ class Notifier:
         for wake in wakes:
             wake()
 
+    def close(self) -> None:
+        """End all waits, since the server ends."""
+        self.is_closed = True
+        self.change()
+
     async def changes(self) -> AsyncGenerator[None]:
-        """Yield once now, and again after changes. Changes in quick succession may be merged."""
+        """Yield once now, and again after changes, until the end. Quick changes may be merged."""
         loop, changed = asyncio.get_running_loop(), asyncio.Event()
 
         def wake() -> None:
@@ -264,7 +270,7 @@ class Notifier:
         with self._lock:
             self._wakes.append(wake)
         try:
-            while True:
+            while not self.is_closed:
                 changed.clear()
                 yield
                 await changed.wait()

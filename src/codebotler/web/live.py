@@ -20,6 +20,8 @@ async def follow(notifier: Notifier, update: Callable[[], Awaitable[None]]) -> N
 
     async def update_at_changes() -> None:
         async for _ in notifier.changes():
+            if client.is_deleted:
+                return
             with here:
                 await update()
             await asyncio.sleep(_UPDATE_PAUSE)

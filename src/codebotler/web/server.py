@@ -263,6 +263,8 @@ class _Server(uvicorn.Server):
         """
         if self._accompanying is not None:
             self._accompanying.cancel()
+        if self._console is not None:
+            self._console.notifier.close()
         await super().shutdown(sockets)
         if self._console is not None:
             await asyncio.to_thread(self._console.end)

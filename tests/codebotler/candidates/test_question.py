@@ -71,6 +71,11 @@ def test_a_shorter_storyboard_is_preferred() -> None:
     assert asked(cluster(1, "a", (look, *ONE), ONE), cluster(1, "b", TWO, TWO)).sample == 1
 
 
+def test_a_world_in_which_the_most_frequent_behaviour_does_something_is_preferred() -> None:
+    drives = (drive("hall", "lab"),)
+    assert asked(cluster(2, "a", drives, (*drives, *ONE)), cluster(1, "b", TWO, TWO)).sample == 1
+
+
 def test_what_a_person_cares_about_is_preferred() -> None:
     waves = (Event("wave", "left", place="hall"),)
     assert asked(cluster(1, "a", waves, (*ONE, *ONE)), cluster(1, "b", (), TWO)).sample == 1
@@ -126,5 +131,5 @@ def test_you_decide_means_the_most_frequent_behaviour() -> None:
 
 @pytest.mark.parametrize("line", ["", "0", "3", "-1", "yes", "1 2"])
 def test_other_lines_are_no_answers(line: str) -> None:
-    with pytest.raises(UserError, match="write 1, 2, none, or you decide"):
+    with pytest.raises(UserError, match='write 1, 2, "none" or "you decide"'):
         asked(cluster(2, "a", ONE), cluster(1, "b", TWO)).parse(line)

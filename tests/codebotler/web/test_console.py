@@ -32,7 +32,7 @@ from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, Robot, RobotResult
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.simulator.worlds.room_map import RoomMap
-from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
+from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console, Notifier
 from codebotler.web.panes.instruction import examples
 from doubles import Answering
 from server import Server
@@ -668,3 +668,14 @@ def test_one_robot_answers_while_another_viewer_sleeps(tmp_path: Path) -> None:
 def test_a_digest_tells_programs_apart() -> None:
     assert program_digest(HELLO) != program_digest(BAD)
     assert program_digest("\ud800")
+
+
+def test_nobody_waits_for_changes_after_the_end() -> None:
+    async def wait() -> bool:
+        notifier = Notifier()
+        waiting = asyncio.ensure_future(notifier.until(lambda: False))
+        await asyncio.sleep(0)
+        notifier.close()
+        return await asyncio.wait_for(waiting, 5) or await notifier.until(lambda: False)
+
+    assert asyncio.run(wait()) is False

@@ -12,7 +12,7 @@ from rich.console import Group
 from rich.text import Text
 
 from codebotler.cli.programs.check import check_view, contract_view, read_program
-from codebotler.cli.programs.generate import ADD_SENTENCE, ask_which, line_reader, note_programless
+from codebotler.cli.programs.generate import ADD_SENTENCE, ask_which, note_programless
 from codebotler.cli.views import EventPrinter, continue_view, ending_view, source_view
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import (
@@ -79,8 +79,7 @@ class Request:
         program = read_program(self.what) if self.is_program else ""
         if self.past is not None:
             return console.rest_of(self.past, program)
-        asks = not self.yes and line_reader() is not None
-        return MissionOrder("" if program else self.what, program=program, asks=asks)
+        return MissionOrder("" if program else self.what, program=program, asks=not self.yes)
 
     @property
     def is_program(self) -> bool:

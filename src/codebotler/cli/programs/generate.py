@@ -148,7 +148,7 @@ def choose_candidate(
             groups = compare_candidates(programs, settings, room_map, refused)
         question = question_about(groups, model=opened.name, is_second=rejected is not None)
         if question is None or ask is None:
-            note(groups.summary)
+            note(groups.summary if question is None else f"{groups.summary}; choose one on a terminal")
             return groups.clusters[0].program
         chosen = question.chosen(ask_which(question, ask))
         if chosen is not None:
@@ -190,7 +190,7 @@ def ask_which(question: ClarifyingQuestion, read_line: Callable[[str], str]) -> 
     console(stderr=True).print(question_view(question))
     numbers = ", ".join(str(number) for number in range(1, len(question.options) + 1))
     while True:
-        line = read_line(f"Answer {numbers}, none, or you decide: ")
+        line = read_line(f'Answer {numbers}, "none" or "you decide": ')
         if not line:
             raise UserError("no answer; `you decide` takes the most frequent behaviour")
         try:

@@ -47,7 +47,9 @@ def add(console: Console, frame: Frame) -> None:
 async def _update(console: Console, page: _MissionPage) -> None:
     """Refresh the page if it shows the current mission of this process."""
     if page.mission == console.view.id and not page.has_ended:
-        page.show(*await asyncio.to_thread(_read, console, page.mission))
+        read = await asyncio.to_thread(_read, console, page.mission)
+        if not page.rest.is_deleted:
+            page.show(*read)
 
 
 def _read(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine], MissionSummary | None]:

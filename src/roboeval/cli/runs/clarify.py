@@ -86,6 +86,8 @@ def clarify_view(data: Mapping[str, Any], title: str, candidates: int) -> Render
     from rich.table import Table
     from rich.text import Text
 
+    from roboeval.evaluation.clarify import DRAWS_PER_PROMPT
+
     table = Table(title=f"{title}, {candidates} candidates", title_justify="left")
     table.add_column("task")
     for name in ("prompt", *COLUMNS.values(), "asked", "mattered"):
@@ -96,8 +98,9 @@ def clarify_view(data: Mapping[str, Any], title: str, candidates: int) -> Render
     table.add_row("all", "", *_cells(data), style="bold")
     lines = [
         "pass@1 of one program, of the largest group with one behaviour, and of what a person chooses",
-        "asked: share of the trials in which the programs differed enough for a question",
-        "mattered: questions whose answer changed the verdict on the largest group of programs",
+        f"each figure is a mean over {DRAWS_PER_PROMPT} random draws of candidates; the check rejects some",
+        "asked: share of the draws in which the programs that are left differed enough for a question",
+        "mattered: share of the questions whose answer led to another verdict than the largest group's",
     ]
     if data["tokens"] is not None:
         lines.append(f"{data['tokens']:,.0f} tokens for {candidates} candidates, on average")
