@@ -28,6 +28,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 from codebotler import __version__
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import note
 from codebotler.core.text.words import listed
 from codebotler.missions.mission import BY_SHUTDOWN
@@ -77,6 +78,7 @@ def serve(
     with place.listen() as bound, console or nullcontext():
         port = bound.getsockname()[1]
         pages = application(console, further, runs, () if companion is None else companion.routes)
+        _check_prefixes(pages, place)
         app: ASGIApp = pages
         if console and alone_for is not None:
             app = Presence(app, alone_for, partial(console.stop, BY_LEAVING, only_moving=True))
@@ -121,6 +123,18 @@ def _links(place: PageAddress, port: int, access: Access, console: Console | Non
 def _address(place: PageAddress, port: int) -> str:
     shown = "localhost" if place.is_loopback else socket.gethostname()
     return f"http://{shown}:{port}/"
+
+
+def _check_prefixes(app: FastAPI, place: PageAddress) -> None:
+    """Refuse prefixes that look like our own paths, because proxies may or may not remove them."""
+    routes = (*app.routes, *nicegui.app.routes)
+    own = {path.split("/")[1] for route in routes if (path := getattr(route, "path", ""))}
+    for proxy in place.proxies:
+        first = proxy.prefix.split("/")[1] if proxy.prefix else ""
+        if first and first in own:
+            raise UserError(
+                f"--behind-proxy {proxy.page}: /{first} is already used by the page; choose another path"
+            )
 
 
 def application(

@@ -231,6 +231,12 @@ def test_a_token_is_made_for_each_start() -> None:
                 ["--behind-proxy", "https://robot.example"],
             )
         ),
+        (["--behind-proxy", "https://robot.example/missions"], ": /missions is already used by the page"),
+        pytest.param(
+            ["--behind-proxy", "https://robot.example/_nicegui/x"],
+            ": /_nicegui is already used by the page",
+            marks=pytest.mark.slow,
+        ),
         (["--behind-proxy", "robot.example"], "https://HOST"),
         (["--token", "short"], "too short"),
         (["--host", "999.1.1.1"], "cannot listen"),
