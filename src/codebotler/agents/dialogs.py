@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
@@ -102,17 +102,19 @@ def ask_whether(
 
 
 class ProposedProgram(NamedTuple):
-    """A mission that waits for approval, and what its check had found when a person was asked."""
+    """A mission that waits for approval, with its problems and rules when a person was asked."""
 
     session: MissionSession
-    problems: Sequence[str]
+    problems: tuple[str, ...]
+    disabled_rules: tuple[str, ...]
 
 
 async def find_program(digest: str, ctx: AgentContext) -> ProposedProgram:
     """Return the mission whose program has a digest."""
     with as_tool_errors():
         session = gatekeeper_of(ctx).find_session(digest)
-    return ProposedProgram(session, session.view.problems)
+    view = session.view
+    return ProposedProgram(session, view.problems, view.disabled_rules)
 
 
 def ask_person(

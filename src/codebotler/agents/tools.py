@@ -300,7 +300,12 @@ def _take_answer(
             if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
                 if view.problems != proposed.problems:
                     raise MissionError("the check has found something else meanwhile; ask again")
-                session.approve(digest, despite_problems=bool(view.problems), by=person)
+                session.approve(
+                    digest,
+                    despite_problems=bool(view.problems),
+                    disabled_rules=proposed.disabled_rules,
+                    by=person,
+                )
         case AcceptedElicitation() | DeclinedElicitation():
             session.stop_soon(person)
 

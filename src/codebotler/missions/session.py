@@ -166,11 +166,22 @@ class MissionSession(SharedView):
             self._change(question=None, busy=CHECKING)
 
     def approve(
-        self, seen: str, *, despite_problems: bool = False, by: str = "", is_person: bool = True
+        self,
+        seen: str,
+        *,
+        despite_problems: bool = False,
+        disabled_rules: tuple[str, ...] | None = None,
+        by: str = "",
+        is_person: bool = True,
     ) -> None:
-        """Approve the program that the person saw, identified by its digest. `by` goes to the log.
+        """Approve the program that the person saw, or raise MissionError if it is not the current one.
 
-        `is_person` is whether a person decides this now, rather than what a person has approved before.
+        Args:
+            seen: the digest of the program.
+            despite_problems: whether the program may run although the check found problems.
+            disabled_rules: the rules that the person saw switched off; None if nobody else can do that.
+            by: who approves, for the log.
+            is_person: whether a person decides this now, rather than what a person has approved before.
         """
         with self._editing:
             view, mission = self._view, self._mission
@@ -180,6 +191,8 @@ class MissionSession(SharedView):
                 raise MissionError("the program has not been checked yet")
             if seen != view.digest or seen != program_digest(mission.summary.program):
                 raise MissionError("the program has changed; review it again")
+            if disabled_rules is not None and disabled_rules != view.disabled_rules:
+                raise MissionError("other rules are switched off now; review the program again")
             if not view.can_run:
                 raise MissionError("this program cannot run; mend it")
             mission.approve(despite_problems=despite_problems, by=by)

@@ -60,6 +60,7 @@ class Approval(_Form):
 
     program: str = Field(description="The digest of the reviewed program.", examples=["3f5a8b0c9d21e467"])
     despite_problems: bool = False
+    disabled_rules: list[str] = Field([], description="The rules that are not in force, as reviewed.")
 
 
 class AnswerForm(_Form):
@@ -201,7 +202,11 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     def approve(mission: str, approval: Approval) -> dict[str, Any]:
         """Run exactly the program that the person reviewed."""
         session = _current_session(console, mission)
-        session.approve(approval.program, despite_problems=approval.despite_problems)
+        session.approve(
+            approval.program,
+            despite_problems=approval.despite_problems,
+            disabled_rules=tuple(approval.disabled_rules),
+        )
         return view_data(session.view)
 
     @api.post("/stop", status_code=202)

@@ -198,6 +198,8 @@ def test_an_unsure_step_needs_a_persons_word(folder: Path) -> None:
     program = folder / "place.py"
     program.write_text('def task_program():\n    place("mug")\n')
     assert ended(folder, "continue", "last", program, "--yes").status == 2
+    asked = ended(folder, "continue", "last", "-", "--yes", given="y\n" + program.read_text())
+    assert asked.status == 2, "a program is no answer"
     assert ended(folder, "continue", "last", program, "--yes", given="n\n").status == 1
     assert ended(folder, "continue", mission["id"], program, "--yes", given="what?\ny\n").status == 0
     assert [one["state"] for one in missions(folder)][-1] == "done"

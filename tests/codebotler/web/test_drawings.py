@@ -297,6 +297,10 @@ def test_a_strip_in_which_something_else_is_answered_is_no_longer_possible() -> 
     [
         ("N = 2\n\ndef task_program():\n  go_to(\"x\")\n  say('y')\n", "typed: go_to(\"x\") say('y')"),
         ("go_to('not parsed')\n    )", "typed: go_to('not parsed') )"),
+        (
+            "def task_program():\n  say('a')\n# def task_program(): say('b')",
+            "typed: say('a') # def task_program(): say('b')",
+        ),
         ("def task_program():\n", "a program without an instruction"),
         ("", "a program without an instruction"),
     ],

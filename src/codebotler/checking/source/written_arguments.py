@@ -23,7 +23,7 @@ FIELD = re.compile(r"%[-+ #0]*\d*(?:\.\d+)?[a-zA-Z]|\{[^{}]*\}")
 """A gap in a text that is formatted with `%` or `format`, where any text may be."""
 
 ESCAPED = re.compile(r"%%|\{\{|\}\}|%\(|%[^a-zA-Z]*\*")
-CLOCKS = frozenset({"datetime", "random", "secrets", "uuid"})
+CLOCKS = frozenset({"datetime", "random", "secrets", "uuid", "sys", "modules"})
 PURE_MODULES = frozenset(
     {"collections", "dataclasses", "enum", "functools", "itertools", "json", "math", "operator", "re"}
     | {"string", "typing"}

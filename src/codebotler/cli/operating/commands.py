@@ -87,7 +87,7 @@ def continue_mission(
 
     request, open_console = run_settings(**shared)
     console = open_console()
-    past = choose_past(console, mission)
+    past = choose_past(console, mission, program)
     raise typer.Exit(run(console, request(program or past.instruction, past=past)))
 
 

@@ -241,12 +241,13 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
 # --- the rest of a mission
 
 
-def choose_past(console: Console, name: str) -> MissionPast:
+def choose_past(console: Console, name: str, program: str) -> MissionPast:
     """Read the past of a mission, show it, and ask whether an unsure step happened.
 
     Args:
         console: the console with the robot, which is asked where it is if a step is unsure.
         name: the ID of the mission, or `last`.
+        program: the file with the rest; `-` means that standard input holds it, and no answer.
 
     Raises:
         UserError: there is no such mission, it cannot be continued, or nobody answers.
@@ -256,6 +257,8 @@ def choose_past(console: Console, name: str) -> MissionPast:
     print_rich(past_view(past))
     if past.unsure is None:
         return past
+    if program == "-":
+        raise UserError(f"{past.question}; name a file for the rest, since a person must answer here")
     for sentence in (past.question, *ask_evidence(console.robot, console.home, past, note)):
         note(sentence)
     happened, answer = _ask_whether(past), ""

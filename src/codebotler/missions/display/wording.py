@@ -68,7 +68,7 @@ def title(summary: MissionSummary) -> str:
     """Return the title of a mission: its instruction, or else the beginning of its program's steps."""
     if summary.instruction:
         return summary.instruction
-    steps = brief(summary.program.rpartition("def task_program():")[2][:_TITLE_SOURCE], _TITLE_STEPS)
+    steps = brief(summary.program.split("def task_program():", 1)[-1][:_TITLE_SOURCE], _TITLE_STEPS)
     begin = "program" if summary.model else "typed"
     return f"{begin}: {steps}" if steps else "a program without an instruction"
 

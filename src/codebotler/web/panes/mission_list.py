@@ -46,12 +46,13 @@ class _MissionList:
         self._console = console
         self._known: list[MissionSummary] = []
         self._seen: object = None
+        self._rows: dict[str, DrawnBox[tuple[MissionSummary, str, str]]] = {}  # by mission
         with ui.element("div").classes("filters").props("role=search"):
             self._text = ui.input("Search", value=text, on_change=self._search)
             self._text.props("outlined dense clearable debounce=300 dir=auto maxlength=200")
         self._count = PlainText("p", "", "quiet").props("role=status")
         self._error = PlainText("p", "", "trouble").props("role=alert")
-        self._list = DrawnBox("rows", _draw_missions, "ol")
+        self._list = ui.element("ol").classes("rows")
 
     async def update(self) -> None:
         """Reload the list if the state of the current mission has changed."""
@@ -80,9 +81,14 @@ class _MissionList:
         found = [one for one in reversed(self._known) if has_words(one, state_words(one, view), words)]
         self._count.say(_count_text(len(found), len(self._known)))
         found = found[:MAX_LISTED_MISSIONS]
-        self._list.show(
-            [(one, state_words(one, view), rest_text(last_rest(one.id, self._known))) for one in found]
-        )
+        for gone in self._rows.keys() - {one.id for one in found}:
+            self._rows.pop(gone).delete()
+        for position, one in enumerate(found):  # to draw all rows would delay STOP
+            if one.id not in self._rows:
+                with self._list:
+                    self._rows[one.id] = DrawnBox("", _draw_mission, "li")
+                self._rows[one.id].move(self._list, position)
+            self._rows[one.id].show((one, state_words(one, view), rest_text(last_rest(one.id, self._known))))
 
 
 def state_words(summary: MissionSummary, view: SessionView) -> str:
@@ -106,15 +112,15 @@ def _count_text(found: int, known: int) -> str:
     return f"{counted(known, 'mission') if found == known else f'{found:,} of {known:,} missions'}{last}"
 
 
-def _draw_missions(missions: Sequence[tuple[MissionSummary, str, str]]) -> None:
-    """Draw missions with their state, and with what became of their rest."""
-    for summary, state, rest in missions:
-        reason = shortened(reason_text(summary.reason, summary.line), _MAX_LISTED_REASON)
-        before = f"continues mission {summary.continues}" if summary.continues else ""
-        parts = (f"mission {summary.id}", f"robot: {summary.robot}", reason, before, rest)
-        with ui.element("li"), html.a(href=outside(f"{_MISSIONS_PATH}/{summary.id}")):
-            PlainText("time", f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
-            with ui.element("span").classes("about"):
-                PlainText("span", shortened(title(summary), _MAX_TITLE), "text")
-                PlainText("span", " · ".join(filter(None, parts)), "outcome")
-            PlainText("small", state, f"state state-{summary.state}")
+def _draw_mission(mission: tuple[MissionSummary, str, str]) -> None:
+    """Draw a mission with its state, and with what became of its rest."""
+    summary, state, rest = mission
+    reason = shortened(reason_text(summary.reason, summary.line), _MAX_LISTED_REASON)
+    before = f"continues mission {summary.continues}" if summary.continues else ""
+    parts = (f"mission {summary.id}", f"robot: {summary.robot}", reason, before, rest)
+    with html.a(href=outside(f"{_MISSIONS_PATH}/{summary.id}")):
+        PlainText("time", f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
+        with ui.element("span").classes("about"):
+            PlainText("span", shortened(title(summary), _MAX_TITLE), "text")
+            PlainText("span", " · ".join(filter(None, parts)), "outcome")
+        PlainText("small", state, f"state state-{summary.state}")

@@ -200,7 +200,9 @@ class ProgramPane:
             warn("The program has changed; review it again.")
         elif session is not None and await self._is_seen(view):
             despite = bool(self._despite.value)
-            await asyncio.to_thread(session.approve, view.digest, despite_problems=despite)
+            await asyncio.to_thread(
+                session.approve, view.digest, despite_problems=despite, disabled_rules=view.disabled_rules
+            )
             scroll_up()
 
     async def _is_seen(self, view: SessionView) -> bool:
