@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -362,6 +363,7 @@ def changed(run: RunFolder, change: Callable[[dict[str, Any], dict[str, Any]], N
     rows = [json.loads(line) for line in run.rows("paper").read_bytes().splitlines()]
     for completion, row in zip(completions, rows, strict=True):
         change(completion, row)
+        row["program_sha256"] = sha256(completion["program"].encode(errors="surrogatepass")).hexdigest()
     run.completions.write_bytes(b"".join(map(to_line, completions)))
     run.rows("paper").write_bytes(b"".join(map(to_line, rows)))
     unseal(run.path)
@@ -406,6 +408,7 @@ def test_no_text_becomes_more_than_text(few: Path, tmp_path: Path, opened: OpenP
     changed(run, make_evil)
     head = json.loads(run.manifest("paper").read_text())
     shutil.copy(run.rows("paper"), run.rows(name))
+    shutil.copy(run.manifest("paper"), run.manifest(name))
     with serving(run.path.parent) as server:
         for size in (DESK, PHONE) if len(evil) > LONGEST else (PHONE,):
             page = opened(server, size=size)

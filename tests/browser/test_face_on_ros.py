@@ -62,12 +62,16 @@ def virtual(graph: Graph, tmp_path: Path) -> Iterator[Path]:
     command = [sys.executable, "-u", "-m", "codebotler", "virtual-robot", "--world", "house.yaml"]
     with said.open("w") as file:
         robot = subprocess.Popen(
-            [*command, "--port", str(graph.port), "--speed", "10"],
+            [*command, "--speed", "10"],
             cwd=tmp_path,
             stdout=file,
             stderr=subprocess.PIPE,
             text=True,
-            env={**os.environ, "CODEBOTLER_HOME": str(tmp_path / "virtual")},
+            env={
+                **os.environ,
+                "CODEBOTLER_HOME": str(tmp_path / "virtual"),
+                "ROS_MASTER_URI": graph.uri,
+            },
         )
         assert robot.stderr is not None
         assert "the robot is ready" in robot.stderr.readline()
