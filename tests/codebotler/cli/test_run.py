@@ -239,7 +239,7 @@ def stopping(process: Process) -> Iterator[None]:
 def read_until(process: Process, text: str) -> str:
     assert process.stdout is not None
     lines = ""
-    watchdog = threading.Timer(30, process.kill)
+    watchdog = threading.Timer(90, process.kill)
     watchdog.start()
     try:
         for line in process.stdout:
