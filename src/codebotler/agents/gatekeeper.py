@@ -81,6 +81,8 @@ class Gatekeeper:
         self, purpose: str, bounds: Mapping[str, Any], author: str
     ) -> tuple[MissionSession, Steps]:
         """Propose a mission in which the agent calls skills one at a time, within these bounds."""
+        if self.console.view.is_running:  # before the bounds are read, which takes time
+            raise MissionError("a mission is running; wait until it is over, or stop it")
         if len(json.dumps(bounds)) > MAX_CONTRACT_CHARACTERS:
             raise UserError(TOO_LONG)
         known = self.console.robot.skills.without(self.console.robot.missing)

@@ -90,6 +90,7 @@ def question(view: SessionView, robot: str, contract: str) -> str:
         f"THE CHECK FOUND PROBLEMS:\n{problems}" if problems else "The check found no problems.",
         f"A person has switched off rules for this program: {switched_off}." if switched_off else "",
         f"It says: {shortened(view.instruction)}" if view.instruction else "",
+        f"It does the rest of mission {view.past.mission}, which ended early." if view.past else "",
         f"At most, the program can do this:\n{visible_lines(contract)}" if contract else "",
         f"For example:\n{_board_text(boards[0])}" if boards else "",
         f"Mission {view.id}, digest {view.digest}, program:\n{visible_lines(view.program.strip())}",

@@ -15,7 +15,7 @@ from codebotler.core.terminal import console, shortened, visible
 from codebotler.missions.display.view import SessionView
 from codebotler.missions.display.wording import event_text, timeline, title
 from codebotler.missions.storage.log import LogLine, MissionState, MissionSummary
-from codebotler.missions.storage.store import last_rest, rest_text
+from codebotler.missions.storage.store import last_rest, rest_text, rests_in
 from codebotler.models.open import ChosenModel
 from codebotler.models.usable import MODEL_HINT, UsableModel
 from codebotler.robots.base import Readiness
@@ -106,6 +106,7 @@ def list_view(summaries: Sequence[MissionSummary]) -> RenderableType:
     if not summaries:
         return Text("there are no missions yet", "dim")
     table = grid("left", "left", "left", "left")
+    rests = rests_in(summaries)
     for summary in summaries:
         state = summary.state
         table.add_row(
@@ -116,7 +117,7 @@ def list_view(summaries: Sequence[MissionSummary]) -> RenderableType:
                 shortened(title(summary), 100)
                 + (f"  ({shortened(summary.reason, 200)})" if summary.reason else "")
                 + (f"  continues {summary.continues}" if summary.continues else "")
-                + (f"  {rest}" if (rest := rest_text(last_rest(summary.id, summaries))) else "")
+                + (f"  {rest}" if (rest := rest_text(last_rest(summary.id, rests))) else "")
             ),
         )
     return table

@@ -20,7 +20,7 @@ from codebotler.core.files import make_folder
 from codebotler.robots.base import NotReadyError, Robot
 
 DEFAULT_PORTS = {"ws": 80, "wss": 443, "http": 80, "https": 443}
-LOOPBACK_ADDRESS = "127.0.0.1"
+LOOPBACK_ADDRESS, RUNTIME_FOLDERS = "127.0.0.1", "/run/user"
 
 
 class Reservation:
@@ -95,7 +95,8 @@ def lock_folder() -> Path:
         NotReadyError: other users can write to the folder.
         OSError: the folder cannot be created.
     """
-    runtime = Path(os.environ.get("XDG_RUNTIME_DIR", ""))
+    # Clients of agents start their servers without this variable, which logins set to this folder.
+    runtime = Path(os.environ.get("XDG_RUNTIME_DIR") or f"{RUNTIME_FOLDERS}/{os.getuid()}")
     is_usable = runtime.is_absolute() and _is_ours(runtime)  # with `sudo`, it may belong to another user
     folder = runtime / "codebotler" if is_usable else Path(gettempdir()) / f"codebotler-{os.getuid()}"
     with suppress(FileExistsError):

@@ -223,9 +223,10 @@ class Console:
         """
         with self._lock:
             session, self._may_recover = self.session, None
-            if holds:
+            stops = session is not None and session.view.is_approved
+            if holds and (stops or not only_moving):
                 self._held_since = 0 if session is None else session.view.number
-        if session is None or session.view.is_over or (only_moving and not session.view.is_approved):
+        if session is None or session.view.is_over or not (stops or not only_moving):
             return False
         session.stop_soon(by)
         return True

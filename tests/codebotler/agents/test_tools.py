@@ -1128,6 +1128,7 @@ def test_after_a_persons_stop_the_contract_of_the_start_approves_nothing(gatekee
         assert await state(0.05) == "checked"
         approve(gatekeeper)
         await until(gatekeeper, lambda view: view.is_over)
+        gatekeeper.console.stop("Escape, while nothing moves", only_moving=True)
         assert await state(SOON) == "done", "a person has approved one since"
 
     use(gatekeeper, act)

@@ -174,9 +174,10 @@ def test_calls_outside_the_contract(contracts: Contracts, call: RequestedCall) -
     assert contracts(BRING).objection(call)
 
 
-def test_a_program_with_tricks_may_do_what_its_runs_do(contracts: Contracts) -> None:
+def test_a_program_with_tricks_may_do_anything(contracts: Contracts) -> None:
     contract = contracts("def task_program():\n    getattr('a', 'lower')()\n    say('hello')\n")
-    assert set(contract.skills) == {"say"}
+    assert {"say", "go_to", "pick"} <= set(contract.skills)
+    assert allowed(contract, "go_to") == {"location": ["{}"]}
 
 
 def test_calls_are_counted(contracts: Contracts) -> None:

@@ -27,6 +27,7 @@ from codebotler.missions.storage.store import (
     last_rest,
     read_missions,
     recover_missions,
+    rests_in,
 )
 
 IF_TOOL_DIES = "its worker cancelled the goal"
@@ -61,10 +62,13 @@ def test_the_rest_of_a_mission_is_what_ran_last() -> None:
         )
 
     known = [one("1"), one("2", "1", dies=""), one("3", "1"), one("4", "3"), one("5")]
-    assert [rest and rest.id for rest in (last_rest(name, known) for name in "12345")] == [
+    assert [rest and rest.id for rest in (last_rest(name, rests_in(known)) for name in "12345")] == [
         *("4", None, "4", None, None)
     ]
-    assert last_rest("1", [one("1", "1"), one("2", "1"), one("1", "2")]) == one("2", "1")
+    circle = rests_in([one("1", "1"), one("2", "1"), one("1", "2")])
+    assert last_rest("1", circle) is not None
+    earlier = one("1", "2")  # begun where the clock shows an earlier time
+    assert last_rest("2", rests_in([earlier, one("2", "")])) == earlier
 
 
 @pytest.mark.parametrize(

@@ -92,11 +92,24 @@ def test_locks_lie_where_nobody_else_can_write(tmp_path: Path, monkeypatch: pyte
     assert (tmp_path / "codebotler").stat().st_mode & 0o777 == 0o700
 
 
+def test_a_process_without_the_variable_of_a_login_has_the_same_locks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runtime = tmp_path / str(os.getuid())
+    runtime.mkdir(mode=0o700)
+    monkeypatch.setattr("codebotler.robots.reservation.RUNTIME_FOLDERS", str(tmp_path))
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime))
+    at_login = lock_folder()
+    monkeypatch.delenv("XDG_RUNTIME_DIR")
+    assert lock_folder() == at_login == runtime / "codebotler"
+
+
 @pytest.mark.parametrize("runtime", [None, "", "run", "/no/such/folder", "others"])
 def test_without_a_runtime_folder_locks_are_temporary(
     runtime: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("codebotler.robots.reservation.gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr("codebotler.robots.reservation.RUNTIME_FOLDERS", str(tmp_path / "none"))
     if runtime is None:
         monkeypatch.delenv("XDG_RUNTIME_DIR")
     elif runtime == "others":
@@ -115,6 +128,7 @@ def test_folder_of_locks_that_is_not_ours_is_refused(
     folder = tmp_path / f"codebotler-{os.getuid()}"
     monkeypatch.delenv("XDG_RUNTIME_DIR")
     monkeypatch.setattr("codebotler.robots.reservation.gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr("codebotler.robots.reservation.RUNTIME_FOLDERS", str(tmp_path / "none"))
     match what:
         case "link":
             folder.symlink_to(tmp_path)

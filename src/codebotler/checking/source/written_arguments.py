@@ -84,7 +84,7 @@ def _read(program: str, parameters: list[tuple[str, list[str]]]) -> tuple[_Found
     found = [
         (skill, name, sorted([*one.parts] for one in templates)) for (skill, name), templates in given.items()
     ]
-    return found, _reads_clock(tree)
+    return found, bool(named & TRICKS) or _reads_clock(tree)
 
 
 def _reads_clock(tree: ast.Module) -> bool:
@@ -97,8 +97,8 @@ def _is_clock(node: ast.AST) -> bool:
     match node:
         case ast.Name("time", ast.Load()) | ast.Attribute(_, "time") | ast.alias("time", str()):
             return True
-        case ast.Name(name) | ast.Attribute(_, name) if name in CLOCKS:
-            return True
+        case ast.Name(name) | ast.Attribute(_, name):
+            return name in CLOCKS or (name.startswith("__") and name != "__name__")
         case ast.Import(names):
             return not {one.name for one in names} <= PURE_MODULES | {"time"}
         case ast.ImportFrom("time", names):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -55,14 +55,19 @@ def find_rest(folder: Path) -> MissionSummary | None:
     for path in sorted(folder.parent.glob(f"*/{SUMMARY_FILE}")):
         with suppress(UserError, OSError):
             known.append(MissionSummary.read(path.parent))
-    return last_rest(folder.name, known)
+    return last_rest(folder.name, rests_in(known))
 
 
-def last_rest(mission: str, known: Sequence[MissionSummary]) -> MissionSummary | None:
-    """Return the last mission that ran and did the rest of another one, directly or after others."""
-    rests = {one.continues: one for one in known if one.if_tool_dies and one.continues < one.id}
-    rest = rests.get(mission)
-    while rest is not None and rest.id in rests:
+def rests_in(known: Sequence[MissionSummary]) -> dict[str, MissionSummary]:
+    """Return the missions that ran and did the rest of others, by the IDs of these."""
+    return {one.continues: one for one in known if one.if_tool_dies and one.continues}
+
+
+def last_rest(mission: str, rests: Mapping[str, MissionSummary]) -> MissionSummary | None:
+    """Return the last mission that did the rest of another one, directly or after others."""
+    rest, seen = rests.get(mission), {mission}  # IDs are local times, which tell no order
+    while rest is not None and rest.id in rests and rest.id not in seen:
+        seen.add(rest.id)
         rest = rests[rest.id]
     return rest
 

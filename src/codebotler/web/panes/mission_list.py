@@ -15,13 +15,13 @@ from codebotler.core.text.words import counted
 from codebotler.missions.display.view import SessionView
 from codebotler.missions.display.wording import reason_text, title
 from codebotler.missions.storage.log import MissionState, MissionSummary
-from codebotler.missions.storage.store import last_rest, read_missions, rest_text
+from codebotler.missions.storage.store import last_rest, read_missions, rest_text, rests_in
 from codebotler.web.console import Console
 from codebotler.web.frame import DrawnBox, Frame, PlainText, outside
 from codebotler.web.live import follow
 
 _MISSIONS_PATH = "/missions"
-MAX_LISTED_MISSIONS = 200
+MAX_LISTED_MISSIONS, MAX_SEARCHED_CHARACTERS = 200, 2_000  # of a program, as long searches delay STOP
 _MAX_TITLE, _MAX_LISTED_REASON = 160, 200
 _NO_MISSIONS = "No missions yet."
 
@@ -80,7 +80,7 @@ class _MissionList:
         view = self._console.view
         found = [one for one in reversed(self._known) if has_words(one, state_words(one, view), words)]
         self._count.say(_count_text(len(found), len(self._known)))
-        found = found[:MAX_LISTED_MISSIONS]
+        found, rests = found[:MAX_LISTED_MISSIONS], rests_in(self._known)
         for gone in self._rows.keys() - {one.id for one in found}:
             self._rows.pop(gone).delete()
         for position, one in enumerate(found):  # to draw all rows would delay STOP
@@ -88,7 +88,7 @@ class _MissionList:
                 with self._list:
                     self._rows[one.id] = DrawnBox("", _draw_mission, "li")
                 self._rows[one.id].move(self._list, position)
-            self._rows[one.id].show((one, state_words(one, view), rest_text(last_rest(one.id, self._known))))
+            self._rows[one.id].show((one, state_words(one, view), rest_text(last_rest(one.id, rests))))
 
 
 def state_words(summary: MissionSummary, view: SessionView) -> str:
@@ -100,7 +100,10 @@ def state_words(summary: MissionSummary, view: SessionView) -> str:
 
 def has_words(summary: MissionSummary, state: str, words: Sequence[str]) -> bool:
     """Whether all words, in lower case, are in the ID, state, robot, instruction, program or reason."""
-    texts = (summary.id, state, summary.robot, summary.instruction, summary.program, summary.reason)
+    if not words:
+        return True
+    program = summary.program[:MAX_SEARCHED_CHARACTERS]
+    texts = (summary.id, state, summary.robot, summary.instruction, program, summary.reason)
     everything = "\n".join(texts).casefold()
     return all(word in everything for word in words)
 
