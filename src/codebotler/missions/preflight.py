@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
+from codebotler.checking.house_rules.rooms import find_evasions, unknown_rooms_in
 from codebotler.checking.problems import no_room
 from codebotler.checking.source.room_names import named_rooms
-from codebotler.core.errors import RobotError
+from codebotler.core.errors import RobotError, UserError
 from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
@@ -90,6 +91,19 @@ def _plan(robot: Robot, world: World) -> tuple[Room, ...]:
         replace(room, objects=(), people=(), stand_at=room.stand_at if is_straight else None)
         for room in rooms
     )
+
+
+def expect_enforceable(
+    rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None, remark: Callable[[str], None]
+) -> None:
+    """Raise UserError or NotReadyError if a rule cannot be enforced. Remark on rules that can be evaded."""
+    rooms = () if room_map is None else room_map.goals
+    for sentence in (one for rule in rules for one in unknown_rooms_in(rule, rooms)):
+        raise UserError(sentence)
+    expect_poses(rules, robot, room_map)
+    regexes = () if room_map is None or room_map.plain else rooms
+    for sentence in find_evasions(rules, regexes, robot.skills):
+        remark(sentence)
 
 
 def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) -> None:

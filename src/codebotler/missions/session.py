@@ -16,7 +16,6 @@ from pathlib import Path
 
 from codebotler.candidates.clusters import compare_candidates
 from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
-from codebotler.checking.house_rules.rooms import find_evasions, unknown_rooms_in
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
@@ -29,7 +28,7 @@ from codebotler.missions.drafts import examine_draft
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import (
     ask_rooms,
-    expect_poses,
+    expect_enforceable,
     limit_rooms,
     resume_robot,
     with_closest_here,
@@ -174,14 +173,10 @@ class MissionSession(SharedView):
         by: str = "",
         is_person: bool = True,
     ) -> None:
-        """Approve the program that the person saw, or raise MissionError if it is not the current one.
+        """Approve the program that the person saw, identified by its digest. `by` goes to the log.
 
-        Args:
-            seen: the digest of the program.
-            despite_problems: whether the program may run although the check found problems.
-            disabled_rules: the rules that the person saw switched off; None if nobody else can do that.
-            by: who approves, for the log.
-            is_person: whether a person decides this now, rather than what a person has approved before.
+        `disabled_rules` are those that the person saw switched off, if somebody else can do that. `is_person`
+        is whether a person decides this now, rather than what a person has approved before.
         """
         with self._editing:
             view, mission = self._view, self._mission
@@ -269,13 +264,7 @@ class MissionSession(SharedView):
             room_map, place = past.add_to(room_map, place)
             self._show(progress=replace(past.progress, room=place))
         self._show(room_map=limit_rooms(room_map, self._add_remark))
-        rules, rooms = self._view.rules, () if room_map is None else room_map.goals
-        regexes = () if room_map is None or room_map.plain else rooms
-        for sentence in (one for rule in rules for one in unknown_rooms_in(rule, rooms)):
-            raise UserError(sentence)
-        expect_poses(rules, self._robot, room_map)
-        for sentence in find_evasions(rules, regexes, self._robot.skills):
-            self._add_remark(sentence)
+        expect_enforceable(self._view.rules, self._robot, room_map, self._add_remark)
         return room_map, place
 
     def _await_approval(self, mission: Mission) -> None:

@@ -59,7 +59,7 @@ class Strip:
 
 
 class Storyboard(NamedTuple):
-    """What a robot would do according to a check, and how far it has come."""
+    """The runs of a robot that a check imagined, and how far the robot has come."""
 
     check: CheckResult
     title: str

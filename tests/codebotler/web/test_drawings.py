@@ -293,7 +293,7 @@ def test_a_strip_in_which_something_else_is_answered_is_no_longer_possible() -> 
 
 
 @pytest.mark.parametrize(
-    ("program", "told"),
+    ("program", "named"),
     [
         ("N = 2\n\ndef task_program():\n  go_to(\"x\")\n  say('y')\n", "typed: go_to(\"x\") say('y')"),
         ("go_to('not parsed')\n    )", "typed: go_to('not parsed') )"),
@@ -305,8 +305,8 @@ def test_a_strip_in_which_something_else_is_answered_is_no_longer_possible() -> 
         ("", "a program without an instruction"),
     ],
 )
-def test_a_typed_program_is_named_by_its_first_steps(program: str, told: str) -> None:
-    assert title(MissionSummary("id", MissionState.DONE, "simulated", 0.0, program=program)) == told
+def test_a_typed_program_is_named_by_its_first_steps(program: str, named: str) -> None:
+    assert title(MissionSummary("id", MissionState.DONE, "simulated", 0.0, program=program)) == named
     assert (
         title(MissionSummary("id", MissionState.DONE, "simulated", 0.0, "Do it.", program=program))
         == "Do it."
