@@ -124,7 +124,8 @@ test-environments: $(VENV)/tested $(addprefix test-environment-,$(ENVIRONMENTS))
 	$(BIN)/python environments/equal.py $(foreach name,$(ENVIRONMENTS),$(name)=$(call environment,$(name)))
 
 $(addprefix test-environment-,$(ENVIRONMENTS)): test-environment-%: $(ENVIRONMENTS_IN)/.venv-%/tested
-	cd environments/$* && $(call environment,$*) -m mypy && $(call environment,$*) -m pytest
+	cd environments/$* && MYPY_CACHE_DIR=$(abspath $(ENVIRONMENTS_IN))/.venv-$*/mypy $(call environment,$*) -m mypy && \
+		$(call environment,$*) -m pytest
 
 TRAINERS = $(shell find environments -type f -not -name '*.pyc' -not -path '*/.*')
 $(ENVIRONMENTS:%=$(ENVIRONMENTS_IN)/.venv-%/tested): $(ENVIRONMENTS_IN)/.venv-%/tested: $(SOURCES) $(TRAINERS) constraints-extras.txt

@@ -22,32 +22,34 @@ from roboeval.training.missions import TrainingMission, load_missions
 from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Rollout, judge
 
-COUNT, MISSIONS = 500, 200
+TASKS, EACH, MISSIONS_EACH = 100, 5, 2  # to make a task takes longer than to judge five programs
 
 Call: TypeAlias = tuple[str, dict[str, Any]]
 
 
 def examples() -> list[tuple[dict[str, Any], str]]:
-    """Rows of prompts, each with a completion: right, wrong and invalid programs."""
+    """Rows of prompts, each with EACH completions: right, wrong and invalid programs."""
     found = []
-    for number, row in enumerate(load_prompts("validation", count=COUNT)):
+    for number, row in enumerate(load_prompts("validation", count=TASKS)):
         task = trained_task(row["family"], row["seed"])
         programs = [task.solution, *(one.program for one in task.wrong), "pass", "def task_program("]
-        program = programs[number // 17 % len(programs)]
-        found.append((row, f"Like this:\n```python\n{program}\n```" if number % 2 else program))
+        for further in range(EACH):
+            program = programs[(number // 17 + further) % len(programs)]
+            found.append((row, f"Like this:\n```python\n{program}\n```" if further % 2 else program))
     return found
 
 
 def missions() -> list[tuple[dict[str, Any], list[Call]]]:
-    """Rows of missions, each with calls: those of right and wrong programs, and mistakes."""
+    """Rows of missions, each with MISSIONS_EACH lists of calls: of right and wrong programs, and mistakes."""
     found = []
-    for number, row in enumerate(load_missions("validation", count=MISSIONS)):
+    for number, row in enumerate(load_missions("validation", count=TASKS)):
         task = trained_task(row["family"], row["seed"])
         programs = [task.solution, *(one.program for one in task.wrong)]
-        calls = calls_of(task, row["world"], programs[number // 17 % len(programs)])
-        more: list[Call] = [("give_up", {"reason": "?"})] if number % 5 == 0 else []
-        mistakes: list[Call] = [("go_to", {"location": "nowhere"})] if number % 3 == 0 else []
-        found.append((row, [*mistakes, *calls, *more]))
+        for further in range(MISSIONS_EACH):
+            calls = calls_of(task, row["world"], programs[(number // 17 + further) % len(programs)])
+            more: list[Call] = [("give_up", {"reason": "?"})] if number % 5 == 0 else []
+            mistakes: list[Call] = [("go_to", {"location": "nowhere"})] if number % 3 == 0 else []
+            found.append((row, [*mistakes, *calls, *more]))
     return found
 
 
@@ -124,8 +126,10 @@ def by_verifiers() -> list[float]:
         return trace.reward
 
     async def all_scored() -> list[float]:
-        programs = zip(tasks("program", COUNT), examples(), strict=True)
-        acted = zip(tasks("agent", MISSIONS), missions(), strict=True)
+        prompts = [task for task in tasks("program", TASKS) for _ in range(EACH)]
+        programs = zip(prompts, examples(), strict=True)
+        begun = [task for task in tasks("agent", TASKS) for _ in range(MISSIONS_EACH)]
+        acted = zip(begun, missions(), strict=True)
         return [
             *[await scored(task, text, []) for task, (_, text) in programs],
             *[await scored(task, "Done.", calls) for task, (_, calls) in acted],
@@ -141,10 +145,10 @@ def by_openenv() -> list[float]:
 
     session, found = CodebotlerEnvironment(), []
     for number, (_, text) in enumerate(examples()):
-        session.reset(seed=number, split="validation")
+        session.reset(seed=number // EACH, split="validation")
         found.append(session.step(CodebotlerAction(completion=text)).reward)
     for number, (_, calls) in enumerate(missions()):
-        session.reset(seed=number, split="validation", mode="agent")
+        session.reset(seed=number // MISSIONS_EACH, split="validation", mode="agent")
         actions = [CodebotlerAction(tool=name, arguments=arguments) for name, arguments in calls]
         for action in (*actions, CodebotlerAction(answer="Done.")):
             if (step := session.step(action)).done:

@@ -121,6 +121,7 @@ def test_a_mission_is_judged_by_its_calls_and_by_how_the_conversation_ends() -> 
 
 def model_and_tokenizer(lines: list[str], end: str = END, text: str = "") -> tuple[Any, Any]:
     """A model so small that it has a token for each line, one for each byte, and those of a text."""
+    torch.set_num_threads(1)  # several threads spend far more time on so small a model
     made = tokenizers.Tokenizer(tokenizers.models.BPE())
     made.pre_tokenizer = tokenizers.pre_tokenizers.ByteLevel(add_prefix_space=False)
     made.decoder = tokenizers.decoders.ByteLevel()
