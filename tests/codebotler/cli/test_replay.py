@@ -269,8 +269,8 @@ def test_ctrl_c_ends_it_at_once(folder: Path) -> None:
         (folder / "plans" / f"{number}.py").write_text(f"def task_program():\n    {body}\n")
     arguments = ("replay", "plans", "--rules", "rules.yaml")
     with Forked("codebotler", *arguments, cwd=folder, environment=os.environ) as process:
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        while not children.read_text():  # until the engine has started
+        threads = Path(f"/proc/{process.pid}/task")
+        while not any(children.read_text() for children in threads.glob("*/children")):  # until the engine has started
             time.sleep(0.01)
         process.send_signal(signal.SIGINT)
         _, err = process.communicate()
