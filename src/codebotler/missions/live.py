@@ -24,7 +24,7 @@ from codebotler.robots.base import CameraPicture, CancelledError, RobotLostError
 from codebotler.simulator.guard.contract import has_place, is_goal
 from codebotler.simulator.guard.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, RuleViolationError
 from codebotler.simulator.guard.rule_guard import RuleGuard, name_of
-from codebotler.simulator.settings import ENDLESS, SimulationSettings
+from codebotler.simulator.settings import LIVE_LIMITS, SimulationSettings
 from codebotler.simulator.worlds.robot import Argument, Result
 from codebotler.simulator.worlds.room_map import RoomMap
 
@@ -64,7 +64,7 @@ class LiveRobot:
         self._button = button or StopButton(robot)
         self.broken_rule: dict[str, object] = {}  # the log entry of the rule that stopped the mission
         starts = clock_starts or datetime.now().astimezone().replace(tzinfo=UTC)
-        self.settings = SimulationSettings(literals="as-written", limits=ENDLESS, clock_starts=starts)
+        self.settings = SimulationSettings(literals="as-written", limits=LIVE_LIMITS, clock_starts=starts)
         self.line: int | None = None  # the line of the program that calls the current skill
         self._place = place
         self._held = "" if room_map is None else held_after(room_map.past)

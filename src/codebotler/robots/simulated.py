@@ -23,7 +23,7 @@ from codebotler.robots.base import (
     ignore_feedback,
 )
 from codebotler.robots.clock import Clock
-from codebotler.simulator.settings import ENDLESS, SimulationSettings
+from codebotler.simulator.settings import LIVE_LIMITS, SimulationSettings
 from codebotler.simulator.worlds.matching import WORDS_FOR_PEOPLE
 from codebotler.simulator.worlds.robot import SimulatedRobot
 
@@ -32,7 +32,7 @@ SIMULATION = SimulationSettings(
     matching="longest-name",
     people="own-name-or-word",
     words_for_people=WORDS_FOR_PEOPLE,
-    limits=ENDLESS,
+    limits=LIVE_LIMITS,
 )
 METRES_PER_SECOND = 0.5
 FEEDBACK_SECONDS = 0.25  # the real time between two position reports

@@ -46,7 +46,7 @@ class SimulationSettings:
 
 
 PAPER_SETTINGS = SimulationSettings()
-ENDLESS = Limits(calls=10**12, trace=10**12)  # for live robots, where each skill refuels the program
+LIVE_LIMITS = Limits(calls=100_000, trace=10_000_000)  # for live robots, where each skill refuels the program
 
 
 def choose(

@@ -16,12 +16,12 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Event, Outcome, Status, Trace
 from codebotler.simulator.process.fork_server_client import ForkServer
 from codebotler.simulator.sandbox import PROGRAM
-from codebotler.simulator.settings import ENDLESS, PAPER_SETTINGS
+from codebotler.simulator.settings import LIVE_LIMITS, PAPER_SETTINGS
 from codebotler.simulator.worker import EngineError, Worker
 from codebotler.simulator.worlds.robot import Argument, Result
 from processes import are_gone, children_of, engine_processes, fork_servers
 
-LIVE = replace(PAPER_SETTINGS, literals="as-written", limits=ENDLESS)
+LIVE = replace(PAPER_SETTINGS, literals="as-written", limits=LIVE_LIMITS)
 
 
 class Machine:
@@ -142,6 +142,14 @@ def test_program_may_compute_for_long_if_it_acts_in_between(
         "        say(str(i))\n"
     )
     assert done(worker, program)[0] == [str(number) for number in range(20)]
+
+
+def test_program_that_never_stops_calling_ends(worker: Worker) -> None:
+    machine = Machine()
+    machine.settings = replace(LIVE, limits=replace(LIVE_LIMITS, calls=5))
+    outcome = worker.run_live("def task_program():\n    while True: say('a')\n", machine)
+    assert (outcome.status, machine.done) == (Status.TIMEOUT, ["a"] * 5)
+    assert LIVE_LIMITS.calls <= 100_000  # each is kept in memory and logged
 
 
 @pytest.mark.slow
