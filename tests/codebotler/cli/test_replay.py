@@ -270,8 +270,8 @@ def test_ctrl_c_ends_it_at_once(folder: Path) -> None:
     arguments = ("replay", "plans", "--rules", "rules.yaml")
     with Forked("codebotler", *arguments, cwd=folder, environment=os.environ) as process:
         threads = Path(f"/proc/{process.pid}/task")
-        while not any(children.read_text() for children in threads.glob("*/children")):  # until the engine has started
-            time.sleep(0.01)
+        while not any(children.read_text() for children in threads.glob("*/children")):
+            time.sleep(0.01)  # until the engine has started
         process.send_signal(signal.SIGINT)
         _, err = process.communicate()
     assert (process.returncode, err) == (130, "codebotler: stopped\n")
