@@ -54,6 +54,7 @@ def test_importing_a_package_imports_next_to_nothing(package: str) -> None:
     assert new <= {package, "codebotler", "codebotler.core", "codebotler.core.facade", "__future__"}
 
 
+@pytest.mark.slow
 def test_using_the_names_imports_no_library_for_pages_figures_or_models() -> None:
     code = "\n".join(  # load_results gives a table of polars
         f"from {package} import {', '.join(name for name in names if name != 'load_results')}"

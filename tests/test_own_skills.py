@@ -188,6 +188,7 @@ def test_the_rule_is_shown_with_examples(own: Own) -> None:
     assert "note:" not in shown
 
 
+@pytest.mark.slow
 def test_a_suite_is_evaluated_and_mutated_from_the_command_line(own: Own, tmp_path: Path) -> None:
     run = str(tmp_path / "run")
     words = ["evaluate", "recorded:hasty", "--suite", str(own.folder), "--out", run, "--json"]

@@ -34,6 +34,7 @@ def test_time_of_a_child_is_used_while_it_lives_and_when_it_has_ended() -> None:
     assert used() - before >= 0.02
 
 
+@pytest.mark.slow
 def test_a_child_is_seen_while_threads_end() -> None:
     script = BURN.format(0.05) + "print(flush=True)\ninput()\n"
     has_ended = threading.Event()

@@ -22,7 +22,7 @@ rules:
 VISIT = "def task_program():\n    go_to('study')\n    say('hello')\n"
 SLY = """def task_program():
     go_to("kitchen")
-    while True:
+    for _ in range(9):
         try:
             go_to("study")
         except BaseException:

@@ -20,7 +20,7 @@ from ros_graph import GO_TO, Graph
 
 FETCH = 'def task_program():\n    go_to("the hall")\n    if is_in_room("mug"):\n        pick("mug")\n'
 FAR = """def task_program():
-    while True:
+    for _ in range(9):
         try:
             go_to("never")
         except BaseException:
@@ -35,7 +35,7 @@ RULES = """rules:
 """
 STUBBORN = """def task_program():
     go_to("the hall")
-    while True:
+    for _ in range(9):
         try:
             go_to("the vault")
         except BaseException:

@@ -932,6 +932,7 @@ def left(home: Path, skill: str, event: str, instruction: str = "") -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_an_agent_proposes_the_rest_and_learns_what_was_done(gatekeeper: Gatekeeper, tmp_path: Path) -> None:
     left(tmp_path, "say", "result")
 

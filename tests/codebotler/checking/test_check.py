@@ -197,6 +197,7 @@ def test_the_closest_room_is_named(checks: Checks) -> None:
 WAITS = ("go_to('kitchen')", "while not is_in_room('person'):", "    time.sleep(1)", "say('hello')")
 
 
+@pytest.mark.slow
 def test_a_robot_that_waits_is_not_wrong(checks: Checks) -> None:
     for seed in range(20):
         found = checks(*WAITS, samples=1, seed=seed)

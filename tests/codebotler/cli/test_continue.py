@@ -123,6 +123,7 @@ def test_a_program_that_forgets_what_is_held_is_not_run(folder: Path) -> None:
     assert missions(folder)[-1]["state"] == "failed"
 
 
+@pytest.mark.slow
 def test_a_model_is_shown_what_happened_and_writes_the_rest(folder: Path) -> None:
     with server(BEGUN, REST) as model:
         assert ended(folder, "run", "Bring Anne a mug.", *at(model), "--yes").status == 1

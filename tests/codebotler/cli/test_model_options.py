@@ -67,6 +67,7 @@ def test_each_command_takes_a_limit(name: str) -> None:
     assert all(option in helped.out for option in ("--max-tokens", "--reasoning-effort", "--extra-body"))
 
 
+@pytest.mark.slow
 def test_settings_that_a_model_does_not_take_are_noted(tmp_path: Path) -> None:
     variables = {"OPENAI_API_KEY": "a key of nobody", "OPENAI_BASE_URL": "http://127.0.0.1:9/v1"}
     ended = roboeval("generate", "--model", "openai-chat:o3-mini", cwd=tmp_path, environment=variables)

@@ -36,6 +36,7 @@ def test_it_is_opened_by_its_name_and_needs_a_world(monkeypatch: pytest.MonkeyPa
         open_robot("pyrobosim", Options(world=WORLD, speed=-1))
 
 
+@pytest.mark.slow
 def test_nothing_heavy_is_imported_before_it_is_connected() -> None:
     program = (
         "import sys\n"

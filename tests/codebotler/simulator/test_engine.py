@@ -315,6 +315,7 @@ def test_nothing_is_left_after_all_outcomes_were_read() -> None:
     assert len(list(run(((saying(str(number)), WORLD) for number in range(20)), workers=2))) == 20
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("nothing_is_left")
 def test_nothing_is_left_after_the_consumer_stopped_early() -> None:
     outcomes = run(((saying(str(number)), WORLD) for number in count()), workers=2)
@@ -334,6 +335,7 @@ LONG_RUNS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("nothing_is_left")
 def test_nothing_is_waited_for_when_the_consumer_stops_during_long_runs() -> None:
     outcomes = run(LONG_RUNS, workers=2)
@@ -346,6 +348,7 @@ def test_nothing_is_waited_for_when_the_consumer_stops_during_long_runs() -> Non
     assert time.monotonic() - start < 3
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("nothing_is_left")
 def test_nothing_is_waited_for_when_the_consumer_stops_while_a_fork_server_is_starting() -> None:
     outcomes = run(LONG_RUNS, workers=2)
@@ -355,6 +358,7 @@ def test_nothing_is_waited_for_when_the_consumer_stops_while_a_fork_server_is_st
     assert time.monotonic() - start < 3
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("nothing_is_left")
 def test_nothing_is_left_after_the_pairs_failed() -> None:
     def pairs() -> Iterator[tuple[str, World]]:
@@ -448,6 +452,7 @@ def killing(times: int) -> Callable[..., None]:
     return say
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("nothing_is_left")
 def test_run_whose_fork_server_is_killed_is_run_again() -> None:
     program = "def task_program():\n    say('a')\n    say('b')\n"
@@ -532,6 +537,7 @@ def test_program_that_waits_a_little_at_a_time_ends_the_same_way_in_each_of_many
     assert ends == {(Status.FINISHED, "2.00", "-1")}
 
 
+@pytest.mark.slow
 @pytest.mark.shared_engine
 def test_requests_beyond_a_limit_are_not_read_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     answered: list[list[object]] = []

@@ -183,6 +183,7 @@ def check_problems(source: str, problems: tuple[Flaw, ...], outcome: Outcome) ->
         assert (outcome.line, told) in told_of or said[1] in names_bound(source)
 
 
+@pytest.mark.slow
 def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
     pool: WorkerPool, other_pool: WorkerPool, ordinary: OrdinaryProcess
 ) -> None:
@@ -294,6 +295,7 @@ def batches(random: Random, sources: Sequence[str], worlds: Sequence[World]) -> 
         del waiting[:size]
 
 
+@pytest.mark.slow
 def test_random_programs_that_share_a_child_end_as_each_does_alone(
     pool: WorkerPool, pool_of_processes: WorkerPool
 ) -> None:

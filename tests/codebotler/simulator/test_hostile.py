@@ -398,6 +398,7 @@ def test_every_program_says_in_one_sentence_what_it_tries() -> None:
         assert first.endswith('."""'), path.name
 
 
+@pytest.mark.slow
 def test_program_that_is_silent_for_too_long_is_ended_though_it_computes(
     reach: Reach, monkeypatch: pytest.MonkeyPatch
 ) -> None:

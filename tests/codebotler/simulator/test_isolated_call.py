@@ -69,6 +69,7 @@ def test_used_process_that_was_killed_is_replaced() -> None:
     assert closed.process_number("") != number
 
 
+@pytest.mark.slow
 def test_answer_to_an_interrupted_call_reaches_no_other() -> None:
     closed.echo("warm")
 
@@ -145,6 +146,7 @@ def test_programs_of_others_are_never_compiled_in_this_process() -> None:
     assert (whole.parses, cut.parses) == (1.0, 0.0)
 
 
+@pytest.mark.slow
 def test_program_that_is_too_long_is_not_read() -> None:
     long = TASK + "# " + "x" * MAX_PROGRAM_LENGTH
     assert [problem.kind for problem in check(long).problems] == ["MemoryError"]

@@ -81,6 +81,7 @@ def test_where_a_program_failed_is_told(server: PageServer) -> None:
     assert "odd" in over["reason"]
 
 
+@pytest.mark.slow
 def test_a_mission_from_its_program_to_its_files(server: PageServer) -> None:
     view = begun(server, HELLO)
     approval = {"program": view["digest"]}
@@ -376,6 +377,7 @@ def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(t
         assert read_missions(tmp_path / "home")[-1].state == "interrupted"
 
 
+@pytest.mark.slow
 def test_nothing_of_the_page_is_loaded_for_other_commands() -> None:
     loaded = "print('nicegui' in sys.modules, 'fastapi' in sys.modules)"
     code = f"import sys, codebotler.cli.app, codebotler.cli.operating.run, codebotler.web.console; {loaded}"

@@ -224,6 +224,7 @@ def test_a_mission_without_a_program_can_be_stopped(tmp_path: Path) -> None:
         assert (console.view.is_over, console.view.state) == (True, MissionState.STOPPED)
 
 
+@pytest.mark.slow
 def test_a_higher_limit_counts_from_then_on(tmp_path: Path) -> None:
     program = f"```python\n{HELLO}```"
 

@@ -206,6 +206,7 @@ def test_the_robot_and_the_log_are_witnesses(tmp_path: Path) -> None:
 # --- by itself
 
 
+@pytest.mark.slow
 def test_a_failed_skill_is_recovered_within_the_approval(tmp_path: Path) -> None:
     with desk_of(tmp_path, Author(FETCH, GO_BACK), recoveries=1) as console:
         before = fetch(console)

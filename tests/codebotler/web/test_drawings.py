@@ -196,6 +196,7 @@ def test_a_floorplan_is_well_formed_whatever_rooms_are_called() -> None:
     assert drawn.encode()
 
 
+@pytest.mark.slow
 def test_a_floorplan_of_a_huge_building_stays_small() -> None:
     world = World(tuple(Room(f"room {n}") for n in range(5_000)), "room 0")
     assert floorplan(world, MapState()).count("<polygon") == MAX_DRAWN_ROOMS

@@ -87,6 +87,7 @@ def ending(socket: ClientConnection, number: int) -> Any:  # noqa: ANN401 - JSON
     return heard(socket, lambda now: (now["ended"] or {}).get("number") == number)["ended"]
 
 
+@pytest.mark.slow
 def test_a_question_is_answered_from_the_face(server: PageServer) -> None:
     with watching(server) as one, watching(server) as other:
         heard(one, lambda now: now["screens"] == 2)

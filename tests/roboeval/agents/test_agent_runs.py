@@ -219,6 +219,7 @@ def test_a_server_that_takes_no_results_stops_the_command(tmp_path: Path, suite:
     assert not run.completions.read_bytes()  # so that the same command can go on once the server is mended
 
 
+@pytest.mark.slow
 def test_many_rejected_missions_in_a_row_stop_the_command(tmp_path: Path, suite: Suite) -> None:
     run = RunFolder(tmp_path / "run")
     with rejecting(2) as server:
@@ -254,6 +255,7 @@ def replan(
     return [*run.read(suite)], rows_of(run, suite), server
 
 
+@pytest.mark.slow
 def test_after_a_failure_the_model_writes_the_rest(tmp_path: Path, suite: Suite) -> None:
     completions, rows, server = replan(tmp_path, suite, [WRONG_DOOR, "say('Sorry')"])
     for one in completions:

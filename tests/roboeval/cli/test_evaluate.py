@@ -231,6 +231,7 @@ def test_a_published_file_that_is_not_assignments_of_texts(tmp_path: Path) -> No
     assert not marker.exists()
 
 
+@pytest.mark.slow
 def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     script = (
@@ -518,6 +519,7 @@ def test_json_is_for_machines_alone(run: Path) -> None:
         json.loads(ended.out)
 
 
+@pytest.mark.slow
 def test_a_pipe_is_a_file_of_completions(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + row(1, "go_to('nowhere')"))
     ended = roboeval("evaluate", "--json", cwd=tmp_path, after="<(cat a.jsonl)")
@@ -714,6 +716,7 @@ def test_tasks_are_listed_and_shown() -> None:
     assert '"Nonsense"' in refused("tasks", "Nonsense").sentence
 
 
+@pytest.mark.slow
 def test_accepted_findings_are_shown_with_their_reasons() -> None:
     linted = roboeval("tasks", "HalloweenShopping", "--lint")
     assert linted.status == 0

@@ -40,6 +40,7 @@ def judged(folder: Path, *more: str) -> bytes:
     return (folder / "run" / "evaluations" / "paper-rules-house.jsonl").read_bytes()
 
 
+@pytest.mark.slow
 def test_verdicts_with_rules_stand_beside_those_without(folder: Path) -> None:
     assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
     plain = (folder / "run" / "evaluations" / "paper.jsonl").read_bytes()
@@ -95,6 +96,7 @@ def test_rejection_sampling_rejects_what_breaks_a_rule(folder: Path) -> None:
     assert accepted(folder, "run") == without
 
 
+@pytest.mark.slow
 def test_an_interval_of_what_is_alike_everywhere_is_unknown(folder: Path) -> None:
     rule = "rules: [{name: silent, says: Say nothing., always: 'not tr.Exists(goto(\".*\"))'}]"
     (folder / "house.yaml").write_text(rule)

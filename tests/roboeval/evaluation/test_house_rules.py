@@ -56,6 +56,7 @@ def test_there_are_three_rules_or_more_of_eight_kinds() -> None:
     assert min(kinds.values()) >= 3
 
 
+@pytest.mark.slow
 def test_rules_stop_what_breaks_them_and_nothing_else(measuring: Measuring) -> None:
     found = effects(measuring, "GetDrink", HASTY)
     broken = {name for name, effect in found.items() if effect.broken}
@@ -72,6 +73,7 @@ def test_what_was_refused_would_have_failed(measuring: Measuring) -> None:
     assert (found.broken, found.failing, found.altered) == (0, 3, 0)
 
 
+@pytest.mark.slow
 def test_a_guard_that_sees_nothing_is_noticed(measuring: Measuring, monkeypatch: pytest.MonkeyPatch) -> None:
     def nothing(_: RuleGuard, *events: Event, is_drive: bool = False) -> None:
         """Take what there is."""

@@ -49,6 +49,7 @@ def test_explanations_of_all_wrong_solutions(name: str, every: int) -> None:
     assert [sentence for sentence in found if "fits the requirement" in sentence] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SUITES)
 def test_titles_of_worlds_and_labels_of_checks(name: str) -> None:
     worlds = [world for task in load_suite(name).tasks.values() for world in task.scenarios]

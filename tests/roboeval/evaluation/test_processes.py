@@ -103,6 +103,7 @@ def test_nobody_waits_for_what_is_no_longer_wanted() -> None:
     assert time.monotonic() - began < 30
 
 
+@pytest.mark.slow
 def test_a_lost_process_is_one_sentence() -> None:
     with pytest.raises(EngineError, match="worker process died"):
         list(Processes(2).map_distinct(dies, numbered(3), abs))

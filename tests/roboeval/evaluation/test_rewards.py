@@ -159,6 +159,7 @@ def test_house_rules_count_even_if_a_program_was_rewarded_without_them(tmp_path:
     assert reward("SayGoodDay", 0, [program], suite=ruled) == with_rules
 
 
+@pytest.mark.slow
 def test_it_may_be_called_from_many_threads_at_once() -> None:
     shared = [*distinct(10, "shared"), *NOTHING]
 

@@ -313,6 +313,7 @@ def test_options_may_have_outer_spaces(linted: Lint, option: str) -> None:
     assert [one.kind for one in said] == ["dead-regex", "implied"]
 
 
+@pytest.mark.slow
 def test_a_regex_that_takes_much_longer_the_longer_a_text_is(linted: Lint) -> None:
     (finding,) = linted({"greets": 'tr.Exists(say("a.*b"))'}, ["greets"])
     assert finding.name == "slow-regex: a.*b"

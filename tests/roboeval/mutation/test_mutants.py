@@ -72,6 +72,7 @@ def test_no_more_are_drawn_than_there_are() -> None:
 # --- originals
 
 
+@pytest.mark.slow
 def test_originals_are_right_solutions_and_what_a_user_names(paper: Suite) -> None:
     further = (Original("mine", GOES, claimed=False), Original("again", GOES))
     for task in paper.tasks.values():

@@ -207,6 +207,7 @@ def test_the_same_runs_give_the_same_bytes(usual: Path, tmp_path: Path) -> None:
         assert (usual / file).read_bytes() == (again / file).read_bytes(), file
 
 
+@pytest.mark.slow
 def test_a_report_that_was_interrupted_is_one_and_says_so(tmp_path: Path) -> None:
     piece = next(write_report("a report", ["about it"], parts([made_up("a", {"Visit": (10,)})]), tmp_path))
     assert piece in {path.stem for path in tmp_path.glob("*/*")}

@@ -230,6 +230,7 @@ def test_every_two_values_meet(sizes: dict[str, int]) -> None:
         assert {row["a"] for row in rows} == set(range(5))
 
 
+@pytest.mark.slow
 def test_every_task_of_plus_has_its_worlds_and_its_pairs() -> None:
     for task in load_suite("plus").tasks.values():
         assert len(task.scenarios) >= 30, task.name

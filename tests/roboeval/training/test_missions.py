@@ -113,6 +113,7 @@ def test_a_mission_ends_at_the_limit_of_calls_with_half_the_reward(row: dict[str
     assert (mission.components.reward, mission.components.without_errors) == (0.5, 0)
 
 
+@pytest.mark.slow
 def test_who_does_nothing_earns_nothing() -> None:
     rows = load_missions(count=60, only=["CollectThings", "SwapThings"])
     assert max(TrainingMission.begin(row).components.reward for row in rows) == 0

@@ -204,6 +204,7 @@ def test_a_run_that_is_deleted_is_not_found_any_more(runs: Path) -> None:
         assert told(server, "/api/runs") == []
 
 
+@pytest.mark.slow
 def test_a_completion_without_a_verdict_has_the_entries_of_a_judged_one(runs: Path) -> None:
     run = RunFolder(runs / "hasty")
     places = ["/".join(str(row[part]) for part in KEY) for _, row in read_rows(run.completions)]
@@ -216,6 +217,7 @@ def test_a_completion_without_a_verdict_has_the_entries_of_a_judged_one(runs: Pa
         assert server.call("GET", f"/runs/hasty/{places[-1]}").status == 200
 
 
+@pytest.mark.slow
 def test_a_damaged_row_is_said(runs: Path) -> None:
     rows = RunFolder(runs / "hasty").rows("paper")
     lines = rows.read_bytes().splitlines(keepends=True)
@@ -238,6 +240,7 @@ def test_a_damaged_row_is_said(runs: Path) -> None:
         assert server.call("GET", f"/runs/hasty/{place}").status == 200
 
 
+@pytest.mark.slow
 def test_hostile_texts_come_as_they_are(runs: Path) -> None:
     run = RunFolder(runs / "hasty")
     lines = run.completions.read_bytes().splitlines(keepends=True)
@@ -256,6 +259,7 @@ def test_hostile_texts_come_as_they_are(runs: Path) -> None:
         assert "<script>window" not in page.text
 
 
+@pytest.mark.slow
 def test_a_suite_of_ones_own_is_named(runs: Path, tmp_path: Path) -> None:
     head = RunFolder(runs / "hasty").manifest("paper")
     head.write_text(json.dumps({**json.loads(head.read_text()), "suite": "mine"}))
@@ -371,6 +375,7 @@ def test_without_a_robot_there_is_nothing_to_stop(server: PageServer) -> None:
     assert "stops the robot" not in server.said
 
 
+@pytest.mark.slow
 def test_the_operators_page_has_the_benchmark_too(tmp_path: Path, runs: Path) -> None:
     with PageServer(tmp_path, "--runs", str(runs)) as server:
         assert told(server, "/api/runs")[0]["run"] == "hasty"

@@ -12,6 +12,7 @@ from roboeval.web.comparison_page import differences_of
 from roboeval.web.run_store import RunStore
 
 
+@pytest.mark.slow
 def test_differences_are_those_of_compare(tmp_path: Path) -> None:
     for name in ("hasty", "careful"):
         words = (

@@ -209,6 +209,7 @@ def test_completions_that_come_later_are_judged_later(tmp_path: Path, paper: Sui
     assert [row["prompt"] for row in judged(run, paper)] == [0, 1]
 
 
+@pytest.mark.slow
 def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Suite) -> None:
     run = a_run(tmp_path / "run", [GREETS])
     script = (
