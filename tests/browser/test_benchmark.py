@@ -350,7 +350,7 @@ def test_an_address_of_nothing_says_so(served: PageServer, opened: OpenPage) -> 
         ("runs/hasty?evaluation=none", '"hasty" has no evaluation "none"'),
     ):
         page = opened(served, expecting="404")
-        page.goto(f"http://localhost:{served.port}/{path}")
+        page.goto(f"{served.inside}/{path}")
         expect(page.get_by_role("alert")).to_have_text(sentence)
 
 
@@ -428,7 +428,7 @@ def test_no_text_becomes_more_than_text(few: Path, tmp_path: Path, opened: OpenP
             shown = page.locator(".program").inner_text()
             assert "".join(shown.split())[1:8] == "".join(visible(evil).split())[:7]
             expect_unharmed(page, count)
-            page.goto(f"http://localhost:{server.port}/runs")
+            page.goto(f"{server.inside}/runs")
             page.get_by_role("checkbox").check()
             page.get_by_role("button", name="Show side by side").click()
             expect(page.locator(".heat td").first).to_be_visible()
@@ -446,7 +446,7 @@ def test_nothing_runs_in_a_report_that_comes_with_a_run(
 ) -> None:
     report = real / "hasty" / "report"
     page = opened(served, expecting="Blocked script execution")
-    page.goto(f"http://localhost:{served.port}/runs/hasty")
+    page.goto(f"{served.inside}/runs/hasty")
     expect(page.locator(".completions-view a").first).to_be_visible()
     assert page.get_by_text("Report of this run").count() == 0
     report.mkdir()
@@ -467,7 +467,7 @@ def test_three_runs_are_compared_pair_by_pair(few: Path, tmp_path: Path, opened:
     made(folder, "careful", "--tasks", "SayGoodDay", count=1)
     with serving(folder) as server:
         page = opened(server)
-        page.goto(f"http://localhost:{server.port}/side-by-side?run=a&run=b&run=careful")
+        page.goto(f"{server.inside}/side-by-side?run=a&run=b&run=careful")
         expect(page.locator(".pairs li")).to_have_count(3)
         expect(page.locator(".heat td", has_text="no completions")).to_have_count(2)
         page.locator(".pairs a").nth(1).click()
@@ -484,10 +484,10 @@ def test_three_runs_are_compared_pair_by_pair(few: Path, tmp_path: Path, opened:
 def test_nothing_is_squeezed_or_hidden(served: PageServer, opened: OpenPage, size: tuple[int, int]) -> None:
     page = opened(served, size=size)
     expect(page.locator(".bar .pages")).to_be_visible(visible=size != PHONE)
-    page.goto(f"http://localhost:{served.port}/runs/hasty")
+    page.goto(f"{served.inside}/runs/hasty")
     expect(page.locator(".kind", has_text="failed checks")).to_be_visible()
     assert page.locator(".ends").evaluate("e => e.scrollHeight <= e.clientHeight")
-    page.goto(f"http://localhost:{served.port}/side-by-side?run=careful&run=hasty")
+    page.goto(f"{served.inside}/side-by-side?run=careful&run=hasty")
     expect(page.locator(".differences tbody tr").first).to_be_visible()
     heights = page.locator(".differences tbody tr").evaluate_all("rows => rows.map(row => row.clientHeight)")
     assert max(heights) < 60

@@ -44,7 +44,7 @@ def test_the_robot_is_stopped_when_the_last_operator_leaves(server: PageServer, 
     first.context.close()
     second.reload()
     expect(second.locator(".headline")).to_have_text("Running")
-    second.goto(f"http://localhost:{server.port}/missions")
+    second.goto(f"{server.inside}/missions")
     expect(second.locator("h1")).to_have_text("Missions")
     second.wait_for_timeout(1000 * (GRACE + 1))
     assert state(server) == "running", "somebody is there"

@@ -63,6 +63,6 @@ def test_pages(
     look("problems")
     office.rest()
     for name, path in (("missions", "missions"), ("mission", f"missions/{mission}")):
-        page.goto(f"http://localhost:{office.port}/{path}")
+        page.goto(f"{office.inside}/{path}")
         expect(page.locator("h1")).to_be_visible()
         look(name)

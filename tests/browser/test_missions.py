@@ -110,7 +110,7 @@ def test_the_list_shows_robot_and_reason_and_can_be_searched(
 
 def test_the_list_is_live_in_all_tabs(server: PageServer, opened: OpenPage) -> None:
     first = opened(server, "missions")
-    stopped = f"http://localhost:{server.port}/missions?text=stopped"
+    stopped = f"{server.inside}/missions?text=stopped"
     second = opened(server, beside=first, link=stopped)
     expect(first.get_by_text("No missions yet.")).to_be_visible()
     server.run(FAR)

@@ -45,7 +45,7 @@ def checked(page: Page, program: str) -> None:
     until(
         page,
         """async (mark) => {
-            const now = await (await fetch("/api/missions/current")).json();
+            const now = await (await fetch("api/missions/current")).json();
             return now.program.includes(mark) && now.state === "checked" && !now.busy;
         }""",
         mark,
@@ -258,7 +258,7 @@ def test_what_was_typed_just_before_a_click_is_checked_and_kept(server: PageServ
     expect(page.get_by_text("Checking your last edit first.")).to_be_visible()
     until(
         page,
-        "fetch('/api/missions/current').then(a => a.json()).then(a => a.program.endsWith('# one more'))",
+        "fetch('api/missions/current').then(a => a.json()).then(a => a.program.endsWith('# one more'))",
     )
     expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
     expect(page.locator(".cm-content")).to_contain_text("# one more")
@@ -409,7 +409,7 @@ def test_stop_is_always_in_the_same_place_and_nothing_is_wider_than_the_screen(
     page = opened(server)
     checked(page, TEA + "    # " + "a long line " * 30 + "\n")
     for path in ("/", "/missions", "/missions/" + server.call("GET", "/api/robot").data["mission"]):
-        page.goto(f"http://localhost:{server.port}{path}")
+        page.goto(f"{server.inside}{path}")
         expect(page.locator("h1, h2").first).to_be_visible()
         for width, height in (DESK, TABLET, PHONE):
             page.set_viewport_size({"width": width, "height": height})

@@ -102,7 +102,7 @@ def test_the_page_lives_and_stops_the_robot(site: Site, opened: OpenPage) -> Non
 def test_no_address_leaves_the_path_of_the_page(site: Site, opened: OpenPage) -> None:
     page = opened(site.server, link=site.link())
     for path in ("", "missions", "runs", "runs/careful", "face"):
-        page.goto(f"{site.proxy.address}/{path}")
+        page.goto(f"{site.proxy.address}{site.server.path}/{path}")
         page.wait_for_load_state("networkidle")
         found = addresses(page)
         left = {each for each in found if not f"{each}/".startswith(f"{site.proxy.address}/")}
@@ -116,8 +116,8 @@ def test_the_cookie_counts_below_the_path_alone_and_only_by_https(site: Site, op
     page = opened(site.server, link=site.link("missions"))
     assert urlsplit(page.url).query == ""
     (cookie,) = page.context.cookies()
-    prefix = urlsplit(site.proxy.address).path
-    assert (cookie["path"], cookie["secure"], cookie["httpOnly"]) == (prefix or "/", True, True)
+    path = urlsplit(site.proxy.address).path + site.server.path
+    assert (cookie["path"], cookie["secure"], cookie["httpOnly"]) == (path, True, True)
 
 
 @BELOW_A_PATH
@@ -153,7 +153,7 @@ def test_the_run_of_a_benchmark_is_shown_to_its_last_page(site: Site, opened: Op
     page.locator(".which a").first.click()
     expect(page.locator("h1")).to_contain_text("SayGoodDay")
     page.locator(".trail a").first.click()
-    expect(page).to_have_url(re.compile(re.escape(site.proxy.address) + "/runs/careful"))
+    expect(page).to_have_url(re.compile(re.escape(site.proxy.address + site.server.path) + "/runs/careful"))
 
 
 def test_without_the_option_stop_says_how_to_start(tmp_path: Path, browser: Browser) -> None:

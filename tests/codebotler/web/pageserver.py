@@ -159,3 +159,13 @@ class PageServer:
         """What a browser sends that has opened the link."""
         answer = self.ask("GET", f"/?token={self.token}")
         return answer.headers["set-cookie"].partition(";")[0]
+
+    @property
+    def path(self) -> str:
+        """The path to which its cookie belongs."""
+        return self.ask("GET", f"/?token={self.token}").headers["location"].rstrip("/")
+
+    @property
+    def inside(self) -> str:
+        """The address below which a browser stays once it has opened the link."""
+        return f"http://localhost:{self.port}{self.path}"

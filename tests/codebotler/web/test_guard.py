@@ -81,12 +81,15 @@ def test_clients_that_send_no_whole_request_give_way_to_new_ones(server: PageSer
 
 def test_the_link_opens_the_page_and_leaves_no_token_in_it(server: PageServer) -> None:
     answer = server.ask("GET", f"/missions?a=b&token={server.token}")
-    assert (answer.status, answer.headers["location"]) == (303, "/missions?a=b")
+    path = server.path
+    assert (answer.status, answer.headers["location"]) == (303, f"{path}/missions?a=b")
     cookie = answer.headers["set-cookie"]
     assert cookie.startswith(f"codebotler-{server.port}="), "pages of one machine share its cookies"
     assert server.token not in cookie
-    assert {"httponly", "samesite=strict", "path=/"} <= {part.strip().lower() for part in cookie.split(";")}
-    assert server.ask("GET", "/", cookie=cookie.partition(";")[0]).status == 200
+    parts = {part.strip().lower() for part in cookie.split(";")}
+    assert {"httponly", "samesite=strict", f"path={path}"} <= parts
+    assert len(path) > 32, "a server on another port must not guess which path has the cookie"
+    assert server.ask("GET", f"{path}/", cookie=cookie.partition(";")[0]).status == 200
     assert socket(server, cookie=cookie.partition(";")[0], origin=origin(server)) == 101
 
 
@@ -122,7 +125,7 @@ def test_the_link_leads_to_pages_of_ours_only(server: PageServer, path: str, sta
 )
 def test_the_link_of_a_page_opens_it(server: PageServer, path: str, leads: str) -> None:
     answer = server.ask("GET", f"{path}?token={server.token}")
-    assert (answer.status, answer.headers["location"]) == (303, leads)
+    assert (answer.status, answer.headers["location"]) == (303, server.path + leads)
 
 
 @pytest.mark.parametrize(
@@ -625,20 +628,21 @@ def test_a_proxy_opens_nothing_without_the_token(proxied: PageServer) -> None:
 @pytest.mark.parametrize(
     ("host", "given", "leads", "path"),
     [
-        ("robot.example", "/robot/missions", "/robot/missions", "/robot"),
-        ("robot.example", "/missions", "/robot/missions", "/robot"),
-        ("robot.example", "/robot", "/robot/", "/robot"),
-        ("lab.example:8443", "/missions", "/missions", "/"),
-        ("localhost", "/missions", "/missions", "/"),
+        ("robot.example", "/robot/missions", "/missions", "/robot"),
+        ("robot.example", "/missions", "/missions", "/robot"),
+        ("robot.example", "/robot", "/", "/robot"),
+        ("lab.example:8443", "/missions", "/missions", ""),
+        ("localhost", "/missions", "/missions", ""),
     ],
 )
 def test_the_link_leads_to_the_path_behind_the_proxy(
     proxied: PageServer, host: str, given: str, leads: str, path: str
 ) -> None:
     answer = proxied.ask("GET", f"{given}?token={proxied.token}", host=host)
-    assert (answer.status, answer.headers["location"]) == (303, leads)
+    inside = path + proxied.path
+    assert (answer.status, answer.headers["location"]) == (303, inside + leads)
     parts = {part.strip().lower() for part in answer.headers["set-cookie"].split(";")}
-    assert f"path={path}" in parts
+    assert f"path={inside}" in parts
     assert ("secure" in parts) == (host != "localhost")
 
 

@@ -114,6 +114,11 @@ class Access:
         """Return a role's cookie, from which the token cannot be derived."""
         return self._cookie_value(self._tokens[role] or "")
 
+    @property
+    def path(self) -> str:
+        """The path to which the cookie belongs. Browsers send cookies to servers on other ports, too."""
+        return f"/{self._cookie_value('path')[:SECRET_BYTES]}"
+
     def _cookie_value(self, token: str) -> str:
         return hmac.new(self.cookie_secret, token.encode(), hashlib.sha256).hexdigest()
 

@@ -101,6 +101,9 @@ class Guard:
         proxy = self._proxies.get(_named_host(scope))
         if proxy is not None:
             scope = proxy.seen_from_outside(scope)
+        inside = prefix_of(scope) + self._access.path
+        if f"{scope['path']}/".startswith(f"{inside}/"):
+            scope = {**scope, "root_path": inside}
         request = HTTPConnection(scope)
         try:
             self._check_path(path_of(scope))
@@ -194,7 +197,8 @@ class Guard:
         if normpath(path) != path or not self._has_page(path):  # browsers resolve ".."
             raise RefusedError(HTTPStatus.NOT_FOUND, NO_PAGE)
         rest = [(name, value) for name, value in request.query_params.multi_items() if name != "token"]
-        prefix = prefix_of(request.scope)
+        secret = self._access.path
+        prefix = prefix_of(request.scope).removesuffix(secret) + (secret if role else "")
         where = prefix + quote(path) + (f"?{urlencode(rest)}" if rest else "")
         answer = RedirectResponse(
             where, HTTPStatus.SEE_OTHER, {**_SECURITY_HEADERS, "cache-control": "no-store"}
@@ -206,7 +210,7 @@ class Guard:
             answer.set_cookie(
                 self._cookie,
                 value,
-                path=prefix or "/",
+                path=prefix,
                 secure=is_secure,
                 httponly=True,
                 samesite="strict",
