@@ -102,15 +102,6 @@ def _unskipped(report: Report, config: pytest.Config) -> Report:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def runtime(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The folder of locks of robots; none of the machine's own."""
-    folder = tmp_path_factory.mktemp("runtime")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_RUNTIME_DIR", str(folder))
-        yield folder
-
-
-@pytest.fixture(scope="session", autouse=True)
 def no_authorities() -> Iterator[None]:
     """Load no public certificate authorities: that takes 30 ms a client, and tests stay on this machine."""
     load = ssl.SSLContext.load_verify_locations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import os
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -11,7 +12,7 @@ from tempfile import gettempdir
 import pytest
 
 from codebotler.core.skills.paper import SKILLS
-from codebotler.robots.reservation import lock_folder
+from codebotler.robots.reservation import robot_file
 from codebotler.robots.ros.kinds import INSTALL_ROS2, ROS2_MODULES
 from codebotler.robots.ros.worker import find_missing
 from ros2_scene import PROFILE, ROS2_PYTHON, Scene, installed
@@ -59,5 +60,6 @@ def scene() -> Iterator[Scene]:
         yield scene
     finally:
         scene.end()
-        for sign in lock_folder().glob("*.goal"):  # of goals that ended with their servers
+        ours = robot_file("ros2", os.environ["ROS_DOMAIN_ID"], "goal")
+        for sign in ours.parent.glob(f"{ours.stem}.*.goal"):  # of goals that ended with their servers
             sign.unlink()

@@ -12,7 +12,6 @@ from datetime import datetime
 from hashlib import sha256
 from ipaddress import ip_address
 from pathlib import Path
-from tempfile import gettempdir
 from typing import Self
 from urllib.parse import urlsplit
 
@@ -20,7 +19,7 @@ from codebotler.core.files import make_folder
 from codebotler.robots.base import NotReadyError, Robot
 
 DEFAULT_PORTS = {"ws": 80, "wss": 443, "http": 80, "https": 443}
-LOOPBACK_ADDRESS, RUNTIME_FOLDERS = "127.0.0.1", "/run/user"
+LOOPBACK_ADDRESS, RUNTIME_FOLDERS, TEMPORARY_FOLDER = "127.0.0.1", Path("/run/user"), Path("/tmp")  # noqa: S108 - a private folder there
 
 
 class Reservation:
@@ -95,10 +94,9 @@ def lock_folder() -> Path:
         NotReadyError: other users can write to the folder.
         OSError: the folder cannot be created.
     """
-    # Clients of agents start their servers without this variable, which logins set to this folder.
-    runtime = Path(os.environ.get("XDG_RUNTIME_DIR") or f"{RUNTIME_FOLDERS}/{os.getuid()}")
-    is_usable = runtime.is_absolute() and _is_ours(runtime)  # with `sudo`, it may belong to another user
-    folder = runtime / "codebotler" if is_usable else Path(gettempdir()) / f"codebotler-{os.getuid()}"
+    # It depends on no variable, since clients of agents start their servers without those of a shell.
+    runtime = RUNTIME_FOLDERS / str(os.getuid())
+    folder = runtime / "codebotler" if _is_ours(runtime) else TEMPORARY_FOLDER / f"codebotler-{os.getuid()}"
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
     if not _is_ours(folder):

@@ -85,50 +85,43 @@ def test_any_address_can_be_locked(address: str, tmp_path: Path) -> None:
         Reservation(addressed(address), tmp_path).__enter__()
 
 
-def test_locks_lie_where_nobody_else_can_write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    tmp_path.chmod(0o700)
-    assert lock_folder() == tmp_path / "codebotler"
-    assert (tmp_path / "codebotler").stat().st_mode & 0o777 == 0o700
+@pytest.fixture
+def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder that stands for /run/user and /tmp, with the runtime folder of this user."""
+    monkeypatch.setattr("codebotler.robots.reservation.RUNTIME_FOLDERS", tmp_path)
+    monkeypatch.setattr("codebotler.robots.reservation.TEMPORARY_FOLDER", tmp_path)
+    (tmp_path / str(os.getuid())).mkdir(mode=0o700)
+    return tmp_path
 
 
-def test_a_process_without_the_variable_of_a_login_has_the_same_locks(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    runtime = tmp_path / str(os.getuid())
-    runtime.mkdir(mode=0o700)
-    monkeypatch.setattr("codebotler.robots.reservation.RUNTIME_FOLDERS", str(tmp_path))
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime))
-    at_login = lock_folder()
-    monkeypatch.delenv("XDG_RUNTIME_DIR")
-    assert lock_folder() == at_login == runtime / "codebotler"
+def test_locks_lie_where_nobody_else_can_write(folders: Path) -> None:
+    assert lock_folder() == folders / str(os.getuid()) / "codebotler"
+    assert lock_folder().stat().st_mode & 0o777 == 0o700
 
 
-@pytest.mark.parametrize("runtime", [None, "", "run", "/no/such/folder", "others"])
-def test_without_a_runtime_folder_locks_are_temporary(
-    runtime: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("codebotler.robots.reservation.gettempdir", lambda: str(tmp_path))
-    monkeypatch.setattr("codebotler.robots.reservation.RUNTIME_FOLDERS", str(tmp_path / "none"))
-    if runtime is None:
-        monkeypatch.delenv("XDG_RUNTIME_DIR")
-    elif runtime == "others":
-        (tmp_path / "run").mkdir()
-        (tmp_path / "run").chmod(0o777)
-        monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "run"))
+def test_no_variable_moves_the_locks(folders: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = lock_folder()
+    for variable in ("XDG_RUNTIME_DIR", "TMPDIR", "HOME"):
+        monkeypatch.setenv(variable, str(folders / str(os.getuid())))
+    assert lock_folder() == folder
+
+
+@pytest.mark.parametrize("mode", [None, 0o777])
+def test_without_a_runtime_folder_locks_are_temporary(folders: Path, mode: int | None) -> None:
+    runtime = folders / str(os.getuid())
+    if mode is None:
+        runtime.rmdir()
     else:
-        monkeypatch.setenv("XDG_RUNTIME_DIR", runtime)
-    assert lock_folder() == tmp_path / f"codebotler-{os.getuid()}"
+        runtime.chmod(mode)
+    assert lock_folder() == folders / f"codebotler-{os.getuid()}"
 
 
 @pytest.mark.parametrize("what", ["link", "file", "open", "somebody else's"])
 def test_folder_of_locks_that_is_not_ours_is_refused(
-    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    what: str, folders: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = tmp_path / f"codebotler-{os.getuid()}"
-    monkeypatch.delenv("XDG_RUNTIME_DIR")
-    monkeypatch.setattr("codebotler.robots.reservation.gettempdir", lambda: str(tmp_path))
-    monkeypatch.setattr("codebotler.robots.reservation.RUNTIME_FOLDERS", str(tmp_path / "none"))
+    (folders / str(os.getuid())).rmdir()
+    folder = folders / f"codebotler-{os.getuid()}"
     match what:
         case "link":
             folder.symlink_to(tmp_path)
