@@ -12,17 +12,17 @@ from codebotler.candidates.clusters import CandidateCluster, CandidateClusters
 from codebotler.checking.problems import Sample
 from codebotler.checking.storyboard import steps_of
 from codebotler.core.errors import UserError
-from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE, SAY
+from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.text.phrases import phrase
 from codebotler.core.text.words import brief, counted, listed
 from codebotler.core.trace import Event
 from codebotler.models.recorded import is_recorded
-from codebotler.simulator.worlds.matching import normalized
+from codebotler.simulator.worlds.matching import SOMEBODY, means_person, normalized
 
 DOMINANT_SHARE = 0.75
 """The share of the candidates from which the largest cluster is taken without a question."""
 
-MAX_CANDIDATE_OPTIONS, MAX_QUESTION_FACTS, MAX_SHOWN_DIFFERENCES = 3, 4, 3
+MAX_CANDIDATE_OPTIONS, MAX_QUESTION_FACTS, MAX_SHOWN_DIFFERENCES = 3, 4, 4
 NOTICED_FIRST = frozenset({"said", "moved", "asked", "room"})
 """The differences that a person cares about most."""
 
@@ -127,7 +127,8 @@ def question_about(
     largest = groups.clusters[0]
     if len(groups.clusters) == 1 or largest.size >= dominant_share * groups.total:
         return None
-    worlds = range(len(largest.samples))
+    every = range(len(largest.samples))
+    worlds = [one for one in every if _is_possible([each.samples[one] for each in groups.clusters])] or every
     number = max(worlds, key=lambda one: _rank(_distinct_clusters(groups.clusters, one), one))
     shown = _distinct_clusters(groups.clusters, number)
     samples = [one.samples[number] for one in shown]
@@ -140,6 +141,14 @@ def question_about(
     why_last = "a recorded model writes no new programs" if is_recorded(model) else why_last
     facts = _facts_that_matter(shown, number)
     return ClarifyingQuestion(tuple(options), facts, groups.total, number, why_last)
+
+
+def _is_possible(samples: Iterable[Sample]) -> bool:
+    """Return whether no candidate meets a person in a room where another one finds nobody."""
+    events = [event for sample in samples for event in sample.outcome.trace if event.kind in {ASK, CHECK}]
+    met = {one.place for one in events if one.answer or (one.found and means_person(one.text))}
+    empty = {one.place for one in events if one.found is False and normalized(one.text) == SOMEBODY}
+    return met.isdisjoint(empty)
 
 
 def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:
@@ -177,8 +186,8 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
 def describe_differences(samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> list[str]:
     """Return a sentence for each run in one world that says only what differs from the other runs."""
     seen = [_aspects(behaviour) for behaviour in behaviours]
-    differing = _telling_first(seen)
-    return [listed([_words(key, sample) for key in differing[:MAX_SHOWN_DIFFERENCES]]) for sample in samples]
+    shown = sorted(_telling_first(seen)[:MAX_SHOWN_DIFFERENCES], key=lambda key: key[0] == "room")  # the end
+    return [listed([_words(key, sample) for key in shown]) for sample in samples]
 
 
 def _telling_first(seen: Sequence[Mapping[Aspect, object]]) -> list[Aspect]:

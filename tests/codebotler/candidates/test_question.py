@@ -1,5 +1,7 @@
 """The question is asked only if it pays, about the world that shows the difference best."""
 
+from dataclasses import replace
+
 import pytest
 
 from codebotler.candidates.behaviour import behaviour_of
@@ -81,6 +83,16 @@ def test_what_a_person_cares_about_is_preferred() -> None:
     assert asked(cluster(1, "a", waves, (*ONE, *ONE)), cluster(1, "b", (), TWO)).sample == 1
 
 
+def test_nobody_is_met_in_a_world_in_which_another_option_finds_nobody() -> None:
+    met = Event("check", "Ann", found=True, place="hall")
+    empty = Event("check", "person", found=False, place="hall")
+    question = asked(cluster(1, "a", (met, *ONE), ONE), cluster(1, "b", (empty, *TWO, *TWO), TWO))
+    assert question.sample == 1
+    elsewhere = replace(met, place="lab")
+    question = asked(cluster(1, "a", (elsewhere, *ONE), ONE), cluster(1, "b", (empty, *TWO, *TWO), ONE))
+    assert question.sample == 0
+
+
 def test_only_facts_that_matter_are_shown() -> None:
     one, other = cluster(1, "a", ONE, ONE), cluster(1, "b", TWO, ONE)
     assert asked(one, other).facts == (MUG.sentence,)
@@ -105,6 +117,8 @@ def test_sentences_say_only_what_differs() -> None:
         "says nothing in hall",
     ]
     assert described((drive("hall", "lab"),), ()) == ["ends in lab", "stays where it is"]
+    both = ['says "1 mugs" in hall and ends in lab', "says nothing and stays where it is"]
+    assert described((drive("hall", "lab"), *ONE), ()) == both
 
 
 def test_sentences_of_three_options_tell_all_of_them_apart() -> None:
