@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from codebotler.checking.contracts.of_program import derive_contract
 from codebotler.checking.contracts.text import contract_rows
-from codebotler.checking.exploration import explore
+from codebotler.checking.exploration import CATCHES_ERRORS, explore
 from codebotler.checking.problems import CheckResult, Problem, RuleProof, RuleVerdict, Sample
 from codebotler.checking.sampled import (
     DEFAULT_SAMPLES,
@@ -178,6 +178,7 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
     written = read_arguments(program, settings.skills)
     is_complete = explored.is_complete and explored.is_steady and not written.reads_clock
     samples, problems, proofs = list(found.samples), list(found.problems), []
+    ends_if_a_skill_fails = not CATCHES_ERRORS.search(program)
     for rule in settings.house_rules:
         sampler = explored.violations.get(rule.name)
         number = next((one.samples[0] for one in found.problems if one.rule == rule.name), None)
@@ -188,7 +189,7 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
             samples.append(replace(runs.samples_on(worker, {})[0], number=number, is_chosen=True))
             problems += group_failures(samples[number:], found.room_map)
         verdict: RuleVerdict = "possible" if number is not None else "never" if is_complete else "unknown"
-        proofs.append(RuleProof(rule.name, verdict, explored.cases, number))
+        proofs.append(RuleProof(rule.name, verdict, explored.cases, number, ends_if_a_skill_fails))
     if any(not problem.rule for problem in problems):  # a robot may get further than these runs
         explored = replace(explored, is_complete=False)
     contract = derive_contract(explored, written, found.room_map, settings.skills)

@@ -26,7 +26,7 @@ MAX_RUNS, MAX_LONE_RUNS, MAX_CALLS = 2_000, 100, 40_000
 
 RUNS_AT_ONCE = 32
 MAX_FAILURES = 30  # runs in which the robot fails once
-CATCHES_ERRORS = re.compile(r"\b(?:except|suppress)\b")
+CATCHES_ERRORS = re.compile(r"\b(?:except|suppress|finally|with|yield)\b")
 
 
 @dataclass(frozen=True)

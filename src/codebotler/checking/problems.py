@@ -64,12 +64,14 @@ class RuleProof:
             there are more worlds than were explored, or if facts may change while the program runs.
         cases: the number of explored worlds.
         sample: the number of the world in which the program breaks it; None if there is none.
+        if_skills_fail: whether this also holds if any skills fail, since the first failure ends the program.
     """
 
     rule: str
     verdict: RuleVerdict
     cases: int
     sample: int | None = None
+    if_skills_fail: bool = True
 
     @property
     def words(self) -> str:
@@ -78,7 +80,8 @@ class RuleProof:
             return f"can be broken, as in imagined world {self.sample}"
         worlds = counted(self.cases, "world")
         if self.verdict == "never":
-            return f"cannot be broken, whatever the program meets ({worlds})"
+            unless = "" if self.if_skills_fail else " unless skills fail"
+            return f"cannot be broken{unless}, whatever the program meets ({worlds})"
         return f"was kept in {worlds}, but others are possible"
 
 

@@ -245,6 +245,13 @@ def test_rules_are_proved_or_broken_in_a_world_that_is_shown(contracts: Contract
     assert [problem.rule for problem in found.problems] == ["cafe"]
 
 
+@pytest.mark.parametrize("last", ["try: say('a')\n    finally: say('b')", "say('a')"])
+def test_a_proof_says_whether_it_holds_if_skills_fail(contracts: Contracts, last: str) -> None:
+    rule = Rule("cafe", "cafe", parse('not tr.Exists(goto("café"))'))
+    (proof,) = contracts.checked(f"def task_program():\n    {last}\n", rule).proofs
+    assert (proof.verdict, proof.if_skills_fail) == ("never", "finally" not in last)
+
+
 def test_a_program_that_does_not_compile_has_no_contract(contracts: Contracts) -> None:
     assert contracts.checked("def task_program(:").contract is None
 

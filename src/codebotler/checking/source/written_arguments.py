@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import sys
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,12 +24,14 @@ FIELD = re.compile(r"%[-+ #0]*\d*(?:\.\d+)?[a-zA-Z]|\{[^{}]*\}")
 """A gap in a text that is formatted with `%` or `format`, where any text may be."""
 
 ESCAPED = re.compile(r"%%|\{\{|\}\}|%\(|%[^a-zA-Z]*\*")
-CLOCKS = frozenset({"datetime", "random", "secrets", "uuid", "sys", "modules"})
 PURE_MODULES = frozenset(
     {"collections", "dataclasses", "enum", "functools", "itertools", "json", "math", "operator", "re"}
     | {"string", "typing"}
 )
 """Modules without a clock. A program that imports another module may depend on the time of day."""
+
+CLOCKS = sys.stdlib_module_names - PURE_MODULES - {"copy"} | {"modules", "attrgetter", "methodcaller", "*"}
+"""Attributes of modules that lead to a clock. Lists have a `copy`, too."""
 
 TRICKS = frozenset(
     {"eval", "exec", "globals", "locals", "vars", "getattr", "__builtins__", "__import__", "sys"}
@@ -95,10 +98,13 @@ def _reads_clock(tree: ast.Module) -> bool:
 
 def _is_clock(node: ast.AST) -> bool:
     match node:
-        case ast.Name("time", ast.Load()) | ast.Attribute(_, "time") | ast.alias("time", str()):
-            return True
-        case ast.Name(name) | ast.Attribute(_, name):
-            return name in CLOCKS or (name.startswith("__") and name != "__name__")
+        case ast.alias("time", None):
+            pass
+        case ast.Name(name):
+            is_read = isinstance(node.ctx, ast.Load)
+            return (name == "time" and is_read) or (name.startswith("__") and name != "__name__")
+        case ast.Attribute(_, name) | ast.alias(name):
+            return name in CLOCKS or (name.startswith("_") and name != "__name__")
         case ast.Import(names):
             return not {one.name for one in names} <= PURE_MODULES | {"time"}
         case ast.ImportFrom("time", names):
