@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from inspect import isawaitable
+from inspect import iscoroutine
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -128,7 +128,7 @@ class Button(PlainText):
         async def press() -> None:
             with warned():
                 result = pressed()
-                if isawaitable(result):
+                if iscoroutine(result):  # a dialog could be awaited, too, and would open again
                     await result
 
         super().__init__("button", text, kind)

@@ -117,6 +117,7 @@ def draw_past(past: MissionPast) -> None:
     if not steps:
         PlainText("p", "No step was finished.")
     PlainText("p", capitalize(past.testimony), "quiet")
+    PlainText("p", "A step that would happen again in the same room is marked below.", "quiet")
 
 
 def _draw_steps(steps: Sequence[tuple[str, Event]]) -> None:
