@@ -126,9 +126,7 @@ def ask_person(
     may_ask = view.may_be_approved and gatekeeper.may_ask_client(view) and _has_dialogs(ctx)
     if not may_ask or gatekeeper.approves_alone(session):
         return NotAsked()
-    return Elicit(
-        question(view, gatekeeper.console.robot.name, gatekeeper.contract_text(view.contract)), Consent
-    )
+    return Elicit(question(view, gatekeeper.console.robot, gatekeeper.contract_text(view.contract)), Consent)
 
 
 # --- the agent and its client

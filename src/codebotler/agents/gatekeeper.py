@@ -66,7 +66,7 @@ class Gatekeeper:
         """Begin a mission that waits for approval. Raise MissionError if the console is busy with another."""
         before = self.console.session
         view = SessionView() if before is None else before.view
-        is_own = before is self._session and not view.is_changed_by_person
+        is_own = before is self._session and not (before is not None and before.is_changed_by_person)
         if not (is_own or view.is_over):
             raise MissionError("a person is working on a mission of their own; wait until it is over")
         if len(order.program) > MAX_PROGRAM_LENGTH:  # it would have no contract
@@ -122,12 +122,12 @@ class Gatekeeper:
     def approves_alone(self, session: MissionSession) -> bool:
         """Whether the contract given at the start allows all that an agent's own proposal may do.
 
-        If a person has edited the program, switched off a rule or pressed STOP, a person must approve it.
+        If a person has changed the program, switched off a rule or pressed STOP, a person must approve it.
         """
         view = session.view
         if self.console.is_held:
             return False
-        is_agents = session is self._session and bool(view.author) and not view.disabled_rules
+        is_agents = session is self._session and not session.is_changed_by_person
         is_within = view.within is not None and view.contract is not None
         return is_agents and is_within and view.may_be_approved and not view.problems
 
@@ -205,7 +205,7 @@ class Gatekeeper:
             remarks=[*view.unknown_rooms, *view.remarks],
             events=[text for text in map(event_text, events[after:seen]) if text],
             event_count=seen,
-            done_before=[] if view.past is None else view.past.steps,
+            done_before=[] if view.past is None else view.past.steps[-MAX_REPORTED_EVENTS:],
             is_over=view.is_over,
             next=self._next(view),
         )

@@ -13,6 +13,7 @@ from codebotler.core.terminal import shortened, visible_lines
 from codebotler.core.text.phrases import is_question, is_spoken
 from codebotler.core.text.words import listed
 from codebotler.missions.display.view import SessionView
+from codebotler.robots.base import Robot
 from codebotler.web.storyboard import Action, Scene, Strip, strips
 
 
@@ -79,15 +80,18 @@ def report_check(check: CheckResult, program: str, problems: Sequence[str], cont
     )
 
 
-def question(view: SessionView, robot: str, contract: str) -> str:
+def question(view: SessionView, robot: Robot, contract: str) -> str:
     """Return the question by which a client asks its person to approve a program."""
+    rules = listed([shortened(rule.name) for rule in view.rules_in_force])
+    where = f" at {shortened(robot.address)}" if robot.address else ""
     problems = "\n".join(f"- {shortened(problem)}" for problem in view.problems)
     switched_off = listed([*map(shortened, view.disabled_rules)])
     boards = [] if view.check is None else strips(view.check)
     boards = [board for board in boards if len(board.scenes) > 1 or board.scenes[0].deeds]
     parts = [
-        f"An agent asks to run a program on the robot {robot}.",
+        f"An agent asks to run a program on the robot {robot.name}{where}.",
         f"THE CHECK FOUND PROBLEMS:\n{problems}" if problems else "The check found no problems.",
+        f"House rules in force: {rules}." if rules else "No house rules are in force.",
         f"A person has switched off rules for this program: {switched_off}." if switched_off else "",
         f"It says: {shortened(view.instruction)}" if view.instruction else "",
         f"It does the rest of mission {view.past.mission}, which ended early." if view.past else "",

@@ -306,7 +306,7 @@ def _take_answer(
                     disabled_rules=proposed.disabled_rules,
                     by=person,
                 )
-        case AcceptedElicitation() | DeclinedElicitation():
+        case AcceptedElicitation() | DeclinedElicitation() if view.digest == digest:
             session.stop_soon(person)
 
 

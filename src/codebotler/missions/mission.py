@@ -97,6 +97,7 @@ class Mission:
         self._writing = threading.RLock()  # held while writing an event, but not while cancelling the robot
         self._has_program = False  # also true for an empty program
         self._live: LiveRobot | None = None
+        self._stuck: threading.Thread | None = None
         self._logged_rule: dict[str, object] = {}
         self._is_over = threading.Event()
         self._fault: Exception | None = None
@@ -134,6 +135,11 @@ class Mission:
     def has_ended(self) -> bool:
         """Whether the mission has reached a final state."""
         return self.summary.has_ended
+
+    @property
+    def is_stuck(self) -> bool:
+        """Whether a skill has not returned since a stop was not confirmed, so the robot may still move."""
+        return self._stuck is not None and self._stuck.is_alive()
 
     def draft(self, program: str, model: str = "") -> None:
         """Set or replace the program and its author, or raise MissionError after the approval."""
@@ -245,7 +251,8 @@ class Mission:
             self._step(MissionState.RUNNING, "run", if_tool_dies=will, place=place)
         if contracts:
             self._write("contract", contracts=[contract_data(contract) for contract in contracts])
-        threading.Thread(target=self._execute, args=(live, drive), name=self.id, daemon=True).start()
+        work = threading.Thread(target=self._execute, args=(live, drive), name=self.id, daemon=True)
+        work.start()
         try:
             self.stop_button.ended.wait()
         except BaseException:
@@ -254,6 +261,7 @@ class Mission:
             raise
         finally:
             if not self._is_over.wait(STOP_GRACE_SECONDS):
+                self._stuck = work
                 self._end(live, MissionState.FAILED, UNCONFIRMED_STOP, None, is_lost=True)
         if self._fault is not None:
             raise self._fault

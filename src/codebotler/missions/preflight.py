@@ -1,4 +1,4 @@
-"""Ask a robot for its rooms, its current room and its missing skills before it moves."""
+"""Ask a robot for its rooms, its current room and its missing skills before it moves, and say what fails."""
 
 from __future__ import annotations
 
@@ -13,14 +13,20 @@ from codebotler.core.errors import RobotError, UserError
 from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.terminal import shortened, visible
+from codebotler.core.terminal import shortened, system_sentence, visible
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.live import check_answer
+from codebotler.missions.mission import MissionError
 from codebotler.missions.storage.past import MissionPast
+from codebotler.models.base import ModelError
 from codebotler.models.recorded import UnknownInstructionError, find_closest, open_recorded
 from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotLostError, RobotResult
 from codebotler.simulator.guard.house_rule import Rule
+from codebotler.simulator.worker import EngineError
 from codebotler.simulator.worlds.room_map import RoomMap
+
+EXPECTED_ERRORS = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)
+"""Errors that can end a mission before it runs, with a sentence that says why."""
 
 MAX_CHECKED_ROOMS = 1_000
 """The limit for a check, which compares each drive with all rooms."""
@@ -176,3 +182,13 @@ def missing_skills(program: str, robot: Robot) -> list[str]:
         for skill, line in sorted(called.items(), key=lambda item: item[1])
         if skill in robot.missing
     ]
+
+
+def error_sentence(error: Exception) -> str:
+    """Say why a mission ended, with the name of an unexpected error."""
+    if isinstance(error, UnknownInstructionError):
+        return f"{error.model} has no program for this instruction"
+    if isinstance(error, OSError) and error.filename is not None:
+        return system_sentence(error)
+    sentence = visible(str(error))
+    return sentence if isinstance(error, EXPECTED_ERRORS) else f"{type(error).__name__}: {sentence}"

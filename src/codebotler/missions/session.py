@@ -18,7 +18,7 @@ from codebotler.candidates.clusters import compare_candidates
 from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import system_sentence, visible
+from codebotler.core.terminal import visible
 from codebotler.core.world import World
 from codebotler.missions.authoring import ModelAuthor, prompt_of
 from codebotler.missions.display.progress import Progress
@@ -27,7 +27,9 @@ from codebotler.missions.display.view import CHECKING, UNCHECKED, MissionOrder, 
 from codebotler.missions.drafts import examine_draft
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import (
+    EXPECTED_ERRORS,
     ask_rooms,
+    error_sentence,
     expect_enforceable,
     limit_rooms,
     resume_robot,
@@ -43,11 +45,9 @@ from codebotler.robots.base import CancelledError, NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.guard.contract import Contract
 from codebotler.simulator.guard.house_rule import Rule
-from codebotler.simulator.worker import EngineError
 from codebotler.simulator.worlds.room_map import RoomMap
 
 _logger = logging.getLogger("codebotler.missions")
-_EXPECTED_ERRORS = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)
 
 
 class MissionSession(SharedView):
@@ -101,6 +101,7 @@ class MissionSession(SharedView):
         self._thread = threading.Thread(target=self._run, name=f"session-{number}", daemon=True)
         self.error: Exception | None = None  # set if an error ended the session
         self.is_approved_by_person = False
+        self.is_changed_by_person = False  # whether a person edited, asked again or switched off a rule
 
     def start(self) -> None:
         """Start the session's thread."""
@@ -116,6 +117,7 @@ class MissionSession(SharedView):
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
             self._next_task = partial(self._take, program=program)
+            self.is_changed_by_person = True
             self._change(program=program, author="", question=None, disabled_rules=(), **UNCHECKED)
 
     def switch_off(self, name: str, reason: str) -> None:
@@ -131,6 +133,7 @@ class MissionSession(SharedView):
             mission.note(f'a person switched off the rule "{name}" for this program: {reason.strip()}')
             with self._lock:
                 self._next_task = partial(self._take, program=view.program)
+                self.is_changed_by_person = True
                 self._change(disabled_rules=(*view.disabled_rules, name), **UNCHECKED)
 
     def ask_again(self, *, repair: bool, max_tokens: int | None = None) -> None:
@@ -143,6 +146,7 @@ class MissionSession(SharedView):
                 raise MissionError("the model cannot be queried again at this point")
             self._author.max_tokens = max_tokens or self._author.max_tokens
             self._next_task = partial(self._ask, repair=repair)
+            self.is_changed_by_person = True
             self._change(busy=f"asking {self._view.model}", is_written=True, reply="")
 
     def answer(self, question: ClarifyingQuestion | None, answer: ClarifyingAnswer, more: str = "") -> None:
@@ -193,6 +197,11 @@ class MissionSession(SharedView):
             mission.approve(despite_problems=despite_problems, by=by)
             self.is_approved_by_person = is_person
 
+    @property
+    def is_stuck(self) -> bool:
+        """Whether a skill has not returned since a stop was not confirmed."""
+        return self._mission is not None and self._mission.is_stuck
+
     def reject(self, reason: str) -> None:
         """End the mission before it runs."""
         assert self._mission is not None, "there is a program to reject"
@@ -225,14 +234,14 @@ class MissionSession(SharedView):
                 self._lead_mission()
         except UnknownInstructionError as error:
             self.error = with_closest_here(error, self._view.room_map)
-            self._show(error=_sentence(error), suggestions=self.error.closest)
+            self._show(error=error_sentence(error), suggestions=self.error.closest)
         except Exception as error:
-            if not isinstance(error, _EXPECTED_ERRORS):
+            if not isinstance(error, EXPECTED_ERRORS):
                 _logger.exception("a mission failed unexpectedly")
             if isinstance(error, NotReadyError) and self._is_stopped:
                 return  # expected, because a stopped robot answers no questions
             self.error = error
-            self._show(error=_sentence(error))
+            self._show(error=error_sentence(error))
         finally:
             self._show(is_over=True, busy="", is_written=False)
 
@@ -310,7 +319,7 @@ class MissionSession(SharedView):
             self._restore(before)
             return
         except UnknownInstructionError as error:
-            mission.fail(_sentence(error))
+            mission.fail(error_sentence(error))
             raise
         except (UserError, ModelError) as error:
             if not before.program and before.programless is None:
@@ -389,12 +398,3 @@ class MissionSession(SharedView):
             if self._next_task is None:
                 self._change(**found, earlier=self._checked)
                 self._checked = found["check"].contract
-
-
-def _sentence(error: Exception) -> str:
-    if isinstance(error, UnknownInstructionError):
-        return f"{error.model} has no program for this instruction"
-    if isinstance(error, OSError) and error.filename is not None:
-        return system_sentence(error)
-    sentence = visible(str(error))
-    return sentence if isinstance(error, _EXPECTED_ERRORS) else f"{type(error).__name__}: {sentence}"

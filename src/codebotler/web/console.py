@@ -75,9 +75,11 @@ class Console:
         self._held_since: int | None = None  # the session, or 0, at which a person pressed STOP
         self.unfinished = ""  # the mission that had begun and ended early before another one was written
         self._checking = threading.Lock()
+        self._hold_file = home / "held"
 
     def __enter__(self) -> Self:
         self.interrupted = tuple(find_interrupted(self.home))
+        self._held_since = 0 if self._hold_file.exists() else None
         make_folder(self.home / "missions")
         return self
 
@@ -88,6 +90,7 @@ class Console:
         """Stop the current mission, and wait until it is over, but not for long if nothing has moved."""
         with self._lock:
             session, self._may_recover = self.session, None
+            self._end_hold()
         is_checking = self._checking.locked() or (session is not None and bool(session.view.busy))
         if session is not None:
             session.stop(BY_SHUTDOWN)
@@ -135,8 +138,9 @@ class Console:
                 raise MissionError(f"mission {before.view.id} is {before.view.state}; stop it first")
             if after is not None and after is not self._may_recover:
                 raise MissionError("somebody pressed STOP, or began another mission")
-            if before is not None and self._held_since is not None and before.is_approved_by_person:
-                self._held_since = self._held_since if before.view.number <= self._held_since else None
+            if before is not None and before.is_stuck:
+                raise MissionError(f"a skill of mission {before.view.id} has not ended; check the robot")
+            self._end_hold()
             if order.past is not None:
                 self.unfinished = ""
             elif before is not None and before.view.progress.has_begun:
@@ -208,8 +212,15 @@ class Console:
 
     @property
     def is_held(self) -> bool:
-        """Whether a person has pressed STOP, and has approved no later mission."""
+        """Whether a person has pressed STOP, also before this process, and has approved no later mission."""
         return self._held_since is not None
+
+    def _end_hold(self) -> None:
+        """End the hold after a person's STOP if a person has approved the mission that began after it."""
+        session, since = self.session, self._held_since
+        if session and since is not None and session.is_approved_by_person and session.view.number > since:
+            self._held_since = None
+            self._hold_file.unlink(missing_ok=True)
 
     def dismiss(self) -> None:
         """Dismiss the notice about interrupted missions."""
@@ -226,6 +237,8 @@ class Console:
             stops = session is not None and session.view.is_approved
             if holds and (stops or not only_moving):
                 self._held_since = 0 if session is None else session.view.number
+                with suppress(OSError):  # the robot must stop, whatever the disk does
+                    self._hold_file.touch()
         if session is None or session.view.is_over or not (stops or not only_moving):
             return False
         session.stop_soon(by)

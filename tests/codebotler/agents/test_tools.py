@@ -1135,6 +1135,53 @@ def test_after_a_persons_stop_the_contract_of_the_start_approves_nothing(gatekee
     use(gatekeeper, act)
 
 
+def test_a_persons_stop_outlives_the_process(tmp_path: Path) -> None:
+    with gatekeeper_at(tmp_path).console as console:
+        console.stop("a person")
+    again = gatekeeper_at(tmp_path)
+
+    async def act(agent: Agent) -> None:
+        await agent.call("propose_mission", program=QUIET)
+        approve(again)
+        await until(again, lambda view: view.is_over)
+
+    with again.console as console:
+        assert console.is_held
+        use(again, act)
+    with gatekeeper_at(tmp_path).console as console:
+        assert not console.is_held
+
+
+def test_a_program_for_which_a_person_asked_is_not_an_agents(gatekeeper: Gatekeeper) -> None:
+    gatekeeper.writes = True
+
+    async def act(agent: Agent) -> None:
+        await agent.call("propose_mission", instruction=next(iter(known_instructions(None))))
+        session_of(gatekeeper).ask_again(repair=False)
+        await until(gatekeeper, lambda view: view.may_be_approved)
+        assert not gatekeeper.approves_alone(session_of(gatekeeper))
+        assert "person" in await agent.fails("propose_mission", program=QUIET)
+
+    use(gatekeeper, act)
+
+
+def test_a_no_is_about_the_program_that_was_asked_about(gatekeeper: Gatekeeper) -> None:
+    gatekeeper.asks_client = True
+
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+        assert "No house rules are in force." in params.message
+        session_of(gatekeeper).edit(HELLO)
+        await until(gatekeeper, lambda view: view.may_be_approved)
+        return ElicitResult(action="decline")
+
+    async def act(agent: Agent) -> None:
+        digest = (await agent.call("propose_mission", program=QUIET))["digest"]
+        await agent.client.call_tool("run_mission", {"digest": digest, "seconds": 0.05})
+        assert view_of(gatekeeper).may_be_approved
+
+    use(gatekeeper, act, answer=answer, mode="legacy")
+
+
 def test_a_late_yes_accepts_only_the_problems_of_its_own_question(tmp_path: Path) -> None:
     gatekeeper, asked = gatekeeper_at(tmp_path, rules=(STAY_OUT,)), list[str]()
     gatekeeper.asks_client = True
@@ -1156,7 +1203,7 @@ def test_a_late_yes_accepts_only_the_problems_of_its_own_question(tmp_path: Path
         await agent.fails("run_mission", digest=digest)
         assert view_of(gatekeeper).may_be_approved
         assert len(asked) == 2
-        assert [STAY_OUT.name in one.splitlines()[4] for one in asked] == [True, False]
+        assert [STAY_OUT.name in one.splitlines()[6] for one in asked] == [True, False]
 
     async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:
         result: ElicitResult = await answers[0](context, params)

@@ -465,6 +465,34 @@ def test_a_stop_reaches_a_robot_that_is_asked_for_its_rooms(tmp_path: Path) -> N
         )
 
 
+def test_nothing_begins_while_a_skill_has_not_ended_since_a_stop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("codebotler.missions.mission.STOP_GRACE_SECONDS", 0.1)
+    is_asked, may_answer = threading.Event(), threading.Event()
+
+    def never(skill: str, _first: str) -> RobotResult:
+        if skill != "say":
+            return ["hall"] if skill == "get_all_rooms" else "hall"
+        is_asked.set()
+        may_answer.wait(60)
+        return None
+
+    with desk_of(tmp_path, Answering(never)) as console:
+        approved(console, "def task_program():\n    say('a')\n")
+        assert is_asked.wait(30)
+        console.stop("a person")
+        until(console, lambda view: view.is_over)
+        with pytest.raises(MissionError):
+            console.begin(MissionOrder(program=HELLO))
+        may_answer.set()
+        ends = time.monotonic() + 30
+        while console.session is not None and console.session.is_stuck:
+            assert time.monotonic() < ends
+            time.sleep(0.01)
+        console.begin(MissionOrder(program=HELLO))
+
+
 def test_a_running_mission_is_not_disturbed(tmp_path: Path) -> None:
     with desk_of(tmp_path, Simulated(WORLD)) as console:
         approved(console, FAR)

@@ -118,11 +118,6 @@ class SessionView:
         return self.check is None or not any(one.kind in _SYNTAX_ERRORS for one in self.check.problems)
 
     @property
-    def is_changed_by_person(self) -> bool:
-        """Whether a person wrote or edited the program, or switched off a rule for it."""
-        return bool(self.disabled_rules) or (bool(self.program) and not self.author)
-
-    @property
     def arriving(self) -> PartialReply:
         """The part of the reply that a model has sent so far."""
         return split_partial(self.reply)
