@@ -199,11 +199,27 @@ def test_an_unsure_step_needs_a_persons_word(folder: Path) -> None:
     program = folder / "place.py"
     program.write_text('def task_program():\n    place("mug")\n')
     assert ended(folder, "continue", "last", program, "--yes").status == 2
+    nameless = ended(folder, "continue", "last", "--yes", given="y\n")
+    assert (nameless.status, "did this happen" in nameless.err) == (2, False), "a word in vain"
     asked = ended(folder, "continue", "last", "-", "--yes", given="y\n" + program.read_text())
     assert asked.status == 2, "a program is no answer"
     assert ended(folder, "continue", "last", program, "--yes", given="n\n").status == 1
     assert ended(folder, "continue", mission["id"], program, "--yes", given="what?\ny\n").status == 0
     assert [one["state"] for one in missions(folder)][-1] == "done"
+
+
+def test_a_wrong_answer_is_asked_for_again(folder: Path) -> None:
+    (folder / "begun.py").write_text("def task_program():\n    ask('', 'Tea?', ['yes', 'no'])\n")
+    ended(folder, "run", "begun.py", "--yes", "--despite-problems")
+    (mission,) = missions(folder)
+    home = folder / "home" / "missions" / mission["id"]
+    log = (home / EVENTS_FILE).read_text().splitlines(keepends=True)
+    asks = next(n for n, line in enumerate(log, 1) if '"skill": "ask"' in line)
+    (home / EVENTS_FILE).write_text("".join(log[:asks]))
+    (home / SUMMARY_FILE).write_text(json.dumps({**mission, "state": "running", "ended": None}))
+    program = folder / "say.py"
+    program.write_text("def task_program():\n    say('thanks')\n")
+    assert ended(folder, "continue", "last", program, "--yes", given="y\nyea\nyes\n").status == 0
 
 
 def test_recover_needs_an_instruction(folder: Path) -> None:

@@ -61,8 +61,6 @@ class Request:
     candidates: int = 1  # how many programs to get from the model, of which the user chooses one
 
     def __post_init__(self) -> None:
-        if not self.what.strip() and self.past is not None:
-            raise UserError(f"mission {self.past.mission} has no instruction; name a program for the rest")
         if not self.what.strip():
             raise UserError("the argument is empty; name a program, or say what the robot should do")
         if self.what.endswith(".py") and not self.is_program:
@@ -250,10 +248,13 @@ def choose_past(console: Console, name: str, program: str) -> MissionPast:
         program: the file with the rest; `-` means that standard input holds it, and no answer.
 
     Raises:
-        UserError: there is no such mission, it cannot be continued, or nobody answers.
+        UserError: there is no such mission, it cannot be continued, it has no instruction and no
+            program is named, or nobody answers.
     """
     recover_missions(console.home)
     past = console.past_of(name)
+    if not (program or past.instruction):
+        raise UserError(f"mission {past.mission} has no instruction; name a program for the rest")
     print_rich(past_view(past))
     if past.unsure is None:
         return past
@@ -261,11 +262,15 @@ def choose_past(console: Console, name: str, program: str) -> MissionPast:
         raise UserError(f"{past.question}; name a file for the rest, since a person must answer here")
     for sentence in (past.question, *ask_evidence(console.robot, console.home, past, note)):
         note(sentence)
-    happened, answer = _ask_whether(past), ""
-    if happened and past.answers:
+    happened = _ask_whether(past)
+    while happened and past.answers:
         known = " | ".join(map(shortened, past.answers))
-        answer = read_line(f"what was the answer [{known}]? (Enter if you do not know) ").strip()
-    return past.resolve(happened=happened, answer=answer)
+        try:
+            answer = read_line(f"what was the answer [{known}]? (Enter if you do not know) ").strip()
+            return past.resolve(happened=True, answer=answer)
+        except UserError as error:
+            note(error.sentence)
+    return past.resolve(happened=happened)
 
 
 def _ask_whether(past: MissionPast) -> bool:

@@ -97,6 +97,7 @@ def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
         )
         table.add_row(task, *cells)
     lines = [
+        "faults: calls made to fail, one in each mission; continued: those for which the model had a rest",
         "handled: faults that the program handled itself; missing: missions for which the model had no rest",
         "passed, rejected (by the check), failed: shares of the continued missions, without the missing ones",
         "steps: those of the missions that passed; fewest: without a fault",
