@@ -157,9 +157,8 @@ def warn_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
 
 def changes_data(found: Sequence[VerdictChanges]) -> dict[str, Any]:
     """Convert the changes of all runs to plain data."""
-    first, second = found[0].suites
     return {
-        "suites": [first, second],
+        "suites": list(found[0].suites),
         "runs": [_run_data(one, found) for one in found],
     }
 
