@@ -70,11 +70,8 @@ def report(
     opened = [open_current(run, suite, ablated=False) for run in runs]
     expect_same_suite(opened, suite)
     engine = Local(workers or cores()) if check else None
-    read = name_runs(
-        [judged_run(one, suite, beside=beside, rules=rules, engine=engine) for one in opened],
-        labels,
-    )
-    read = price_runs(read, prices)
+    read = [judged_run(one, suite, beside=beside, rules=rules, engine=engine) for one in opened]
+    read = price_runs(name_runs(read, labels), prices)
     options: list[object] = ["--out", out, *["--published"] * published]
     options += [] if beside is None else ["--beside", beside]
     options += [] if rules is None else ["--rules", rules]
@@ -84,8 +81,7 @@ def report(
     again = command("report", *runs, *options, suite=suite)
     with busy("assembling the report"):
         parts = sections(read, with_published=published, command=again)
-    written = write_report(*headline(read), parts, out)
-    for _ in show_progress(written, "writing", pieces(parts)):
+    for _ in show_progress(write_report(*headline(read), parts, out), "writing", pieces(parts)):
         pass
     note(f"the report is in {out / 'index.html'}")
 
