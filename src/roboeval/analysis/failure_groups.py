@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections import Counter, defaultdict
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
 from difflib import SequenceMatcher
@@ -85,20 +86,19 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
     programs = results.programs
     candidates = cache(partial(_passing_in, results))
     for rows in groups:
-        often = Counter(programs[key_of(row)] for row in rows)
-        program = often.most_common(1)[0][0]
+        program = Counter(programs[key_of(row)] for row in rows).most_common(1)[0][0]
         row = next(row for row in rows if programs[key_of(row)] == program)
-        has_none = failure_of(row)["class"] == NO_PROGRAM_CLASS
+        failure = failure_of(row)
+        has_none = failure["class"] == NO_PROGRAM_CLASS
+        right = {} if has_none else candidates(row["task"], row.get("mission_world"))
         yield FailureGroup(
             task=row["task"],
-            failure=failure_of(row),
+            failure=failure,
             members=tuple(sorted(map(key_of, rows))),
             representative=key_of(row),
             program=program,
             reason=reason(row, results.suite, ablated=results.is_ablated),
-            fix=None
-            if has_none
-            else shortest_fix(program, candidates(row["task"], row.get("mission_world"))),
+            fix=shortest_fix(program, right),
         )
 
 
@@ -156,13 +156,11 @@ def group_data(group: FailureGroup) -> dict[str, Any]:
 def normalised_lines(program: str) -> ProgramLines:
     """Normalise a program to lines that are independent of names, comments and layout."""
     tree = parse_program(program) if len(program) <= MAX_COMPARED_CHARACTERS else None
-    if not isinstance(tree, ast.Module):
-        return _lines(program)
-    try:
-        shape = _Normaliser(all_bound_names(tree) - {TASK_FUNCTION}).visit(deepcopy(tree))
-        return _lines(ast.unparse(shape))
-    except (RecursionError, MemoryError, ValueError):
-        return _lines(program)
+    if isinstance(tree, ast.Module):
+        with suppress(RecursionError, MemoryError, ValueError):
+            shape = _Normaliser(all_bound_names(tree) - {TASK_FUNCTION}).visit(deepcopy(tree))
+            return _lines(ast.unparse(shape))
+    return _lines(program)
 
 
 NAMES_OF_OTHERS = ast.keyword | ast.alias  # nodes whose names a program does not choose
@@ -219,23 +217,18 @@ def shortest_fix(program: str, candidates: Mapping[ProgramLines, str]) -> Fix | 
         theirs = Counter(other)
         return ((counts - theirs) + (theirs - counts)).total()
 
-    best: tuple[int, ProgramLines] | None = None
+    best: Fix | None = None
     for bound, other in sorted(((least_changes(one), one) for one in candidates), key=lambda pair: pair[0]):
-        if best is not None and bound >= best[0]:
+        if best is not None and bound >= best.changed:
             break
-        changed = _count_changes(lines, other)
-        if best is None or changed < best[0]:
-            best = changed, other
-    return best and Fix(candidates[best[1]], best[0], tuple(_changes(lines, best[1])))
+        matcher = SequenceMatcher(None, lines, other, autojunk=False)
+        changed = len(lines) + len(other) - 2 * sum(block.size for block in matcher.get_matching_blocks())
+        if best is None or changed < best.changed:
+            best = Fix(candidates[other], changed, tuple(_changes(lines, other, matcher)))
+    return best
 
 
-def _count_changes(one: ProgramLines, other: ProgramLines) -> int:
-    matcher = SequenceMatcher(None, one, other, autojunk=False)
-    return len(one) + len(other) - 2 * sum(block.size for block in matcher.get_matching_blocks())
-
-
-def _changes(one: ProgramLines, other: ProgramLines) -> Iterator[DiffLine]:
-    matcher = SequenceMatcher(None, one, other, autojunk=False)
+def _changes(one: ProgramLines, other: ProgramLines, matcher: SequenceMatcher[str]) -> Iterator[DiffLine]:
     for number, group in enumerate(matcher.get_grouped_opcodes(DIFF_CONTEXT)):
         if number or group[0][1] > 0:
             yield " ", "..."

@@ -23,17 +23,6 @@ def path_to(what: str) -> Callable[[str], Path]:
 SourceArgument = Annotated[
     str, typer.Argument(help="A run, a .jsonl file, a folder or zip of .py files, or recorded:NAME.")
 ]
-KeepOption = Annotated[
-    Path | None,
-    typer.Option(help="Save completions and verdicts in this run folder.", parser=path_to("a run")),
-]
-RedoOption = Annotated[
-    bool, typer.Option("--redo", help="Discard earlier verdicts and judge everything again.")
-]
-TaskOption = Annotated[str | None, typer.Option(help="Only completions for this task.")]
-InWorldOption = Annotated[
-    str | None, typer.Option(help="Only in the world with this number, from 1, or description.")
-]
 RunArgument = Annotated[Path, typer.Argument(help="A run folder.", parser=path_to("a run"))]
 SuiteOption = Annotated[
     str,
@@ -70,37 +59,7 @@ WorldsOption = Annotated[
     int | None,
     typer.Option(min=1, max=10_000, help="Number of worlds per task, if the suite samples worlds."),
 ]
-WorldSeedOption = Annotated[
-    int | None, typer.Option(min=0, help="Random seed for sampling worlds, instead of the suite's own seed.")
-]
-RequestsOption = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE",
-        help="Write the requests to this file for a batch endpoint; query no model.",
-        parser=path_to("a file"),
-    ),
-]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
-OutOption = Annotated[
-    Path | None, typer.Option(help="The run folder; by default runs/MODEL.", parser=path_to("a run"))
-]
-NumOption = Annotated[
-    int | None,
-    typer.Option(
-        min=1,
-        max=10_000,
-        help="Number of completions per prompt; with --mode, of missions per prompt and world.",
-        show_default="50; with --mode agent or replan 1",
-    ),
-]
-ModeOption = Annotated[
-    Literal["program", "agent", "replan"],
-    typer.Option(
-        help="How the model is used: it writes a program for all worlds of a task, calls skills as an agent "
-        "in each world, or writes a program in each world and, after each failure, one for the rest."
-    ),
-]
 TurnsOption = Annotated[
     int | None,
     typer.Option(
@@ -110,26 +69,4 @@ TurnsOption = Annotated[
         show_default="300 calls; 4 programs",
     ),
 ]
-MissionTokensOption = Annotated[
-    int | None, typer.Option(min=1, help="With --mode: the maximum number of tokens of a mission.")
-]
 ConcurrencyOption = Annotated[int, typer.Option(min=1, help="Maximum number of concurrent requests.")]
-RateOption = Annotated[float | None, typer.Option(min=0.001, help="Maximum number of requests per minute.")]
-BudgetOption = Annotated[int | None, typer.Option(min=1, help="Stop after using this many tokens.")]
-PublishedOption = Annotated[
-    bool, typer.Option("--published", help="Add the failure causes that the paper published.")
-]
-PricesOption = Annotated[
-    list[str] | None,
-    typer.Option(help="MODEL=INPUT/OUTPUT, the prices per million tokens; may be given several times."),
-]
-LabelsOption = Annotated[
-    list[str] | None,
-    typer.Option(help="RUN=TEXT, the name of a run in tables and figures; may be given several times."),
-]
-BesideOption = Annotated[
-    str | None, typer.Option(help="Compare with the verdicts of another suite that judged the runs.")
-]
-CheckOption = Annotated[
-    bool, typer.Option(help="Run the check on programs not checked yet, for rejection sampling.")
-]

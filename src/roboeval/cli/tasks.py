@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +13,7 @@ from roboeval.cli.options import JsonOption, SuiteOption
 from roboeval.cli.output import fail, note, print_json, print_rich, print_text, show_progress
 
 if TYPE_CHECKING:
-    from roboeval.suites.load import Suite
+    from roboeval.suites.load import Suite, Task
 
 
 def tasks(
@@ -41,10 +42,11 @@ def tasks(
     if json and lint:
         fail("--lint has no JSON output; leave out --json")
     known = load(suite)
+    chosen = list(known.tasks.values()) if task is None else [known.task(task)]
     if lint:
-        lint_tasks(known, task, accepted=accepted)
+        lint_tasks(known, chosen, accepted=accepted)
     elif json:
-        print_json(suite_data(known, None if task is None else known.task(task).name))
+        print_json(suite_data(known, chosen))
     else:
         show(known, task)
 
@@ -74,25 +76,24 @@ def start(task: str, suite: str) -> None:
     note(f"{path} is a complete task; edit it, then check it with `{lint}`")
 
 
-def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
+def lint_tasks(suite: Suite, tasks: Sequence[Task], *, accepted: bool) -> None:
     """Print the findings of the linter. Exit with status 1 unless all of them are accepted."""
     from codebotler.simulator.pool import cores
     from roboeval.linting.findings import render
     from roboeval.linting.lint import lint
     from roboeval.linting.task_findings import judge_solutions
 
-    wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
     matching = suite.settings.matching
-    linted = (lint(one, judge_solutions(one, suite, workers=cores()), matching) for one in wanted)
-    findings = [found for several in show_progress(linted, "linting", len(wanted)) for found in several]
+    linted = (lint(one, judge_solutions(one, suite, workers=cores()), matching) for one in tasks)
+    findings = [found for several in show_progress(linted, "linting", len(tasks)) for found in several]
     print_text(render(findings, accepted=accepted))
     if any(finding.accepted is None for finding in findings):
         raise SystemExit(1)
 
 
-def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
-    """Return the tasks of a suite, or a single task, as JSON data."""
-    tasks = [
+def suite_data(suite: Suite, tasks: Sequence[Task]) -> dict[str, Any]:
+    """Return some tasks of a suite as JSON data."""
+    entries = [
         {
             "task": task.name,
             "summary": task.summary,
@@ -101,7 +102,6 @@ def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
             "worlds": [scenario.world.about for scenario in task.scenarios],
             "ablation": task.ablation is not None,
         }
-        for task in suite.tasks.values()
-        if only in {None, task.name}
+        for task in tasks
     ]
-    return {"suite": suite.name, "version": suite.version, "digest": suite.digest, "tasks": tasks}
+    return {"suite": suite.name, "version": suite.version, "digest": suite.digest, "tasks": entries}

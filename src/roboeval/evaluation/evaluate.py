@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from typing import Any
 
@@ -46,7 +46,9 @@ def evaluate_run(
             for path in (run.rows(key), run.manifest(key)):
                 path.unlink(missing_ok=True)
         was = expect_same_judge(run, suite, ablated=ablated)
-        about = evaluation_metadata(suite, ablated=ablated, tasks=_selected(tasks, was))
+        before = frozenset() if was is None else selected_tasks(was)
+        every = None if tasks is None or before is None else tasks | before
+        about = evaluation_metadata(suite, ablated=ablated, tasks=every)
         if was is None:
             write_whole(run.manifest(key), to_text(about))
         left = {one.key: one for one in (run.read(suite) if completions is None else completions)}
@@ -99,11 +101,6 @@ def evaluation_metadata(
         "ablation": ablated,
         "tasks": None if tasks is None else sorted(tasks),
     }
-
-
-def _selected(tasks: frozenset[str] | None, was: Mapping[str, Any] | None) -> frozenset[str] | None:
-    before = frozenset() if was is None else selected_tasks(was)
-    return None if tasks is None or before is None else tasks | before
 
 
 def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import ast
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from codebotler.checking.house_rules.rooms import may_mean
-from codebotler.core.program import parse_expression
 from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
@@ -53,7 +51,7 @@ def _names(requirement: Requirement, world: World, task: Task) -> Iterator[tuple
         if element.place is not None:
             yield from (("room", one, known_names["room"]) for one in _alternatives(element.place))
     check = next(check for check in task.checks if check.name == requirement.check)
-    for parameter, argument in zip(check.parameters, _arguments(requirement), strict=True):
+    for parameter, argument in zip(check.parameters, requirement.arguments, strict=True):
         if parameter == "person" or argument.lower() in _people(task):
             yield "person", argument, [*people, *WORDS_FOR_ANYBODY]
 
@@ -83,12 +81,6 @@ def _people(task: Task) -> set[str]:
 def _owners(rooms: Iterable[Room]) -> list[str]:
     owners = (re.fullmatch(r"(.+)'s (?:office|lab)", room.name, re.IGNORECASE) for room in rooms)
     return [owner[1] for owner in owners if owner]
-
-
-def _arguments(requirement: Requirement) -> list[str]:
-    call = parse_expression(requirement.text.strip().removeprefix("not "))
-    values = call.args if isinstance(call, ast.Call) else []
-    return [str(value.value) for value in values if isinstance(value, ast.Constant)]
 
 
 def _alternatives(pattern: str) -> list[str]:

@@ -97,9 +97,8 @@ def _unworded(task: Task) -> Iterator[Finding]:
 def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
     if task.borrows:  # borrowed programs were written for other requirements
         return
-    for solution, judged in zip(
-        solutions(task), verdicts, strict=False
-    ):  # ignore the verdicts in the worlds of an ablation, which follow
+    # Ignore the verdicts in the worlds of an ablation, which follow.
+    for solution, judged in zip(solutions(task), verdicts, strict=False):
         failed = _by_some_prompt(judged, len(task.prompts))
         if (None if failed is None else failed["kind"]) == solution.fails:
             continue

@@ -35,8 +35,7 @@ def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
             *("-" if share is None else f"{share:.3f}" for share in (score.score, score.score_of_all)),
             *(f"{score.count(status):,}" for status in (MutantStatus.SAME, MutantStatus.CRASHES)),
         )
-    title = Text.assemble(("Mutation scores", "bold"), f" under the suite {suite}")
-    return Group(title, Text(), table)
+    return Group(Text.assemble(("Mutation scores", "bold"), f" under the suite {suite}"), Text(), table)
 
 
 def survivors_view(score: MutationScore) -> RenderableType:

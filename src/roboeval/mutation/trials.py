@@ -69,13 +69,12 @@ def mutation_score(
     tried = pool.map_distinct(
         lambda some: [*map(result, some)], made, name=lambda mutant: digest(mutant.program)
     )
-    results = progress(tried, f"mutating {task.name}", len(made))
     return MutationScore(
         task=task.name,
         worlds=len(scenarios),
         right=right,
         wrong=tuple((one, found[-1]) for one, found in faults.items() if found[-1] and None not in found),
-        mutants=tuple(map(TriedMutant, made, results)),
+        mutants=tuple(map(TriedMutant, made, progress(tried, f"mutating {task.name}", len(made)))),
     )
 
 

@@ -104,13 +104,13 @@ def _card(card: Card) -> str:
     if estimate.is_known:
         bar += f'<u style="left: {low:.1f}%; width: {high - low:.1f}%"></u>'
     failure = f"Most frequent failure: {_text(card.failure)}." if card.failure else "Every program passes."
-    more = [f"<p>{_prose(words)}</p>" for words in (card.cost,) if words]
-    more += [f'<p class="warning">{_prose(words)}</p>' for words in card.warnings]
+    cost = f"<p>{_prose(card.cost)}</p>" if card.cost else ""
+    warning = f'<p class="warning">{_prose(card.warning)}</p>' if card.warning else ""
     return (
         f'<article class="card"><h3>{_text(card.name)}</h3><p><b>{estimate.mean:.3f}</b> pass@1</p>'
         f'<div class="bar" aria-hidden="true">{bar}</div>'
         f"<p>{_text(estimate.interval)}</p><p>{_text(card.coverage)}</p>"
-        f"<p>{failure}</p>{''.join(more)}</article>"
+        f"<p>{failure}</p>{cost}{warning}</article>"
     )
 
 

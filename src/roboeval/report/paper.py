@@ -86,6 +86,5 @@ def published_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         pairs.append(("all of these", run.mean, overall_mean(model, [*means])))
         for task, ours, theirs in pairs:
             rows.append([task, run.name, ours, theirs, None if theirs is None else ours - theirs])
-    has_their_prompts = all(uses_authors_prompts(run) for run, _ in known)
-    phrasings = [] if has_their_prompts else [note("other-phrasings")]
+    phrasings = [] if all(uses_authors_prompts(run) for run, _ in known) else [note("other-phrasings")]
     return sheet("published", rows, notes=[*recognised_models(runs), *phrasings, note("two-sums")])

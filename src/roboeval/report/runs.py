@@ -152,10 +152,8 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
 
 def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
     """Name each run after its label or model. Add the folder or a number to names that would be equal."""
-    given = {at: short_name(label, MAX_RUN_NAME) for at, label in labels.items()}
-    plain = [
-        given.get(at) or short_name(run.model or run.folder, MAX_RUN_NAME) for at, run in enumerate(runs)
-    ]
+    given = [labels.get(at) or run.model or run.folder for at, run in enumerate(runs)]
+    plain = [short_name(name, MAX_RUN_NAME) for name in given]
     names = _extend_duplicates(
         plain, [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)]
     )

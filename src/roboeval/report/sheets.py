@@ -93,7 +93,7 @@ class Card(NamedTuple):
     coverage: str  # describes the judged completions and tasks
     failure: str  # describes the most frequent failure; empty if nothing failed
     cost: str  # describes the cost; empty if unknown
-    warnings: Sequence[str] = ()
+    warning: str = ""  # that many replies were cut off; empty if few were
 
 
 class Cards(NamedTuple):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from collections.abc import Set as AbstractSet
 from pathlib import Path
 
 from codebotler.core.errors import UserError
@@ -91,7 +90,7 @@ def glance(runs: Sequence[JudgedRun]) -> Section:
             coverage=run.coverage_sentence,
             failure=failures.most_frequent(run),
             cost=cost.cost_sentence(run),
-            warnings=failures.cut_off_warnings(run),
+            warning=f"{warning}." if (warning := run.results.scope.cut_off_warning) else "",
         )
         for run in runs
     ]
@@ -148,10 +147,17 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
             write_csv(part, out / "tables")
             yield part.name
         elif isinstance(part, ReportFigure):
-            drawings[part.name] = _draw(part, out / "figures")
+            with use_style():
+                files = render(part.draw())
+            for kind in FIGURE_FORMATS:
+                write_whole(out / "figures" / f"{part.name}.{kind}", files[kind])
+            drawings[part.name] = files["svg"]
             yield part.name
     write_whole(out / PAGE_FILE, page(title, lead, sections, drawings).encode())
-    _remove_others(out, {part.name for part in parts if isinstance(part, Sheet | ReportFigure)})
+    written = {part.name for part in parts if isinstance(part, Sheet | ReportFigure)}
+    for name in {*page_words()["figures"], *page_words()["tables"]} - written:
+        for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FIGURE_FORMATS)):
+            (out / file).unlink(missing_ok=True)
     yield "page"
 
 
@@ -168,20 +174,6 @@ def expect_no_others(out: Path) -> None:
         )
 
 
-def _remove_others(out: Path, names: AbstractSet[str]) -> None:
-    for name in {*page_words()["figures"], *page_words()["tables"]} - names:
-        for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FIGURE_FORMATS)):
-            (out / file).unlink(missing_ok=True)
-
-
 def pieces(sections: Sequence[Section]) -> int:
     """Count the names that `write_report` yields."""
     return 1 + sum(isinstance(part, Sheet | ReportFigure) for section in sections for part in section.parts)
-
-
-def _draw(figure: ReportFigure, folder: Path) -> bytes:
-    with use_style():
-        files = render(figure.draw())
-    for kind in FIGURE_FORMATS:
-        write_whole(folder / f"{figure.name}.{kind}", files[kind])
-    return files["svg"]

@@ -24,6 +24,7 @@ class Requirement:
 
     Args:
         words: the prompts that ask for it, as pairs of number and words; empty if all prompts do.
+        arguments: what the check's parameters are.
     """
 
     text: str  # the requirement in the task file, such as `not greets("amy")`
@@ -32,6 +33,7 @@ class Requirement:
     category: Category  # the kind of failure if the formula does not hold
     line: int | None = None  # the line in the task file
     words: tuple[tuple[int, str], ...] = field(default=(), repr=False)
+    arguments: tuple[str, ...] = field(default=(), repr=False)
 
     def is_asked_by(self, prompt: int) -> bool:
         """Whether a prompt asks for this requirement."""

@@ -242,7 +242,8 @@ class _Reader:
             sentence = f'the formula of the check "{name}" is not valid ({error})'
             raise UserError(sentence, file=self.file.name, line=check.line) from None
         words = self._words(prompts or {}, (*at, "prompts"))
-        return Requirement(text, name, formula, check.category, self.file.line(at), words)
+        line = self.file.line(at)
+        return Requirement(text, name, formula, check.category, line, words, tuple(arguments))
 
     def _words(self, prompts: Mapping[int, str], at: YamlPath) -> tuple[tuple[int, str], ...]:
         """Return the words that ask for a requirement, after checking that the prompts contain them."""

@@ -52,7 +52,19 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         """Show one run with all prompts and all kinds of failure."""
         return _json(run_details(store.open(run, evaluation)))
 
-    _add_report(api, store)
+    @api.get("/{run}/report")
+    def show_report(run: str) -> Response:
+        """Show the report in the folder of a run, created by `roboeval run` or `roboeval report`."""
+        # Forbid scripts, because the folder may contain any page instead of a report.
+        headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
+        return HTMLResponse(store.report(run), headers=headers)
+
+    @api.get("/{run}/tables/{table}.csv")
+    def show_table(run: str, table: str) -> Response:
+        """Show a table of a run's report as CSV."""
+        if not TABLE_NAME.fullmatch(table):
+            raise HTTPException(404, "this run has no such table")
+        return Response(store.report(run, f"tables/{table}.csv"), media_type="text/csv")
 
     @api.get("/{run}/completions")
     def list_completions(
@@ -75,22 +87,6 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         return _json(completion_details(store.open(run, evaluation), name_of((task, prompt, index))))
 
     return api
-
-
-def _add_report(api: APIRouter, store: RunStore) -> None:
-    @api.get("/{run}/report")
-    def show_report(run: str) -> Response:
-        """Show the report in the folder of a run, created by `roboeval run` or `roboeval report`."""
-        # Forbid scripts, because the folder may contain any page instead of a report.
-        headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
-        return HTMLResponse(store.report(run), headers=headers)
-
-    @api.get("/{run}/tables/{table}.csv")
-    def show_table(run: str, table: str) -> Response:
-        """Show a table of a run's report as CSV."""
-        if not TABLE_NAME.fullmatch(table):
-            raise HTTPException(404, "this run has no such table")
-        return Response(store.report(run, f"tables/{table}.csv"), media_type="text/csv")
 
 
 def _json(data: object) -> Response:

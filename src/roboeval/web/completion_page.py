@@ -161,7 +161,12 @@ def _draw_reasons(data: Mapping[str, Any], anchor: str) -> None:
         PlainText("p", sentence, "quiet" if data["satisfied"] else "trouble")
     with ui.element("ul").classes("failed-checks"):
         for check in data["failed_checks"]:
-            _draw_check(check, anchor)
+            with ui.element("li").classes("failed-check"):
+                PlainText("code", shortened(check_label(check["check"])))
+                if check["explanation"] is not None:
+                    PlainText("span", shortened(check["explanation"], MAX_SENTENCE))
+                if check["step"] is not None:
+                    html.a(f"step {check['step']}", href=f"#{anchor}{check['step']}")
 
 
 def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> None:
@@ -180,20 +185,10 @@ def _draw_world(data: Mapping[str, Any], world: World | None, anchor: str) -> No
     if cut is not None:
         PlainText("p", f"{cut_sentence(cut)}.", "quiet")
     if steps:
-        kept = "All steps" if cut is None else "All stored steps"
-        title = f"{kept} ({len(steps):,})"
+        title = f"All {'' if cut is None else 'stored '}steps ({len(steps):,})"
         _draw_folded(partial(PlainText, "span", title), partial(_draw_steps, steps))
     if world is not None:
         _draw_folded(partial(PlainText, "span", "The world"), partial(_draw_rooms, world))
-
-
-def _draw_check(check: Mapping[str, Any], anchor: str) -> None:
-    with ui.element("li").classes("failed-check"):
-        PlainText("code", shortened(check_label(check["check"])))
-        if check["explanation"] is not None:
-            PlainText("span", shortened(check["explanation"], MAX_SENTENCE))
-        if check["step"] is not None:
-            html.a(f"step {check['step']}", href=f"#{anchor}{check['step']}")
 
 
 def _draw_folded(head: Callable[[], object], draw: Callable[[], None]) -> None:

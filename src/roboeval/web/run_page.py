@@ -163,8 +163,7 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
             PlainText("span", f"started {date_text(data)} UTC", "quiet")
         if data["settings"]:
             PlainText("span", shortened(data["settings"], 200), "quiet")
-    bar = html.progress(max="1").classes("long")
-    show_state(data, state, bar)
+    show_state(data, state, html.progress(max="1").classes("long"))
     with ui.element("ul").classes("notes"):
         for sentence in data["notes"]:
             PlainText("li", sentence, "unsure")

@@ -19,10 +19,7 @@ from roboeval.suites.load import ABLATED, Suite, has_suite, load_suite
 from roboeval.web.snapshot import Snapshot
 
 MAX_SNAPSHOTS = 16  # number of evaluations kept in memory
-REPORT_PAGE, MAX_REPORT_BYTES = (
-    "index.html",
-    20_000_000,
-)  # file name of a report, and its maximum size in bytes
+REPORT_PAGE, MAX_REPORT_BYTES = "index.html", 20_000_000  # file name and maximum size of a report
 REST_FACTOR = 10  # pause between two reads of a run, as a multiple of the time that a read takes
 OUTSIDE_FOLDER = "leads outside the folder of runs; move it into the folder"
 
@@ -162,8 +159,7 @@ class _Reader:
         except UserError as error:  # pages show no folders of this machine
             raise UserError(error.sentence, file=Path(str(error.file)).name, line=error.line) from None
         name = results.manifest.get("suite") or results.about.get("suite")
-        suite = self._store.suite(name if isinstance(name, str) else "paper")
-        return replace(results, suite=suite)
+        return replace(results, suite=self._store.suite(name if isinstance(name, str) else "paper"))
 
 
 def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:

@@ -15,7 +15,6 @@ from codebotler.core.terminal import shortened
 from roboeval.evaluation.generating.requests import batches
 from roboeval.evaluation.judging.explanation import completion_data, suite_instruction
 from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of, recorded_suffix
-from roboeval.suites.load import Suite
 from roboeval.web.run_store import MissingError, RunStore
 from roboeval.web.snapshot import CompletionFilter, Snapshot
 
@@ -147,7 +146,15 @@ def run_details(run: Snapshot) -> dict[str, Any]:
     means = {score.task: score.pass_at(1).mean for score in run.scores}
     tasks: dict[str, list[dict[str, Any]]] = {}
     for prompt in run.prompts(CompletionFilter(passed=True)):
-        tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite))
+        counts = {
+            "prompt": prompt["prompt"],
+            "instruction": suite_instruction(run.suite, prompt["task"], prompt["prompt"]),
+            "completions": prompt["written"],
+            "judged": prompt["judged"],
+            "passed": prompt["counted"],
+            "pass@1": prompt["share"],
+        }
+        tasks.setdefault(prompt["task"], []).append(counts)
     kinds = [(name, one) for (name, kind), one in run.failures.items() if kind is not None]
     kinds.sort(key=lambda each: (-each[1].count, each[0], each[1].name))
     return {
@@ -157,17 +164,6 @@ def run_details(run: Snapshot) -> dict[str, Any]:
             {"class": name, "kind": kind.name, "count": kind.count, "share": kind.share}
             for name, kind in kinds
         ],
-    }
-
-
-def _prompt_data(prompt: Mapping[str, Any], suite: Suite | None) -> dict[str, Any]:
-    return {
-        "prompt": prompt["prompt"],
-        "instruction": suite_instruction(suite, prompt["task"], prompt["prompt"]),
-        "completions": prompt["written"],
-        "judged": prompt["judged"],
-        "passed": prompt["counted"],
-        "pass@1": prompt["share"],
     }
 
 

@@ -154,8 +154,7 @@ class Snapshot:
             judged=pl.col("passed").count(),
             counted=chosen.verdict.condition.sum(),
         )
-        share = pl.col("counted") / pl.when(judged > 0).then(judged)
-        return counts.with_columns(share=share).to_dicts()
+        return counts.with_columns(share=pl.col("counted") / pl.when(judged > 0).then(judged)).to_dicts()
 
     @property
     def judged(self) -> int:

@@ -148,8 +148,7 @@ def _in_order(places: Mapping[str, int]) -> str:
 def warn_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
     """Return a warning if the runs have different prompts."""
     asked = {frozenset((task.task, task.prompts) for task in one.comparison.tasks) for one in found}
-    warning = "The runs have different prompts, which may affect their ranking."
-    return [warning] if len(asked) > 1 else []
+    return ["The runs have different prompts, which may affect their ranking."] if len(asked) > 1 else []
 
 
 # --- plain data
@@ -157,9 +156,8 @@ def warn_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
 
 def changes_data(found: Sequence[VerdictChanges]) -> dict[str, Any]:
     """Convert the changes of all runs to plain data."""
-    first, second = found[0].suites
     return {
-        "suites": [first, second],
+        "suites": list(found[0].suites),
         "runs": [_run_data(one, found) for one in found],
     }
 

@@ -133,7 +133,6 @@ def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
 
 def summary_data(summary: EvaluationSummary) -> dict[str, Any]:
     """Convert a summary to plain data."""
-    estimates = zip(summary.k, summary.overall, strict=True)
     return {
         "models": sorted(model for model in summary.scope.models if model is not None),
         "judged": summary.judged,
@@ -144,7 +143,7 @@ def summary_data(summary: EvaluationSummary) -> dict[str, Any]:
         **({"endings": dict(ends), "turns": summary.scope.turns} if (ends := summary.scope.endings) else {}),
         "completions": summary.judged,
         "passed": sum(task.c for task in summary.tasks),
-        **{f"pass@{k}": asdict(estimate) for k, estimate in estimates},
+        **{f"pass@{k}": asdict(estimate) for k, estimate in zip(summary.k, summary.overall, strict=True)},
         "tasks": [_task_score_data(task, summary) for task in summary.tasks],
         "failures": [
             {**_failure_data(each, "class"), "kinds": [_failure_data(kind, "kind") for kind in each.kinds]}

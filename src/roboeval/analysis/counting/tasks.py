@@ -32,19 +32,14 @@ def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
     """Summarise a judged prompt as plain data: its distinct programs, and why each of them fails."""
     of_prompt = completions_of(results.table).filter(pl.col("task") == task, pl.col("prompt") == prompt)
     programs = results.programs
-    groups: dict[str, list[CompletionKey]] = defaultdict(list)
+    groups: dict[str, list[int]] = defaultdict(list)
     for index in of_prompt["index"]:
-        key = task, prompt, index
-        groups[programs[key]].append(key)
+        groups[programs[task, prompt, index]].append(index)
     return {
         "task": task,
         **_prompt_head(results, of_prompt),
         "programs": [
-            {
-                "indices": [index for _, _, index in same],
-                **_reason(results, same[0]),
-            }
-            for same in groups.values()
+            {"indices": same, **_reason(results, (task, prompt, same[0]))} for same in groups.values()
         ],
     }
 

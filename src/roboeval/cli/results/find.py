@@ -9,14 +9,7 @@ import typer
 
 from codebotler.core.errors import UserError
 from roboeval.cli.inputs import open_current
-from roboeval.cli.options import (
-    AblationOption,
-    InWorldOption,
-    JsonOption,
-    RunArgument,
-    SuiteOption,
-    TaskOption,
-)
+from roboeval.cli.options import AblationOption, JsonOption, RunArgument, SuiteOption
 from roboeval.cli.output import fail, note, print_json, print_rich, show_progress
 
 if TYPE_CHECKING:
@@ -33,8 +26,10 @@ def find(
     negated: Annotated[
         bool, typer.Option("--not", help="Find completions whose traces do not satisfy the formula.")
     ] = False,
-    task: TaskOption = None,
-    world: InWorldOption = None,
+    task: Annotated[str | None, typer.Option(help="Only completions for this task.")] = None,
+    world: Annotated[
+        str | None, typer.Option(help="Only in the world with this number, from 1, or description.")
+    ] = None,
     most: Annotated[int, typer.Option("--groups", min=0, help="Number of failure groups to show.")] = 10,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,

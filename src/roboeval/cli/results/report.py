@@ -8,17 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboeval.cli.inputs import command, expect_same_suite, open_current
-from roboeval.cli.options import (
-    BesideOption,
-    CheckOption,
-    HouseRulesOption,
-    LabelsOption,
-    PricesOption,
-    PublishedOption,
-    SuiteOption,
-    WorkersOption,
-    path_to,
-)
+from roboeval.cli.options import HouseRulesOption, SuiteOption, WorkersOption, path_to
 from roboeval.cli.output import fail, note, show_progress
 from roboeval.cli.results.compare import check_run
 
@@ -26,6 +16,24 @@ if TYPE_CHECKING:
     from roboeval.evaluation.engines.engine import OpenEngine
     from roboeval.evaluation.runs.results import Results
     from roboeval.report.runs import JudgedRun
+
+PublishedOption = Annotated[
+    bool, typer.Option("--published", help="Add the failure causes that the paper published.")
+]
+PricesOption = Annotated[
+    list[str] | None,
+    typer.Option(help="MODEL=INPUT/OUTPUT, the prices per million tokens; may be given several times."),
+]
+LabelsOption = Annotated[
+    list[str] | None,
+    typer.Option(help="RUN=TEXT, the name of a run in tables and figures; may be given several times."),
+]
+BesideOption = Annotated[
+    str | None, typer.Option(help="Compare with the verdicts of another suite that judged the runs.")
+]
+CheckOption = Annotated[
+    bool, typer.Option(help="Run the check on programs not checked yet, for rejection sampling.")
+]
 
 
 def report(
@@ -62,11 +70,8 @@ def report(
     opened = [open_current(run, suite, ablated=False) for run in runs]
     expect_same_suite(opened, suite)
     engine = Local(workers or cores()) if check else None
-    read = name_runs(
-        [judged_run(one, suite, beside=beside, rules=rules, engine=engine) for one in opened],
-        labels,
-    )
-    read = price_runs(read, prices)
+    read = [judged_run(one, suite, beside=beside, rules=rules, engine=engine) for one in opened]
+    read = price_runs(name_runs(read, labels), prices)
     options: list[object] = ["--out", out, *["--published"] * published]
     options += [] if beside is None else ["--beside", beside]
     options += [] if rules is None else ["--rules", rules]
@@ -76,8 +81,7 @@ def report(
     again = command("report", *runs, *options, suite=suite)
     with busy("assembling the report"):
         parts = sections(read, with_published=published, command=again)
-    written = write_report(*headline(read), parts, out)
-    for _ in show_progress(written, "writing", pieces(parts)):
+    for _ in show_progress(write_report(*headline(read), parts, out), "writing", pieces(parts)):
         pass
     note(f"the report is in {out / 'index.html'}")
 

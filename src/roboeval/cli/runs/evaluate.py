@@ -18,14 +18,11 @@ from roboeval.cli.options import (
     HouseRulesOption,
     IsolationOption,
     JsonOption,
-    KeepOption,
     ProcessOption,
-    RedoOption,
     SourceArgument,
     SuiteOption,
     TasksOption,
     WorkersOption,
-    WorldSeedOption,
     WorldsOption,
     path_to,
 )
@@ -40,6 +37,17 @@ if TYPE_CHECKING:
     from roboeval.evaluation.runs.rows import Row
     from roboeval.evaluation.runs.source import Source
     from roboeval.suites.load import Suite
+
+KeepOption = Annotated[
+    Path | None,
+    typer.Option(help="Save completions and verdicts in this run folder.", parser=path_to("a run")),
+]
+RedoOption = Annotated[
+    bool, typer.Option("--redo", help="Discard earlier verdicts and judge everything again.")
+]
+WorldSeedOption = Annotated[
+    int | None, typer.Option(min=0, help="Random seed for sampling worlds, instead of the suite's own seed.")
+]
 
 
 def evaluate(

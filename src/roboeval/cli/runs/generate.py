@@ -8,7 +8,7 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -19,21 +19,15 @@ from codebotler.core.text.words import counted
 from roboeval.cli.engine_choice import engine_named
 from roboeval.cli.inputs import command, load
 from roboeval.cli.options import (
-    BudgetOption,
     ConcurrencyOption,
     IsolationOption,
     JsonOption,
-    MissionTokensOption,
-    ModeOption,
-    NumOption,
-    OutOption,
     ProcessOption,
-    RateOption,
-    RequestsOption,
     SuiteOption,
     TasksOption,
     TurnsOption,
     WorkersOption,
+    path_to,
 )
 from roboeval.cli.output import fail, note, progress_meter, stoppable
 from roboeval.cli.results.compare import check_completions
@@ -80,20 +74,46 @@ class GenerationRequest:
         return open_model(self.name, self.settings)
 
 
+NumOption = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        max=10_000,
+        help="Number of completions per prompt; with --mode, of missions per prompt and world.",
+        show_default="50; with --mode agent or replan 1",
+    ),
+]
+ModeOption = Annotated[
+    Literal["program", "agent", "replan"],
+    typer.Option(
+        help="How the model is used: it writes a program for all worlds of a task, calls skills as an agent "
+        "in each world, or writes a program in each world and, after each failure, one for the rest."
+    ),
+]
+
+
 @inherit_options(model_settings)
 def read_options(
     model: ModelOption = None,
-    out: OutOption = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The run folder; by default runs/MODEL.", parser=path_to("a run"))
+    ] = None,
     num_completions: NumOption = None,
     mode: ModeOption = "program",
     max_turns: TurnsOption = None,
-    max_mission_tokens: MissionTokensOption = None,
+    max_mission_tokens: Annotated[
+        int | None, typer.Option(min=1, help="With --mode: the maximum number of tokens of a mission.")
+    ] = None,
     within: WithinOption = None,
     suite: SuiteOption = "paper",
     tasks: TasksOption = None,
     concurrency: ConcurrencyOption = 8,
-    requests_per_minute: RateOption = None,
-    token_budget: BudgetOption = None,
+    requests_per_minute: Annotated[
+        float | None, typer.Option(min=0.001, help="Maximum number of requests per minute.")
+    ] = None,
+    token_budget: Annotated[
+        int | None, typer.Option(min=1, help="Stop after using this many tokens.")
+    ] = None,
     base_url: BaseUrlOption = None,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> GenerationRequest:
@@ -142,7 +162,14 @@ def complete_run(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace)
 @inherit_options(read_options)
 def generate(
     *,
-    requests: RequestsOption = None,
+    requests: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write the requests to this file for a batch endpoint; query no model.",
+            parser=path_to("a file"),
+        ),
+    ] = None,
     **options: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Let a model write programs for a suite.

@@ -63,15 +63,10 @@ def comparison_view(
         if (warning := run.scope.cut_off_warning) is not None
     ]
     needed = map(Text, sample_size_sentences(comparison))
-    ends = _ends((a, b), failing)
-    return Group(sentence, Text(), rows, Text(), *needed, *warnings, Text(), ends, Text(), table)
-
-
-def _ends(names: tuple[str, str], failing: Sequence[Mapping[str, float]]) -> Table:
-    table = ruled("share that fails", *names)
+    ends = ruled("share that fails", a, b)
     for name in classes_to_show([name for shares in failing for name, share in shares.items() if share]):
-        table.add_row(plural_of(name), *(f"{shares.get(name, 0.0):.1%}" for shares in failing))
-    return table
+        ends.add_row(plural_of(name), *(f"{shares.get(name, 0.0):.1%}" for shares in failing))
+    return Group(sentence, Text(), rows, Text(), *needed, *warnings, Text(), ends, Text(), table)
 
 
 def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableType:
@@ -79,8 +74,12 @@ def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableTyp
     parts: list[RenderableType] = [Text(visible(sentence), "bold") for sentence in sentences(found)]
     parts += [Text(), _scores(found)]
     for one in found:
-        parts += [Text(), _tasks(one)]
         first, second = one.suites
+        table = ruled(visible(one.name), "both", f"{first} only", f"{second} only", "neither")
+        for task in one.tasks:
+            counts = task.both, task.first_only, task.second_only, task.neither
+            table.add_row(Text(visible(task.task)), *(f"{count:,}" for count in counts))
+        parts += [Text(), table]
         parts += _groups(one.first_only, most, f"{first} only, and what {second} says")
         parts += _groups(one.second_only, most, f"{second} only, and what {first} says")
     return Group(*parts)
@@ -92,21 +91,11 @@ def _scores(found: Sequence[VerdictChanges]) -> Table:
     ranked = ranks(found)
     for one in found:
         before, after = one.pass_at_1
-        ends = one.comparison.over_tasks
         numbers = f"{before:.3f}", f"{after:.3f}", f"{after - before:+.3f}"
-        interval = ends.ends("+.3f")
+        interval = one.comparison.over_tasks.ends("+.3f")
         places = " -> ".join(dict.fromkeys(str(of[one.name]) for of in ranked))
         of = f"{one.completions:,} of {one.completions + one.left_out:,}"
         table.add_row(Text(visible(one.name)), *numbers, interval, places, of)
-    return table
-
-
-def _tasks(one: VerdictChanges) -> Table:
-    first, second = one.suites
-    table = ruled(visible(one.name), "both", f"{first} only", f"{second} only", "neither")
-    for task in one.tasks:
-        counts = task.both, task.first_only, task.second_only, task.neither
-        table.add_row(Text(visible(task.task)), *(f"{count:,}" for count in counts))
     return table
 
 

@@ -46,8 +46,7 @@ def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
         happened = [one.name for one in summary.failures if one.count]
         shown = happened if n == 1 else {*happened, *classes_to_show(happened)}
         listed = [_failure_table(one) for one in summary.failures if one.name in shown]
-        tables = Columns(listed, padding=(1, 3))
-        parts += [Text(), Text(sentence), Text(), tables]
+        parts += [Text(), Text(sentence), Text(), Columns(listed, padding=(1, 3))]
     return Group(*parts)
 
 

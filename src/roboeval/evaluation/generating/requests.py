@@ -160,8 +160,7 @@ def begin_batch(
 def _run_metadata(
     run: RunFolder, plan: GenerationPlan, model: str, settings: SamplingSettings
 ) -> dict[str, Any]:
-    suite = plan.suite
-    fixed = {"model": model, "settings": _recorded(settings), **plan.describe(), "suite": suite.name}
+    fixed = {"model": model, "settings": _recorded(settings), **plan.describe(), "suite": plan.suite.name}
     earlier: dict[str, Any] = {}
     if run.about.exists():
         earlier = load_json_object(run.about)

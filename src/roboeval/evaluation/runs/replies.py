@@ -25,13 +25,13 @@ def reply_data(completion: Completion) -> dict[str, Any] | None:
     more = completion.more
     if not any(more.get(name) for name in ("finish_reason", "raw_reply", "reasoning", "ending")):
         return None
-    texts = {name: text if isinstance(text := more.get(name), str) else None for name in REPLY_TEXTS}
+    entries = {name: more.get(name) for name in ("mode", "ending", "tool_errors")}
     return {
         "finish_reason": completion.finish_reason,
         "cut_off": completion.is_cut_off,
         **reply_numbers(completion),
-        **texts,
-        **({} if completion.acted is None else _mission_data(completion)),
+        **{name: text if isinstance(text := more.get(name), str) else None for name in REPLY_TEXTS},
+        **({} if completion.acted is None else {**entries, "turns": completion.turns}),
     }
 
 
@@ -42,11 +42,6 @@ def reply_numbers(completion: Completion) -> dict[str, float | None]:
     usage = usage if isinstance(usage, dict) else {}
     tokens = {name: number_or_none(usage.get(name), int) for name in TOKENS}
     return {**tokens, "latency_s": number_or_none(more.get("latency_s"), int | float)}
-
-
-def _mission_data(completion: Completion) -> dict[str, Any]:
-    entries = {name: completion.more.get(name) for name in ("mode", "ending", "tool_errors")}
-    return {**entries, "turns": completion.turns}
 
 
 def reply_facts(reply: Mapping[str, Any]) -> list[str]:

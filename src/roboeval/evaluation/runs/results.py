@@ -60,8 +60,7 @@ def load_results(
         UserError: the run or suite does not exist, the suite has not judged the run, a file is damaged, or
             a program has changed since it was judged.
     """
-    known = load_suite(suite)
-    table = read_results(*evaluation_of(Path(run), known, ablated=ablation)).table
+    table = read_results(*evaluation_of(Path(run), load_suite(suite), ablated=ablation)).table
     return table if price is None else with_cost(table, Price(*price))
 
 
@@ -75,9 +74,8 @@ class Results:
     manifest: Mapping[str, Any]  # the content of KEY.json
     about: Mapping[str, Any]  # the content of run.json
     completions: Mapping[CompletionKey, Completion]  # all completions in the run, in order
-    places: Mapping[CompletionKey, tuple[int, int]] = field(
-        repr=False
-    )  # the offset and size of each row in the file, in bytes
+    # The offset and size of each row in the file, in bytes.
+    places: Mapping[CompletionKey, tuple[int, int]] = field(repr=False)
     table: pl.DataFrame  # the table that `load_results` returns
 
     @cached_property

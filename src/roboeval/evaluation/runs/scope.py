@@ -64,13 +64,15 @@ class JudgingScope:
         every = list(completions)
         selected = [one for one in every if tasks is None or one.task in tasks]
         missions = [(one.acted.ending, one.turns) for one in selected if one.acted is not None]
+        settings = about.get("settings")
+        limit = settings.get("max_tokens") if isinstance(settings, dict) else None
         return cls(
             completions=Counter(one.task for one in every),
             tasks=tasks,
             models=frozenset(one.model for one in selected),
             requested=requested_of(about, suite),
             cut_off=sum(one.is_cut_off for one in selected),
-            limit=limit_of(about),
+            limit=limit if type(limit) is int else None,
             endings=Counter(ending for ending, _ in missions),
             turns=sum(turns for _, turns in missions),
         )
@@ -129,10 +131,3 @@ def requested_of(about: Mapping[str, Any], suite: Suite | None) -> dict[str, int
     worlds = {name: len(task.scenarios) if "mode" in about else 1 for name, task in suite.tasks.items()}
     sizes = {name: len(task.prompts) * worlds[name] for name, task in suite.tasks.items()}
     return {name: count * sizes[name] for name, count in each.items() if name in sizes}
-
-
-def limit_of(about: Mapping[str, Any]) -> int | None:
-    """Return the token limit in run.json, or None if there is no limit."""
-    settings = about.get("settings")
-    limit = settings.get("max_tokens") if isinstance(settings, dict) else None
-    return limit if type(limit) is int else None

@@ -129,9 +129,8 @@ class TableBuilder:
         key = dict(zip(KEY, key_of(row), strict=True))
         judged = {**key, "program_sha256": row["program_sha256"], "passed": row["passed"]}
         failure = {f"failure_{name}": value for name, value in (row["failure"] or {}).items()}
-        known = {} if written is None else _known_of(written)
         # Columns without an entry are null.
-        self._rows.append({**judged, **failure, **known})
+        self._rows.append({**judged, **failure, **({} if written is None else _known_of(written))})
         self._counts.append(len(row["verdicts"]))
         for number, verdict in enumerate(row["verdicts"]):
             checks, error = verdict["failed_checks"], verdict["error"]

@@ -73,8 +73,6 @@ def trace_of(verdict: Mapping[str, Any]) -> Trace:
         if number in to:
             asked[event.kind] = to[number]
         seen = event.kind, event.text, event.options, event.answer, event.found
-        led = None
-        if event.kind == GOTO:
-            led = destinations.get(number, places.get(number + 1, here))
+        led = destinations.get(number, places.get(number + 1, here)) if event.kind == GOTO else None
         events.append(Event(*seen, here, 0.0, held, asked.get(event.kind), event.more, led))
     return tuple(events)

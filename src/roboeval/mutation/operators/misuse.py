@@ -20,8 +20,7 @@ def pass_another_type(program: ProgramTree, _: Context) -> Edits:
     """Passes an argument of the wrong type."""
     for node, skill in _own_calls(program):
         for argument, parameter in zip(node.args, skill.parameters, strict=False):
-            value = OTHER_TYPE[parameter.type.base or "str"]
-            yield {argument: ast.Constant(value)}
+            yield {argument: ast.Constant(OTHER_TYPE[parameter.type.base or "str"])}
 
 
 def pass_no_choice(program: ProgramTree, _: Context) -> Edits:

@@ -220,9 +220,8 @@ def _looks() -> dict[str, tuple[str, str]]:
     others = [name for name in FAILURE_CLASSES if name != NO_PROGRAM_CLASS]
     colours = cycle(COLOURS[at] for at in (1, 0, 3, 2, 4, 5))
     hatches = cycle(("", "////", "\\\\\\\\", "....", ""))
-    of_others = {one: look for one, *look in zip(others, colours, hatches, strict=False)}
-    looks = {name: (colour, hatch) for name, (colour, hatch) in of_others.items()}
-    return {PASSED: (PALE, ""), NO_PROGRAM_CLASS: (MUTED, ""), **looks}
+    looks = zip(others, zip(colours, hatches, strict=False), strict=False)
+    return {PASSED: (PALE, ""), NO_PROGRAM_CLASS: (MUTED, ""), **dict(looks)}
 
 
 def _kinds(axes: Axes, found: Sequence[tuple[str, Causes]], cause: str, kinds: Sequence[str]) -> None:
@@ -233,9 +232,8 @@ def _kinds(axes: Axes, found: Sequence[tuple[str, Causes]], cause: str, kinds: S
         axes.set_yticks([])
         return
     cells = [[one.kinds[cause].get(kind, 0.0) for _, one in shown_runs] for kind in kinds]
-    counts = [one.counts.get((cause, ALL)) for _, one in shown_runs]
     names = [
-        name if count is None else f"{name} (n = {count:,})"
-        for (name, _), count in zip(shown_runs, counts, strict=True)
+        name if (count := one.counts.get((cause, ALL))) is None else f"{name} (n = {count:,})"
+        for name, one in shown_runs
     ]
     draw_heat_map(axes, cells, [short_name(kind, 24) for kind in kinds], names)

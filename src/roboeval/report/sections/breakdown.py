@@ -46,8 +46,7 @@ def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """Build the table that compares the tasks that end with a report to all others, if there are any."""
-    tasks = runs[0].suite.tasks.items()
-    reporting = {name for name, task in tasks if REPORT_ABILITY in task.abilities}
+    reporting = {one.name for one in runs[0].suite.tasks.values() if REPORT_ABILITY in one.abilities}
     rows: list[list[Cell]] = []
     for run in runs:
         if not reporting & {score.task for score in run.scores}:

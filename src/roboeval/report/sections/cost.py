@@ -150,8 +150,7 @@ def budgets(run: JudgedRun) -> Iterator[Budget]:
 
 def budget_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """Build a table that shows how many passing programs a budget buys, for runs with checked programs."""
-    rows = [[run.name, *one] for run in runs if run.checked for one in budgets(run)]
-    return sheet("budget", rows)
+    return sheet("budget", [[run.name, *one] for run in runs if run.checked for one in budgets(run)])
 
 
 def _per(total: float | None, count: float) -> float | None:

@@ -53,12 +53,6 @@ def most_frequent(run: JudgedRun) -> str:
     return f"{kind} ({plural_of(name)}), {count / run.completions.height:.0%} of all completions"
 
 
-def cut_off_warnings(run: JudgedRun) -> list[str]:
-    """Return a warning if many replies of a run were cut off."""
-    warning = run.results.scope.cut_off_warning
-    return [] if warning is None else [f"{warning}."]
-
-
 def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
     """Build the table of all causes with their counts and shares."""
     rows = [

@@ -124,8 +124,7 @@ def leader(runs: Sequence[JudgedRun]) -> list[str]:
         return []
     best, second, *_ = sorted(runs, key=lambda run: -run.mean)
     try:
-        found = compare_tables(second.table, best.table)
-        return [comparison_sentence(found, (second.name, best.name))]
+        return [comparison_sentence(compare_tables(second.table, best.table), (second.name, best.name))]
     except UserError:  # no prompt in common
         return []
 
