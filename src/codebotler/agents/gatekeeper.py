@@ -66,7 +66,7 @@ class Gatekeeper:
         """Begin a mission that waits for approval. Raise MissionError if the console is busy with another."""
         before = self.console.session
         view = SessionView() if before is None else before.view
-        is_own = before is self._session and not (before is not None and before.is_changed_by_person)
+        is_own = before is None or (before is self._session and not before.is_changed_by_person)
         if not (is_own or view.is_over):
             raise MissionError("a person is working on a mission of their own; wait until it is over")
         if len(order.program) > MAX_PROGRAM_LENGTH:  # it would have no contract
