@@ -48,7 +48,7 @@ from codebotler.simulator.worlds.robot import SimulatedRobot
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.simulator.worlds.sampled_robot import SampledRobot
 from roboeval.evaluation.judging.judge import judge
-from roboeval.evaluation.recording import Call, RecordingRobot
+from roboeval.evaluation.recording import SLEEP, Call, RecordingRobot
 from roboeval.evaluation.recovery import check_rest
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.source import recorded_completions, recorded_model_for
@@ -350,15 +350,16 @@ def crashes(worker: Worker, one: Completion, folder: Path) -> Iterator[Crash]:
         if outcome.error is not None or not judge(outcome, scenario.asked_by(one.prompt)).satisfied:
             continue
         calls = tuple(robot.calls)
+        skills = [number for number, (name, _) in enumerate(calls) if name != SLEEP]
         crash = partial(Crash, whole=outcome.trace, world=scenario.world)
-        for at in range(len(calls)):
+        for at, number in enumerate(skills):
             before = [line for pair in robot.log[:at] for line in pair]
             start, end = robot.log[at]
             read = partial(read_log, folder, task.prompts[one.prompt], one.program, scenario.world)
-            yield crash(calls[: at + 1], read([*before, start, end]))
+            yield crash(calls[: number + 1], read([*before, start, end]))
             unsure = read([*before, start])
-            yield crash(calls[: at + 1], unsure.resolve(happened=True))
-            yield crash(calls[:at], unsure.resolve(happened=False))
+            yield crash(calls[: number + 1], unsure.resolve(happened=True))
+            yield crash(calls[:number], unsure.resolve(happened=False))
 
 
 def read_log(
