@@ -143,6 +143,23 @@ def test_a_rest_that_did_not_run_leaves_the_question_open(tmp_path: Path) -> Non
     assert read_past(mission.folder, SKILLS).unsure is not None
 
 
+def test_a_persons_word_is_kept_through_all_rests(tmp_path: Path) -> None:
+    folder = failed(tmp_path, BRING)
+    cut(folder, line_of(folder, "pick", "skill"))
+    past = read_past(folder, SKILLS).resolve(happened=True)
+    with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
+        mission.continue_from(past)
+        mission.draft("def task_program():\n    go_to('nowhere')\n")
+        mission.check([])
+        mission.approve()
+        with Reservation(Simulated(WORLD, speed=None), tmp_path) as reserved:
+            mission.run(reserved, "hall")
+    again = read_past(mission.folder, SKILLS)
+    assert again.testimony == past.testimony
+    second = replace(again, unsure=again.trace[-1]).resolve(happened=False)
+    assert second.testimony.startswith(f"{past.testimony}; ")
+
+
 def test_where_nothing_was_tried_the_program_is_still_the_rest(tmp_path: Path) -> None:
     folder = failed(tmp_path, BRING)
     assert read_past(folder, SKILLS).has_failed

@@ -54,7 +54,7 @@ class MissionPast:
         unsure: a step that may have happened or not; None if there is none.
         before: the number of steps that missions did before this program.
         has_failed: whether it failed, rather than that somebody stopped it or it was interrupted.
-        testimony: what a person said of the unsure step, in a sentence.
+        testimony: what people said of unsure steps, in a sentence.
     """
 
     mission: str
@@ -143,7 +143,8 @@ class MissionPast:
         done = replace(self.unsure, answer=answer or None)
         trace = (*self.trace, done) if happened else self.trace
         did = "happened" if happened else "did not happen"
-        testimony = f"a person said that this {did}: {self._unsure_words}"
+        word = f"a person said that this {did}: {self._unsure_words}"
+        testimony = "; ".join(filter(None, (self.testimony, word)))
         return replace(self, trace=trace, unsure=None, testimony=testimony)
 
     def add_to(self, room_map: RoomMap | None, place: str) -> tuple[RoomMap, str]:
@@ -158,6 +159,7 @@ class MissionPast:
             "continues": self.mission,
             "why": self.why,
             "trace": placed_trace_data(self.trace),
+            "testimony": self.testimony,
         }
 
 
@@ -207,6 +209,7 @@ def read_past(
         unsure,
         len(before.get("trace", ())),
         summary.state is MissionState.FAILED,
+        str(before.get("testimony", "")),
     )
 
 
