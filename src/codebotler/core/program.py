@@ -212,16 +212,18 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
     from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - takes a tenth of a second
     from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - slow
 
-    # Names in string annotations are never looked up at run time.
-    spelled = {(n.lineno, n.col_offset) for n in nodes(tree) if isinstance(n, ast.Name)}
+    class NameChecker(Checker):  # type: ignore[misc]  # pyflakes has no types
+        def handleStringAnnotation(self, *_: object) -> None:  # noqa: N802 - a method of pyflakes
+            """Skip names in string annotations, which are never looked up at run time."""
+
     with _PARSING:
-        found = Checker(tree, builtins={*skills, *GIVEN_MODULES}, withDoctest=False).messages
+        found = NameChecker(tree, builtins={*skills, *GIVEN_MODULES}, withDoctest=False).messages
     return [
         # pyflakes gives the bare name, not a tuple, where a local variable hides a builtin
         (m.lineno, m.message_args if isinstance(m.message_args, str) else m.message_args[0], is_local)
         for m in found
         for is_local in [isinstance(m, messages.UndefinedLocal)]
-        if (is_local or isinstance(m, messages.UndefinedName)) and (m.lineno, m.col) in spelled
+        if is_local or isinstance(m, messages.UndefinedName)
     ]
 
 

@@ -162,7 +162,6 @@ DEEP = {
     "null": TASK + "\0",
     "half a character": TASK + "'\ud800'",
     "digits": TASK + "9" * 10_000,
-    "annotation": TASK + "x: '" + "(" * 10_000 + "' = 1\ny: '\\0' = 2\nz: '" + "-" * 9_000 + "1' = 1",
 }
 
 
@@ -178,6 +177,13 @@ def test_hostile_source_is_a_problem(text: str) -> None:
     assert find_flaws(in_task(text) if "\n" not in text else text)
     assert find_flaws(program_of(text).source)
     assert program_of(fenced(text) + fenced(TASK)).source
+
+
+def test_text_annotations_are_never_read() -> None:
+    annotations = (
+        "x: '" + "(" * 10_000 + "' = 1\ny: '\\0' = 2\nz: '" + "-" * 9_000 + "1' = 1\nw: 'nowhere' = 1"
+    )
+    assert not find_flaws(f"{TASK}\n{annotations}\n")
 
 
 # Garbage is collected all the time, by Python code: so threads are often interrupted while they make a tree.
