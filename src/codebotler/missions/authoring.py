@@ -32,7 +32,7 @@ class ModelAuthor:
         Args:
             prompt: the request.
             count: how many replies to request.
-            on_text: receives a single reply as it arrives.
+            on_text: receives the reply as it arrives, if `count` is 1.
         """
         model = self._open()
         listener = on_text if count == 1 else ignore_text

@@ -1,4 +1,4 @@
-"""Examine a draft of a mission's program: the check, and what the robot and the past say of it."""
+"""Check a mission's program before its approval, against the robot and the steps already done."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from codebotler.robots.base import Robot
 
 
 def examine_draft(program: str, view: SessionView, order: MissionOrder, robot: Robot) -> dict[str, Any]:
-    """Return the fields of a session's view that tell what a check and the robot say of a program.
+    """Check a program, and return the results as values for fields of `SessionView`, such as `check`.
 
     Args:
         program: the program.
         view: the view of the session.
-        order: the order, which may have a past or drive the robot in place of the program.
+        order: the order. If its `drive` replaces this program, its contract replaces the program's.
         robot: the connected robot.
     """
     rules, skills = view.rules_in_force, robot.skills

@@ -86,7 +86,7 @@ class LiveRobot:
 
     @property
     def trace(self) -> Trace:
-        """The trace of the robot so far."""
+        """What the robot has done, seen and said so far, in order."""
         return tuple(self._events)
 
     def stop(self) -> None:
@@ -247,7 +247,7 @@ class LiveRobot:
         self.check_end()
 
     def report_unkept(self) -> str:
-        """Log the first rule that is broken at the end, and return its sentence, or "" if all are kept."""
+        """Log a rule that is broken if the mission ends now, and return the message, or "" if all hold."""
         broken = None if self._guard is None else self._guard.at_end()
         if broken is None:
             return ""

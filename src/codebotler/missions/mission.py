@@ -138,11 +138,11 @@ class Mission:
 
     @property
     def is_stuck(self) -> bool:
-        """Whether a skill has not returned since a stop was not confirmed, so the robot may still move."""
+        """Whether a skill still runs after a stop that the robot did not confirm, so the robot may move."""
         return self._stuck is not None and self._stuck.is_alive()
 
     def draft(self, program: str, model: str = "") -> None:
-        """Set or replace the program and its author, or raise MissionError after the approval."""
+        """Set or replace the program, written by `model` or a person. Raise MissionError once approved."""
         with self._writing:
             self._step(
                 MissionState.DRAFTING, "take another program", program=program, model=model, problems=()
@@ -206,7 +206,7 @@ class Mission:
             raise MissionError(f"mission {self.id} is {self.state}; there is nothing to stop")
 
     def continue_from(self, past: MissionPast) -> None:
-        """Add what an earlier mission did to the log, before this one does the rest."""
+        """Log the steps of the earlier mission that this mission continues, before this one runs."""
         self.summary.continues = past.mission
         self._write("past", **past.data())
         if past.testimony:

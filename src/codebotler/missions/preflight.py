@@ -29,16 +29,16 @@ EXPECTED_ERRORS = (UserError, ModelError, NotReadyError, EngineError, MissionErr
 """Errors that can end a mission before it runs, with a sentence that says why."""
 
 MAX_CHECKED_ROOMS = 1_000
-"""The limit for a check, which compares each drive with all rooms."""
+"""The most rooms for which a check compares each drive with every room."""
 
 
 def is_resumable(robot: Robot) -> bool:
-    """Whether a robot is simulated, so that it can be brought to where it was after a past."""
+    """Whether a robot can be put where an earlier mission left it. Only simulated robots can."""
     return hasattr(robot, "resume")  # an optional method
 
 
 def resume_robot(robot: Robot, past: MissionPast) -> None:
-    """Bring a connected robot to where it was after a past, if it is simulated."""
+    """Put a connected robot where the earlier mission `past` left it, if the robot is simulated."""
     if is_resumable(robot):
         robot.resume(past.trace)  # type: ignore[attr-defined]  # as was just found
 
@@ -148,7 +148,7 @@ def unknown_rooms(program: str, room_map: RoomMap, skills: SkillTable = SKILLS) 
 
 
 def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
-    """Return the recorded instructions whose rooms exist here, each with its program."""
+    """Return the recorded instructions whose rooms the robot knows, each with its program."""
     replies = open_recorded("recorded").replies
     known = {instruction: solutions[0].program for instruction, solutions in replies.items()}
 
@@ -160,14 +160,14 @@ def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
 
 
 def with_closest_here(error: UnknownInstructionError, room_map: RoomMap | None) -> UnknownInstructionError:
-    """Return the same error, but suggest only instructions whose rooms exist here."""
+    """Return the same error, but suggest only instructions whose rooms the robot knows."""
     closest = find_closest(error.instruction, known_instructions(room_map))
     return UnknownInstructionError(error.model, error.instruction, closest)
 
 
 @contextmanager
 def suggesting_here(room_map: RoomMap | None) -> Iterator[None]:
-    """Suggest only instructions whose rooms exist here if a recorded model does not know one."""
+    """If a recorded model does not know an instruction, suggest only those whose rooms the robot knows."""
     try:
         yield
     except UnknownInstructionError as error:
@@ -185,7 +185,7 @@ def missing_skills(program: str, robot: Robot) -> list[str]:
 
 
 def error_sentence(error: Exception) -> str:
-    """Say why a mission ended, with the name of an unexpected error."""
+    """Say why a mission ended. An unexpected error starts with its class, as in `KeyError: 'kitchen'`."""
     if isinstance(error, UnknownInstructionError):
         return f"{error.model} has no program for this instruction"
     if isinstance(error, OSError) and error.filename is not None:

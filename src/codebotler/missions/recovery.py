@@ -28,7 +28,7 @@ class PriorApproval:
 
     Args:
         contract: what the approved program may do at most.
-        done_before: how many steps its past had when it was approved.
+        done_before: how many steps earlier missions had done when the program was approved.
     """
 
     contract: Contract
@@ -36,18 +36,18 @@ class PriorApproval:
 
     @classmethod
     def of(cls, view: SessionView) -> PriorApproval | None:
-        """Return what the approval of a session's program allows, or None if that is unknown."""
+        """Return the approval of the program in a session's view, or None if the program was not checked."""
         before = 0 if view.past is None else len(view.past.trace)
         return None if view.contract is None else cls(view.contract, before)
 
     def allows(self, view: SessionView, past: MissionPast) -> bool:
-        """Whether the program for the rest, of which a session has a view, needs no further approval."""
+        """Whether the program in `view`, for the rest of the mission `past`, does only what was approved."""
         if view.contract is None or view.problems:
             return False
         return not view.contract.beyond(self.contract_after(past.trace)).skills
 
     def contract_after(self, trace: Trace) -> Contract:
-        """Return what is left of the contract after a trace."""
+        """Return the contract minus the calls since the approval: after one `pick`, 2 of 3 are left."""
         rows = (by_event(event.kind) for event in trace[self.done_before :] if not event.failed)
         done = Counter(row.name for row in rows if row is not None)
         return Contract(
@@ -63,7 +63,7 @@ class PriorApproval:
 def is_recoverable(view: SessionView, events: Sequence[LogLine], skills: SkillTable) -> bool:
     """Whether a mission failed because a skill did, so that a model may be asked for the rest.
 
-    Own skills that record no event must not have been called, since nothing would notice a second call.
+    No called skill may have an effect without an event in the trace, since a second call would go unnoticed.
     """
     ends = [line for line in events if line["event"] in SKILL_END_EVENTS]
     failed = bool(ends) and ends[-1]["event"] == "error" and view.reason.startswith(f"{ends[-1]['kind']}: ")
@@ -73,7 +73,7 @@ def is_recoverable(view: SessionView, events: Sequence[LogLine], skills: SkillTa
 
 
 def past_to_recover(session: MissionSession, robot: Robot, home: Path) -> MissionPast | None:
-    """Return the past of a session's mission if a skill failed, or None if a person must decide."""
+    """Wait for a session. Return its mission's steps if a skill failed, or None if a person must decide."""
     session.join()
     if not is_recoverable(session.view, session.events(), robot.skills):
         return None
@@ -81,9 +81,9 @@ def past_to_recover(session: MissionSession, robot: Robot, home: Path) -> Missio
 
 
 def ask_evidence(robot: Robot, home: Path, past: MissionPast, remark: Callable[[str], None]) -> list[str]:
-    """Return what the log and the robot say, for a person who decides whether an unsure step happened.
+    """Return sentences that help a person to decide whether the step `past.unsure` happened.
 
-    The robot is connected, unless it is in use. `remark` receives likely mistakes in its setup.
+    A real robot is asked where it is, unless it is in use. `remark` receives likely mistakes in its setup.
     """
     before = [past.was] if past.was else []
     if is_resumable(robot):  # it knows no more than the log

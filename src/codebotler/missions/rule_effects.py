@@ -1,4 +1,4 @@
-"""Find the effects of house rules on programs, each run once in simulation, and on logs of missions."""
+"""Find out what house rules would stop, in programs that are run once in simulation and in mission logs."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class RuleEffect:
 
     @classmethod
     def of(cls, broken: RuleViolationError, ended: str, line: int | None = None) -> RuleEffect:
-        """Return the effect of a rule on a run."""
+        """Return the effect of a broken rule on a run. `ended` says how the run ended, such as `stopped`."""
         if broken.event is None:
             return cls("finished", broken.rule.name, "at the end")
         when = "late" if broken.is_late else "before"
@@ -52,14 +52,14 @@ class RuleEffect:
 
 
 class NotingGuard(RuleGuard):
-    """A guard that keeps the violations that it raises."""
+    """A rule guard that also collects the violations it raises, in `violations`."""
 
     def __init__(self, rules: Sequence[Rule], world: World | None) -> None:
         super().__init__(rules, NO_ROOMS if world is None else RoomMap.of(world))
         self.violations: list[RuleViolationError] = []
 
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Let a robot execute one skill, and keep a violation."""
+        """Let a robot execute one skill, and collect the violation if a rule forbids it."""
         try:
             return super().perform(robot, skill, arguments)
         except RuleViolationError as broken:
@@ -67,7 +67,7 @@ class NotingGuard(RuleGuard):
             raise
 
     def at_end(self) -> RuleViolationError | None:
-        """Return the error of a rule that is broken if the mission ends now, and keep it."""
+        """Return and collect the violation of a rule that is broken if the mission ends now, or None."""
         broken = super().at_end()
         self.violations += [broken] if broken else []
         return broken
@@ -76,7 +76,7 @@ class NotingGuard(RuleGuard):
 def find_program_effects(
     programs: Iterable[str], rules: Sequence[Rule], world: World | None, skills: SkillTable
 ) -> Iterator[RuleEffect]:
-    """Run programs on all cores, and yield the effects in order. Without a world, imagine one for each."""
+    """Simulate each program once and yield the effects in order. Without `world`, sample one for each."""
     sampler = first_samplers(CheckSettings())[0]
     with WorkerPool(cores()) as pool:
 

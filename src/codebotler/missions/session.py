@@ -108,7 +108,7 @@ class MissionSession(SharedView):
         self._thread.start()
 
     def join(self, seconds: float | None = None) -> None:
-        """Wait for the end of the session."""
+        """Wait for the end of the session, for at most `seconds`."""
         self._thread.join(seconds)
 
     def edit(self, program: str) -> None:
@@ -150,7 +150,7 @@ class MissionSession(SharedView):
             self._change(busy=f"asking {self._view.model}", is_written=True, reply="")
 
     def answer(self, question: ClarifyingQuestion | None, answer: ClarifyingAnswer, more: str = "") -> None:
-        """Say which behaviour is meant. With `none`, a sentence is added to the instruction.
+        """Say which behaviour a person means. With `none`, add the sentence `more` to the instruction.
 
         The answer `none` without a sentence, or to the last question, ends the mission.
 
@@ -177,10 +177,10 @@ class MissionSession(SharedView):
         by: str = "",
         is_person: bool = True,
     ) -> None:
-        """Approve the program that the person saw, identified by its digest. `by` goes to the log.
+        """Approve the program that the person saw, whose digest is `seen`. `by` goes to the log.
 
-        `disabled_rules` are those that the person saw switched off, if somebody else can do that. `is_person`
-        is whether a person decides this now, rather than what a person has approved before.
+        `disabled_rules` are those that the person saw switched off, or None to skip this comparison.
+        `is_person` is False if no person decides now, because an earlier approval covers the program.
         """
         with self._editing:
             view, mission = self._view, self._mission
@@ -199,11 +199,11 @@ class MissionSession(SharedView):
 
     @property
     def is_stuck(self) -> bool:
-        """Whether a skill has not returned since a stop was not confirmed."""
+        """Whether a skill still runs after a stop that the robot did not confirm, so the robot may move."""
         return self._mission is not None and self._mission.is_stuck
 
     def reject(self, reason: str) -> None:
-        """End the mission before it runs."""
+        """End the mission as failed, before it runs, and log the reason."""
         assert self._mission is not None, "there is a program to reject"
         self._mission.fail(reason)
 

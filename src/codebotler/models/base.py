@@ -33,7 +33,7 @@ class Usage:
 
 @dataclass(frozen=True)
 class Reply:
-    """A model's reply."""
+    """A model's reply to a prompt, and the program that was extracted from it."""
 
     text: str = field(repr=False)  # the complete reply with tool calls, or the message of a refusal
     program: str = field(repr=False)  # the program in the reply; it may not parse
@@ -69,10 +69,10 @@ def make_reply(
     known_kind: NoProgram | None = None,
     has_answer: bool = True,
 ) -> Reply:
-    """Extract the program and build a `Reply`.
+    """Extract the program from a model's text, and build a `Reply`.
 
-    `opening` is the prompt that a base model continues, or None for a chat model. `known_kind` says why there
-    is no program, if the server reported this outside the text. Without an answer, no program is extracted.
+    `opening` is the prompt that a base model continues, None for a chat model. `known_kind` says why there is
+    no program, if the server does. Without an answer, the text is a refusal, tool calls or an error message.
     """
     answer = text if has_answer else ""
     found = read_reply(

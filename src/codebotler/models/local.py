@@ -251,7 +251,7 @@ class LocalModel:
 
 
 def find_source(path: str) -> str:
-    """Return a model's folder, or its name on the hub, as transformers expects it."""
+    """Return a model's folder with `~` expanded, or its hub name. Raise UserError if there is no folder."""
     folder = Path(path).expanduser()
     if path.startswith((".", "/", "~")) and not folder.is_dir():
         raise UserError("there is no such model folder; correct the path", file=path)

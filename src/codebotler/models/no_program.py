@@ -1,4 +1,4 @@
-"""Classify replies without a program, if the server reports the cause or the text makes it certain."""
+"""Find out why a reply contains no program: for example, it was cut off, or the model refused."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from codebotler.prompts.extract import defines_task
 from codebotler.simulator.process.isolated_call import IsolatedCallError
 
 NoProgram: TypeAlias = Literal["cut-off", "tool-call", "refusal", "filtered", "empty", "no-code"]
-"""The kinds of replies without a program."""
+"""Why a reply contains no program."""
 
 NO_PROGRAM_KINDS: tuple[NoProgram, ...] = get_args(NoProgram)
 NO_PROGRAM_SENTENCES: Mapping[NoProgram, str] = {

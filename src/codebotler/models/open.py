@@ -88,7 +88,7 @@ def kind_of(name: str) -> str:
 
 @dataclass(frozen=True)
 class ChosenModel:
-    """A model with its default settings."""
+    """The name of a model, with the server and the token limit to use it with."""
 
     name: str  # the argument for `open_model`
     base_url: str | None = None  # None means the provider's own server

@@ -85,7 +85,7 @@ class RateLimited:
     ) -> Reply:
         """Request one reply, with retries. Each try passes the reply to `on_text` from the beginning.
 
-        `around` returns a context for each try, which is entered as soon as the try may start.
+        Each try runs inside a context from `around`, which is entered when the limits let the try start.
 
         Raises:
             ModelError: the last try failed.

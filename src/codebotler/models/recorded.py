@@ -60,7 +60,7 @@ class InstructionSolutions(_RecordedPart):
     continuations: tuple[Continuation, ...] = ()
 
     def replies_of(self, model: str) -> tuple[Solution, ...]:
-        """Return the replies of one of the models."""
+        """Return the replies of the recorded model `careful` or `hasty`."""
         return self.careful if model == "careful" else self.hasty
 
 
@@ -146,7 +146,7 @@ def is_recorded(name: str) -> bool:
 
 
 def open_recorded(name: str, folder: Path | None = None) -> RecordedModel:
-    """Open a recorded model by its name. `folder` may hold further solutions."""
+    """Open `recorded:careful`, `recorded:hasty` or `recorded:FOLDER`. `folder` may hold further solutions."""
     short = name.removeprefix("recorded").removeprefix(":") or RECORDED_NAMES[0]
     if short not in RECORDED_NAMES and Path(short).is_dir():
         own = _read(Path(short))

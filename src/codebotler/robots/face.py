@@ -173,7 +173,7 @@ class Face:
 
 
 def without_speech(skills: SkillTable = SKILLS) -> SkillTable:
-    """Return the skills that are not spoken, which a robot with a face must still perform itself."""
+    """Return the skills that a robot with a face performs itself, without spoken ones such as `say`."""
     return SkillTable(tuple(skill for skill in skills.rows if _speech_of(skill) is None))
 
 

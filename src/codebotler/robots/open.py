@@ -1,4 +1,4 @@
-"""Open a robot by its kind, with names in one spelling, and check which kinds work on this machine."""
+"""Open a robot by its kind, such as `ros2`, and check which kinds work on this machine."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ROBOT_KINDS = {
     "rosbridge": "ros.kinds:rosbridge",
     "ros2": "ros.kinds:ros2",
 }
-"""The function that opens each kind of robot without connecting it, in a module that must import quickly."""
+"""The function that opens each kind of robot, as MODULE:NAME. These modules must import quickly."""
 PACKAGES = {"pyrobosim": "pyrobosim", "rosbridge": "websockets"}
 """The optional package that a kind of robot needs."""
 NOTES = {
@@ -40,7 +40,7 @@ NOTES = {
     "rosbridge": "at --address, ws://localhost:9090 by default; with ROS 2, tested only against a simulated "
     "rosbridge",
 }
-"""Advice for users of a kind of robot that works wherever its package is installed."""
+"""Advice for users, for each kind of robot that needs no ROS on this machine."""
 
 
 def open_robot(name: str, options: Options | None = None) -> Robot:
@@ -91,7 +91,7 @@ def _missing_package(name: str) -> str:
 
 
 class SpellingRobot:
-    """Wraps a robot so that programs see composed names, while the robot gets names in its own spelling."""
+    """Wraps a robot so that programs see `é` as one character, even if the robot writes `e` and an accent."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -103,7 +103,7 @@ class SpellingRobot:
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Perform a skill with names in the robot's own spelling."""
+        """Perform a skill. Send names as the robot spelled them earlier, and return names composed (NFC)."""
         given = [self._spellings.get(one, one) if isinstance(one, str) else one for one in arguments]
         result = self._robot.perform(skill, given, feedback)
         for text in result if isinstance(result, list) else [result]:

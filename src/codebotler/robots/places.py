@@ -77,7 +77,7 @@ class PlacesFile(_PlacesForm):
 
 
 class PlacesMapping(_PlacesForm):
-    """Describes how to find places in a file. A path is a list of keys and indices joined by dots."""
+    """Says where a YAML or JSON file has places. In a path such as `rooms.*`, `*` matches any key."""
 
     file: Name
     frame: Name = "map"

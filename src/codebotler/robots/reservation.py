@@ -82,7 +82,7 @@ class Reservation:
 
 
 def robot_file(robot: str, address: str, kind: str) -> Path:
-    """Return the path of this user's file of some kind, such as `lock`, for the robot at an address."""
+    """Return the path of this user's file about the robot at an address, with a suffix such as `lock`."""
     digest = sha256(normalize_address(address).encode(errors="surrogatepass")).hexdigest()
     return lock_folder() / f"{robot} {digest}.{kind}"
 

@@ -25,7 +25,7 @@ _STOP_STATES = frozenset({MissionState.STOPPING, MissionState.STOPPED})  # logge
 
 @dataclass(frozen=True)
 class Moment:
-    """An entry in the activity list."""
+    """A line of the activity list, such as `drives to "kitchen"`, with its time."""
 
     clock: float  # seconds on the robot's clock since the program began
     kind: str  # the kind of event; for speech, the kind of skill, such as `say`, or `ANSWER`
@@ -42,7 +42,7 @@ class Find:
 
 @dataclass(frozen=True)
 class Progress:
-    """A snapshot of the progress of a mission."""
+    """A snapshot of a mission's progress: the current skill, the robot's position, and what it has found."""
 
     has_begun: bool = False  # whether the program has started on the robot
     doing: str = ""  # the current skill or pause in words; empty between them

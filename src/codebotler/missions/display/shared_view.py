@@ -36,7 +36,7 @@ class SharedView:
         return self._view
 
     def events(self, start: int = 0) -> list[LogLine]:
-        """Return the events of the mission, beginning at a position."""
+        """Return the events of the mission so far, without the first `start` ones."""
         return self._events[start:]
 
     def _add_remark(self, sentence: str) -> None:

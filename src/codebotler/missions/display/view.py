@@ -32,14 +32,14 @@ UNCHECKED: dict[str, object] = {
     "programless": None,
     "busy": CHECKING,
 }
-"""The fields of the view for a program that has not been checked."""
+"""Values that reset the results of the check in a `SessionView`, for a program that is not checked yet."""
 
 Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking", "no-program", "question"]
 
 
 @dataclass(frozen=True)
 class MissionOrder:
-    """A request for a mission. It raises UserError if it asks for nothing, or if its past is unsure."""
+    """A request for a mission. Raises UserError if it asks for nothing, or if a step of `past` is unsure."""
 
     instruction: str = ""
     model: str = ""  # empty if no model may be asked
@@ -65,7 +65,7 @@ class MissionOrder:
 
 @dataclass(frozen=True)
 class SessionView:
-    """An immutable snapshot of a session, the same for all observers."""
+    """An immutable snapshot of a mission session: its program, the result of the check, and its progress."""
 
     number: int = 0  # counts sessions from 1; 0 before the first
     id: str = ""  # the ID of the mission; empty until it exists
@@ -98,13 +98,13 @@ class SessionView:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """Sentences about problems in the program."""
+        """Sentences about problems that the check found, and about skills that the robot lacks."""
         found = () if self.check is None else self.check.problems
         return (*(problem.sentence for problem in found), *self.missing_skills)
 
     @property
     def contract(self) -> Contract | None:
-        """The contract of the program; None if it was not checked."""
+        """What the program may do at most, according to its check; None if it was not checked."""
         return None if self.check is None else self.check.contract
 
     @property
@@ -114,12 +114,12 @@ class SessionView:
 
     @property
     def can_run(self) -> bool:
-        """Whether the program can start, despite its problems."""
+        """Whether the program can start. Only syntax errors prevent it; people can accept other problems."""
         return self.check is None or not any(one.kind in _SYNTAX_ERRORS for one in self.check.problems)
 
     @property
     def arriving(self) -> PartialReply:
-        """The part of the reply that a model has sent so far."""
+        """What a model has sent so far of its reply, split into text and code."""
         return split_partial(self.reply)
 
     @property
@@ -129,7 +129,7 @@ class SessionView:
 
     @property
     def phase(self) -> Phase:
-        """The current phase of the session, or the final state of its mission."""
+        """What the session does now, such as `writing` or `checking`, or the final state of its mission."""
         if self.is_over or self.is_running:
             return "" if self.state is None else self.state
         if self.is_written:
@@ -149,7 +149,7 @@ class SessionView:
 
     @property
     def is_approved(self) -> bool:
-        """Whether the robot works, or is about to, since the program is approved."""
+        """Whether the program is approved and not yet over, so that the robot works or is about to."""
         return self.is_running or (self.state is MissionState.APPROVED and not self.is_over)
 
     @property
@@ -159,13 +159,13 @@ class SessionView:
 
     @property
     def waits_for_program(self) -> bool:
-        """Whether a model replied without a program, so that a person must decide."""
+        """Whether a model replied without a program, so that a person must ask again, write one, or stop."""
         is_open = self.state is MissionState.DRAFTING and not self.is_over and not self.busy
         return is_open and self.programless is not None and self.question is None
 
     @property
     def waits_for_answer(self) -> bool:
-        """Whether a person must say which behaviour they mean."""
+        """Whether a person must answer `question`, by saying which of several behaviours they mean."""
         return self.question is not None and not self.is_over and not self.busy
 
     @property
@@ -184,5 +184,5 @@ class SessionView:
 
 
 def program_digest(program: str) -> str:
-    """Return a hash of a program."""
+    """Return the SHA-256 hash of a program, by which an approval names exactly this program."""
     return hashlib.sha256(program.encode(errors="surrogatepass")).hexdigest()

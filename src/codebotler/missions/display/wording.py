@@ -29,7 +29,7 @@ def event_text(line: LogLine) -> str:
 
 
 def timeline(events: Iterable[LogLine]) -> Iterator[tuple[LogLine, str]]:
-    """Yield events with their descriptions, without feedback, repeated states, and what a stop implies."""
+    """Yield events with descriptions. Leave out feedback, repeated states, and `stopped` after a stop."""
     before, is_stopped = "", False
     for number, line in enumerate(events):
         words = event_text(line) if number else "mission created"
@@ -50,12 +50,12 @@ def _state(line: LogLine) -> str:
 
 
 def stop_text(by: str) -> str:
-    """Describe a stop."""
+    """Describe a stop by its source, such as `stopped by Ctrl-C` or `stopped from the page`."""
     return f"stopped {'from' if by == BY_PAGE else 'by'} {visible(by)}"
 
 
 def reason_text(reason: str, line: int | None) -> str:
-    """Return the reason, preceded by the program's line, if known."""
+    """Return why a mission ended, after the program's line if that is known, as in `line 3: no such room`."""
     return reason if line is None else f"line {line}: {reason}"
 
 

@@ -162,7 +162,7 @@ SKILL_END_EVENTS = frozenset({"result", "error", "cancelled", "late"})
 
 
 def find_skill_end(events: Sequence[LogLine], number: int) -> LogLine | None:
-    """Return the first event from a position on that ends a skill, or None if there is none."""
+    """Return the first event with index `number` or later that ends a skill, such as `result`, or None."""
     later = (events[at] for at in range(number, len(events)))
     return next((line for line in later if line["event"] in SKILL_END_EVENTS), None)
 

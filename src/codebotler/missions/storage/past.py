@@ -36,25 +36,25 @@ from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.worlds.room_map import RoomMap
 
 DONE_EVENTS = frozenset({"result", "late"})
-"""The kinds of log events that end a skill which the robot has executed."""
+"""The kinds of log events that show that the robot completed a skill."""
 
 
 @dataclass(frozen=True)
 class MissionPast:
-    """The steps of a mission, and of those that it continued, until it ended.
+    """What an ended mission, and the missions that it continued, did. A new mission can do the rest.
 
     Args:
-        mission: its ID.
+        mission: the ID of the ended mission.
         instruction: the instruction; empty if there was only a program.
-        model: the model that wrote its program; empty if a person did.
-        program: its program.
-        why: why it ended, in a sentence.
-        trace: what the robot did and saw, with the names that programs used.
+        model: the model that wrote the program; empty if a person did.
+        program: the program of the ended mission.
+        why: why the mission ended, in a sentence.
+        trace: what the robot did and saw, with rooms and objects named as in the programs.
         place: where the robot was last; empty if unknown.
-        unsure: a step that may have happened or not; None if there is none.
-        before: the number of steps that missions did before this program.
-        has_failed: whether it failed, rather than that somebody stopped it or it was interrupted.
-        testimony: what people said of unsure steps, in a sentence.
+        unsure: a step whose end the log lacks, such as a cancelled `say`, so it may have happened; or None.
+        before: how many steps of `trace` earlier missions did, before this program.
+        has_failed: whether the mission failed, rather than being stopped or interrupted.
+        testimony: what people said about unsure steps, in a sentence.
     """
 
     mission: str
@@ -71,22 +71,22 @@ class MissionPast:
 
     @property
     def is_untouched(self) -> bool:
-        """Whether nothing was done or tried, so that its program is still the whole rest."""
+        """Whether the robot did and tried nothing, so that the whole program is still to do."""
         return bool(self.program) and not (self.trace or self.unsure or self.has_failed)
 
     @property
     def held(self) -> str:
-        """The thing in the robot's hand; empty for nothing."""
+        """The object in the robot's hand; empty for nothing."""
         return held_after(self.trace)
 
     @property
     def progress(self) -> Progress:
-        """The progress of a mission that begins with this past."""
+        """The progress with which the new mission begins: the robot's place and the object in its hand."""
         return Progress(room=self.place, held=self.held)
 
     @property
     def steps(self) -> list[str]:
-        """The robot's steps, in words."""
+        """All steps of the robot in words, including failed ones."""
         return [*map(_step_words, self.trace)]
 
     @property
@@ -123,15 +123,15 @@ class MissionPast:
 
     @property
     def answers(self) -> tuple[str, ...]:
-        """The answers that the unsure step may have had, if it is a question."""
+        """The possible answers if the unsure step is a question; empty otherwise."""
         return () if self.unsure is None else tuple(option.text for option in self.unsure.options)
 
     def resolve(self, *, happened: bool, answer: str = "") -> MissionPast:
-        """Return the past with a person's word on the unsure step.
+        """Return the past after a person has said whether the unsure step happened.
 
         Args:
-            happened: whether it happened.
-            answer: its answer, if it is a question; empty if nobody knows it.
+            happened: whether the step happened.
+            answer: the answer, if the step is a question; empty if nobody knows the answer.
 
         Raises:
             UserError: the answer is none of the options.
@@ -148,7 +148,7 @@ class MissionPast:
         return replace(self, trace=trace, unsure=None, testimony=testimony)
 
     def add_to(self, room_map: RoomMap | None, place: str) -> tuple[RoomMap, str]:
-        """Return the rooms with this past, and the robot's place, which is the last one if it is unknown."""
+        """Return a map with these steps, and `place`, or if that is empty the robot's last known place."""
         place = place or self.place
         known = RoomMap((place,), place, guessed=True) if room_map is None else room_map
         return replace(known, start=known.room(place) or known.start, past=self.trace), place
@@ -166,12 +166,12 @@ class MissionPast:
 def read_past(
     folder: Path, skills: SkillTable, robot_kind: str = "", world: World | None = None
 ) -> MissionPast:
-    """Read what a mission did and saw.
+    """Read from a mission's log what the robot did and saw.
 
     Args:
         folder: the folder of the mission.
         skills: the robot's skills.
-        robot_kind: the kind of robot that is to do the rest; by default that of the mission.
+        robot_kind: the kind of robot that will do the rest; by default that of the mission.
         world: the map of that robot, or None if it has none.
 
     Raises:
@@ -214,7 +214,7 @@ def read_past(
 
 
 def expect_rest(folder: Path) -> None:
-    """Raise UserError if the mission in a folder goes on, is done, or has been continued."""
+    """Raise UserError if the mission in a folder has not ended, is done, or was already continued."""
     summary = MissionSummary.read(folder)
     if not summary.has_ended:
         raise UserError(f"mission {summary.id} has not ended; stop it first")
@@ -277,17 +277,17 @@ def _has_effect(row: Skill) -> bool:
 
 
 class LoggedRobot(SimulatedRobot):
-    """A robot whose skills end as in the log of a mission."""
+    """A simulated robot that replays a mission's log: each skill ends as the event in `end` says."""
 
     def __init__(self, world: World | None, skills: SkillTable) -> None:
         super().__init__(world or World((), ""), SIMULATION, skills)
         self.end: LogLine = {}  # the event that ends the current skill
 
     def thing_meant(self, request: str) -> None:
-        """Return None, since a log does not list the things in a room."""
+        """Return None, since a log does not list the objects in a room."""
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Repeat the end of a skill, and record its event."""
+        """Return a skill's logged result and record its event, or raise RobotError if it did not succeed."""
         if self.end["event"] not in DONE_EVENTS:
             raise RobotError(self.end["event"], "the skill failed or was cancelled")
         row, result = self.skills[skill], self.end.get("result")

@@ -24,13 +24,13 @@ from codebotler.missions.storage.log import (
 )
 
 RECENT_MISSIONS = 200
-"""The number of missions that agents see, and among which the last one is looked for."""
+"""How many of the latest missions to read, to list them for agents or to find the last one."""
 
 _MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d{1,6})?", re.ASCII)
 
 
 def read_missions(home: Path, most: int | None = None) -> list[MissionSummary]:
-    """Read the summaries of all missions, or of the last ones, oldest first.
+    """Read the summaries of all missions, or of the last `most` ones, oldest first.
 
     Raises:
         UserError: a summary is damaged.
@@ -50,7 +50,7 @@ def find_mission(home: Path, name: str) -> Path:
 
 
 def find_rest(folder: Path) -> MissionSummary | None:
-    """Return the `last_rest` of the mission in a folder, without damaged missions."""
+    """Return the latest mission that continued the one in a folder, or None. Skip damaged missions."""
     known: list[MissionSummary] = []
     for path in sorted(folder.parent.glob(f"*/{SUMMARY_FILE}")):
         with suppress(UserError, OSError):
@@ -59,12 +59,12 @@ def find_rest(folder: Path) -> MissionSummary | None:
 
 
 def rests_in(known: Sequence[MissionSummary]) -> dict[str, MissionSummary]:
-    """Return the missions that ran and did the rest of others, by the IDs of these."""
+    """Return the missions that ran to continue another mission, each by the ID of the continued one."""
     return {one.continues: one for one in known if one.if_tool_dies and one.continues}
 
 
 def last_rest(mission: str, rests: Mapping[str, MissionSummary]) -> MissionSummary | None:
-    """Return the last mission that did the rest of another one, directly or after others."""
+    """Return the last in the chain of missions that continued a mission, given the result of `rests_in`."""
     rest, seen = rests.get(mission), {mission}  # IDs are local times, which tell no order
     while rest is not None and rest.id in rests and rest.id not in seen:
         seen.add(rest.id)
@@ -73,7 +73,7 @@ def last_rest(mission: str, rests: Mapping[str, MissionSummary]) -> MissionSumma
 
 
 def rest_text(rest: MissionSummary | None) -> str:
-    """Say which mission did the rest of another one, and its state; empty if none did."""
+    """Say which mission did the rest, as in `continued by mission 20260102-120000 (done)`; "" if none did."""
     return "" if rest is None else f"continued by mission {rest.id} ({rest.state})"
 
 
@@ -94,7 +94,7 @@ def recover_missions(home: Path) -> list[MissionSummary]:
 
 
 def find_interrupted(home: Path) -> list[MissionSummary]:
-    """Close missions whose process died. Return them, and the last that ran if it was interrupted before."""
+    """Close and return missions whose process died. Add the last that ran if it was interrupted earlier."""
     found = recover_missions(home)
     with suppress(UserError):
         ran = [one for one in read_missions(home, RECENT_MISSIONS) if one.if_tool_dies]

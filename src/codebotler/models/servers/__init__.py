@@ -1,1 +1,1 @@
-"""Models on servers: the protocols of providers, and the errors of networks."""
+"""Models on servers: send requests in the protocols of providers, and explain failures."""

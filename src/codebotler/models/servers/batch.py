@@ -37,7 +37,7 @@ class BatchRequest:
 class BatchModel:
     """A model whose requests and answers are stored in files. It sends nothing and needs no key.
 
-    It reuses the model's code for single requests, and takes the place of the server.
+    It gives a `ChatModel` or `CompletionsModel` a fake server that stores requests and replays answers.
     """
 
     def __init__(self, name: str, settings: SamplingSettings) -> None:

@@ -51,7 +51,7 @@ from codebotler.prompts.tools import ToolPrompt
 BASE_URL_VARIABLE = "OPENAI_BASE_URL"
 OWN_SERVER = "openai-chat"  # the protocol of vLLM, llama.cpp and similar servers
 NEW_LIMIT_HOSTS = ("api.openai.com", ".openai.azure.com")
-"""Hosts that support OpenAI's newer name for the token limit."""
+"""Hosts that support `max_completion_tokens`, OpenAI's newer name for the token limit."""
 EFFORTS = ("none", *get_args(ThinkingEffort))
 NO_TAGS = ("\0", "\0")  # reasoning is extracted from the complete text, since a stream may split its tags
 QUOTED_VARIABLE = re.compile(r"`([A-Z][A-Z0-9]*_[A-Z0-9_]+)`")

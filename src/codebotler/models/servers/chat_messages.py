@@ -44,14 +44,14 @@ def _request_part(message: PromptMessage) -> messages.ModelRequestPart:
 
 
 def definition_of(tool: Tool) -> ToolDefinition:
-    """Convert a tool to its type in pydantic-ai."""
+    """Convert a tool to pydantic-ai's `ToolDefinition`."""
     return ToolDefinition(
         name=tool.name, description=tool.description, parameters_json_schema=json.loads(tool.schema)
     )
 
 
 def turn_of(reply: Reply, response: messages.ModelResponse) -> Reply:
-    """Return a reply to the offer of tools, with its calls in place of a program."""
+    """Return a reply to a `ToolPrompt` with the tool calls that the model requests, and without a program."""
     parts = [part for part in response.parts if isinstance(part, messages.ToolCallPart)]
     calls = tuple(ToolCall(one.tool_call_id, one.tool_name, one.args_as_json_str()) for one in parts)
     known = reply.no_program if reply.no_program in {"refusal", "filtered"} else None

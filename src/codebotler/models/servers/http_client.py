@@ -105,13 +105,13 @@ def _limit_stream(stream: Any, name: str, limit: int) -> Any:  # noqa: ANN401 - 
 
 
 def without_proxy(url: str | None) -> AbstractContextManager[None]:
-    """Return a context in which a client is created that uses no proxies for a local server."""
+    """Return a context for creating an HTTP client that uses no proxy if `url` is on this machine."""
     is_local = url is not None and _is_loopback(urlsplit(url).hostname or "")
     return unset([name for name in os.environ if is_local and name.lower().endswith("_proxy")])
 
 
 def mention_proxy(error: ModelError, url: str | None) -> ModelError:
-    """Add the proxy of a request, if any, to the request's error, and return the error."""
+    """Add the proxy that requests to `url` go through, if any, to an error's sentence. Return the error."""
     parts = urlsplit(url or "https://provider.invalid")
     host = parts.hostname or ""
     proxies = getproxies()

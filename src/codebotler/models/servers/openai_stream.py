@@ -65,7 +65,7 @@ class Chunks:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the server has marked the end of the reply in any way."""
+        """Whether the server has marked the end of the reply, with a finish reason or `[DONE]`."""
         if not self._has_choice or self.finish_reason in FAILURE_REASONS:
             return False
         return bool(self.finish_reason) or bool(getattr(self.source._decoder, "is_done", False))  # noqa: SLF001 - no public way

@@ -47,7 +47,7 @@ class Passage:
 
     @property
     def area(self) -> Polygon:
-        """The area it covers on the floor."""
+        """The part of the floor that the passage covers."""
         return self.line.buffer(PASSAGE_WIDTH / 2, cap_style="flat")
 
 
@@ -61,7 +61,7 @@ class Floorplan:
     tables: tuple[XY | None, ...]  # the centre of the table in each room, or None
 
     def corners(self, number: int) -> list[XY]:
-        """Return the corners of a floor's free space, at which a shortest path may turn."""
+        """Return the corners of the free space on floor `number`, at which a shortest path may turn."""
         table = self.tables[number] if number < len(self.tables) else None
         space = _without(_free(self.floors[number]), table)
         return [corner for ring in (space.exterior, *space.interiors) for corner in ring.coords[:-1]]

@@ -1,1 +1,1 @@
-"""Robots on ROS: `robot` contains the code that all kinds share, and each kind has its own module."""
+"""Robots on ROS: `robot.py` has the code of all kinds, `kinds.py` opens each, and `workers/` talks to ROS."""

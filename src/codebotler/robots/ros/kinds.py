@@ -49,7 +49,7 @@ def ros2(options: Options, waits: Timeouts | None = None) -> RosRobot:
 def rosbridge(options: Options, waits: Timeouts | None = None) -> RosRobot:
     """Create a robot behind a rosbridge server, which gives access to ROS over a websocket.
 
-    It needs no ROS here, and its worker uses CodeBotler's Python. By default, it is on this machine.
+    Its worker uses CodeBotler's Python, so no ROS is needed here. The default server is on this machine.
     """
     options = replace(options, ros_python=Path(sys.executable))
     address = options.address or ROSBRIDGE_ADDRESS

@@ -1,1 +1,1 @@
-"""How skills and places are connected to a robot on ROS."""
+"""Map skills and places to the actions, services and topics of a robot on ROS."""

@@ -40,7 +40,7 @@ class SkillCall:
     failure: str = ""  # the kind of error for failures that do not specify one
 
     def fields(self, values: Values) -> Any:  # noqa: ANN401 - a message
-        """Return the request with its variables replaced by values."""
+        """Return the request with variables such as `$place.x` replaced by values."""
         return _fill(self.request, values)
 
     def answer(self, received: Values) -> Any:  # noqa: ANN401 - a mission checks its type

@@ -54,7 +54,7 @@ class KeepoutForm(_ConnectionPart):
 
 
 class SkillForm(_ConnectionPart):
-    """The ROS call for a skill, or the camera and detector."""
+    """The entry of one skill: an action, service or topic, or else a camera and a detector."""
 
     action: Topic | None = None
     service: Topic | None = None

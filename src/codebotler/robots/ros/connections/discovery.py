@@ -36,21 +36,21 @@ MAPPINGS = (
     (r"sends \S+ nav_msgs/msg/Odometry", "pose", "topic: NAME", CHECK_FRAME),
     (r"sends \S+ nav_msgs/msg/Odometry", "velocity", "topic: NAME", ""),
 )
-"""For each regex for offers: the key in the draft (empty to derive it from the offer's name), the value, and
-a task for the user. A line with a task becomes a comment.
+"""Regexes for offers such as `sends /odom nav_msgs/msg/Odometry`, each with the draft's key (empty to use the
+offer's name), its value, and a task for the user. A line with a task becomes a comment.
 """
 
 INTERNAL_OFFERS = re.compile(
     r"\S+ \S*((lifecycle|controller)_manager|costmap|rosbag|rosbridge|rosapi|rviz|/_|/tf_static).*"
     r"|.* (rcl_interfaces|lifecycle_msgs|\w+_interfaces|bond|diagnostic_msgs)/\w+/\w+"
 )
-"""Matches offers that no skill can use, such as the parameter services of every node."""
+"""Matches actions, services and topics that no skill can use, such as every node's parameter services."""
 
 NOT_SKILLS = ("pose", "velocity")
 
 
 def discover_offers(address: str, python: Path) -> list[str]:
-    """List the offers of a robot's nodes as strings "KIND NAME TYPE" (KIND: action, service, hears or sends).
+    """List what a robot's nodes offer as "KIND NAME TYPE". KIND is action, service, hears or sends.
 
     Args:
         address: a ROS 2 domain number, or "" for the default.
@@ -71,7 +71,7 @@ def discover_offers(address: str, python: Path) -> list[str]:
 
 
 def draft_connection(offers: Iterable[str]) -> str:
-    """Draft a file for `--connect`. Lines that the user must complete and unused offers become comments."""
+    """Draft a file for `--connect` from offers. Lines to complete and unused offers become comments."""
     known = [
         offer
         for offer in sorted(offers)

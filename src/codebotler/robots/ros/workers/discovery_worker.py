@@ -1,4 +1,4 @@
-"""List the offers of a robot's nodes on ROS 2, under a Python that has rclpy."""
+"""List the actions, services and topics of a robot's nodes on ROS 2, under a Python that has rclpy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Offer = Tuple[str, str, str]  # the kind (action, service, sends or hears), the 
 
 
 class DiscoveryWorker:
-    """Sends all offers in its first message."""
+    """Sends all actions, services and topics to CodeBotler in its first message."""
 
     def __init__(self, channel: Channel, _start: Fields) -> None:
         channel.send("ready", offers=sorted(find_offers()))
@@ -25,7 +25,7 @@ class DiscoveryWorker:
 
 
 def find_offers() -> set[Offer]:
-    """Collect the offers of all nodes until no new offers appear."""
+    """Collect the actions, services and topics of all other nodes until no new ones appear."""
     import rclpy
 
     rclpy.init(args=None)

@@ -1,4 +1,4 @@
-"""The base class of workers, which perform one skill at a time as a goal and supervise it."""
+"""The base class of workers. A worker sends one skill at a time to the robot as a goal, and watches it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ROS2_ENDS = {4: "succeeded", 5: "cancelled", 6: "aborted"}
 
 
 class Goal:
-    """A goal and its progress. All times are those of the monotonic clock."""
+    """A request to a server to perform a skill, and its progress. All times are of the monotonic clock."""
 
     def __init__(self, number: int, server: Any) -> None:
         self.number, self.server = number, server
@@ -181,7 +181,7 @@ class SkillWorker:
         }
 
     def wait_for_servers(self) -> None:
-        """Wait until all servers on the graph are connected, or the patience is exceeded."""
+        """Wait until all servers on the graph are connected, but at most `patience` seconds."""
         deadline = time.monotonic() + self.patience
         present = [server for server in self.servers.values() if self.graph.nodes_of(server.name)]
         # Ask all servers in each round, because a server's first call starts the timer for its connection.

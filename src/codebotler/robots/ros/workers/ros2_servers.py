@@ -40,7 +40,7 @@ class Ros2ActionServers:
         channel.send("ready", has_master=False)
 
     def obey(self, line: Fields) -> None:
-        """End a goal as a message from CodeBotler says."""
+        """End a goal as succeeded, aborted or cancelled, as a message from CodeBotler says."""
         self.graph.resolve(self.ends.pop(line["id"]), line)
 
     def leave(self) -> None:

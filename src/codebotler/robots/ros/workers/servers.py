@@ -42,7 +42,7 @@ class ActionServers:
         channel.send("ready", has_master=self.master is not None)
 
     def obey(self, line: Fields) -> None:
-        """End a goal as a message from CodeBotler says."""
+        """End a goal as succeeded, aborted or cancelled, as a message from CodeBotler says."""
         with self.lock:
             handle = self.handles.pop(line["id"])
         result = handle.get_default_result()
