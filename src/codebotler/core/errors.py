@@ -20,7 +20,7 @@ EXTRAS = {
     "pyrobosim": "pyrobosim",
     "ray": "ray",
 }
-"""Maps each optional package to the extra of this distribution that installs it."""
+"""Maps each optional package to our extra that installs it: `PIL` needs `codebotler[robots]`."""
 
 MAX_SENTENCE_LENGTH = 600
 
@@ -45,7 +45,7 @@ class UserError(ValueError):
 
 
 def elide_middle(text: str, longest: int) -> str:
-    """Replace the middle of a long text with an ellipsis."""
+    """Shorten a text to about `longest` characters: ` ... ` replaces its middle."""
     half = longest // 2
     return text if len(text) <= longest else f"{text[:half]} ... {text[-half:]}"
 
@@ -54,13 +54,13 @@ BadInput = UserError  # the former name, for one version
 
 
 def expect_list(given: Sequence[str] | None, what: str) -> None:
-    """Reject a string in place of a list, since Python would iterate over its characters."""
+    """Raise UserError for `rooms="lobby"` instead of `rooms=["lobby"]`; `what` names the argument."""
     if isinstance(given, str):
         raise UserError(f"{what} must be a list, not the single string {given[:40]!r}")
 
 
 def install_command(package: str) -> str:
-    """Return the command that installs a package together with the rest of its extra."""
+    """Return the pip command for an optional package: `pip install 'codebotler[robots]'` for `PIL`."""
     return f"pip install 'codebotler[{EXTRAS[package]}]'"
 
 
@@ -77,7 +77,7 @@ def installed() -> Iterator[None]:
 
 
 VIOLATION = "RuleViolation"
-"""The kind of the error with which a house rule ends a run or refuses a skill."""
+"""The `kind` of the RobotError that is raised when a house rule refuses a skill or ends a run."""
 
 
 class RobotError(Exception):

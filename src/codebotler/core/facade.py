@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 def facade(
     package: str, public: Mapping[str, Sequence[str]]
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Return `__getattr__` and `__dir__` for a package, given the public names of each module."""
+    """Return `__getattr__` and `__dir__` for a package; `public` maps each module to the names it defines."""
     homes = {name: module for module, names in public.items() for name in names}
 
     def get(name: str) -> object:

@@ -38,7 +38,7 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def decode_text(data: bytes, name: Path | str, *, limit: int = MAX_FILE_BYTES) -> str:
-    """Decode the bytes of a UTF-8 file, normalize its line endings and drop a byte order mark."""
+    """Decode UTF-8, normalize line endings and drop a byte order mark. UserErrors name the file `name`."""
     if len(data) > limit:
         raise UserError(f"is larger than {limit:,} bytes", file=name)
     _expect_not_utf_16(data, name)
@@ -97,7 +97,10 @@ def read_rows(path: Path, *, growing: bool = False) -> Iterator[tuple[int, dict[
 
 
 def parse_row(line: bytes, example: str | None = None) -> dict[str, Any] | None:
-    """Return the JSON object in a line, or None if it is not JSON; raise UserError for other JSON values."""
+    """Return the JSON object in a line, or None if the line is not JSON.
+
+    For other JSON, such as a list, raise UserError. Its sentence quotes `example`, a correct row.
+    """
     try:
         row = json.loads(line)
     except (ValueError, RecursionError):
@@ -195,7 +198,7 @@ def write_whole(path: Path, content: bytes | memoryview) -> None:
 
 @contextmanager
 def open_replacement(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
-    """Open a file that atomically replaces `path` on success, and leaves it unchanged after an error."""
+    """Open a temporary file that atomically replaces `path` when it is complete, but not after an error."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = temporary or path.with_name(path.name + ".new")
     try:
@@ -226,7 +229,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def expect_replaceable(path: Path, *beginnings: bytes) -> None:
-    """Raise UserError if a file does not begin like our own files, to keep it from being overwritten."""
+    """Raise UserError if a file starts with none of `beginnings`, so that we overwrite only our own files."""
     if path.is_file():
         with path.open("rb") as file:
             start = file.read(max(map(len, beginnings)))
@@ -238,7 +241,7 @@ def expect_replaceable(path: Path, *beginnings: bytes) -> None:
 
 
 def home() -> Path:
-    """Return the folder in which missions are stored, which may not exist yet."""
+    """Return the folder for missions, such as `~/.local/state/codebotler`. It may not exist yet."""
     folder = _user_folder("XDG_STATE_HOME", ".local/state")
     if folder is None:
         raise UserError("you have no home folder; set CODEBOTLER_HOME to a folder")
@@ -246,7 +249,7 @@ def home() -> Path:
 
 
 def config_file() -> Path | None:
-    """Return the path of the user's settings, which may not exist, or None if there is no home folder."""
+    """Return the path of `config.yaml`, even if there is no such file, or None without a home folder."""
     folder = _user_folder("XDG_CONFIG_HOME", ".config")
     return None if folder is None else folder / "config.yaml"
 

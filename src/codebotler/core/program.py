@@ -1,4 +1,4 @@
-"""Parse programs, and find the skills they call and their definite errors.
+"""Parse programs, list the skills they call, and find mistakes such as undefined names.
 
 CPython 3.11 parses some texts in quadratic time, so the length of programs is limited. The compiler,
 `symtable` and pyflakes may still take any time, so apply them to untrusted text only in isolated processes
@@ -47,7 +47,7 @@ os.register_at_fork(
 
 @dataclass(frozen=True)
 class Flaw:
-    """A definite error in a program."""
+    """A mistake that can be found without running the program, such as an undefined name."""
 
     line: int | None  # counted from 1; None if no single line is at fault
     kind: str  # the kind of error that it causes, such as `NameError` or `AskEmptyOptions`
@@ -57,11 +57,7 @@ class Flaw:
 
 @dataclass(frozen=True)
 class Program:
-    """Python source that should define `task_program`.
-
-    Args:
-        source: its text; any text is allowed.
-    """
+    """Python source that should define `task_program`, although any text is allowed."""
 
     source: str
 
@@ -74,7 +70,7 @@ class Program:
 
 @lru_cache(maxsize=8)
 def parse(source: str) -> ast.Module:
-    """Return a program's syntax tree, which callers must not change, or raise an error of `ast.parse`."""
+    """Parse a program, or raise an error of `ast.parse`. Callers share the cached tree: do not change it."""
     _expect_short_rows(source)
     with _PARSING:
         return ast.parse(compose(source), SOURCE_NAME)
@@ -133,7 +129,7 @@ def _text_flaw(source: str) -> Flaw:
 
 
 def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, booleans, lists of them
-    """Return the value of a literal. Raise ValueError for other nodes.
+    """Return the value of a literal, such as `["yes", "no"]`. Raise ValueError for other nodes.
 
     Dictionaries and sets are rejected, too, since hash collisions can make them slow to build.
     """
@@ -179,7 +175,10 @@ def _bound_in_module(source: str) -> set[str]:
 
 
 def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
-    """Return the names that a program binds in any scope, with `*` for `from x import *`."""
+    """Return the names that a program binds in any scope, with `*` for `from x import *`.
+
+    Skip the nodes in `ignoring`.
+    """
     names: set[str] = set()
     skipped = {id(node) for node in ignoring}
     for node in nodes(tree):
@@ -198,7 +197,7 @@ def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[s
 
 
 def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, int]:
-    """Return the skills that a program uses and does not redefine, each with the line of its first use."""
+    """Map each skill that a program uses to the line of its first use, except skills that it redefines."""
     rebound = all_bound_names(tree)
     lines: dict[str, int] = {}
     for node in nodes(tree):
@@ -231,7 +230,7 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
 
 
 def find_tree_flaws(tree: ast.Module, source: str, skills: SkillTable) -> tuple[Flaw, ...]:
-    """Find the definite errors in a program that compiles, and sort them by line."""
+    """Find mistakes in a program that compiles, such as misspelt skills, and sort them by line."""
     try:
         found = [*_entry_flaws(tree, source), *_name_flaws(tree, skills), *_call_flaws(tree, skills)]
     except (RecursionError, MemoryError) as error:

@@ -63,12 +63,12 @@ def open_streams() -> None:
 
 
 def flush_output() -> None:
-    """Flush stdout."""
+    """Flush stdout now, so that an error such as a full disk can be reported."""
     sys.stdout.flush()
 
 
 def drop_output() -> None:
-    """Discard all further output to stdout."""
+    """Discard all further output to stdout, for example because its reader has exited."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -97,7 +97,7 @@ def progress(*columns: ProgressColumn) -> Progress:
 
 
 def print_rich(what: RenderableType) -> None:
-    """Print to a terminal, or as plain text to a pipe, where lines are wrapped only if COLUMNS is set."""
+    """Print a rich table or text. A pipe gets plain text, and lines wrap there only if COLUMNS is set."""
     from rich.measure import Measurement
 
     drawing = console()
@@ -114,7 +114,7 @@ def print_rich(what: RenderableType) -> None:
 
 @contextmanager
 def busy(doing: str) -> Iterator[None]:
-    """Show on a terminal what a command is doing, and for how long."""
+    """Show a spinner with the elapsed time and the text `doing`, such as `asking the model`."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
     with progress(SpinnerColumn(), TextColumn(doing, markup=False), TimeElapsedColumn()) as shown:
@@ -123,7 +123,7 @@ def busy(doing: str) -> Iterator[None]:
 
 
 def print_found(view: Callable[[], RenderableType], data: Callable[[], object], *, as_json: bool) -> None:
-    """Print a result for a person, or as JSON for machines."""
+    """Print the result of `view` for a person or, if `as_json`, the result of `data` as JSON."""
     if as_json:
         print_json(data())
     else:
@@ -131,7 +131,7 @@ def print_found(view: Callable[[], RenderableType], data: Callable[[], object], 
 
 
 def print_json(data: object) -> None:
-    """Print JSON."""
+    """Print data as indented JSON."""
     import json
 
     print(json.dumps(data, indent=2))
@@ -160,9 +160,9 @@ def confirm(question: str) -> bool:
 
 
 def read_line(question: str) -> str:
-    """Ask a question on stderr, and return the answer, which is empty at the end of the input.
+    """Ask a question on stderr, and return the line that a person types, or `""` at the end of the input.
 
-    What a person typed before the question was there is not an answer to it, and is discarded.
+    On a terminal, text that was typed before the question appeared is discarded.
     """
     if sys.stdin.isatty():
         termios.tcflush(sys.stdin, termios.TCIFLUSH)
@@ -171,7 +171,7 @@ def read_line(question: str) -> str:
 
 
 def is_interactive() -> bool:
-    """Whether a person can read a question and answer it."""
+    """Whether stdin and stderr are terminals, so that a person can read a question and answer it."""
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
@@ -197,6 +197,6 @@ def visible_lines(text: str) -> str:
 
 
 def shortened(text: str, most: int = 500, shown: Callable[[str], str] = visible) -> str:
-    """Escape a string. If it has more than `most` characters, replace the rest by its length."""
+    """Escape a string with `shown`, and shorten it after `most` characters: `abc... 9 more characters`."""
     left = len(text) - most
     return shown(text) if left <= 0 else f"{shown(text[:most])}... {left:,} more characters"

@@ -35,7 +35,7 @@ def to_options(values: Iterable[object]) -> tuple[Option, ...]:
 
 @dataclass(frozen=True)
 class Event:
-    """A skill that the robot executed.
+    """One action of the robot, such as a drive to the kitchen, or a question and its answer.
 
     Args:
         kind: goto, say, ask, check, pick or place, or the kind that a custom skill records.
@@ -74,7 +74,7 @@ def attempted_event(
     time: float,
     holding: str = "",
 ) -> Event | None:
-    """Return the event that a skill records if it runs now, or None if it records none."""
+    """Return the event of a skill call, such as `Event("goto", "kitchen")`, or None if it is not recorded."""
     if skill.recording is None:
         return None
     row, given = skill.recording, dict(zip((p.name for p in skill.parameters), arguments, strict=True))
@@ -85,7 +85,7 @@ def attempted_event(
 
 
 def arguments_of_event(skill: Skill, event: Event) -> list[Scalar | tuple[str, ...]]:
-    """Return the arguments with which a skill records an event. Others are empty."""
+    """Return the arguments of the skill call that an event records, with `""` for those not in the event."""
     row, given = skill.recording, dict[str | None, Scalar | tuple[str, ...]]()
     if row is not None:
         given = dict(zip(row.more, event.more, strict=False))
@@ -147,7 +147,7 @@ def held_after(trace: Iterable[Event]) -> str:
 
 
 def trace_data(trace: Trace, skills: SkillTable = SKILLS) -> list[list[Any]]:
-    """Convert a trace to plain data.
+    """Convert a trace to lists that can be written as JSON.
 
     An event is `[kind, text]`, `[kind, text, found]` or `[kind, text, options, answer]`. For a skill with
     several arguments, it is `[kind, text, more]` or `[kind, text, more, found]`.
@@ -162,13 +162,13 @@ def trace_from(data: Iterable[object]) -> Trace:
 
 
 def placed_trace_data(trace: Trace) -> list[dict[str, Any]]:
-    """Convert a trace to plain data that also tells where each event happened, and with whom."""
+    """Convert a trace to JSON data that also has each event's rooms, addressee, held object and error."""
     names = ("place", "holding", "to", "destination", "failed")
     return [{"what": trace_data((event,))[0], **{n: getattr(event, n) for n in names}} for event in trace]
 
 
 def placed_trace_from(data: Iterable[Mapping[str, Any]]) -> Trace:
-    """Convert the data of `placed_trace_data` back to a trace, or raise UserError for other data."""
+    """Convert the data of `placed_trace_data` back to a trace; raise UserError for an invalid event."""
     rows = [dict(row) for row in data]
     return tuple(replace(trace_from([row.pop("what")])[0], **row) for row in rows)
 

@@ -75,7 +75,7 @@ class World:
         robot: the room where the robot starts.
         about: a short description.
         may_wait_forever: whether a program may wait in it for something that never happens.
-        truths: values of further facts and results of custom skills.
+        truths: statements with their values, such as `read_gauge("boiler")` with 3.
         traits: the properties of things and people, by their labels and names.
     """
 
@@ -100,13 +100,13 @@ class World:
         return f"World({counted(len(self.rooms), 'room')}, robot={self.robot!r})"
 
     def to_yaml(self) -> str:
-        """Return the text of a world file."""
+        """Return this world as the text of a world file."""
         import yaml
 
         return yaml.safe_dump(self.to_data(), sort_keys=False, allow_unicode=True, width=100)
 
     def to_data(self) -> dict[str, object]:
-        """Return the content of a world file."""
+        """Return this world as dictionaries and lists, with the keys of a world file."""
         traits = {name: {key: _as_lists(value) for key, value in of} for name, of in self.traits}
         rooms = self.rooms
         places = {room.name: [_room_data(one) for one in rooms if one.within == room.name] for room in rooms}
@@ -189,7 +189,7 @@ def is_within(point: Point, corners: Sequence[Point]) -> bool:
 
 
 def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tuple[str, ...]]:
-    """Yield, for each part of a straight path from start to end, the names of the rooms that contain it."""
+    """Cut a straight path wherever it enters or leaves a room, and yield the names of each part's rooms."""
     here, way = complex(*start), complex(*end) - complex(*start) or MIN_PART
     edges = {}  # for each room, the fractions of the path at which the path crosses its edges
     for room in rooms:

@@ -68,7 +68,7 @@ def _not_zero(option: int) -> int:
 
 
 class OptionFile(_Form):
-    """An answer in a world file, given as the position of an option."""
+    """An answer in a world file by its position: `option: 1` means the first option."""
 
     option: Annotated[int, Field(strict=True, ge=-100, le=100), AfterValidator(_not_zero)]
 
@@ -91,7 +91,7 @@ class _Described(BaseModel):
 
     @property
     def traits(self) -> tuple[Trait, ...]:
-        """The further properties."""
+        """The properties of the thing or person, such as `("wears", "red coat")`."""
         extra = (self.model_extra or {}).items()
         return tuple((key, tuple(value) if isinstance(value, list) else value) for key, value in extra)
 
@@ -144,7 +144,7 @@ class RoomFile(PlaceFile):
 
 
 class WorldFile(_Form):
-    """A world in a file, alone or inside a task."""
+    """The content of a world file, or of a world inside a task file."""
 
     about: YamlText = ""
     robot: Name
@@ -165,7 +165,7 @@ class WorldFile(_Form):
             yield asked, tuple(value) if isinstance(value, list) else value
 
     def world(self, file: YamlFile, at: YamlPath = (), skills: SkillTable | None = None) -> World:
-        """Convert the file to a World, or raise UserError if a room, a regex or a truth is wrong."""
+        """Convert the file to a World, or raise UserError if a room, a trait or a truth is wrong."""
         names: dict[str, str] = {}  # by lower-case name
         for where, room, _ in self._goals():
             if other := names.get(room.name.lower()):

@@ -18,7 +18,7 @@ from codebotler.core.files import read_text
 from codebotler.core.text.unicode import compose
 
 YamlPath: TypeAlias = tuple[str | int, ...]
-"""The keys and positions that lead to a part of a file."""
+"""The keys and positions that lead to a part of a file, such as `("rooms", 0, "name")`."""
 
 FileModel = TypeVar("FileModel", bound=BaseModel)
 
@@ -105,7 +105,7 @@ class YamlFile:
         return self._lines[path]
 
     def part(self, key: str, data: object) -> YamlFile:
-        """Return the value of a key as a file of its own that keeps the line numbers.
+        """Return the part of this file under a key as a YamlFile, whose errors have the same line numbers.
 
         Args:
             key: a key of the file.
@@ -121,7 +121,10 @@ class YamlFile:
         return UserError(sentence, file=self.name, line=self.line(place))
 
     def validate(self, model: type[FileModel], data: object = None, *, at: YamlPath = ()) -> FileModel:
-        """Validate the content, or `data` at a place, against a model; raise UserError if it is invalid."""
+        """Convert the content to a pydantic model, or raise UserError with the line of a mistake.
+
+        With `data`, convert this instead: the value of the part at `at`.
+        """
         try:
             return model.model_validate(self.data if data is None and not at else data)
         except ValidationError as error:

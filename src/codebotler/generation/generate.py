@@ -31,7 +31,7 @@ Checker: TypeAlias = Callable[[str], Sequence[str]]
 
 @dataclass(frozen=True)
 class Attempt:
-    """One reply of a model and its problems."""
+    """One reply of a model, and the problems of the program in it."""
 
     number: int  # the number of the sample, counted from 0
     prompt: Prompt = field(repr=False)  # for a repair, with the previous program and its problems
@@ -57,7 +57,7 @@ class Generation:
 
     @property
     def programless(self) -> ProgramlessReply | None:
-        """The description of the last reply if it has no program, else None."""
+        """Why the last reply has no program, or None if it has one."""
         return self.attempts[-1].programless
 
     @property
@@ -67,7 +67,7 @@ class Generation:
 
 
 def ignore_attempt(_attempt: Attempt) -> None:
-    """Do nothing with an attempt."""
+    """The default for `on_attempt`: do nothing."""
 
 
 async def write_program(
@@ -79,9 +79,9 @@ async def write_program(
     repair: bool = False,
     on_attempt: Callable[[Attempt], None] = ignore_attempt,
 ) -> Generation:
-    """Ask a model until the check accepts a program (rejection sampling; paper, section V).
+    """Ask a model for a program until `find_problems` accepts one (rejection sampling; paper, section V).
 
-    Each further request draws another sample. With `repair`, it includes the rejected program and its
+    Ask again at most `retries` times. With `repair`, a further request includes the rejected program and its
     problems, or the reason why the reply has no program. The model is closed at the end.
     """
     attempts: list[Attempt] = []
@@ -107,7 +107,7 @@ async def make_attempt(
     settings: SamplingSettings,
     find_problems: Checker | None = None,
 ) -> Attempt:
-    """Check the program in a reply. If there is none, this is the only problem."""
+    """Check the program in a reply. A reply without a program has this as its only problem."""
     if (none := describe_programless(reply, settings)) is not None:
         return Attempt(number, prompt, reply, (none.sentence,), none)
     found = () if find_problems is None else await asyncio.to_thread(find_problems, reply.program)
@@ -149,7 +149,7 @@ def write_checked_program(
     repair: bool = False,
     on_attempt: Callable[[Attempt], None] = ignore_attempt,
 ) -> Generation:
-    """Ask a model until a program passes the check in sampled worlds. This works inside event loops, too."""
+    """Ask a model until a program passes the check in sampled worlds. This works in notebooks, too."""
     with WorkerPool(1) as pool:
 
         def find_problems(program: str) -> list[str]:

@@ -25,7 +25,7 @@ class ProgramlessReply:
 
     @property
     def can_repair(self) -> bool:
-        """Whether the model may write a program if it is asked again with the sentence."""
+        """Whether asking again with the sentence may help, which it cannot after a content filter."""
         return self.kind != "filtered"
 
 

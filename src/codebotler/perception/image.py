@@ -28,7 +28,7 @@ ENCODINGS: Mapping[str, tuple[str, str]] = {
     "bgra8": ("RGBA", "BGRA"),
     "mono8": ("L", "L"),
 }
-"""Pillow's mode and the order of the bytes of each supported sensor_msgs/Image encoding."""
+"""Maps each supported sensor_msgs/Image encoding to Pillow's mode and the order of its bytes."""
 
 
 def image_of(data: bytes, name: str = "the picture") -> Image.Image:

@@ -41,7 +41,7 @@ class ZeroShotDetector:
             raise UserError(f"{self.name} has weights that are not finite; use another model")
 
     def look(self, image: Image, label: str) -> Sighting:
-        """Return the best match for a label."""
+        """Return the best match for a label. It counts as found if its score is at least `least_score`."""
         words = check_label(label)
         self._check_length(words)
         try:

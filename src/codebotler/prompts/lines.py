@@ -48,7 +48,7 @@ def is_prose(line: str) -> bool:
 
 
 def continues_prose(line: str) -> bool:
-    """Whether a line continues a paragraph of prose."""
+    """Whether a line after a line of prose is prose, too: it is neither blank nor code."""
     return bool(line.strip()) and not is_code(without_residue(line))
 
 

@@ -27,7 +27,7 @@ STOP_TEXTS = ("\ndef ", "\nclass ", "\n# Instruction", "\n```")  # OpenAI accept
 
 
 NO_STEP = "no step was finished"
-"""The words for a mission without any step."""
+"""The text that a prompt shows instead of steps if the mission has none."""
 
 
 @dataclass(frozen=True)
@@ -106,22 +106,22 @@ class Prompt:
         )
 
     def after_no_program(self, why: str) -> Prompt:
-        """Return the request to send after a reply without a program, with the reason for chat models."""
+        """Return this request with the reason why the last reply had no program. Only chat models see it."""
         *before, request = self.messages
         asked = f"{request.text}\n\n{fill_template('no-program', why=why)}"
         return replace(self, messages=(*before, replace(request, text=asked)))
 
     def program_from(self, reply: str) -> str:
-        """Return the program in a base model's continuation of `text`."""
+        """Return the program from a base model's reply: `opening` and the lines that continue it."""
         if re.match(rf"\s*(```|(async )?def {TASK_FUNCTION}\b)", reply):
             return reply  # the model started the program again
         return self.opening + reply[: task_end(self.opening, reply, self.stop)]
 
 
 def task_end(opening: str, reply: str, stop: Sequence[str] = STOP_TEXTS) -> int:
-    """Return the index in a reply where the function ends that starts with `opening`.
+    """Return the index in a base model's reply at which the function begun by `opening` ends.
 
-    The function ends before a line without indentation, unless a bracket or string is open there.
+    It ends before the first line without indentation outside brackets and strings, or before a `stop` text.
     """
     stops = [at for at in (reply.find(text) for text in stop) if at >= 0]
     end = min(stops, default=len(reply))
@@ -185,7 +185,7 @@ def prompt_for(
 
 
 def stub(skill: Skill) -> str:
-    """Return the stub of a skill for prompts, including an example call and errors for a custom skill."""
+    """Return a skill's signature and docstring for prompts, with errors and, if custom, an example call."""
     lines = [skill.doc.replace('"""', "'''")]
     if skill.fails:
         lines.append(f"Fails with an exception if {listed([when for _, when in skill.fails], 'or if')}.")
@@ -199,7 +199,7 @@ def stub(skill: Skill) -> str:
 
 @cache
 def examples() -> tuple[Example, ...]:
-    """Return all examples, in the order of their file names."""
+    """Return the examples that prompts show, from the text files in the folder `examples`."""
     files = (path.read_text(encoding="utf-8") for path in sorted((PROMPT_FOLDER / "examples").glob("*.txt")))
     parts = (text.partition("\n\n") for text in files)
     return tuple(
@@ -223,12 +223,12 @@ def _template(name: str) -> Template:
 
 
 def fill_template(name: str, **values: str) -> str:
-    """Return the text of a file in this folder, with values in place of its variables."""
+    """Return the text of the file `name`.txt in this folder, with values in place of its variables."""
     return _template(name).substitute(values).rstrip("\n")
 
 
 def list_lines(sentences: Sequence[str]) -> str:
-    """Return a list in Markdown."""
+    """Return a Markdown list with one sentence on each line."""
     return "\n".join(f"- {sentence}" for sentence in sentences)
 
 

@@ -54,13 +54,13 @@ class ResultMessage(PromptMessage):
 
 @dataclass(frozen=True)
 class ToolPrompt(Prompt):
-    """A request to call one of some tools."""
+    """A request to carry out an instruction by calling tools."""
 
     tools: tuple[Tool, ...] = ()
 
 
 TO_END = "When everything is done, answer with a short sentence instead of a call. This ends the mission."
-"""How an agent ends its mission, unless it is told another way."""
+"""The default sentence that tells an agent how to end its mission."""
 
 
 def agent_prompt(
@@ -87,7 +87,7 @@ def agent_prompt(
 
 
 def tools_for(skills: SkillTable) -> tuple[Tool, ...]:
-    """Return a tool for each skill, and those to wait and to give up."""
+    """Return a tool for each skill, and the tools `wait` and `give_up`."""
     found = {tool.name: tool for tool in _MORE_TOOLS}
     for skill in skills.values():
         description = " ".join([skill.doc, *(f"Fails if {when}." for _, when in skill.fails)])

@@ -1,4 +1,4 @@
-"""The formulas of RTL as immutable values, which `str` writes and `parse` reads."""
+"""The formulas of RTL as immutable objects. `str` writes a formula, and `parse` reads it."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Without(Matcher):
 
 @dataclass(frozen=True)
 class Words(Matcher):
-    """Matches texts in which all parts are found, in any order."""
+    """Matches texts that all parts match, in any order: `words("tea", "milk")` matches `milk or tea`."""
 
     parts: tuple[TextPattern, ...]
 
@@ -78,7 +78,7 @@ TextPattern: TypeAlias = Regex | Words | Without | Number | Time | Claim
 
 @dataclass(frozen=True)
 class EventPattern:
-    """A pattern for events of one kind.
+    """A pattern for events of one kind, such as `goto("lobby")` or `ask("tea", "yes")`.
 
     Args:
         kind: the kind of event, such as `goto`.
@@ -115,7 +115,7 @@ class EventPattern:
 
     @cached_property
     def is_about_more(self) -> bool:
-        """Whether it has conditions other than those on text, options and room."""
+        """Whether it has conditions on the answer, result, held object, addressee or further arguments."""
         wanted = self.answer, self.found, self.holding, self.to
         return bool(self.more) or any(one is not None for one in wanted)
 

@@ -28,7 +28,7 @@ def parse_tree(pattern: str) -> Tree:
 
 
 def whole_word(pattern: str) -> re.Pattern[str]:
-    """Compile a regex to match whole words only."""
+    """Compile a regex to match whole words only, such as `tea` but not `team`."""
     return compile_regex(rf"\b(?:{scope_flags(pattern)})\b")
 
 
@@ -44,7 +44,7 @@ def quote(text: str) -> str:
 
 
 class Matcher(ABC):
-    """A pattern that texts match or not."""
+    """The base class of patterns for texts, such as `Regex`."""
 
     def matches(self, text: str) -> bool:
         """Whether a string matches. The result is cached, since programs repeat texts."""

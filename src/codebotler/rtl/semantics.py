@@ -48,7 +48,7 @@ def holds(formula: formulas.Formula, trace: Trace) -> bool:
 
 
 def visible(trace: Trace) -> tuple[object, ...]:
-    """Return everything in a trace that formulas can distinguish: all but the times."""
+    """Return only those fields of each event that formulas can compare, such as its text but not its time."""
     return tuple(
         (e.kind, e.text, e.options, e.answer, e.found, e.place, e.holding, e.to, e.more) for e in trace
     )
@@ -64,7 +64,7 @@ def _test_holds(test: formulas.Test, trace: Trace) -> bool:
 
 
 def positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
-    """Return the positions at which a matching event makes a test hold."""
+    """Return the positions where a matching event makes a test hold, such as only the last one for `Last`."""
     span = positions_in_scopes(test.scopes, trace)
     match test:
         case formulas.Exists():
@@ -118,7 +118,7 @@ def _offers(element: formulas.EventPattern, event: Event, at: int) -> bool:
 
 
 def occurrences(element: formulas.EventPattern, trace: Trace, span: Iterable[int]) -> Iterator[int]:
-    """Yield those of the positions in a span whose events match."""
+    """Yield the positions in `span`, a part of the trace, whose events match `element`."""
     kind = element.kind  # compared first, since most events have another kind
     for at in span:
         event = trace[at]
@@ -145,13 +145,13 @@ def positions_in_scopes(scopes: tuple[formulas.Scope, ...], trace: Trace) -> ran
 
 
 def bounding_event(scope: formulas.Scope, trace: Trace, span: range) -> int | None:
-    """Return the position of the event that bounds a scope, or None if there is no such event."""
+    """Return where a scope ends or begins: at the first or last matching event of a span, or None."""
     found = occurrences(scope.element, trace, span)
     return next(found, None) if scope.name.endswith("First") else max(found, default=None)
 
 
 def narrow(scope: formulas.Scope, at: int | None, span: range) -> range:
-    """Restrict a span to a scope. Its bounding event is at position `at`, or missing if `at` is None."""
+    """Return the part of a span in a scope. Its bounding event is at position `at`, or missing if None."""
     if at is None:
         return range(span.stop, span.stop) if scope.is_only else span
     return range(span.start, at) if scope.is_before else range(at + 1, span.stop)

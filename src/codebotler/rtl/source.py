@@ -33,7 +33,7 @@ class RtlSyntaxError(ValueError):
 
 
 class FormulaSource:
-    """The text of one formula."""
+    """The text of one formula, with methods that return errors for mistakes in it."""
 
     def __init__(self, text: str) -> None:
         self.indent = len(text) - len(text.lstrip())
@@ -41,7 +41,7 @@ class FormulaSource:
         self.bytes = self.text.encode(errors="replace")  # `ast` counts columns in bytes
 
     def unknown(self, at: ast.expr, what: str, name: str, known: Iterable[str]) -> RtlSyntaxError:
-        """Return the error for an unknown name, with a hint at known names."""
+        """Return the error for an unknown name of a `what`, such as a test. It hints at a name in `known`."""
         close = [SKILL_KINDS[name]] if name in SKILL_KINDS else get_close_matches(name, known, 1)
         hint = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(known)}"
         if name == INSIDE:
@@ -51,13 +51,13 @@ class FormulaSource:
         return self.error(at, f"unknown {what} {name}; {hint}")
 
     def expected(self, what: str, node: ast.expr) -> RtlSyntaxError:
-        """Return the error for a node of the wrong kind."""
+        """Return the error for a part of the formula that is not a `what`, such as `a string`."""
         found = brief(ast.get_source_segment(self.text, node) or "something else", _MAX_SHOWN_LENGTH)
         hint = "; put quotes around it" if "string" in what and isinstance(node, ast.Name) else ""
         return self.error(node.col_offset, f"expected {what}, found {found}{hint}")
 
     def error(self, at: ast.expr | int, problem: str) -> RtlSyntaxError:
-        """Return the error for a problem at a node, or after a number of bytes."""
+        """Return the error for a problem at a syntax node, or at an offset in bytes."""
         if isinstance(at, ast.Attribute):
             at = (at.end_col_offset or 0) - len(at.attr.encode())
         offset = at if isinstance(at, int) else at.col_offset

@@ -362,7 +362,7 @@ class _Parser(FormulaSource):
 
 
 def no_set(name: str, sets: Iterable[str]) -> str:
-    """Return a sentence about a set that does not exist, with the names of those that do."""
+    """Return the error message for an unknown set, with the names of the known sets."""
     known = ", ".join(sets)
     return f"there is no set {name}; " + (f"the sets are {known}" if known else 'list its names under "sets"')
 

@@ -58,7 +58,7 @@ def all_names() -> list[str]:
 
 
 def by_event(kind: str) -> Skill | None:
-    """Return the skill declared in this process that records a kind of event, or None."""
+    """Return the skill of this process that records a kind of event, such as `go_to` for `goto`, or None."""
     other = POSE_IN_ROOM if kind == INSIDE else None
     return next((row for row in _DECLARED.values() if row.recording and row.recording.kind == kind), other)
 

@@ -40,7 +40,7 @@ def _declared_skills(path: Path) -> list[Skill]:
 
 
 def files_of(skills: SkillTable) -> dict[str, str]:
-    """Return the name and the SHA-256 hash of each file that declares skills of a table."""
+    """Map the name of each file that declares skills of a table to the SHA-256 hash of its content."""
     modules = {getattr(row.does, "__module__", "") for row in skills.rows}
     paths = {Path(location_of(name)) for name in modules if is_own_module(name)}
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(paths)}

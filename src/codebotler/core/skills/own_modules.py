@@ -52,11 +52,11 @@ def load_own_module(path: Path) -> ModuleType:
 
 
 def location_of(module: str) -> str:
-    """Return the `place` for `find_object`: the path of a custom skill file, or else the module's name."""
+    """Return the path of a custom skill file, or else the module's name, as `find_object` expects it."""
     return str(sys.modules[module].__file__) if is_own_module(module) else module
 
 
 def find_object(place: str, name: str) -> object:
-    """Return the object named `name` in the module at `place`, a result of `location_of`."""
+    """Import a module and return its object named `name`; `place` is a result of `location_of`."""
     module = load_own_module(Path(place)) if place.endswith(".py") else import_module(place)
     return getattr(module, name)

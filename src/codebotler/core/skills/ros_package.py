@@ -12,7 +12,7 @@ TEMPLATE = Path(__file__).with_name("ros_package_template")
 
 
 def ros_packages(skills: SkillTable) -> Mapping[str, Mapping[str, str]]:
-    """Return the files of the ROS 2 packages that define the actions of skills, by package name."""
+    """Map the name of each ROS 2 package to its files, such as `action/GoTo.action`, with their texts."""
     packages: dict[str, dict[str, str]] = {}
     for skill in skills.rows:
         if skill.ros is not None:

@@ -7,18 +7,18 @@ from typing import Any, NoReturn, Protocol
 
 
 class Simulation(Protocol):
-    """A robot in a simulated world, whose operations raise a RobotError if they fail."""
+    """A robot in a simulated world. A method raises RobotError if its action fails."""
 
     @property
     def room(self) -> str:
-        """The robot's current room."""
+        """The name of the robot's current room."""
 
     @property
     def rooms(self) -> Sequence[str]:
-        """All rooms."""
+        """The names of all rooms."""
 
     def drive(self, location: str) -> None:
-        """Drive to the room that a request refers to."""
+        """Drive to the room whose name fits `location`."""
 
     def look(self, entity: str) -> bool:
         """Return whether an object or a person is in the robot's room."""
@@ -33,32 +33,32 @@ class Simulation(Protocol):
         """Put down the object that the robot holds."""
 
     def record(self, kind: str, text: str) -> None:
-        """Record an event at the current place and time."""
+        """Add an event to the trace, such as `record("say", "hello")`, at the current place and time."""
 
     @property
     def state(self) -> dict[str, Any]:
-        """The data that skills keep between the calls of a run."""
+        """A dictionary in which skills keep data during a run, such as which doors are open."""
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - the skill's type
         """Return a random result for a skill with an empty body, or raise one of its errors."""
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
-        """Return the names of the things in a room or at a place, or anywhere, that fit a description."""
+        """Return the names of things, such as `things("kitchen", "fruit")` for all fruit in the kitchen."""
 
     def people(self, where: str = "", is_: str = "", **traits: str) -> list[str]:
-        """Return the names of the people in a room, or anywhere, who fit a description."""
+        """Return the names of people, such as `people("lobby", wears="red coat")`. Filters are optional."""
 
     def traits(self, name: str) -> Mapping[str, Any]:
-        """Return the properties that the world gives to a thing or person."""
+        """Return the properties of a thing or person, such as `{"wears": "red coat"}`."""
 
     def move_person(self, name: str, room: str) -> None:
         """Move a person to a room or place."""
 
     def value(self, statement: str, *values: Any) -> Any:  # noqa: ANN401 - any type
-        """Return the value of a statement in this world: from `truths` in its file, or one at random."""
+        """Return a statement's value from `truths` in the world's file, or else one of `values` at random."""
 
     def truth(self, statement: str) -> bool:
         """Return whether a statement is true in this world: as `truths` in its file says, or at random."""
 
     def fail(self, kind: str) -> NoReturn:
-        """Raise an error that the skill declares under `fails`."""
+        """Raise the RobotError of a kind that the skill declares under `fails`, such as `DoorLocked`."""

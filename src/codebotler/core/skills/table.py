@@ -24,18 +24,18 @@ class Parameter:
 
     @property
     def kind(self) -> str:
-        """The name by which the sandbox knows the type."""
+        """The name of the type in the sandbox, such as `str` or `list[int]`."""
         return "list" if self.is_options else self.type.kind
 
     @property
     def words(self) -> str:
-        """A description of the expected values."""
+        """The expected values in words, such as `a whole number`."""
         return "a list" if self.is_options else self.type.words
 
 
 @dataclass(frozen=True)
 class Recording:
-    """The event that a skill records in the trace."""
+    """How a skill becomes an event in the trace when it is called."""
 
     kind: str  # the kind of event and its name in RTL, such as `goto`
     text: str  # the parameter that becomes the event's text; empty for no text
@@ -135,7 +135,7 @@ class Skill:
 
     @property
     def call(self) -> str:
-        """An example call for prompts."""
+        """An example call for prompts, such as `go_to("location")`."""
         return self.example or written_call(self.name, [_sample(each) for each in self.parameters])
 
     def wrong(self, sentence: str) -> NoReturn:
@@ -187,12 +187,12 @@ class SkillTable(Mapping[str, Skill]):
 
     @cached_property
     def recordings(self) -> Mapping[str, Recording]:
-        """The events that a trace can have, by kind."""
+        """For each kind of event that the skills add to a trace, such as `goto`, how it is recorded."""
         return {skill.recording.kind: skill.recording for skill in self.rows if skill.recording}
 
     @cached_property
     def idle(self) -> frozenset[str]:
-        """The names of skills that change neither the robot nor its world."""
+        """The names of skills that change neither the robot nor its world, such as `say`."""
         return frozenset(skill.name for skill in self.rows if skill.is_idle)
 
     @cached_property

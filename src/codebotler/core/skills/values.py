@@ -15,13 +15,13 @@ Scalar: TypeAlias = str | int | float | bool
 Base: TypeAlias = Literal["str", "int", "float", "bool"]
 
 RoomName = NewType("RoomName", str)
-"""The result of a skill that returns the name of a room."""
+"""The annotation `-> RoomName` for a skill that returns the name of a room."""
 
 ThingName = NewType("ThingName", str)
-"""The result of a skill that returns the name of a thing."""
+"""The annotation `-> ThingName` for a skill that returns the name of a thing."""
 
 PersonName = NewType("PersonName", str)
-"""The result of a skill that returns the name of a person."""
+"""The annotation `-> PersonName` for a skill that returns the name of a person."""
 
 MAX_INTEGER = 2**53  # JSON and robots represent integers up to this value exactly
 BASE_TYPES: Mapping[type, Base] = {str: "str", int: "int", float: "float", bool: "bool"}
@@ -47,7 +47,7 @@ class ValueType:
 
     @property
     def kind(self) -> str:
-        """The name by which the sandbox knows the type, without choices."""
+        """The name of the type in the sandbox, such as `str` or `list[int]`, without choices."""
         return f"list[{self.base}]" if self.is_list else str(self.base)
 
     @property
@@ -59,7 +59,7 @@ class ValueType:
 
     @property
     def words(self) -> str:
-        """A description of the expected values."""
+        """The expected values in words, such as `a whole number` or `"red" or "green"`."""
         if self.base is None:
             return "nothing"
         quoted = [f'"{one}"' if isinstance(one, str) else str(one) for one in self.choices]
@@ -85,7 +85,7 @@ class ValueType:
         return not self.choices or value in self.choices
 
     def wanted(self, value: Any) -> Any:  # noqa: ANN401 - any of these types
-        """Convert a value of this type to the one that the skill's function receives."""
+        """Convert an argument for the skill's function: `"red"` to `Color.RED` for an Enum, or 3 to 3.0."""
         if isinstance(value, list | tuple):
             return [self.wanted(each) for each in value]
         if self.enum is not None:
@@ -109,7 +109,7 @@ TEXT_TYPE, TRUTH_TYPE, NO_VALUE = ValueType(), ValueType("bool"), ValueType(None
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 - any of these types
-    """Replace members of enumerations with their values."""
+    """Replace members of enumerations with their values, such as `Color.RED` with `"red"`, even in lists."""
     if isinstance(value, list | tuple):
         return [plain(each) for each in value]
     return value.value if isinstance(value, Enum) else value
@@ -140,7 +140,7 @@ def _one_of(choices: tuple[Any, ...], enum: type[Enum] | None = None) -> ValueTy
 
 
 def sample_values(value: ValueType, names: Sequence[str] = ()) -> tuple[Any, ...]:
-    """Return some values of a type, from which random results are chosen; `names` are known names."""
+    """Return some values of a type to choose random results from; texts are chosen from `names`, if any."""
     if value.is_list:
         some = sample_values(replace(value, is_list=False), names)
         return [some[0]], [], [some[0], some[-1]]

@@ -1,4 +1,4 @@
-"""Validate the labels of a world, reject regexes that may take exponential time, and scope their flags.
+"""Validate the labels of a world, and reject regexes that may take exponential time.
 
 Python tries every way to match a regex and cannot be interrupted. In a label, a repetition may therefore
 contain only single characters, at most one may be unlimited, and the ways to match a string are limited. This
@@ -28,7 +28,7 @@ UNSUPPORTED_OPCODES = frozenset({"GROUPREF", "GROUPREF_EXISTS"})
 
 
 def plain_names(labels: Iterable[str]) -> tuple[str, ...]:
-    """Return the labels that are names and not regexes, each once."""
+    """Return the labels without special characters of regexes, such as `mug` but not `mug|cup`, each once."""
     return tuple(dict.fromkeys(filter(PLAIN_LABEL.fullmatch, labels)))
 
 
@@ -37,11 +37,7 @@ class SlowRegexError(Exception):
 
 
 def check_label(text: str) -> str:
-    """Return a label unchanged if it is valid.
-
-    Raises:
-        ValueError: it is not a regular expression, or it may be slow to search.
-    """
+    """Return a label unchanged, or raise ValueError if it is not a regex or may be slow to search."""
     if PLAIN_LABEL.fullmatch(text):
         return text
     check_regex(text)
@@ -63,7 +59,7 @@ def check_regex(text: str) -> str:
 
 
 def scope_flags(pattern: str) -> str:
-    """Turn the flags at the start of a regex into flags of a group, so that it can be embedded in another."""
+    """Limit the flags of a regex to a group, so that others can contain it: `(?i)tea` becomes `(?i:tea)`."""
     found = LEADING_FLAGS.match(pattern)
     if found is None:
         return pattern

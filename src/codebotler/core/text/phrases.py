@@ -26,8 +26,7 @@ def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, 
         event: the event.
         form: the form of the verb.
         show: shortens and escapes texts for the output.
-        quote: the quotation mark around texts. Those within them become apostrophes, so that no text ends
-            early.
+        quote: the quotation mark around texts. Inside a text, it becomes an apostrophe.
     """
     if quote:
         show = partial(_without_quotes, show, quote)
@@ -68,17 +67,17 @@ def verb(kind: str) -> Verb:
 
 
 def has_no_text(kind: str) -> bool:
-    """Whether events of a kind have no text because their skill has no parameters."""
+    """Whether events of this kind have no text because their skill has no parameters."""
     return not _recording(kind).text
 
 
 def is_spoken(kind: str) -> bool:
-    """Whether events of a kind are spoken."""
+    """Whether the robot speaks the text of events of this kind, such as `say` and `ask`."""
     return _recording(kind).is_spoken
 
 
 def is_question(kind: str) -> bool:
-    """Whether events of a kind offer options."""
+    """Whether events of this kind offer options, such as `ask`."""
     return _recording(kind).options is not None
 
 

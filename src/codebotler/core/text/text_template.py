@@ -1,4 +1,4 @@
-"""Texts with holes, in which any text may be."""
+"""Templates such as `Go to the {}.`, in whose holes any text may be."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ _HOLE = "\ud800"  # a lone surrogate
 
 @dataclass(frozen=True)
 class TextTemplate:
-    """A text with holes, in which any text may be, even none.
+    """A text with holes, such as `Go to the {}.`. A hole stands for any text, even an empty one.
 
     Texts are compared without regard to case, Unicode composition and the amount of whitespace.
 
     Args:
-        parts: the pieces around the holes; a single piece is one exact text, and two empty ones are any text.
-            Adjacent holes become one. More than 20 pieces or 2,000 characters become any text, and so does a
-            text with the character that stands for a hole.
+        parts: the pieces around the holes, such as `("Go to the ", ".")`. A single piece has no hole, and two
+            empty ones match any text. So does a template with more than 20 pieces or 2,000 characters, or
+            with the character U+D800. Adjacent holes become one.
 
     Raises:
         ValueError: there are no parts.
@@ -48,7 +48,7 @@ class TextTemplate:
 
     @cached_property
     def joined(self) -> str:
-        """The text in the spelling in which texts are compared, with a character for each hole."""
+        """The template in lower case and normalized, as texts are compared, with U+D800 for each hole."""
         return _comparable(_HOLE.join(self.parts))
 
     @cached_property
@@ -56,19 +56,19 @@ class TextTemplate:
         return self.joined.split(_HOLE)
 
     def matches(self, text: str) -> bool:
-        """Whether a text is one of this template's texts."""
+        """Whether a text has all the pieces in order, with any text in the holes."""
         return _are_in_order(self._pieces, _comparable(text))
 
     def covers(self, other: TextTemplate) -> bool:
-        """Whether each text of another template is one of this template's texts.
+        """Whether this template matches every text that another template matches.
 
-        The answer may be False although it is so, but not True although it is not.
+        True is always right. False may be wrong.
         """
         return _are_in_order(self._pieces, other.joined)
 
     @staticmethod
     def beyond(templates: Iterable[TextTemplate], allowed: Iterable[TextTemplate]) -> list[TextTemplate]:
-        """Return the templates that no allowed one covers, in linear time for texts without holes."""
+        """Return the templates that none in `allowed` covers, in linear time for texts without holes."""
         known = [*allowed]
         exact, open_ones = {one.joined for one in known}, [one for one in known if len(one.parts) > 1]
         left = [one for one in templates if one.joined not in exact]

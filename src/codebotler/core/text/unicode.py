@@ -14,13 +14,13 @@ MAX_ACCENTS = 30
 """The most accents in a row that are normalized, as in Unicode's Stream-Safe Text Format."""
 
 SHORT_TEXT = 100
-"""Characters that are normalized quickly, whatever they are."""
+"""Any text of at most this many characters is normalized quickly."""
 
 Composed = TypeVar("Composed")
 
 
 def compose(value: Composed) -> Composed:
-    """Compose a string, or the texts in a list or a tuple; return other values unchanged."""
+    """Convert a string, or the strings in a list or a tuple, to NFC; return other values unchanged."""
     if isinstance(value, str):
         return normalize_text("NFC", value)  # type: ignore[return-value]  # a string, too
     if isinstance(value, list):
@@ -31,13 +31,13 @@ def compose(value: Composed) -> Composed:
 
 
 def compose_fields(frozen: object) -> None:
-    """Compose the texts in a frozen data class after initialization."""
+    """Convert the strings in a frozen data class to NFC; called in `__post_init__`."""
     for name, value in vars(frozen).items():
         object.__setattr__(frozen, name, compose(value))
 
 
 def normalize_text(form: Literal["NFC", "NFD"], text: str) -> str:
-    """Normalize a text, but keep longer rows of accents as they are.
+    """Normalize a text, but keep rows of more than 30 accents as they are.
 
     Python sorts a row of accents in quadratic time, and no other thread, such as the one for STOP, can run
     meanwhile.
@@ -50,7 +50,7 @@ def normalize_text(form: Literal["NFC", "NFD"], text: str) -> str:
 
 
 def long_rows(text: str) -> Iterator[tuple[int, int]]:
-    """Yield where each letter with too many accents begins, and where its accents end."""
+    """Yield the start of each letter with more than 30 accents, and the end of these accents."""
     if len(text) <= SHORT_TEXT or text.isascii():
         return
     letter = 0  # where the last letter begins

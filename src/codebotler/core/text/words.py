@@ -13,7 +13,7 @@ def listed(parts: Sequence[str], last: str = "and") -> str:
 
 
 def elide_list(parts: Sequence[str], most: int = 5) -> list[str]:
-    """Shorten an enumeration to its first parts and the number of the rest."""
+    """Shorten a long enumeration to its first `most` parts and, for example, `3 more`."""
     more = len(parts) - most
     return [*parts[:most], f"{more:,} more"] if more > 0 else [*parts]
 

@@ -44,7 +44,7 @@ def alphabet(
     rooms: Sequence[str] | None = None,
     moves: Sequence[str] | None = None,
 ) -> list[Event]:
-    """Return one event for each combination of patterns that some generated event matches.
+    """Generate example events, and keep one for each set of patterns that an event matches.
 
     Args:
         wanted: the patterns.
@@ -90,7 +90,7 @@ def alphabet(
 
 
 def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
-    """Split a pattern into one pattern for each aspect, so that it matches an event if all of them do."""
+    """Split a pattern into four that must all match: texts, result, room, and held object with addressee."""
     kind = element.kind
     return (
         EventPattern(kind, element.text, element.options, element.mention, more=element.more),

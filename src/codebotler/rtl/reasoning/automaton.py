@@ -14,7 +14,7 @@ MAX_STATES = 1_000  # the limit applies before minimization
 
 AutomatonState: TypeAlias = Hashable
 Letter: TypeAlias = frozenset[formulas.EventPattern]
-"""The patterns of a formula that match an event."""
+"""The input of an automaton for one event: the set of the formula's patterns that match the event."""
 
 
 class Undecided(Exception):  # noqa: N818 - not a mistake of the caller
@@ -61,7 +61,7 @@ class Automaton:
 
     @cached_property
     def always(self) -> Automaton:
-        """The automaton of the traces for which the formula holds after every event."""
+        """The automaton of the traces for which the formula holds at the start and after every event."""
         rows = tuple(
             row if accepted else (state,) * len(row)
             for state, (row, accepted) in enumerate(zip(self.rows, self.accepts, strict=True))
@@ -90,7 +90,7 @@ class Machine(NamedTuple):
 
 
 def machine_of(formula: formulas.Formula) -> Machine:
-    """Build the automaton of a formula with lazily computed states."""
+    """Build an automaton of a formula that computes each state only when it is reached."""
     match formula:
         case formulas.And(parts) | formulas.Or(parts):
             return _together([*map(machine_of, parts)], all if isinstance(formula, formulas.And) else any)

@@ -20,7 +20,7 @@ SUFFIXES = ("", "\0 x y z")
 
 
 class RepeatedText(NamedTuple):
-    """A repetitive text that can have any length."""
+    """A text such as `aaa... x` that repeats a unit, and so can have any length."""
 
     unit: str
     prefix: str = ""
@@ -33,7 +33,7 @@ class RepeatedText(NamedTuple):
 
 @cache
 def slow_text(pattern: str) -> str | None:
-    """Return the start of a string on which a regex is slow, or None if no such text was found."""
+    """Return the start of a string on which a regex is slow, such as `aaa` for `(a+)+b`, or else None."""
     for find, sizes in ((failing_regex(pattern), SHORT_SIZES), (compile_regex(pattern), LONG_SIZES)):
         for text in texts_to_try(pattern):
             if is_slow(find.findall, text, sizes):
@@ -59,7 +59,7 @@ def is_slow(
 
 @cache
 def texts_to_try(pattern: str) -> list[RepeatedText]:
-    """Return texts on which a regex may be slow, always the same ones, or none if it has no repetition."""
+    """Return texts on which a regex may be slow, always the same for a regex; none without a repetition."""
     tree = parse_tree(pattern)
     if "REPEAT" not in str(tree):
         return []

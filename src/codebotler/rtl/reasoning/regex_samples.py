@@ -36,7 +36,7 @@ def _loosen(tree: Tree) -> None:
 
 
 def inner_trees(op: str, arguments: Any) -> list[Tree]:  # noqa: ANN401 - private classes of `re`
-    """Return the trees directly inside a node."""
+    """Return the parts directly inside a node of a parsed regex, such as `tea` and `milk` in `tea|milk`."""
     match op:
         case "BRANCH":
             return list(arguments[1])
@@ -60,7 +60,7 @@ def samples(pattern: str) -> tuple[str, ...]:
 
 
 def counter_samples(pattern: str) -> list[str]:
-    """Return strings that a regex excludes by its negative lookaheads."""
+    """Return strings that negative lookaheads exclude, such as `grilled` for `(?!grilled)cheese`."""
     denied = (arguments[-1] for op, arguments in parse_tree(pattern) if str(op) == "ASSERT_NOT")
     words = (word.strip() for tree in denied for word in _spell_in_all_ways(tree)[:_MOST_SPELLED])
     return [*dict.fromkeys(filter(None, words))]
@@ -79,7 +79,7 @@ def _spell_in_all_ways(tree: Tree) -> list[str]:
 
 
 def spell_out(tree: Tree, gap: str = "") -> list[str]:
-    """Return some strings that a tree matches, with `gap` where any character may be."""
+    """Return some strings that a parsed regex matches, with `gap` wherever it allows any character."""
     texts = [""]
     for op, arguments in tree:
         parts = _spell_node(op, arguments, gap)

@@ -20,7 +20,7 @@ _MOST_ALIKE = 2
 
 @cache
 def distinct_strings(texts: tuple[TextPattern, ...], *, outer: bool = False) -> tuple[str, ...]:
-    """Return one short string for each combination of patterns that some candidate matches.
+    """Generate strings, and return one short string for each set of patterns that a string matches.
 
     `outer` allows outer spaces, which options may have but texts of events may not.
     """
@@ -32,12 +32,12 @@ def distinct_strings(texts: tuple[TextPattern, ...], *, outer: bool = False) -> 
 
 @cache
 def can_match(text: TextPattern, *, outer: bool = False) -> bool:
-    """Whether some candidate matches a pattern."""
+    """Whether a generated string matches a pattern; if not, other strings may match it."""
     return any(map(text.matches, _candidates((text,), outer=outer)))
 
 
 def patterns(text: TextPattern) -> Iterator[str]:
-    """Yield the regexes in a string pattern."""
+    """Yield the regexes in a pattern, such as `tea` and `milk` in `words("tea", "milk")`."""
     match text:
         case Words(parts):
             yield from chain.from_iterable(map(patterns, parts))

@@ -23,7 +23,7 @@ from codebotler.rtl.semantics import holds, is_match
 MAX_VISITED_STATES = 20_000  # states of the product automaton in one search
 
 Reading: TypeAlias = tuple[Automaton, list[int]]
-"""An automaton and, for each event of the alphabet, the index of its letter."""
+"""An automaton, and for each event of the alphabet the index of the letter that the automaton reads."""
 
 
 class Reasoner:

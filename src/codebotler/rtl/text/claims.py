@@ -19,7 +19,7 @@ from codebotler.rtl.text.times import TimeOfDay, times_in
 
 @dataclass(frozen=True)
 class Number(Matcher):
-    """Matches texts that give one number for a thing, and no other number for it.
+    """Matches texts with one number for a thing, and no other: `number(2, "mug")` matches `there are 2 mugs`.
 
     Args:
         number: the number.
@@ -81,7 +81,7 @@ def _word(pattern: str) -> re.Pattern[str]:
 
 
 Mark = tuple[int | None, tuple[float, ...]]
-"""A thing, as its index without numbers, or a number, as None with its alternative values."""
+"""Either a thing, such as `(0, ())` for the first, or a number, such as `(None, (2.0, 3.0))` for `2 or 3`."""
 
 
 def _marks(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[Mark]:
@@ -125,14 +125,14 @@ def _numbers_of_thing(marks: list[Mark]) -> Iterator[float]:
 
 @dataclass(frozen=True)
 class Time(Matcher):
-    """Matches texts that name times of day if all of them are within a span.
+    """Matches texts that name times of day, all of them between `start` and `end`.
 
-    A time that may be morning or afternoon is within the span if one of the two is.
+    A time that may be morning or afternoon counts as between them if one of the two is.
 
     Args:
         start: the earliest time, such as `11:00`.
         end: the latest time.
-        other: whether at least one time must be outside the span instead.
+        other: whether at least one time must be outside instead.
     """
 
     start: str
@@ -164,7 +164,7 @@ def minutes(time: str) -> TimeOfDay:
 
 @dataclass(frozen=True)
 class Claim(Matcher):
-    """Matches texts with a clause that affirms a thing or, with `denied`, one that denies it.
+    """Matches texts with a clause such as `there is tea` or, with `denied`, one such as `there is no tea`.
 
     Args:
         pattern: a regex for the thing, as a whole word.

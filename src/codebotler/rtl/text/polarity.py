@@ -51,7 +51,7 @@ _OPEN = re.compile(
 
 
 class Polarity(Enum):
-    """Whether a clause affirms the things it names, denies them or leaves them open."""
+    """Whether a clause affirms (`tea is there`), denies (`no tea`) or leaves open (`maybe tea`)."""
 
     AFFIRMS = "affirms"
     DENIES = "denies"

@@ -47,10 +47,10 @@ _DAY = 24 * 60
 
 @lru_cache(maxsize=1024)  # several formulas read the same text
 def times_in(text: str) -> tuple[tuple[TimeOfDay, ...], ...]:
-    """Return the times of day in a string, with both values for a time that may be morning or afternoon.
+    """Return the times of day in a string, in minutes: `at 3` gives `((180, 900),)`, 3 am or 3 pm.
 
     `12 pm`, `12:00`, `noon`, `twelve o'clock`, `half past twelve` and `six in the evening` are times, and so
-    is a string that consists of an hour. `before 12 pm` is not a time.
+    is a string such as `12` or `at 12` without other words. `before 12 pm` is not a time.
     """
     plain = ". ".join(sentence.rstrip("? ") for sentence in sentences(text))
     plain = _IN_THE.sub(lambda match: f"{match[1]} {'am' if match[2].lower() == 'morning' else 'pm'}", plain)
