@@ -1,4 +1,4 @@
-"""The behaviour of a run: what a person would notice, whatever the words and the order of visits."""
+"""Reduce a run to what a person would notice, whatever its wording and the order of its visits."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ MAX_STATEMENT_LENGTH = 4_000  # characters; a program may talk without end, and 
 HALF_DAY, ZERO = 12 * 60, (0,)  # minutes, and the time of day that "eggs: 0" might give
 
 Claims: TypeAlias = frozenset[tuple[str, str]]
-"""The claims of a statement, each with its kind, such as `number`, and its value."""
+"""The claims of a statement: `("number", "3")` for "three mugs", `("denies", "mug")` for "no mug"."""
 
 
 @dataclass(frozen=True)
 class Behaviour:
-    """The part of a run that a person would notice. Visits, looks, waiting and words do not count.
+    """The part of a run that a person would notice. Visits, looks, waiting and the wording do not count.
 
     Args:
         said: the room and the claims of the statements between two drives. All statements without claims,
@@ -40,7 +40,7 @@ class Behaviour:
         asked: the room, the options and the person of each question; case and order do not matter. The
             person counts only where candidates name different ones.
         done: the other skills with their arguments, in order of their names.
-        ending: how the run ended; empty if it finished.
+        ending: `waits` if the run reached a limit, or else the kind of its error; empty if it finished.
         room: the room where the robot ended; empty unless the run finished.
     """
 
@@ -68,8 +68,8 @@ def behaviour_of(
     Args:
         outcome: the run.
         start: the room where the robot started.
-        names: a pattern from `names_in` that finds the names which statements may make claims about.
-        shared_rooms: the rooms of `rooms_with_several` in which it matters who is asked.
+        names: a regex from `names_in`. Statements may make claims about the names that it finds.
+        shared_rooms: the rooms in which it matters who is asked, from `rooms_with_several`.
     """
     trace = outcome.trace
     is_done = outcome.status is Status.FINISHED
@@ -94,7 +94,7 @@ def behaviour_of(
 
 
 def statements(trace: Trace) -> Iterator[tuple[str, str]]:
-    """Yield the room and the text of what was said between two drives to different rooms."""
+    """Yield each statement with its room. A statement joins all that is said before a change of room."""
     spoken = (one for one in trace if one.kind in {GOTO, SAY} and not _stays(one))
     for is_drive, some in groupby(spoken, key=lambda one: one.kind == GOTO):
         if not is_drive:
@@ -111,9 +111,9 @@ def rooms_with_several(traces: Iterable[Trace]) -> frozenset[str]:
 
 
 def names_in(rooms: Iterable[str], traces: Iterable[Trace]) -> re.Pattern[str]:
-    """Return a pattern for the names of rooms, and of the things and people that runs are about.
+    """Return a regex that finds the names of rooms, and of what runs look for, ask, carry or offer.
 
-    These are what the programs look for, carry and offer, but not words for anybody, yes and no.
+    Words such as "anybody", "yes" and "no" are not names.
     """
     found = dict.fromkeys(map(_plain, rooms))
     places = set(found)

@@ -53,7 +53,7 @@ class CandidateCluster:
 
     @property
     def program(self) -> str:
-        """The program that represents the cluster."""
+        """The most frequent program, which represents the cluster."""
         return self.programs[0]
 
 
@@ -62,9 +62,9 @@ class CandidateClusters:
     """The clusters of the candidates that the check accepts, with the largest one first.
 
     Args:
-        clusters: at least one; if the check rejects all candidates, it consists of the first of them.
-        rejected: the number of candidates that the check rejects.
-        unwanted: the number of candidates that do what a person did not mean.
+        clusters: at least one. If the check rejects all candidates, the only cluster has the first of them.
+        rejected: the number of rejected candidates that are not in a cluster.
+        unwanted: the number of accepted candidates that behave like a refused program.
     """
 
     clusters: tuple[CandidateCluster, ...]
@@ -78,7 +78,7 @@ class CandidateClusters:
 
     @property
     def summary(self) -> str:
-        """A sentence about the largest cluster, which is taken if nobody is asked."""
+        """A phrase about the choice of a cluster: "took the most frequent behaviour: 3 of 4 programs"."""
         largest, total = self.clusters[0], counted(self.total, "program")
         if not largest.samples:
             every = counted(self.total + self.rejected, "program")
@@ -106,7 +106,7 @@ def cluster_candidates(
         programs: the candidates, at least one; equal ones count separately.
         settings: the settings of the check and of the runs.
         room_map: the rooms; by default all rooms that the programs name.
-        refused: programs that a person did not mean, so that no other one may do the same.
+        refused: programs that a person did not mean. Candidates that behave like one of them are left out.
 
     Raises:
         UserError: all accepted candidates do what a person did not mean.
@@ -163,7 +163,7 @@ def _cluster(
 
 
 def shared_rooms(programs: Iterable[str], maps: Sequence[RoomMap], settings: CheckSettings) -> RoomMap:
-    """Return a map of the rooms that programs name, where the longest of similar names counts.
+    """Return one map of the rooms that any program names, without "office" if another is "ann's office".
 
     If a program lists the rooms, there are two of each kind, since a loop needs several rooms to go wrong.
     """
@@ -183,7 +183,7 @@ def _second_room(kind: str, rooms: Sequence[str]) -> str:
 def run_in_shared_worlds(
     worker: Worker, programs: Sequence[str], room_map: RoomMap, settings: CheckSettings
 ) -> list[list[Sample]]:
-    """Run programs in the same worlds, and return the runs of each, one for each world.
+    """Run programs in the same worlds. Return a list for each program, with its run in each world.
 
     The first worlds are random. Further ones try both values of each fact that a program meets.
     """

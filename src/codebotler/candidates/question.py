@@ -20,30 +20,30 @@ from codebotler.models.recorded import is_recorded
 from codebotler.simulator.worlds.matching import SOMEBODY, means_person, normalized
 
 DOMINANT_SHARE = 0.75
-"""The share of the candidates from which the largest cluster is taken without a question."""
+"""The largest cluster is taken without a question if it has at least this share of the candidates."""
 
 MAX_CANDIDATE_OPTIONS, MAX_QUESTION_FACTS, MAX_SHOWN_DIFFERENCES = 3, 4, 4
 NOTICED_FIRST = frozenset({"said", "moved", "asked", "room"})
-"""The differences that a person cares about most."""
+"""The fields of a `Behaviour` that a person cares about most."""
 
 NOTICED_KINDS = frozenset({SAY, ASK, PICK, PLACE})
 
 ClarifyingAnswer: TypeAlias = int | Literal["none", "decide"]
-"""The position of an option, none of them, or the tool's choice."""
+"""The position of an option from 0, `none` to reject them all, or `decide` to leave it to the tool."""
 
 Aspect: TypeAlias = tuple[str, str]
-"""A field of a behaviour, with the room or thing."""
+"""A field of a `Behaviour` and the room or thing in question, such as `("said", "kitchen")`."""
 
 
 @dataclass(frozen=True)
 class CandidateOption:
-    """One possible behaviour.
+    """A program that a person can choose, and how its behaviour differs from that of the others.
 
     Args:
         program: the program that the robot would run.
         size: the number of candidates that behave like it.
-        steps: its steps in the world of the question, as of `steps_of`.
-        difference: a sentence that says only how it differs from the other options.
+        steps: its steps in the world of the question, from `steps_of`.
+        difference: only how it differs from the other options, such as "ends in kitchen".
     """
 
     program: str = field(repr=False)
@@ -58,10 +58,10 @@ class ClarifyingQuestion:
 
     Args:
         options: two or three options with different behaviours, beginning with the most frequent one.
-        facts: the facts of the imagined world that matter, in words.
+        facts: the facts of the imagined world that explain the differences, in words.
         total: the number of accepted candidates.
-        sample: the number of the world.
-        why_last: why no programs follow the answer `none`; empty if they do.
+        sample: the number of the imagined world.
+        why_last: why no new programs are written after the answer `none`; empty if some are.
     """
 
     options: tuple[CandidateOption, ...]
@@ -72,7 +72,7 @@ class ClarifyingQuestion:
 
     @property
     def left_out(self) -> str:
-        """Say how many candidates no option stands for; empty if none."""
+        """A sentence about missing candidates: "Not shown: 2 programs that ..."; empty if none is missing."""
         left = self.total - sum(one.size for one in self.options)
         return f"Not shown: {counted(left, 'program')} that would do something else." if left else ""
 
@@ -83,11 +83,11 @@ class ClarifyingQuestion:
 
     @property
     def rejections(self) -> list[str]:
-        """Sentences for a model about what a person did not mean by any option."""
+        """Hints for a model, one per option: "the person did not mean a robot that ends in kitchen"."""
         return [f"the person did not mean a robot that {one.difference}" for one in self.options]
 
     def chosen(self, answer: ClarifyingAnswer) -> CandidateOption | None:
-        """Return the option that an answer means, or None for none of them."""
+        """Return the option that an answer selects: the first one for `decide`, and None for `none`."""
         if answer == "none":
             return None
         return self.options[0 if answer == "decide" else answer]
@@ -119,10 +119,10 @@ def question_about(
     """Return a question, or None if one behaviour dominates or all candidates do the same.
 
     Args:
-        groups: the candidates by behaviour.
-        dominant_share: the share of the candidates from which no question is asked.
+        groups: the candidates, clustered by behaviour.
+        dominant_share: no question is asked if the largest cluster has at least this share of them.
         model: the model that would write other programs.
-        is_second: whether the person rejected other programs before, after which there are no more.
+        is_second: whether the person rejected other programs before; no new ones are written a second time.
     """
     largest = groups.clusters[0]
     if len(groups.clusters) == 1 or largest.size >= dominant_share * groups.total:
@@ -184,7 +184,7 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
 
 
 def describe_differences(samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> list[str]:
-    """Return a sentence for each run in one world that says only what differs from the other runs."""
+    """Say of each run in one world only what differs from the other runs, such as "ends in kitchen"."""
     seen = [_aspects(behaviour) for behaviour in behaviours]
     shown = sorted(_telling_first(seen)[:MAX_SHOWN_DIFFERENCES], key=lambda key: key[0] == "room")  # the end
     return [listed([_words(key, sample) for key in shown]) for sample in samples]

@@ -60,7 +60,7 @@ def check(
         seed: the random seed, which gives the same worlds on all machines.
         strict: whether to randomize even facts that the program takes for granted.
         skills: the skills that the program may call.
-        pool: the pool one of whose workers runs the program; by default the pool of this process.
+        pool: runs the program on one of its workers; by default the pool of this process.
         room_map: a map that replaces `rooms` and `start` if more is known about the rooms.
         house_rules: the rules that the program must keep in every world.
         explores: whether to explore all worlds that the program can tell apart, up to a budget, for its
@@ -111,7 +111,7 @@ def check_on(
 def check_together(
     worker: Worker, programs: Sequence[tuple[str, RoomMap]], settings: CheckSettings
 ) -> list[CheckResult]:
-    """Check several programs on one worker, where their first runs may share a process."""
+    """Check several programs on one worker. Their first runs may share a process, which is faster."""
     samplers = first_samplers(settings)[:WORLDS_AT_ONCE]
     runs = [SampledRuns(program, room_map, samplers, settings) for program, room_map in programs]
     return [
@@ -164,12 +164,12 @@ def room_map_for(
 
 
 def extend_check(worker: Worker, program: str, found: CheckResult, settings: CheckSettings) -> CheckResult:
-    """Return a check with the contract of the program, a proof for each rule, and the problems that it shows.
+    """Explore the worlds of a program, and add its contract, proofs for rules and new problems to its check.
 
     Args:
         worker: a worker that no other thread uses.
         program: the program.
-        found: the result of its check; without a run, it is returned unchanged.
+        found: the result of its check, returned unchanged if it has no samples.
         settings: the settings of the check.
     """
     if not found.samples:
@@ -204,7 +204,7 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
 
 
 def hold_within(found: CheckResult, allowed: Contract, skills: SkillTable) -> CheckResult:
-    """Return a check with a problem for each skill with which the program may do what a contract forbids."""
+    """Add a problem to a check for each skill that the program may use beyond the allowed contract."""
     if found.contract is None:
         return found
     new = [" ".join(filter(None, row)) for row in contract_rows(found.contract.beyond(allowed), skills)]

@@ -37,9 +37,9 @@ class Exploration:
         cases: the number of these worlds that were explored.
         calls: the different skill calls in all of them.
         most_calls: the highest number of calls of each skill in a run; empty if a run is endless.
-        violations: for each rule that is broken, the first world in which it is.
-        is_complete: whether no other world of these rooms can let the program do anything else.
-        is_steady: whether this is so even if facts change during a run, or if the robot fails.
+        violations: the first world in which a rule is broken, by the name of the rule.
+        is_complete: whether the program can do nothing else in other worlds with the same rooms.
+        is_steady: whether this holds even if facts change during a run, or if the robot fails.
     """
 
     cases: int
@@ -51,7 +51,7 @@ class Exploration:
 
 
 class ExploringGuard(RuleGuard):
-    """A guard that prevents nothing, but keeps each call, and which rules are broken.
+    """A guard that allows everything, and records the calls of a program and the names of broken rules.
 
     Args:
         rules: the house rules.
@@ -69,7 +69,7 @@ class ExploringGuard(RuleGuard):
         self.violations: set[str] = set()  # names of rules
 
     def judge_call(self, row: Skill, arguments: Sequence[Argument], goals: Sequence[str], place: str) -> None:
-        """Keep the next call, or raise RobotError if the robot fails in it."""
+        """Record the next call. Raise RobotError if it is the one in which the robot fails."""
         call = RequestedCall.of(row, arguments, goals, place)
         if row.returns.base is not None and row.name not in TELLING_SKILLS:
             self.asks_again |= call in self._asked
@@ -79,15 +79,15 @@ class ExploringGuard(RuleGuard):
             raise RobotError("SkillFailed", f"the robot failed in {row.name}")
 
     def judge(self, *attempts: Event, is_drive: bool = False) -> None:
-        """Keep the rules that any of the possible next events would break."""
+        """Record the rules that the next event would break. `attempts` are all events that it may be."""
         self._keep(self.find_violations(attempts, is_drive=is_drive))
 
     def happened(self, event: Event) -> None:
-        """Add an event to the history, and keep the rules that its result broke."""
+        """Add an event to the history, and record the rules that its result broke."""
         self._keep(self.add_event(event))
 
     def at_end(self) -> None:
-        """Keep the rules that are broken if the mission ends now."""
+        """Record the rules that are broken if the mission ends now."""
         self._keep(self.find_unkept())
 
     def _keep(self, found: Iterable[RuleViolationError]) -> None:
@@ -97,8 +97,8 @@ class ExploringGuard(RuleGuard):
 def explore(worker: Worker, program: str, room_map: RoomMap, settings: CheckSettings) -> Exploration:
     """Run a program in all worlds that it can tell apart, or in as many of them as the budget allows.
 
-    If it takes facts for granted, there are two kinds of worlds: where these hold, as in a check, and where
-    each may be false. If it catches errors, the robot also fails once in each call of a run.
+    If it takes facts for granted, explore two kinds of worlds: those where these facts hold, as in a check,
+    and those where each may be false. If it catches errors, also let the robot fail in one call of a run.
     """
     calls: set[RequestedCall] = set()
     most: Counter[str] = Counter()

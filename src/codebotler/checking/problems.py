@@ -56,15 +56,15 @@ RuleVerdict: TypeAlias = Literal["never", "possible", "unknown"]
 
 @dataclass(frozen=True)
 class RuleProof:
-    """The verdict of an exploration on a house rule.
+    """Whether a program can break a house rule, as far as its explored worlds show.
 
     Args:
-        rule: its name.
-        verdict: whether no world of these rooms lets the program break it, or a possible one does; unknown if
-            there are more worlds than were explored, or if facts may change while the program runs.
+        rule: the name of the rule.
+        verdict: `never` if the program breaks it in no world with these rooms, `possible` if in some world;
+            `unknown` if not all worlds were explored, or if facts may change while the program runs.
         cases: the number of explored worlds.
         sample: the number of the world in which the program breaks it; None if there is none.
-        if_skills_fail: whether this also holds if any skills fail, since the first failure ends the program.
+        if_skills_fail: whether `never` also holds if skills fail, since the first failure ends the program.
     """
 
     rule: str
@@ -75,7 +75,7 @@ class RuleProof:
 
     @property
     def words(self) -> str:
-        """The proof in words, without the rule."""
+        """The verdict in words, such as "can be broken, as in imagined world 3"."""
         if self.sample is not None:
             return f"can be broken, as in imagined world {self.sample}"
         worlds = counted(self.cases, "world")
@@ -98,7 +98,7 @@ class Sample:
     repeated: Trace = ()  # the steps that a mission which the program continues has done already
 
     def would_repeat_in(self, sampler: FactSampler) -> bool:
-        """Whether a run in another world would discover the same facts, and therefore be identical."""
+        """Return whether a run in the sampler's world would discover the same facts, and so be identical."""
         return all(draw.holds_in(sampler) for draw in self.draws)
 
     @property
@@ -122,8 +122,8 @@ class CheckResult:
         room_map: the rooms of all worlds.
         seed: the seed of the worlds.
         strict: whether all facts were random.
-        proofs: what is proved of each house rule; empty unless all worlds were explored.
-        contract: what the program may do at most; None unless all worlds were explored.
+        proofs: a verdict on each house rule; empty unless the check explored worlds.
+        contract: what the program may do at most; None unless the check explored worlds.
     """
 
     problems: tuple[Problem, ...]
@@ -151,7 +151,7 @@ class CheckResult:
 
     @property
     def evidence(self) -> frozenset[int]:
-        """The number of the first sample of each problem that any sample shows."""
+        """The numbers of the samples that prove the problems: for each problem, the first one that has it."""
         ends = {
             sample.outcome.line: sample.number for sample in reversed(self.samples) if sample.outcome.error
         }
@@ -192,7 +192,7 @@ class CheckResult:
 
 
 def no_room(request: str, room_map: RoomMap) -> str:
-    """Return the message for a request that means no room, with the most similar name, or several rooms."""
+    """Say why a request is no room: `there is no room "hal"; the closest is "hall"`, or it means several."""
     if len(possible := room_map.possible_rooms(request)) > 1:
         return ambiguous(brief(request), possible)
     name = brief(request)
@@ -200,6 +200,6 @@ def no_room(request: str, room_map: RoomMap) -> str:
 
 
 def closest_room(name: str, rooms: Sequence[str]) -> str:
-    """Return a clause with the most similar name of a room, or an empty string if none is similar."""
+    """Return a clause such as `; the closest is "hall"`, or an empty string if no room has a similar name."""
     closest = difflib.get_close_matches(name.lower(), rooms, n=1)
     return f'; the closest is "{closest[0]}"' if closest else ""

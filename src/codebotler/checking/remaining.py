@@ -1,4 +1,4 @@
-"""Find what a program would do after the part of it that a robot has done."""
+"""Find what an interrupted program would still do after the steps that the robot has done."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from codebotler.simulator.worlds.sampled_robot import SampledRobot
 def remaining_outcomes(
     begun: str, room_map: RoomMap, skills: SkillTable, *, first: int = 0, worker: Worker | None = None
 ) -> tuple[Outcome, ...]:
-    """Return what a program would do after the past of a map, in each sampled world where it does not fail.
+    """Return what an interrupted program would still do, once for each sampled world where it does not fail.
 
-    Nothing is returned if the program does not repeat this past, or always fails.
+    The result is empty if the program always fails, or does not repeat the steps in `room_map.past`.
 
     Args:
         begun: the program.
-        room_map: the rooms, with the past.
+        room_map: the rooms, and in `past` the steps that the robot has done.
         skills: the robot's skills.
-        first: the number of steps in the past before the program began.
+        first: the number of steps that the robot had done when the program began.
         worker: a worker that no other thread uses; by default one of the shared pool.
     """
     if worker is None:
@@ -51,14 +51,14 @@ def remaining_outcomes(
 
 
 class RepeatingRobot(SampledRobot):
-    """A robot that gives a program the results in the past of its map, and then those of a sampled world."""
+    """A robot that repeats the recorded results of the past to a program, then acts in a sampled world."""
 
     def __init__(self, room_map: RoomMap, sampler: FactSampler, how: CheckSettings, first: int) -> None:
         super().__init__(room_map, sampler, how.simulation, how.skills)
         self.left = deque(event for event in room_map.past[first:] if not event.failed)
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Return the result in the past. A call that is not in it failed."""
+        """Return the recorded result of the next step. Any other call must have failed before."""
         if not self.left:
             return super().execute(skill, arguments)
         row, past = self.skills[skill], self.left[0]

@@ -1,4 +1,4 @@
-"""Find what a program would do again, or forget, that an earlier mission has begun."""
+"""Find steps of an earlier mission that a program would repeat, and a thing that it never puts down."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.simulator.worlds.sampled_robot import AGREEING_TEXT
 
 UNBOUNDED_COUNT = 1_000_000
-"""The number of steps that remain of a kind that a program repeats without end."""
+"""Replaces the number of remaining steps of a kind if the program would repeat them without end."""
 
 MAX_COMPARED_PAIRS = 20_000
-"""The limit for pairs of a program's step and one that was, or remains to be, done. More are not compared."""
+"""The limit for pairs of a step of the program and an earlier or remaining step. More give `LongPast`."""
 
 EMPTY_WORDS = frozenset(
     {
@@ -40,14 +40,14 @@ _PUNCTUATION = re.compile(r"[^\w\s]+")
 
 
 def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = ()) -> CheckResult:
-    """Return a check with a problem for each step that is done already, and for a thing that stays in hand.
+    """Add problems to a check: steps that the robot has done already, and a thing that it never puts down.
 
-    A program may wait where the begun one waits: what it waits for was not there, but may come.
+    The program may wait without end if the begun one does, since what both wait for may still come.
 
     Args:
         found: the check of a program for the rest of a mission; its map contains what was done.
-        begun: the program of that mission.
-        remaining: what that program would still do, in several worlds; none if that is unknown.
+        begun: the program that the mission began with.
+        remaining: what the begun program would still do, in several worlds; empty if that is unknown.
     """
     past, problems, samples = found.room_map.past, list(found.problems), []
     others = len(_distinct(past)) + len(_distinct(event for one in remaining for event in one.trace))
@@ -79,9 +79,9 @@ def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = 
 
 
 def repeated_steps(trace: Trace, room_map: RoomMap, remaining: Sequence[Outcome] = ()) -> Iterator[Event]:
-    """Yield the steps of a trace that have an effect which the past of the map contains already.
+    """Yield the steps of a trace that the robot has done already, such as the same question in the same room.
 
-    If more steps of a kind follow in a room than remained to be done, those about the same are done already.
+    If a room gets more steps of a kind than remained to be done, a past step in other words counts as well.
     """
     done = _distinct(event for event in room_map.past if not event.failed)
     later = _distinct(event for one in remaining for event in one.trace)
@@ -144,7 +144,7 @@ def has_same_effect(one: Event, other: Event, room_map: RoomMap) -> bool:
 
 
 def is_about_same(one: Event, other: Event) -> bool:
-    """Return whether two steps of a kind are about the same, in whatever words."""
+    """Return whether two steps of a kind have the same topic, as do "Is it ready?" and "Ready yet?"."""
     if not is_spoken(one.kind):
         return _words(one.text) == _words(other.text)
     if not one.options and polarity(one.text) is not polarity(other.text):

@@ -57,7 +57,7 @@ class SampledRuns:
         self.job: Job = program, [partial(self._new_robot, number) for number in range(len(samplers))]
 
     def samples_on(self, worker: Worker, known: Mapping[int, Outcome]) -> list[Sample]:
-        """Return the samples, but reuse known outcomes and skip worlds that would repeat a run."""
+        """Return a sample for each world. Reuse `known` outcomes, and skip worlds that would repeat a run."""
         ran: list[Sample] = []
         for number, sampler in enumerate(self.samplers):
             if number in known:
@@ -72,7 +72,7 @@ class SampledRuns:
         return ran
 
     def new_guard(self) -> RuleGuard | None:
-        """Return a guard for one run, or None if it needs none."""
+        """Return a guard that holds one run to the house rules, or None if there are no rules."""
         rules = self.settings.house_rules
         return RuleGuard(rules, self.room_map) if rules else None
 
@@ -84,7 +84,7 @@ class SampledRuns:
 
 
 def run_together(worker: Worker, runs: Sequence[SampledRuns]) -> list[list[Sample]]:
-    """Run several programs, of which tame ones share a process, and return the samples of each."""
+    """Run several programs, and return the samples of each. Tame programs share a process."""
     known: list[dict[int, Outcome]] = [{} for _ in runs]
     for (number, run), outcome in worker.run_tame([one.job for one in runs]).items():
         known[number][run] = outcome

@@ -41,7 +41,7 @@ def _step_data(number: int, event: Event, *, has_places: bool) -> dict[str, Any]
 
 
 def event_from_step(step: Mapping[str, Any]) -> Event:
-    """Convert a step back to an event without a place."""
+    """Convert a step from `steps_of` back to an event. Its place is left out."""
     options = tuple(map(option_from, step.get("options", ())))
     more = tuple(step.get("more", ()))
     return Event(step["kind"], step["text"], options, step.get("answer"), step.get("found"), more=more)
@@ -70,7 +70,7 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 def select_steps(
     steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 ) -> Iterator[tuple[bool, Sequence[Mapping[str, Any]]]]:
-    """Group steps by whether they are shown. Of a long trace, show both ends and the needed steps."""
+    """Split steps into runs to show or to hide. Of a long trace, show both ends and the needed steps."""
 
     def is_shown(step: Mapping[str, Any]) -> bool:
         number = step["step"]
@@ -100,7 +100,7 @@ def _drive(step: Mapping[str, Any]) -> Text:
 
 
 def grid(*justify: Literal["left", "right"]) -> Table:
-    """Return a table without lines, whose right-aligned columns contain numbers and never wrap."""
+    """Return a table without lines. Right-aligned columns are for numbers, and never wrap."""
     table = Table.grid(padding=(0, 2, 0, 0))
     for side in justify:
         table.add_column(justify=side, no_wrap=side == "right", overflow="fold")

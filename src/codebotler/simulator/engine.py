@@ -45,7 +45,7 @@ def run(
 
 
 def digest(*texts: str) -> bytes:
-    """Return a hash of some texts, each prefixed with its length."""
+    """Return a hash of texts and their lengths, so that "ab", "c" and "a", "bc" get different ones."""
     hashed = hashlib.sha256()
     for text in texts:
         data = text.encode(errors="surrogatepass")

@@ -47,13 +47,13 @@ class SkillPerformer(Protocol):
 
 
 def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, float, bool]:
-    """Return a run's fuel, time now, limit of time, start of the clocks, and whether it is live."""
+    """Return what a child needs to run a program: fuel, time, time limit, start of clocks, if it is live."""
     settings, limits = robot.settings, robot.settings.limits
     return limits.ticks, robot.now, limits.seconds, settings.clock_starts.timestamp(), robot.is_live
 
 
 class Ledger:
-    """Counts the requests of one run to its robot, up to a limit."""
+    """Counts the skill calls and texts of one run, and ends the run at a limit."""
 
     def __init__(self, robot: SkillPerformer) -> None:
         self.robot, self.limits = robot, robot.settings.limits
@@ -135,7 +135,7 @@ class Ledger:
 
 
 def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
-    """Return the final outcome of a simulated run: an error if a rule does not hold at its end."""
+    """Return the outcome, or an error instead if the program finished but breaks a rule at the end."""
     unkept = robot.guard.at_end() if robot.guard is not None and outcome.error is None else None
     if unkept is None:
         return outcome

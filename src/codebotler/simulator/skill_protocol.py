@@ -70,7 +70,7 @@ class SkillProtocol:
         return self.ledger.outcome_at_end(final or {})
 
     def talk(self) -> dict[str, object] | None:
-        """Answer requests, and return the child's last message, which says how it ended, or None."""
+        """Answer requests, and return the child's last message about its end, or None if there is none."""
         if self.child.receive() is None:
             raise LostProcessError("a child ended before it was isolated")
         overrun = 0
@@ -124,7 +124,7 @@ def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
 
 
 def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:
-    """Convert a skill's arguments for the robot. Raise ProtocolError if they do not fit its parameters."""
+    """Convert a call's arguments for the robot. Raise ProtocolError if they do not fit the skill."""
     if len(values) != len(skill.parameters):
         raise ProtocolError("a skill call has the wrong number of arguments")
     arguments: list[Argument] = []

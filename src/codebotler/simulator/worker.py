@@ -29,9 +29,9 @@ Job: TypeAlias = tuple[str, Sequence[NewRobot]]
 class Worker:
     """Owns the processes that run programs, one at a time.
 
-    Nearly all programs are tame, and many of them share a child, which has copies of their robots. Any other
-    run, or one that the shared child cannot decide, gets its own child, and the engine performs its skills.
-    The fork server for these runs holds the standard library, and starts when it is first needed.
+    Nearly all programs are tame: they leave nothing behind, so many of them share a child with copies of
+    their robots. Any other run, or one that a shared child cannot decide, gets its own child, and the engine
+    performs its skills. The fork server of these runs has the standard library, and starts when needed.
 
     Args:
         one_process_per_run: no two runs share a child, so the fork server for single runs starts first.
@@ -102,7 +102,7 @@ class Worker:
     # --- several tame programs in one child
 
     def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
-        """Return outcomes of tame programs by job and robot number, without undecided runs."""
+        """Run the tame programs, and return their outcomes by job and robot number, if they are decided."""
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
             return known
@@ -197,7 +197,7 @@ class Worker:
         return outcome
 
     def run_on(self, source: str, robot: SimulatedRobot) -> Outcome:
-        """Run a program on a given robot, whose calls cannot be made again if a process is lost."""
+        """Run a program on a robot that cannot start again. Raise EngineError if a process is lost."""
         robots = [robot]
 
         def only_robot() -> SimulatedRobot:

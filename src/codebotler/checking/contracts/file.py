@@ -43,7 +43,7 @@ def read_contract(path: Path, skills: SkillTable = SKILLS) -> Contract:
 
 
 def contract_from(data: Mapping[str, Any], skills: SkillTable) -> Contract:
-    """Convert the bounds of skills, as in a file, to a contract. Raise UserError if they are not valid."""
+    """Convert the `skills` part of a contract file to a contract. Raise UserError if it is not valid."""
     return _contract_in(
         YamlFile(json.dumps({"version": 1, "skills": data}, ensure_ascii=False), "the contract"), skills
     )
@@ -111,5 +111,5 @@ def _bound_data(bound: SkillBound) -> dict[str, Any]:
 
 
 def contract_yaml(contract: Contract) -> str:
-    """Write a contract as YAML."""
+    """Return a contract as the YAML text of a contract file."""
     return yaml.safe_dump(contract_data(contract), sort_keys=False, allow_unicode=True, width=WIDTH)

@@ -26,15 +26,15 @@ MAX_TEXTS, MAX_CHARACTERS = 1_000, 50_000  # of an argument; it may have any tex
 def derive_contract(
     found: Exploration, written: WrittenArguments, room_map: RoomMap, skills: SkillTable
 ) -> Contract:
-    """Return the upper bound of what a program may do.
+    """Return a contract that allows all that a program may do.
 
-    What the text of a program gives to a skill is allowed, also in worlds that change, which no exploration
-    visits. If the text leaves open what that is, the calls of a complete exploration are allowed, or else
-    anything.
+    An argument may have the texts that are written in the program, such as "hall" in `go_to("hall")`, and
+    those of all explored calls. If the program computes other texts, and not all of its worlds were
+    explored, the argument may have any text.
 
     Args:
-        found: the runs of the program.
-        written: the arguments of its calls, as far as its text gives them.
+        found: what the program did in the explored worlds.
+        written: the texts that it passes to skills, as far as its source shows them.
         room_map: the rooms.
         skills: the skills that the program may call.
     """

@@ -17,7 +17,7 @@ NEVER = {
     ASK: "asks nobody",
     SAY: "says nothing",
 }
-"""Phrases for a contract that lacks the skill which records such events."""
+"""What a program never does if its contract lacks a skill, by the kind of event that the skill records."""
 
 ANYBODY = "anybody"  # a question to "" may be answered by any person in the room
 GAP = "[...]"
@@ -28,9 +28,9 @@ LONG_TEXT = 30  # characters
 def contract_rows(
     contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief, *, is_short: bool = False
 ) -> Iterator[tuple[str, str, str]]:
-    """Yield the verb of each skill, what may be done with it and where, and how often if that is limited.
+    """Yield three texts per skill: verb, objects, limit: ("pick up", '"mug" in "office"', "at most 2 times").
 
-    A short row only counts some of the texts and places.
+    If `is_short`, long lists end with a number, such as "or 4 more". `show` shortens a single text.
     """
     named = contract.skills.keys() - TELLING_SKILLS
     for row in sorted((row for row in skills.rows if row.name in named), key=lambda row: not row.is_drive):
@@ -47,7 +47,7 @@ def contract_sentence(
 ) -> str:
     """Say in a sentence or two what a program may do at most, and what it never does.
 
-    A short sentence only counts some of the texts. Show it together with a table that has them all.
+    If `is_short`, long lists end with a number, such as "or 4 more"; show a table of all texts as well.
     """
     rows = contract_rows(contract, skills, show, is_short=is_short)
     may = [f"{what} {allowed}".strip() for what, allowed, _ in rows]

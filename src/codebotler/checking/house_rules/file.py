@@ -41,7 +41,7 @@ def _as_set_name(text: str) -> str:
 
 SetName = Annotated[YamlText, AfterValidator(_as_set_name)]
 Sets: TypeAlias = Mapping[str, Sequence[str]]
-"""The names in each set."""
+"""The names in each set, by the name of the set, such as `labs: [lab 1, lab 2]` in a file."""
 
 
 class HouseRuleFile(BaseModel):
@@ -59,7 +59,7 @@ class HouseRuleFile(BaseModel):
     for_each: Annotated[list[Name] | Name | None, Field(min_length=1)] = None
 
     def rule(self, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Sets) -> Rule:
-        """Convert the entry to a rule, or raise UserError if it is not valid."""
+        """Convert this entry, found at `at` in the file, to a rule. Raise UserError if it is not valid."""
         if len(self._texts) != 1:
             needed = 'exactly one of "always", "leaving" and "finally"; write one rule for each'
             raise file.wrong(f'the rule "{self.name}" needs {needed}', *at, *[*self._texts][-1:])
@@ -84,7 +84,7 @@ class HouseRuleFile(BaseModel):
     def with_single_names(
         self, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Sets
     ) -> Iterator[Rule]:
-        """Yield the rule with each name of a set alone, so that a misspelled one is noticed."""
+        """Yield a copy of the rule for each single name in its sets, so that a misspelled name is noticed."""
         (text,) = self._texts.values()
         for used in {tag[1] for tag in SET_TAG.finditer(text)} & {*sets}:
             yield from (self.rule(file, at, skills, {**sets, used: [name]}) for name in sets[used])

@@ -56,7 +56,7 @@ class Review:
 
 
 def review_rules(rules: Sequence[Rule], world: World | None = None) -> list[Review]:
-    """Review rules for a robot in any rooms, or in the rooms of a world."""
+    """Find examples and warnings for each rule. Examples use the rooms of the world if there is one."""
     found = {rule.name: _review(rule, world) for rule in rules}
     for one, other in combinations(rules, 2):
         for rule, warning in _pair_warnings(one, other, world):

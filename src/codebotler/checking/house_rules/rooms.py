@@ -44,7 +44,7 @@ def room_patterns(rule: Rule) -> Iterator[str]:
 
 
 def may_mean(pattern: str, labels: Iterable[str]) -> bool:
-    """Whether a regex may refer to one of these labels, or matches everything or nothing."""
+    """Return whether a regex may refer to one of the labels. If it matches all or nothing, assume so."""
     matches, texts = Regex(pattern).matches, samples(pattern)
     return (
         not texts

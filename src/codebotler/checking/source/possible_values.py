@@ -21,7 +21,7 @@ SAME_METHODS = frozenset(
 """Methods whose result has the values of their object, apart from case and surrounding whitespace."""
 
 CHANGES = frozenset({"insert", "update", "setdefault", "appendleft"})
-"""Methods that may give a list any other elements."""
+"""Methods after which a list or dictionary may have unknown elements."""
 
 SEQUENCES = ast.List | ast.Tuple | ast.ListComp
 
@@ -30,12 +30,12 @@ PossibleValue: TypeAlias = ast.expr | None
 
 
 class PossibleValues:
-    """The values of a program's expressions, whatever their scope and the order of statements.
+    """Finds which values an expression may have. It ignores scopes and the order of statements.
 
     Args:
         tree: the program.
-        guess_entries: whether an entry of a container counts as any of its elements. For a dictionary, this
-            is wrong, since its elements are its keys.
+        guess_entries: whether `rooms[0]` may be any element of `rooms`. For a dictionary, this is a wrong
+            guess, since its elements are its keys.
     """
 
     def __init__(self, tree: ast.Module, *, guess_entries: bool = False) -> None:
@@ -56,7 +56,7 @@ class PossibleValues:
                 self._bind_parameters(node, self._functions.get(node.func.id))
 
     def of(self, node: ast.expr) -> list[PossibleValue]:
-        """Return the expressions that give an expression, or the elements of a list, their values."""
+        """Return the expressions that may give a node its value: "hall" for `room` after `room = "hall"`."""
         found: list[PossibleValue] = []
         seen: set[str | ast.expr] = set()
         waiting: list[PossibleValue] = [node]

@@ -30,7 +30,7 @@ def named_rooms(tree: ast.Module, skills: SkillTable = SKILLS) -> tuple[str, ...
 
 
 def fixed_drives(tree: ast.Module, skills: SkillTable = SKILLS) -> list[tuple[int, str]]:
-    """Return the line and the request of each drive whose room is a literal.
+    """Return the line and the room of each drive that names its room, such as `go_to("hall")`.
 
     Drives to rooms that the program uses in comparisons are omitted, since it may check that they exist.
     """

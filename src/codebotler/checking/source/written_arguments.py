@@ -31,7 +31,7 @@ PURE_MODULES = frozenset(
 """Modules without a clock. A program that imports another module may depend on the time of day."""
 
 CLOCKS = sys.stdlib_module_names - PURE_MODULES - {"copy"} | {"modules", "attrgetter", "methodcaller", "*"}
-"""Attributes of modules that lead to a clock. Lists have a `copy`, too."""
+"""Attributes that may lead to a clock, such as `os`. Not `copy`, since lists have a `copy` as well."""
 
 TRICKS = frozenset(
     {"eval", "exec", "globals", "locals", "vars", "getattr", "__builtins__", "__import__", "sys"}
@@ -43,7 +43,7 @@ NOTHING: Templates = frozenset()
 
 @dataclass(frozen=True)
 class WrittenArguments:
-    """The arguments that the text of a program gives to its skills.
+    """The texts that a program passes to its skills, as far as its source shows them.
 
     Args:
         skills: the texts of each argument, by the skill's and the parameter's name. `ANY_TEXT` is among them
@@ -56,7 +56,7 @@ class WrittenArguments:
 
 
 def read_arguments(program: str, skills: SkillTable) -> WrittenArguments:
-    """Return what the text of a program gives to its skills. A text that cannot be read tells nothing."""
+    """Return the texts that a program passes to its skills. If its source cannot be read, allow any text."""
     parameters = [(row.name, [one.name for one in row.parameters]) for row in skills.rows]
     try:
         found, reads_clock = _read(program, parameters)

@@ -46,7 +46,7 @@ UNDECIDED_RUN = b"null"  # replaces a transcript if the run must be repeated in 
 
 
 def main(*descriptors: str) -> None:
-    """Prepare everything that batches share, then fork a child for each batch."""
+    """Prepare everything that batches share, then fork children to run them."""
     forget_the_shell()
     arrange(list(map(int, descriptors)))
     door = socket(fileno=RUN_DOOR)
@@ -164,7 +164,7 @@ class TranscribedRun(ProgramRun):
         raise LimitReachedError
 
     def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
-        """Return a function that detects whether a program caught an error that depends on its process."""
+        """Return a function for each `except` that notices a caught RecursionError or MemoryError."""
 
         def caught() -> None:
             error = sys.exc_info()[0]
@@ -175,7 +175,7 @@ class TranscribedRun(ProgramRun):
         return caught
 
     def ended_by(self, error: BaseException) -> str:
-        """Describe the error that ended the program."""
+        """Describe the error that ended the program. A recursion or memory error makes the run undecided."""
         try:
             str(error)
         except (RecursionError, MemoryError):

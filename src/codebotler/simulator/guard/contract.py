@@ -1,4 +1,4 @@
-"""`Contract`: an upper bound of what a program may do, by which a person approves it."""
+"""`Contract`: what a program may do at most. A person reads and approves it before the program runs."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from codebotler.simulator.guard.house_rule import UNKNOWN_ROOM, Rule, RuleViolat
 from codebotler.simulator.worlds.robot import Argument
 
 CONTRACT = Rule("approved contract", "Do only what the contract allows", And(()))
-"""The rule that names the contract in messages and logs. The name of a house rule has no spaces."""
+"""The rule under which messages report a broken contract. No name of a house rule has a space."""
 
 TELLING_SKILLS = frozenset({"get_all_rooms", "get_current_location"})
-"""Skills that only tell rooms, which every contract allows."""
+"""Skills that only return names of rooms. Every contract allows them."""
 
 KINDS_WITH_PLACE = {PICK, PLACE}
 
@@ -29,10 +29,10 @@ Templates: TypeAlias = tuple[TextTemplate, ...]
 
 @dataclass(frozen=True)
 class RequestedCall:
-    """A call of a skill, whatever comes of it.
+    """A call that a program makes, before the skill is executed.
 
     Args:
-        skill: its name.
+        skill: the name of the skill.
         texts: the texts of each argument; for the goal of a drive, the names of the rooms that it may mean.
         place: the robot's room; "" if it is unknown.
     """
@@ -43,7 +43,7 @@ class RequestedCall:
 
     @classmethod
     def of(cls, row: Skill, arguments: Sequence[Argument], rooms: Sequence[str], place: str) -> RequestedCall:
-        """Make the call of a skill. `rooms` are the rooms that the goal of a drive may mean."""
+        """Describe a call of a skill. If it is a drive, `rooms` replace the text of its goal."""
         texts = []
         for parameter, value in zip(row.parameters, arguments, strict=True):
             if is_goal(row, parameter.name) and rooms:
@@ -63,13 +63,13 @@ def is_goal(row: Skill, parameter: str) -> bool:
 
 
 def has_place(row: Skill) -> bool:
-    """Return whether a contract says in which rooms a skill may be called."""
+    """Return whether a contract limits the rooms where a skill may be called, as for `pick` and `place`."""
     return row.recording is not None and row.recording.kind in KINDS_WITH_PLACE
 
 
 @dataclass(frozen=True)
 class SkillBound:
-    """The upper bound of a program's calls of one skill.
+    """What a program may do at most with one skill.
 
     Args:
         texts: the allowed texts of each argument, by the parameter's name.
@@ -82,7 +82,7 @@ class SkillBound:
     at_most: int | None = None
 
     def objection(self, call: RequestedCall) -> str:
-        """Return why a call is not allowed, as the end of a sentence, or an empty string if it is."""
+        """Return why a call is not allowed: `since its obj may be "mug", and not "pen"`; empty if it is."""
         for (name, allowed), texts in zip(self.texts, call.texts, strict=True):
             for text in texts:
                 if not any(template.matches(text) for template in allowed):
@@ -94,9 +94,9 @@ class SkillBound:
         return f'since it may happen in {_some(self.places)}, and not in "{brief(call.place)}"'
 
     def beyond(self, other: SkillBound) -> SkillBound | None:
-        """Return the part of this bound that another one does not allow, or None if it allows all.
+        """Return what this bound allows and the other one forbids, or None if the other one allows it all.
 
-        If several of its limits are wider, the part is the whole bound.
+        If several limits are wider than those of the other bound, return this whole bound.
         """
         added: list[tuple[str, Templates]] = []
         for (name, templates), (_, allowed) in zip(self.texts, other.texts, strict=True):
@@ -116,7 +116,7 @@ class SkillBound:
 
 @dataclass(frozen=True)
 class Contract:
-    """An upper bound of what a program may do.
+    """What a program may do at most.
 
     Args:
         skills: the bound of each skill that may be called; no other skill may be called.
@@ -125,7 +125,7 @@ class Contract:
     skills: Mapping[str, SkillBound]
 
     def objection(self, call: RequestedCall, earlier: int = 0) -> str:
-        """Return why a call is not allowed, as the end of a sentence, or an empty string if it is.
+        """Return why a call is not allowed, such as "since ask may not be called"; empty if it is.
 
         Args:
             call: the call.
@@ -141,7 +141,7 @@ class Contract:
         return bound.objection(call)
 
     def beyond(self, other: Contract) -> Contract:
-        """Return the part of this contract that another one does not allow."""
+        """Return what this contract allows and the other one forbids."""
         new = {
             name: bound if name not in other.skills else bound.beyond(other.skills[name])
             for name, bound in self.skills.items()

@@ -33,7 +33,7 @@ class Rule:
         says: the rule as a sentence for people and models.
         formula: the rule as a formula.
         when: `always` if the formula must hold after each event, `finally` if only at the end of the mission,
-            `leaving` if there and before each drive.
+            `leaving` if at the end and each time the robot is about to leave a room.
         refuse: whether to skip a forbidden action and let the program continue, rather than end the mission.
         any_room: whether the rule may name rooms that the house does not have.
     """
@@ -52,7 +52,7 @@ class Rule:
 
     @cached_property
     def inside(self) -> tuple[EventPattern, ...]:
-        """The event patterns for rooms that the robot's pose enters."""
+        """The event patterns of kind `inside`, which match when the robot's pose enters a room."""
         return tuple(element for element in self.elements if element.kind == INSIDE)
 
     @property

@@ -27,18 +27,18 @@ KINDS_OF_MOVES = {PICK, PLACE}
 
 
 def name_of(label: str, request: str) -> str:
-    """Return the name of a room or thing for rules: its label, or the request if the label is a regex."""
+    """Return the name that rules compare for a room or thing: its label, or the request for a regex."""
     is_name = PLAIN_LABEL.fullmatch(label) or not request or label.casefold() in request.casefold()
     return label if is_name else request
 
 
 def rooms_meant(robot: SimulatedRobot, request: str) -> list[str]:
-    """Return the names for rules of all rooms that a request for a drive may refer to."""
+    """Return all rooms that a drive to the request may lead to, by the names that rules compare."""
     return [name_of(robot.full_names.get(room, room), request) for room in robot.possible_rooms(request)]
 
 
 def goals_meant(robot: SimulatedRobot, row: Skill, arguments: Sequence[Argument]) -> list[str]:
-    """Return the names for rules of the rooms that the goal of a call may mean; none if it is no drive."""
+    """Return the rooms that a call may drive to, by the names that rules compare; none if it is no drive."""
     goals = (
         one for parameter, one in zip(row.parameters, arguments, strict=True) if is_goal(row, parameter.name)
     )
@@ -67,7 +67,7 @@ class RuleGuard:
     Args:
         rules: the rules in force.
         room_map: the known rooms and their footprints, and what happened before the program began.
-        contracts: bounds of what the program may do, all of which count.
+        contracts: limits of what the program may do. Each call must keep all of them.
     """
 
     def __init__(
@@ -178,17 +178,17 @@ class RuleGuard:
         self._calls[row.name] += 1
 
     def uncount_call(self, row: Skill) -> None:
-        """Count the last call of a skill no longer, because it failed, and the program may try again."""
+        """Take back the count of a skill's last call, since it failed and the program may try again."""
         self._calls[row.name] -= 1
 
     def judge(self, *attempts: Event, is_drive: bool = False) -> None:
-        """Raise RuleViolationError if any of the possible next events, perhaps drives, would break a rule."""
+        """Raise RuleViolationError if one of `attempts`, the possible next events, would break a rule."""
         found = list(self.find_violations(attempts, is_drive=is_drive))
         if found:
             raise min(found, key=lambda broken: not broken.ends_run)  # another rule may end the run
 
     def find_violations(self, attempts: Sequence[Event], *, is_drive: bool) -> Iterator[RuleViolationError]:
-        """Yield an error for each rule, and possible next event, perhaps a drive, that would break it."""
+        """Yield an error for each pair of a rule and a possible next event that would break the rule."""
         attempts = tuple(map(_trimmed, attempts))
         leaves = is_drive and any(map(self._leaves, attempts[1:] or attempts))
         for rule, monitor in self._history.monitors:
@@ -232,7 +232,7 @@ class RuleGuard:
         return late
 
     def moved(self, start: Point, end: Point, holding: str) -> None:
-        """Add a straight drive between two poses. Raise RuleViolationError if it broke a rule."""
+        """Add the rooms that a straight drive enters. Raise RuleViolationError if that broke a rule."""
         if self.judges_poses:
             for event in self._entered(rooms_along(self._rooms, start, end), holding):
                 self.happened(event)

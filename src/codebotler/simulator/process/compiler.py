@@ -64,7 +64,7 @@ def compile_programs(
 
 
 def result_of(kind: str, text: str, further: Any) -> CompiledProgram | Outcome:  # noqa: ANN401 - from JSON
-    """Convert a result of `compile_here`."""
+    """Convert a result of `compile_here` to the program, or to the outcome of all runs if it is an error."""
     if kind == CODE:
         return CompiledProgram(b64decode(text), further)
     return Outcome(Status.PYTHON_ERROR, (), RunError(kind, text), further)

@@ -35,7 +35,7 @@ _Result = TypeVar("_Result")
 
 
 class IsolatedCallError(Exception):
-    """A function failed on a string, or exceeded the time or memory limit of a call.
+    """An isolated function raised an error, or exceeded the time or memory limit of a call.
 
     Args:
         kind: the kind of failure, such as `TimeoutError` or `MemoryError`.
@@ -100,7 +100,7 @@ def isolated(
 
 
 class ClosedProcess:
-    """A closed process in which the isolated functions of one module are called."""
+    """A process that can reach only its channel. It calls the isolated functions of one module."""
 
     def __init__(self, module: str) -> None:
         ours, theirs = channel_pair()

@@ -44,7 +44,7 @@ def start_fork_server(*descriptors: int) -> subprocess.Popen[bytes]:
 
 
 def start_module(code: str, arguments: Sequence[str], descriptors: Sequence[int]) -> subprocess.Popen[bytes]:
-    """Start a process that runs a line of our code, which can import our modules, and pass it descriptors."""
+    """Run a line of our code in a new process, and pass it descriptors. The code can import our modules."""
     folders = [os.path.abspath(folder) for folder in sys.path]  # noqa: PTH100 - Path.resolve follows links
     setup = f"import sys; sys.path[:] = {folders!r}; {code}"
     return _start(["-c", setup, *arguments, *map(str, descriptors)], descriptors)
@@ -150,5 +150,5 @@ def code_of(file: str, shown: str) -> bytes:
 
 
 def compiled_source(source: str, shown: str) -> bytes:
-    """Compile a source text."""
+    """Compile a source text, and return its marshalled code. `shown` is the file name in tracebacks."""
     return marshal.dumps(compile(source, shown, "exec", dont_inherit=True, optimize=0), WITHOUT_REFERENCES)

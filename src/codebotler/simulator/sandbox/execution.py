@@ -202,7 +202,7 @@ class ProgramRun:
         return self.request(f"{quoted(name)},[{','.join(given)}]")
 
     def sleep(self, seconds: object, /) -> None:
-        """Advance simulated time, of which the engine learns with the next request or at the end."""
+        """Advance simulated time. The engine learns of it with the next request, or at the end."""
         if not isinstance(seconds, int | float):
             raise TypeError(f"{NAME_OF(type(seconds))!r} object cannot be interpreted as an integer")
         if not 0 <= seconds < float("inf"):
@@ -237,7 +237,7 @@ class ProgramRun:
 
 
 def call_task() -> object:
-    """Call the task. This code runs with the program's names, and need not be compiled in each child."""
+    """Call `task_program`. This code runs with the program's names, so no child must compile it."""
     return task_program()  # type: ignore[name-defined] # noqa: F821 - defined by the program
 
 

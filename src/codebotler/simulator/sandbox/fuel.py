@@ -31,7 +31,7 @@ SCOPE_NODES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 def prepared(
     source: str, *, lowercase: bool, skills: frozenset[str] | None = None
 ) -> tuple[types.CodeType, bool]:
-    """Compile a program to use fuel, and return whether it is tame. Without skills, it counts as wild."""
+    """Return a program's code, changed to use fuel, and whether it is tame. Without skills, it is wild."""
     if "\0" in source:
         line = source.count("\n", 0, source.index("\0")) + 1
         raise SyntaxError("source code cannot contain null characters", (PROGRAM, line, 1, None))

@@ -82,7 +82,7 @@ def parameters_of(given: ast.arguments) -> list[str]:
 
 
 def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
-    """Return whether a program is tame.
+    """Return whether a program is tame, so that it may share a process with others.
 
     Args:
         tree: the program's syntax tree.
@@ -131,7 +131,7 @@ class ProgramVerifier:
         return name in among and not self.is_data(name)
 
     def check(self, *nodes: ast.stmt | ast.expr) -> None:
-        """Check statements or expressions."""
+        """Raise WildError if one of these statements or expressions is not allowed."""
         for node in nodes:
             self.ALLOWED.get(type(node), wild)(self, node)
 

@@ -12,7 +12,7 @@ EIGHTS = 8
 
 @dataclass(frozen=True)
 class FactSampler:
-    """Draws the facts of one sampled world, which do not depend on the order of the draws."""
+    """Draws the random facts of one sampled world. The order of the draws does not matter."""
 
     seed: int = 0
     sample: int = 0  # number of this world among the worlds with the same seed
@@ -22,13 +22,13 @@ class FactSampler:
     by_options: bool = False  # an answer depends on the room and the options, not on the question
 
     def draw(self, count: int, *fact: str) -> int:
-        """Draw a number from 0 to `count - 1` for a fact."""
+        """Draw a number from 0 to `count - 1` for a fact. The same texts always give the same number."""
         texts = [str(self.seed), str(self.sample), *fact]
         named = "".join(f"{len(text)}:{text}" for text in texts).encode(errors="surrogatepass")
         return int.from_bytes(blake2b(named, digest_size=8).digest(), "big") % count
 
     def decide(self, method: DrawMethod, *arguments: str | int) -> Draw:
-        """Draw a fact, unless its result is given.
+        """Return the given result of a fact from `forced`, or else draw it.
 
         Args:
             method: `answer`, `outcome` or `is_there`.

@@ -76,7 +76,7 @@ def meant_by(request: str, labels: Iterable[str], *, plain: bool = False) -> lis
     """Return the label that equals a request, else those that match most of its words, as whole words.
 
     Args:
-        request: the words of a program.
+        request: what a program asks for, such as "the red mug".
         labels: regexes, as in world files.
         plain: whether the labels are plain names instead.
     """
@@ -90,7 +90,7 @@ def goals_meant(
     """Return the rooms and places that a request may mean. "The desk in the office" means only the desk.
 
     Args:
-        request: the words of a program.
+        request: what a program asks for, such as "the desk in the office".
         goals: the rooms and places.
         around: the room that contains each place.
         plain: whether they are plain names instead of regexes.
@@ -147,11 +147,11 @@ class Entity(NamedTuple):
 def best_fits(request: str, entities: Sequence[Entity], anybody: Sequence[str] = ()) -> list[int]:
     """Return the positions of the entities that a request fits best.
 
-    There are several only if the request contains the names of several entities. Of those that merely have
-    the traits in a request, or that have equal names, the first is meant.
+    There are several only if the request contains the names of several entities. Of those that fit only by
+    their traits ("the tall person"), or that have equal names, the first is meant.
 
     Args:
-        request: the words of a program.
+        request: what a program asks for, such as "the red mug".
         entities: the candidates.
         anybody: regexes for words that mean any of the candidates.
     """
@@ -177,7 +177,7 @@ def _fit(request: str, label: str, traits: frozenset[str], anybody: tuple[str, .
 
 
 def trait_words(traits: Iterable[Trait]) -> frozenset[str]:
-    """Return the words that describe a thing or person: its values, and the names of those that are true."""
+    """Return the words that describe a thing or person: "red" for `color: red`, "wet" for `wet: true`."""
     words = [key if value is True else value for key, value in traits if value is not False]
     texts = [text for one in words for text in (one if isinstance(one, tuple) else (str(one),))]
     return frozenset(word for text in texts for word in content_words(text))
@@ -213,12 +213,12 @@ def means_person(request: str) -> bool:
 
 
 def content_words(request: str) -> list[str]:
-    """Return the words of a description without articles and the like, in lower case."""
+    """Return the lower-case words of a description without fillers: "red", "mug" for "the red mug"."""
     return [word for word in _WORD.findall(request.casefold()) if word not in _FILLERS]
 
 
 def normalized(request: str) -> str:
-    """Return the canonical form of a requested name: drop articles, and map all words for people to one."""
+    """Return a name in canonical form: "mug" for "the Mug", and "somebody" for any words for people."""
     name = " ".join(request.casefold().split())
     name = _ARTICLE.sub("", name, count=1)
     return SOMEBODY if means_anybody(name) else name

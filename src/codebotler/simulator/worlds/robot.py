@@ -36,7 +36,7 @@ class SkillGuard(Protocol):
         """Raise RobotError if an action inside one of the user's own skills is forbidden."""
 
     def at_end(self) -> RobotError | None:
-        """Return the error that arises if the run ends now, or None if there is none."""
+        """Return an error if the run breaks a rule by ending now, or else None."""
 
 
 class SimulatedRobot(SimulatedWorld):
@@ -72,7 +72,7 @@ class SimulatedRobot(SimulatedWorld):
 
     @property
     def own_skills(self) -> tuple[str, ...]:
-        """The skills that a copy made from `setup` would lack, since they are declared elsewhere."""
+        """The skills that a copy made from `setup` would lack, such as the user's own."""
         if "is_copied" not in vars(type(self)):
             return tuple(self.skills)
         if self.skills is SKILLS:
@@ -107,7 +107,7 @@ class SimulatedRobot(SimulatedWorld):
     # --- effects of skills
 
     def drive(self, location: str) -> None:
-        """Drive to the first room whose name occurs in the request."""
+        """Drive to the room that a request means. Raise RobotError if it means none or could mean several."""
         room = self.room_for(location)
         goal = None if room is None else self.full_names.get(room, room)
         if self.settings.events == "as-requested":

@@ -14,7 +14,7 @@ from codebotler.simulator.worlds.matching import goals_meant
 
 @dataclass(frozen=True)
 class RoomMap:
-    """The part of a world that is known before any facts are drawn."""
+    """The rooms of a world, and all else that is known before random facts are drawn."""
 
     rooms: tuple[str, ...]  # in the order in which the robot lists them
     start: str
@@ -59,7 +59,7 @@ class RoomMap:
         return meant[0] if len(meant) == 1 else None
 
     def possible_rooms(self, request: str) -> list[str]:
-        """Return all known rooms that a request may refer to, however a real robot understands it."""
+        """Return all known rooms that any robot might drive to if it got this request."""
         meant, wanted = self._meant(request), request.strip().casefold()
         if not self.plain or any(room.strip().casefold() == wanted for room in meant):
             return meant
@@ -69,18 +69,18 @@ class RoomMap:
         return goals_meant(request, self.goals, dict(self.places), plain=self.guessed or self.plain)
 
     def full_name(self, room: str) -> str:
-        """Return a room's name as rules know it, with the room around it if it is a place."""
+        """Return the name that rules compare: "hall" for a room, "desk in office" for a place."""
         within = dict(self.places).get(room)
         return f"{room} in {within}" if within else room
 
     @property
     def goals(self) -> tuple[str, ...]:
-        """The rooms and the places in them, to all of which the robot can drive."""
+        """The rooms, and the places in them. The robot can drive to each of them."""
         return (*self.rooms, *(place for place, _ in self.places))
 
     @property
     def described(self) -> list[str]:
-        """The rooms for a model, each with its places."""
+        """The rooms as a model reads them, such as "office (with desk and shelf)"."""
         places = {room: [place for place, within in self.places if within == room] for room in self.rooms}
         return [f"{room} (with {listed(within)})" if within else room for room, within in places.items()]
 

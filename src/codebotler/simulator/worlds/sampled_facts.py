@@ -10,7 +10,7 @@ from codebotler.simulator.worlds.matching import SOMEBODY, contains
 
 @dataclass(frozen=True)
 class SampledFact:
-    """A fact of a sampled world.
+    """A fact of a sampled world, such as `"mug" is in "hall"`.
 
     Args:
         form: the fact in words, with `{}` in place of each name or text.
@@ -24,13 +24,13 @@ class SampledFact:
 
     @property
     def sentence(self) -> str:
-        """The fact in words, where no text ends its quotation."""
+        """The fact in words. Quotes in a name become single ones, so that they do not end its quotation."""
         names = map(brief, self.names)
         return self.form.format(*(name.replace('"', "'") if '"' in self.form else name for name in names))
 
 
 def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True) -> SampledFact:
-    """Return the fact that a person or thing is, or is not, in a room. The name is canonical."""
+    """Return the fact that a person or thing is, or is not, in a room. The name is from `normalized`."""
     if name == SOMEBODY:
         return SampledFact(f'{SOMEBODY if is_there else "nobody"} is in "{{}}"', (room,), is_random)
     return SampledFact(f'"{{}}" {"is" if is_there else "is not"} in "{{}}"', (name, room), is_random)
@@ -41,14 +41,14 @@ def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True)
 
 @dataclass
 class ExploredRoom:
-    """The knowledge of a program about one room."""
+    """What a program has found out about one room. All names are from `normalized`."""
 
     missed: set[str] = field(default_factory=set)  # looked for and not found
     gone: set[str] = field(default_factory=set)  # picked up here
     people: set[str] = field(default_factory=set)
 
     def lacks(self, name: str) -> bool:
-        """Return whether a name, or a longer name that contains it, is known to be absent."""
+        """Return whether a name is known to be absent. If "red mug" finds nothing, neither does "mug"."""
         missed = self.missed
         return name in missed or (name != SOMEBODY and any(contains(longer, name) for longer in missed))
 

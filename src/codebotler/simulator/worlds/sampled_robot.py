@@ -49,7 +49,7 @@ class SampledRobot(SimulatedRobot):
     A program that searches several rooms assumes that the thing is in one of them. If the thing is in none,
     `excuses` holds the resulting errors, which are not the program's fault.
 
-    What the past of the room map says of the world holds as it was last seen.
+    Facts from the past of the room map hold as the robot last saw them.
     """
 
     is_copied = True
@@ -103,7 +103,7 @@ class SampledRobot(SimulatedRobot):
         return self.explored[self.room]
 
     def search(self, name: str) -> RoomSearch:
-        """Return the rooms where the program looked for a name, including longer and shorter forms of it."""
+        """Return where the program looked for a name. Looks for "red mug" count for "mug", and vice versa."""
         combined = RoomSearch()
         for sought, search in self.searches.items():
             is_part = contains(name, sought) or contains(sought, name)
@@ -114,7 +114,7 @@ class SampledRobot(SimulatedRobot):
 
     @contextmanager
     def excused(self, *, when: bool) -> Iterator[None]:
-        """Excuse any error raised in this context if random facts, and not the program, caused it."""
+        """Excuse errors raised in this context `when` random facts, and not the program, cause them."""
         try:
             yield
         except RobotError as error:
@@ -202,7 +202,7 @@ class SampledRobot(SimulatedRobot):
         return self.draws[-1].result
 
     def answer(self, options: Sequence[str], *question: str) -> str:
-        """Draw the answer to a question from its options."""
+        """Draw the answer to a question from its options. `question` is its room, person and text."""
         if self.sampler.by_options:
             given = {option.strip().casefold(): option for option in options}
             options, name = [given[text] for text in sorted(given)], (question[0], *sorted(given))
@@ -213,7 +213,7 @@ class SampledRobot(SimulatedRobot):
         return options[self._draw("answer", len(options), agreeing, *question)]
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], errors: Sequence[str] = ()) -> int:
-        """Draw an outcome for a statement, or return the outcome drawn earlier."""
+        """Draw the number of a statement's outcome, or return the number that was drawn earlier."""
         possible = [*outcomes, *errors]
         if statement not in self.outcomes:
             drawn = self.outcomes[statement] = self._draw("outcome", len(possible), statement)
@@ -324,7 +324,7 @@ class SampledRobot(SimulatedRobot):
         return [entity.label for entity in entities if best_fits(wanted, [entity], words)]
 
     def move_person(self, name: str, room: str) -> None:
-        """Move a person to a room or place. Where they were, they are no longer."""
+        """Move a person to a room or place, away from all other rooms."""
         goal, who = self._room_around(self.goal_of(room)), normalized(name)
         for place, explored in self.explored.items():
             things = self.contents[place]

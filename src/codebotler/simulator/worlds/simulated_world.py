@@ -27,7 +27,7 @@ from codebotler.simulator.worlds.matching import (
 )
 
 NO_SUCH_THING = "PickInvalidObject"
-"""The kind of error with which a robot fails to pick up a thing that is not there."""
+"""The kind of error when a robot tries to pick up a thing that is not there."""
 
 
 class SimulatedWorld:
@@ -52,7 +52,7 @@ class SimulatedWorld:
 
     @property
     def place(self) -> str:
-        """Where the robot is, as traces name it."""
+        """Where the robot is, as in traces: "hall" for a room, "desk in office" for a place."""
         return self.full_names.get(self.room, self.room)
 
     @cached_property
@@ -101,7 +101,7 @@ class SimulatedWorld:
         return next((room.within for room in self.world.rooms if room.name == goal), "") or goal
 
     def possible_rooms(self, request: str) -> Sequence[str]:
-        """Return all rooms that a request may refer to; for an exact name, only where it would lead."""
+        """Return all rooms that a request may refer to; for an exact name, it and where it leads."""
         if self.settings.matching == "longest-name":
             around = {room.name: room.within for room in self.world.rooms if room.within}
             return goals_meant(request, self.goals, around)
@@ -172,7 +172,7 @@ class SimulatedWorld:
         return room
 
     def traits(self, name: str) -> Mapping[str, Scalar | tuple[str, ...]]:
-        """Return the properties that the world gives to a thing or person."""
+        """Return the properties that the world gives to a thing or person, such as `{"color": "red"}`."""
         return dict(dict(self.world.traits).get(name, ()))
 
     def move_person(self, name: str, room: str) -> None:
@@ -195,7 +195,7 @@ class SimulatedWorld:
         return values[self.draw_outcome(f'"{statement}"', [f"is {value}" for value in values])]
 
     def truth(self, statement: str) -> bool:
-        """Return whether a statement is true in this world."""
+        """Return whether a statement is true in this world; at random if the world does not set it."""
         known = self._truths.get(statement.casefold())
         if known is None:
             return self.draw_outcome(f'"{statement}"', ("is true", "is not true")) == 0
@@ -214,7 +214,7 @@ class SimulatedWorld:
         return plain_names(labels)
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], _errors: Sequence[str] = ()) -> int:
-        """Draw an outcome for a statement. The same world always gives the same outcome."""
+        """Draw the number of an outcome of a statement. The same world always gives the same one."""
         return self._sampler.draw(len(outcomes), statement)
 
     @cached_property
@@ -230,6 +230,6 @@ def unknown_room(location: str, possible: Sequence[str] = ()) -> RobotError:
 
 
 def ambiguous(request: str, names: Sequence[str]) -> str:
-    """Return a sentence about a request that several names match equally well."""
+    """Return the message `"lab" could mean "lab 1" or "lab 2"; use the name of one of them`."""
     quoted = [f'"{name}"' for name in names]
     return f'"{request}" could mean {listed(quoted, "or")}; use the name of one of them'
