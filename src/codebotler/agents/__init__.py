@@ -1,1 +1,1 @@
-"""Agents: other programs that use the robot over MCP, and whose missions a person approves."""
+"""Agents: other programs, such as Claude Code, propose missions over MCP, and a person approves them."""

@@ -1,4 +1,4 @@
-"""The questions that agents' clients ask their person: to approve, to choose, and what happened."""
+"""Ask the person behind an agent in a dialog of its client: to approve, to choose, or what happened."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ AgentContext: TypeAlias = Context[Gatekeeper, Any]
 
 
 class NotAsked(BaseModel):
-    """The answer to a question that nobody was asked."""
+    """The result if no dialog was shown, for example because the client has none."""
 
 
 class Consent(BaseModel):
-    """The form in which a client asks its person."""
+    """The dialog in which a person approves a program, or declines it."""
 
     approve: bool = Field(
         title="Run it on the robot", description="Tick this to let the robot do exactly this."
@@ -41,14 +41,14 @@ class Consent(BaseModel):
 
 
 class Choice(BaseModel):
-    """The form in which a client asks its person which behaviour they mean."""
+    """The dialog in which a person chooses between the behaviours of different programs."""
 
     answer: Literal["1", "2", "3", "none", "you decide"] = Field(title="Which did you mean?")
     more: str = Field(default="", max_length=MAX_ARGUMENT, title="If none: what should be different?")
 
 
 class StepWord(BaseModel):
-    """The form in which a client asks its person about an unsure step."""
+    """The dialog in which a person says whether a step happened, if the log does not say so."""
 
     answer: Literal["it happened", "it did not happen"] = Field(title="Did this happen?")
 
@@ -57,14 +57,14 @@ class StepWord(BaseModel):
 
 
 class OpenQuestion(NamedTuple):
-    """A question about behaviours, and the mission that waits for its answer."""
+    """A mission that waits until a person chooses a behaviour, and the question about it."""
 
     session: MissionSession
     asked: ClarifyingQuestion
 
 
 async def find_question(ctx: AgentContext) -> OpenQuestion:
-    """Return the question that the current mission asks a person."""
+    """Return the question of the current mission. Raise ToolError if it waits for no choice."""
     session = gatekeeper_of(ctx).console.session
     view = None if session is None else session.view
     if session is None or view is None or view.question is None or not view.waits_for_answer:
@@ -75,14 +75,14 @@ async def find_question(ctx: AgentContext) -> OpenQuestion:
 def ask_which_behaviour(
     question: Annotated[OpenQuestion, Resolve(find_question)], ctx: AgentContext
 ) -> Elicit[Choice] | NotAsked:
-    """Have the client ask its person which behaviour they mean, if it can."""
+    """Open a dialog of the client in which its person chooses a behaviour, if the client has dialogs."""
     if not gatekeeper_of(ctx).asks_client or not _has_dialogs(ctx):
         return NotAsked()
     return Elicit(f"Mission {question.session.view.id}: {which_question(question.asked)}", Choice)
 
 
 async def read_last_past(ctx: AgentContext) -> MissionPast:
-    """Return the past of the last mission, or the one that the current mission continues."""
+    """Return what the last mission did and saw, or, while a rest is current, what the rest continues."""
     gatekeeper, console = gatekeeper_of(ctx), gatekeeper_of(ctx).console
     with as_tool_errors():
         if console.view.past is not None and not console.view.is_over:
@@ -93,7 +93,7 @@ async def read_last_past(ctx: AgentContext) -> MissionPast:
 def ask_whether(
     past: Annotated[MissionPast, Resolve(read_last_past)], ctx: AgentContext
 ) -> Elicit[StepWord] | NotAsked:
-    """Have the client ask its person whether an unsure step happened, beside what the log says."""
+    """Open a dialog of the client on whether a step happened, if the log does not say so."""
     gatekeeper = gatekeeper_of(ctx)
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
         return NotAsked()
@@ -102,7 +102,7 @@ def ask_whether(
 
 
 class ProposedProgram(NamedTuple):
-    """A mission that waits for approval, with its problems and rules when a person was asked."""
+    """A mission to approve, with the problems and switched-off rules that the person sees."""
 
     session: MissionSession
     problems: tuple[str, ...]
@@ -110,7 +110,7 @@ class ProposedProgram(NamedTuple):
 
 
 async def find_program(digest: str, ctx: AgentContext) -> ProposedProgram:
-    """Return the mission whose program has a digest."""
+    """Return the current mission. Raise ToolError if its program has another digest."""
     with as_tool_errors():
         session = gatekeeper_of(ctx).find_session(digest)
     view = session.view
@@ -120,7 +120,7 @@ async def find_program(digest: str, ctx: AgentContext) -> ProposedProgram:
 def ask_person(
     proposed: Annotated[ProposedProgram, Resolve(find_program)], ctx: AgentContext
 ) -> Elicit[Consent] | NotAsked:
-    """Have the client ask its person, unless the program is already approved or the client cannot ask."""
+    """Open a dialog of the client to approve a program, if that is needed and the client has dialogs."""
     gatekeeper, session = gatekeeper_of(ctx), proposed.session
     view = session.view
     may_ask = view.may_be_approved and gatekeeper.may_ask_client(view) and _has_dialogs(ctx)
@@ -133,12 +133,12 @@ def ask_person(
 
 
 def gatekeeper_of(ctx: AgentContext) -> Gatekeeper:
-    """Return what the server's tools share."""
+    """Return the gatekeeper that all tools of the server share."""
     return ctx.request_context.lifespan_context
 
 
 def agent_name(ctx: AgentContext) -> str:
-    """Return the agent's name for logs, as its client gives it."""
+    """Return the agent's name for logs, such as `agent "claude-code"`. Its client gives it."""
     known = ctx.session.client_params
     if known is None:
         return "an agent"
@@ -154,7 +154,7 @@ def _has_dialogs(ctx: AgentContext) -> bool:
 
 @contextmanager
 def as_tool_errors() -> Iterator[None]:
-    """Tell agents about mistakes in a sentence."""
+    """Convert an error of the block to a ToolError, so that the agent reads its sentence."""
     try:
         yield
     except (UserError, MissionError, ModelError) as error:

@@ -44,7 +44,7 @@ MAX_ASKED_CHARACTERS = 4_000
 
 @dataclass
 class Gatekeeper:
-    """Passes the wishes of agents to the console that the page also uses. No method approves for an agent.
+    """Checks what agents ask for, and passes it to the console of the page. No method approves a mission.
 
     Args:
         console: the robot and its current mission.
@@ -80,7 +80,7 @@ class Gatekeeper:
     def propose_steps(
         self, purpose: str, bounds: Mapping[str, Any], author: str
     ) -> tuple[MissionSession, Steps]:
-        """Propose a mission in which the agent calls skills one at a time, within these bounds."""
+        """Propose a mission in which the agent calls skills one at a time. `bounds` is its contract."""
         if self.console.view.is_running:  # before the bounds are read, which takes time
             raise MissionError("a mission is running; wait until it is over, or stop it")
         if len(json.dumps(bounds)) > MAX_CONTRACT_CHARACTERS:
@@ -114,13 +114,13 @@ class Gatekeeper:
         return session, steps
 
     def takes_steps(self, session: MissionSession) -> bool:
-        """Whether a session runs step by step now, and not a program that a person wrote in its place."""
+        """Whether a session runs an agent's steps now, rather than a program that a person wrote instead."""
         steps, view = self._steps, session.view
         is_running = view.state is MissionState.RUNNING and session is self._session
         return is_running and steps is not None and view.program == steps.program
 
     def approves_alone(self, session: MissionSession) -> bool:
-        """Whether the contract given at the start allows all that an agent's own proposal may do.
+        """Whether a mission needs no person, because the contract given at the start allows all it may do.
 
         If a person has changed the program, switched off a rule or pressed STOP, a person must approve it.
         """
@@ -139,12 +139,12 @@ class Gatekeeper:
         return contract_sentence(contract, self.console.robot.skills, whole, is_short=False)
 
     def may_ask_client(self, view: SessionView) -> bool:
-        """Whether a client may ask its person to approve a program, which must fit into a dialog."""
+        """Whether clients may open a dialog to approve a program that can run and is short enough to show."""
         is_short = max(len(view.program), len(self.contract_text(view.contract))) <= MAX_ASKED_CHARACTERS
         return self.asks_client and view.can_run and is_short
 
     def check(self, program: str) -> CheckReport:
-        """Check a program without a mission, in the rooms that are known now."""
+        """Check a program without beginning a mission, in the rooms that are known now."""
         checked = self.console.check(program, self.console.view.room_map, self.console.rules)
         problems = [problem.sentence for problem in checked.problems]
         problems += missing_skills(program, self.console.robot)
@@ -152,7 +152,7 @@ class Gatekeeper:
 
     @contextmanager
     def waiting(self) -> Iterator[None]:
-        """Count a call that waits. Raise MissionError if too many do."""
+        """Count the block as a waiting call. Raise MissionError if `MAX_WAITING_CALLS` wait already."""
         if self._waiting >= MAX_WAITING_CALLS:
             raise MissionError(f"{MAX_WAITING_CALLS} calls are waiting already; wait for their answers")
         self._waiting += 1
@@ -162,17 +162,17 @@ class Gatekeeper:
             self._waiting -= 1
 
     def write(self, author: ModelAuthor, prompt: Prompt) -> CheckReport:
-        """Have a model write a program, and check it."""
+        """Have a model write a program, and check it. Raise UserError if the reply has no program."""
         _, (made, *_) = author.write(prompt, 1, ignore_text)
         if made.programless is not None:
             raise UserError(made.programless.sentence)
         return self.check(made.reply.program)
 
     async def alone(self, kind: str, work: Callable[[], _Made]) -> _Made:
-        """Do slow work on a thread of its own. Raise MissionError if work of this kind is under way.
+        """Do slow work on a new thread. Raise MissionError if work of this `kind` is under way already.
 
-        People need the threads of the SDK and of the event loop, which are few, and a person's check must not
-        wait for many others.
+        The few threads of the SDK and of the event loop stay free for people, and a person's check never
+        waits for many checks of agents.
         """
         if kind in self._under_way:
             raise MissionError(f"another {kind} is under way; try again when it is over")
@@ -191,7 +191,7 @@ class Gatekeeper:
         return await asyncio.wrap_future(made)
 
     def report(self, session: MissionSession | None, after: int = 0) -> MissionReport:
-        """Return a session's mission, with its first events after a position."""
+        """Describe a session's mission for agents, with at most 1,000 events from the position `after`."""
         view = SessionView() if session is None else session.view
         events = [] if session is None else session.events()
         seen = min(len(events), after + MAX_REPORTED_EVENTS)
@@ -211,7 +211,7 @@ class Gatekeeper:
         )
 
     def report_robot(self) -> RobotReport:
-        """Return the robot with all that is known now."""
+        """Describe the robot for agents: its skills, its house rules, and the rooms that are known now."""
         console, room_map = self.console, self.console.view.room_map
         on_map = [] if console.world is None else [room.name for room in console.world.rooms]
         skills = console.robot.skills.without(console.robot.missing)

@@ -70,7 +70,7 @@ class SkillOutcome(_Report):
 
 
 def report_check(check: CheckResult, program: str, problems: Sequence[str], contract: str) -> CheckReport:
-    """Return the result of a check, with the storyboards that people see on the page."""
+    """Convert the result of a check for agents, with the storyboards of the page as text."""
     return CheckReport(
         accepted=not problems,
         problems=[*problems],
@@ -81,7 +81,7 @@ def report_check(check: CheckResult, program: str, problems: Sequence[str], cont
 
 
 def question(view: SessionView, robot: Robot, contract: str) -> str:
-    """Return the question by which a client asks its person to approve a program."""
+    """Return the text of the dialog to approve a program: its problems, its contract and an example run."""
     rules = listed([shortened(rule.name) for rule in view.rules_in_force])
     where = f" at {shortened(robot.address)}" if robot.address else ""
     problems = "\n".join(f"- {shortened(problem)}" for problem in view.problems)
@@ -103,7 +103,7 @@ def question(view: SessionView, robot: Robot, contract: str) -> str:
 
 
 def which_question(asked: ClarifyingQuestion) -> str:
-    """Return the question by which a client asks its person which behaviour they mean."""
+    """Return the text of the dialog to choose a behaviour, with numbered options."""
     facts = f"Suppose that {listed([*map(shortened, asked.facts)])}." if asked.facts else ""
     options = (
         f"{number}. The robot {shortened(one.difference)}." for number, one in enumerate(asked.options, 1)

@@ -42,11 +42,11 @@ MAX_SESSIONS = 100
 """The limit for clients over HTTP that have not ended their sessions."""
 
 MAX_READ_BYTES = 1_000_000
-"""The limit for a file of a mission, since STOP waits while the event loop writes an answer."""
+"""The limit for reading a mission's file. While the event loop sends a large file, STOP would wait."""
 
 
 class Streams(NamedTuple):
-    """The two streams over which a client speaks to us."""
+    """Standard input and output, reserved for the messages of an MCP client."""
 
     received: FileIO
     sent: BufferedWriter
@@ -58,7 +58,7 @@ digest: it waits for the person's approval, which you cannot give. Call stop whe
 
 
 def make_server(gatekeeper: Gatekeeper) -> MCPServer[Gatekeeper]:
-    """Create the server with all tools and resources."""
+    """Create the MCP server with all tools, and with past missions as resources."""
 
     @asynccontextmanager
     async def lifespan(_: MCPServer[Gatekeeper]) -> AsyncIterator[Gatekeeper]:
@@ -129,7 +129,7 @@ def _read_file(home: Path, mission: str, name: str) -> str:
 
 
 def over_http(server: MCPServer[Gatekeeper], announce: Callable[[str], None]) -> Companion:
-    """Return what serves agents over HTTP on the page's port. `announce` receives the page's address."""
+    """Return a companion of the page that serves agents at `/mcp`. `announce` receives the page's address."""
     security = TransportSecuritySettings(enable_dns_rebinding_protection=False)  # the page's guard has it
     (route,) = server.streamable_http_app(
         streamable_http_path=AGENT_PATH, transport_security=security, max_sessions=MAX_SESSIONS
@@ -145,7 +145,7 @@ def over_http(server: MCPServer[Gatekeeper], announce: Callable[[str], None]) ->
 
 
 def over_stdio(server: MCPServer[Gatekeeper], streams: Streams, announce: Callable[[str], None]) -> Companion:
-    """Return what serves one agent on standard input and output, until it closes them."""
+    """Return a companion of the page that serves one agent over `streams`, until its client closes them."""
     server.streamable_http_app()  # makes the session manager, the public way to the server below
     running = server.session_manager.app
 
@@ -209,10 +209,10 @@ async def _open_output(sent: BufferedWriter) -> Any:  # noqa: ANN401 - the SDK w
 
 
 def take_streams() -> Streams:
-    """Take standard input and output for the protocol, so that all that is printed goes to standard error.
+    """Reserve standard input and output for the protocol. From now on, prints go to standard error.
 
     Raises:
-        UserError: no client can be behind standard input.
+        UserError: standard input is neither a pipe nor a socket, so no client started us.
     """
     kind = os.fstat(0).st_mode
     if not (stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind)):

@@ -26,7 +26,7 @@ from codebotler.simulator.skill_protocol import named_arguments, named_result
 from codebotler.simulator.worlds.robot import Argument
 
 IDLE_POLL_SECONDS = 0.1
-"""How often an idle mission looks whether it was stopped."""
+"""The interval at which an idle mission looks whether it was stopped."""
 
 MAX_STEPS = 10_000
 """The limit for the calls of one mission, since people and reports read its events."""
@@ -45,7 +45,7 @@ _Call: TypeAlias = tuple[Skill, list[Argument], "Future[SkillOutcome]"]
 
 @dataclass
 class Steps:
-    """Hands an agent's calls to the thread of its mission, one at a time."""
+    """A queue of an agent's calls of skills. The thread of the mission takes them one at a time."""
 
     purpose: str  # in the agent's words
     contract: Contract  # what it may call
@@ -58,14 +58,14 @@ class Steps:
 
     @cached_property
     def program(self) -> str:
-        """The text that a person approves in place of a program."""
+        """The text that a person approves in place of a program: the purpose and the contract."""
         contract = contract_yaml(self.contract).splitlines()
         purpose = visible(" ".join(self.purpose.split()))
         lines = "\n".join(f"#   {line}" for line in contract)
         return _PROGRAM.format(mark=self.mark, purpose=purpose, contract=lines)
 
     def call(self, name: str, arguments: Mapping[str, object]) -> Future[SkillOutcome]:
-        """Call a skill of the running mission. Raise UserError for a wrong call."""
+        """Queue a call of a skill, and return its future outcome. Raise UserError if the call is wrong."""
         if name not in (self.contract.skills.keys() | TELLING_SKILLS) & {*self.skills}:
             raise UserError(f"this mission may call only {listed(list(self.contract.skills))}")
         call = self.skills[name], named_arguments(self.skills[name], arguments), Future[SkillOutcome]()

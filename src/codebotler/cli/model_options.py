@@ -75,7 +75,7 @@ def model_settings(
     seed: ModelSeedOption = None,
     timeout: TimeoutOption = SamplingSettings.timeout,
 ) -> SamplingSettings:
-    """Return the settings from the options, or raise UserError if two options contradict each other."""
+    """Return a model's settings. Raise UserError if an option is invalid or contradicts another one."""
     if settings not in {None, "paper"}:
         raise UserError(f'unknown settings "{settings}"; use --settings paper, or leave it out')
     if settings is not None and max_tokens is None:  # the paper's temperature and top-p are the defaults
@@ -120,7 +120,7 @@ def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
 
 
 def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], CommandT]:
-    """Return a decorator that adds all options of a function to a command with `**` arguments."""
+    """Return a decorator that gives a command with `**shared` the options of the function `called`, too."""
 
     def extended(command: CommandT) -> CommandT:
         inherited, own = (signature(one, eval_str=True).parameters for one in (called, command))
@@ -135,5 +135,5 @@ def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], Comma
 
 
 def options_for(called: Callable[..., object], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the subset of the given options that a function accepts."""
+    """Return those of the `given` options that the function `called` accepts."""
     return {name: given[name] for name in signature(called).parameters}

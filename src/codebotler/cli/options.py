@@ -1,4 +1,4 @@
-"""Options that several commands share, and the common basis of both command lines."""
+"""Options that several commands share, and what both command lines, codebotler and roboeval, share."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ def robot_settings(
     within: WithinOption = None,
     skills: SkillsOption = None,
 ) -> RobotSettings:
-    """Read the files that the options name, or raise UserError if a file is invalid."""
+    """Read the world, rules, contract and other files of the options. Raise UserError if one is invalid."""
     from codebotler.checking.house_rules.file import read_rules
     from codebotler.core.skills.files import skills_from
     from codebotler.robots.base import Options
@@ -186,7 +186,7 @@ def robot_settings(
 def read_connect_option(
     file: Path | None, robot: str | None, skills: SkillTable
 ) -> tuple[str, Connection | None]:
-    """Return the kind of robot, and the connection from a file or None if no file is given."""
+    """Return the kind of robot, such as `sim`, and the connection in the --connect file, if given."""
     if file is None:
         return robot or "sim", None
     from codebotler.robots.ros.connections.connection_file import read_connection
@@ -200,7 +200,7 @@ def read_connect_option(
 def read_world(
     robot: str, file: Path | None, skills: SkillTable, connection: Connection | None = None
 ) -> World | None:
-    """Read the world file. Without one, return the robot's places, the simulated robot's office or None."""
+    """Read a world file. By default, return the places of the connection, the office of `sim`, or None."""
     from codebotler.core import world_file
     from codebotler.robots.simulated import OFFICE
 

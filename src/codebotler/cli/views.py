@@ -126,7 +126,7 @@ def list_view(summaries: Sequence[MissionSummary]) -> RenderableType:
 def mission_view(
     summary: MissionSummary, events: Sequence[LogLine], rest: MissionSummary | None = None
 ) -> RenderableType:
-    """Show a mission with its events, and what became of its rest."""
+    """Show a mission with its program and events, and how the mission that continued it ended."""
     head = Text.assemble((f"mission {summary.id}", "bold"), f" on the robot {summary.robot}")
     if summary.instruction:
         head.append(f"\n{shortened(summary.instruction)}")

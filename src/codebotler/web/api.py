@@ -26,7 +26,7 @@ from codebotler.missions.storage.store import find_mission, read_missions
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, MAX_WAIT_SECONDS, Console
 
 _CURRENT = "current"
-"""The name of the current mission in a path."""
+"""In a path, this word means the current mission, as in `/api/missions/current`."""
 
 _LimitedText = Annotated[str, Field(max_length=MAX_PROGRAM_CHARACTERS)]
 
@@ -64,7 +64,7 @@ class Approval(_Form):
 
 
 class AnswerForm(_Form):
-    """An answer to the question which of several behaviours is meant."""
+    """A person's answer if programs behave differently: the behaviour that the person means."""
 
     answer: Annotated[int, Field(ge=1)] | Literal["none", "decide"] = Field(
         description="The number of an option, from 1; `none` of them; or `decide` to take the most frequent."
@@ -75,7 +75,7 @@ class AnswerForm(_Form):
 
 
 class AskAgainForm(_Form):
-    """A request for another program."""
+    """A request that the model write another program."""
 
     repair: bool = Field(default=False, description="Whether to send the program and its problems.")
     max_tokens: Annotated[int, Field(ge=0)] = Field(
@@ -84,7 +84,7 @@ class AskAgainForm(_Form):
 
 
 class ContinueForm(_Form):
-    """A request for the rest of a mission."""
+    """A request to do the rest of a mission that ended early."""
 
     happened: bool | None = Field(
         None, description="A person's word on whether the last step happened, if the log does not say so."
@@ -95,22 +95,22 @@ class ContinueForm(_Form):
 
 
 class AsciiJSONResponse(JSONResponse):
-    """ASCII-only JSON, because programs may contain lone surrogates."""
+    """A JSON response in ASCII, because UTF-8 cannot encode the lone surrogates that programs may have."""
 
     def render(self, content: object) -> bytes:
-        """Encode the body of the response."""
+        """Return the body of the response: JSON without spaces, in ASCII."""
         return json.dumps(content, separators=(",", ":")).encode("ascii")
 
 
 def invalid_request(_request: Request, error: Exception) -> AsciiJSONResponse:
-    """Explain what is wrong with a request, without echoing it."""
+    """Return status 422 with the fields that are wrong, and why, but without the values sent."""
     assert isinstance(error, RequestValidationError), "registered only for this error"
     detail = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
     return AsciiJSONResponse({"detail": detail}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
 
 def router(console: Console) -> APIRouter:
-    """Create the routes of the API."""
+    """Create the routes below `/api` for missions, checks and the robot."""
     api = APIRouter(
         prefix="/api",
         tags=["missions"],
@@ -281,7 +281,7 @@ async def _stream(console: Console, session: MissionSession, known: int) -> Asyn
 
 
 def view_data(view: SessionView) -> dict[str, Any]:
-    """Return a view as plain data."""
+    """Convert what viewers see of a mission, such as its program and its check, to data for JSON."""
     as_in_view = (
         *("id", "state", "phase", "busy", "instruction", "model", "author", "digest", "is_written"),
         *("problems", "unknown_rooms", "remarks", "reason", "line", "is_over"),

@@ -38,14 +38,14 @@ MAX_WAIT_SECONDS = 15.0
 """The longest time that a request waits for a change."""
 
 CLEANUP_SECONDS = 2.0
-"""The time limit for ending a mission if the robot has not moved yet."""
+"""The time limit for ending a mission if its program has not begun to run."""
 
 
 class Console:
-    """Holds the robot and the current mission for viewers on any thread. Only missions connect the robot.
+    """Begins, changes and stops the missions of one robot, for the page, for agents and for the terminal.
 
-    `models` are the names of the available models, beginning with the default. `recoveries` says how many
-    times a model may write the rest of a mission without a request, if a skill fails.
+    Any thread may use it. Only missions connect the robot. `models` are names; the first is the default.
+    If a skill fails, a model may write the rest of the mission, `recoveries` times in a row.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Console:
         self.end()
 
     def end(self) -> None:
-        """Stop the current mission, and wait until it is over, but not for long if nothing has moved."""
+        """Stop the current mission, and wait for its end, but not for long if it had not begun to run."""
         with self._lock:
             session, self._may_recover = self.session, None
             self._end_hold()
@@ -101,12 +101,12 @@ class Console:
 
     @property
     def view(self) -> SessionView:
-        """The current view."""
+        """What viewers see of the current mission, or else of the last one; empty before the first."""
         session = self.session
         return SessionView() if session is None else session.view
 
     async def view_once(self, *, over: bool) -> SessionView:
-        """Return the view once its `is_over` equals `over`, or after `MAX_WAIT_SECONDS`."""
+        """Wait until a mission is over, or has begun if not `over`, at most 15 s, and return the view."""
         await self.notifier.until(lambda: self.view.is_over == over, MAX_WAIT_SECONDS)
         return self.view
 
@@ -167,11 +167,11 @@ class Console:
         return session
 
     def past_of(self, mission: str) -> MissionPast:
-        """Read what a mission did and saw, given its ID or `last`. Raise UserError if it has no rest."""
+        """Read what a mission did and saw, by ID or `last`. Raise UserError if it cannot be continued."""
         return read_past(find_mission(self.home, mission), self.robot.skills, self.robot.name, self.world)
 
     def rest_of(self, past: MissionPast, program: str = "", author: str = "") -> MissionOrder:
-        """Return the order for the rest of a mission: its own program, if nothing was done."""
+        """Return the order to continue a mission by `program`, its own if nothing was done, or a model's."""
         if not program and (past.is_untouched or not past.instruction):
             program, author = past.program, past.model
             model = past.model if past.model in self.models else ""
@@ -214,7 +214,7 @@ class Console:
 
     @property
     def is_held(self) -> bool:
-        """Whether a person has pressed STOP, also before this process, and has approved no later mission."""
+        """Whether a person must approve the next mission, after a person's STOP, even before a restart."""
         return self._held_since is not None
 
     def _end_hold(self) -> None:
@@ -230,9 +230,9 @@ class Console:
         self.notifier.change()
 
     def stop(self, by: str, *, only_moving: bool = False, holds: bool = True) -> bool:
-        """Stop the mission, or only an approved one, without waiting. Return whether there was one.
+        """Ask the current mission to stop. Return at once whether there was a mission to stop.
 
-        If it `holds`, as a person's STOP does, a person must approve the next mission.
+        `only_moving` spares a mission without approval. With `holds`, a person must approve the next one.
         """
         with self._lock:
             session, self._may_recover = self.session, None
@@ -271,12 +271,12 @@ class Notifier:
             wake()
 
     def close(self) -> None:
-        """End all waits, since the server ends."""
+        """End the loops over `changes`, because the server ends."""
         self.is_closed = True
         self.change()
 
     async def changes(self) -> AsyncGenerator[None]:
-        """Yield once now, and again after changes, until the end. Quick changes may be merged."""
+        """Yield now and after each change, until `close`. Changes in quick succession may count as one."""
         loop, changed = asyncio.get_running_loop(), asyncio.Event()
 
         def wake() -> None:

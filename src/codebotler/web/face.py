@@ -1,4 +1,4 @@
-"""The page and the API of the robot's face, which can neither run nor read programs."""
+"""The page and the API of the robot's face: a screen where people answer the robot, or stop it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class FaceAnswer(BaseModel):
 
 
 def router(console: Console, face: Face) -> APIRouter:
-    """Create the routes of the face."""
+    """Create the routes of the page `/face` and of the API below `/api/face`."""
     routes = APIRouter(tags=["face"])
 
     @routes.get("/face", include_in_schema=False)
@@ -105,7 +105,7 @@ async def _send_changes(socket: WebSocket, console: Console, face: Face) -> None
 
 
 def face_data(console: Console, face: Face) -> dict[str, Any]:
-    """Return the contents of a face as plain data."""
+    """Return what a face shows, such as what the robot says and asks, as data for JSON."""
     view, shown = console.view, face.shown
     question = shown.question
     is_moving = view.is_running and view.progress.is_driving
@@ -130,7 +130,7 @@ def _seconds_left(question: FaceQuestion) -> float | None:
 
 
 def question_data(question: FaceQuestion) -> dict[str, Any]:
-    """Return a question as plain data."""
+    """Convert a question to data for JSON, with long strings shortened, and at most 50 options."""
     return {
         "number": question.number,
         "person": screen_text(question.person, MAX_FACE_OPTION),
@@ -141,7 +141,7 @@ def question_data(question: FaceQuestion) -> dict[str, Any]:
 
 
 def screen_text(text: str, most: int = MAX_FACE_TEXT) -> str:
-    """Shorten a string, keep its line breaks, and escape hidden characters."""
+    """Shorten a string to `most` characters, and escape hidden characters, but keep line breaks."""
     return shortened(text, most, visible_lines)
 
 

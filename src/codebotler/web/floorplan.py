@@ -1,4 +1,4 @@
-"""Draw a map of the rooms as SVG, with the robot, its trail and its finds."""
+"""Draw a map of the rooms as SVG, with the robot, its path and what it has found."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MAX_LABEL_CHARACTERS, _MAX_FINDS = 60, 3
 
 @dataclass(frozen=True)
 class MapState:
-    """The contents of a map, apart from its rooms.
+    """What a map shows besides rooms: where the robot is and was, what it holds, and what it has found.
 
     Args:
         at: the robot's position in metres, if known.
@@ -41,7 +41,7 @@ class MapState:
 
     @property
     def sentence(self) -> str:
-        """A description of the contents."""
+        """The map in words: `The robot is in kitchen. Found in kitchen: cup.`, for screen readers."""
         where = "is between rooms" if self.at else ""
         if self.room:
             where = f"{'is driving to' if self.is_driving else 'is in'} {self.room}"

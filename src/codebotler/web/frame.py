@@ -36,7 +36,7 @@ PAGE_BUILD_SECONDS = 60.0
 
 @dataclass(frozen=True)
 class Frame:
-    """Adds the bar to a page. Its STOP button works even if the rest of the page does not.
+    """Adds the bar and STOP to a page. STOP works even if the rest of the page does not.
 
     Args:
         links: the names and addresses of pages, in order.
@@ -68,7 +68,7 @@ class Frame:
 
 
 def outside(address: str) -> str:
-    """Return the address that the browser must use for a path, which may have a prefix behind a proxy."""
+    """Return a path with the prefix that browsers must use, such as `/robot/missions` for `/missions`."""
     request = ui.context.client.request
     return prefix_of(request.scope) + address
 
@@ -98,7 +98,7 @@ class PlainText(TextElement):
 
 
 def scroll_up() -> None:
-    """Scroll to the first pane, if the panes form one column."""
+    """Scroll to the first pane on small screens, where the panes form one column."""
     ui.run_javascript("matchMedia('(max-width: 1180px)').matches && scrollTo(0, 0)")
 
 
@@ -114,7 +114,7 @@ def warn(sentence: str, seconds: float = 5.0) -> None:
 
 @contextmanager
 def warned() -> Iterator[None]:
-    """End the block at an error that people can cause, and show its sentence as a warning."""
+    """Show a UserError, MissionError or AnswerError of the block as a warning on the page."""
     try:
         yield
     except (AnswerError, MissionError, UserError) as error:
@@ -122,7 +122,7 @@ def warned() -> Iterator[None]:
 
 
 class Button(PlainText):
-    """A button that calls a function, and shows the sentence of its error as a warning."""
+    """A button that calls a function. A mistake of the user is shown as a warning."""
 
     def __init__(self, text: str, pressed: Callable[[], Any], kind: str = "") -> None:
         async def press() -> None:
@@ -147,7 +147,7 @@ Content = TypeVar("Content")
 
 
 class DrawnBox(Element, Generic[Content]):
-    """An element whose inside is drawn again when what it shows has changed."""
+    """An element that draws its content with a function, and again only when the content has changed."""
 
     def __init__(self, kind: str, draw: Callable[[Content], None], tag: str = "div") -> None:
         super().__init__(tag)
@@ -172,12 +172,12 @@ class DrawnBox(Element, Generic[Content]):
 
 @dataclass(frozen=True)
 class Site:
-    """The site to which other packages add pages. The guard protects these pages, and keeps faces out.
+    """The website to which other packages add pages. Only operators can open them.
 
     Args:
         app: the application; API routes belong below `/api/`, and files below `/static/`.
         frame: the frame, which must be called first on each page.
-        runs: the folder of runs.
+        runs: the folder with the runs of benchmarks.
     """
 
     app: FastAPI

@@ -17,7 +17,7 @@ _PARTS = (("Instruct", "#h-instruct"), ("Program", "#h-program"), ("Status", "#h
 
 
 def add(console: Console, frame: Frame) -> None:
-    """Add the operator's pages."""
+    """Add the pages for operators: the three panes, the list of missions, and each mission."""
 
     @ui.page("/", response_timeout=PAGE_BUILD_SECONDS)
     async def operate() -> None:

@@ -53,7 +53,7 @@ _STREAM_END_SECONDS = 3
 
 @dataclass(frozen=True)
 class Companion:
-    """A server that shares the page's process and robot."""
+    """A second server in the page's process and for its robot, such as the server for agents."""
 
     routes: Sequence[BaseRoute]  # on the page's port, behind the guard
     run: Callable[[], Coroutine[Any, Any, None]]  # returns at its end
@@ -70,10 +70,10 @@ def serve(
     alone_for: float | None = None,
     companion: Companion | None = None,
 ) -> None:
-    """Serve the page until Ctrl-C, which also stops a running robot. Without a console, serve only `further`.
+    """Serve the page until Ctrl-C, which also stops the robot. Without a console, serve `further` pages only.
 
-    Unless `alone_for` is None, a running robot is also stopped that many seconds after all operators left.
-    The page ends with `companion`.
+    If `alone_for` is given, the robot stops that many seconds after the last operator has closed the page.
+    When the `companion` ends, the page ends, too.
     """
     with place.listen() as bound, console or nullcontext():
         port = bound.getsockname()[1]
@@ -143,7 +143,7 @@ def application(
     runs: Path = RUNS_FOLDER,
     routes: Sequence[BaseRoute] = (),
 ) -> FastAPI:
-    """Create the application, without the guard."""
+    """Create the web application with all its pages and routes, but without the guard of requests."""
     links = tuple((pages.name, pages.address) for pages in further)
     to_face = (FACE_LINK,) if console and console.face else ()
     frame = (

@@ -1,4 +1,4 @@
-"""Draw storyboards on the page, with one strip for each kind of sampled world."""
+"""Draw what the robot would do, room by room, in a strip for each different outcome of a check."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SCENE_MARKS = {
     "failed": ("✗", "failed here"),
     "stopped": ("■", "stopped here"),
 }
-"""The sign of a room for how far a mission came, and its meaning."""
+"""For each way in which a visit to a room ended: the sign at the room, and its meaning in words."""
 _LEFT_OUT = "…"  # replaces rooms in a shortened strip
 _NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which are only examples."
 
@@ -50,7 +50,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Strip:
-    """The scenes of one sampled world."""
+    """What the robot would do in one imagined world: its visits to rooms, and how the program ends."""
 
     world: str  # a description of the world, as the first half of a sentence
     scenes: tuple[Scene, ...]
@@ -59,7 +59,7 @@ class Strip:
 
 
 class Storyboard(NamedTuple):
-    """The runs of a robot that a check imagined, and how far the robot has come."""
+    """What the check expects the robot to do, and how far the real robot has come."""
 
     check: CheckResult
     title: str
@@ -69,7 +69,7 @@ class Storyboard(NamedTuple):
 
 
 def draw_strips(board: Storyboard) -> None:
-    """Draw what a robot would do in each kind of world.
+    """Draw a strip for each different outcome in imagined worlds.
 
     Visited rooms are ticked off, and strips that the actual run contradicts are collapsed.
     """
@@ -94,7 +94,7 @@ def draw_strips(board: Storyboard) -> None:
 
 
 def scenes_reached(strip: Strip, visited: Sequence[str], learned: Sequence[Event]) -> int | None:
-    """Return how many drives of a strip the robot has completed, or None if its run differs from it."""
+    """Return how many drives of a strip the robot has done, or None if it did or saw something else."""
     is_whole = all(scene.room != _LEFT_OUT for scene in strip.scenes)
     expected = [deed.text for scene in strip.scenes for deed in scene.deeds if deed.kind in {CHECK, ANSWER}]
     actual = [_learned_text(event) for event in learned]
@@ -121,9 +121,9 @@ def draw_scene(
     mark: str = "",
     anchor: str = "",
 ) -> None:
-    """Draw one visit to a room, and mark wrong steps and, by a key of `SCENE_MARKS`, how far a mission came.
+    """Draw one visit to a room. `wrong` holds the numbers of steps to draw in red.
 
-    A step's HTML ID is `anchor` followed by its number.
+    `mark` is a key of `SCENE_MARKS`. With an `anchor`, each step gets it and its number as HTML ID.
     """
     kinds = ["scene"] if scene.deeds or not scene.is_found else ["scene", "passing"]
     kinds += ["wrong"] * (scene.step in wrong) + [mark] * bool(mark)
@@ -151,7 +151,7 @@ def _number(element: PlainText, step: int, anchor: str) -> None:
 
 
 def strips(check: CheckResult) -> list[Strip]:
-    """Return one strip for each distinct outcome, beginning with the outcomes that have problems."""
+    """Return one strip for each different outcome, but at most 6, with problems first."""
     different: dict[tuple[tuple[Scene, ...], str], tuple[bool, Strip]] = {}
     for sample in check.samples:
         strip = _strip(sample, check)
@@ -180,7 +180,7 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
 def scenes(
     steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int | None] = frozenset()
 ) -> tuple[Scene, ...]:
-    """Return the scenes of a trace. A long trace is shortened in the middle, but keeps all needed steps."""
+    """Group the steps of a run by visits to rooms. Of a long run, show both ends and the `needed` steps."""
     found: list[Scene] = [Scene(shortened(start, _MAX_STEP_TEXT))]
     for is_shown, some in select_steps(steps, needed):
         if not is_shown:

@@ -23,7 +23,7 @@ def published() -> dict[str, Any]:
 
 
 def model_of(run: JudgedRun) -> str | None:
-    """Return the paper's model that a run used, judged by its recorded name or folder, or None if unsure."""
+    """Return the paper's name for a run's model, found by its recorded name or folder. None if unsure."""
     if run.results.manifest.get("suite") != PAPER_SUITE or run.is_mixed:
         return None
     provider, colon, name = (run.model or run.folder).lower().partition(":")
@@ -33,7 +33,7 @@ def model_of(run: JudgedRun) -> str | None:
 
 
 def recognised_models(runs: Iterable[JudgedRun]) -> list[str]:
-    """Describe which runs are recognised as models of the paper."""
+    """Say in a sentence which runs are by models of the paper. Return nothing if none is."""
     pairs = [f"{run.name} is {model}" for run in runs if (model := model_of(run)) is not None]
     return [f"Recognised by name as models of the paper: {', '.join(pairs)}."] if pairs else []
 
@@ -45,13 +45,13 @@ def uses_authors_prompts(run: JudgedRun) -> bool:
 
 
 def cell(model: str, task: str, prompt: int) -> float | None:
-    """Return the published pass@1 of one of the authors' prompts."""
+    """Return the pass@1 that the paper gives for a model on one of the authors' prompts, or None."""
     rows = published()["pass_at_1"].get(task, [])
     return rows[prompt][_column(model)] if prompt < len(rows) else None
 
 
 def task_mean(model: str, task: str) -> float | None:
-    """Return the mean of the published pass@1 over the prompts of a task."""
+    """Return a model's published pass@1 of a task, the mean over its prompts, or None if there is none."""
     rows = published()["pass_at_1"].get(task)
     return None if rows is None else sum(row[_column(model)] for row in rows) / len(rows)
 

@@ -26,7 +26,7 @@ MAX_DRAWN_RUNS = 8  # readers cannot tell apart more colours
 
 @dataclass(frozen=True, eq=False)
 class JudgedRun:
-    """A judged run, with its results under other requirements if available."""
+    """A run with its verdicts, and with its verdicts by other requirements, if there are any."""
 
     results: Results
     table: pl.DataFrame  # the column `accepted` is null for unchecked programs
@@ -73,12 +73,12 @@ class JudgedRun:
 
     @cached_property
     def by_prompt(self) -> dict[tuple[str, int], float]:
-        """The pass@1 of each prompt, by task and prompt."""
+        """The pass@1 of each prompt. The key of prompt 0 of CountMen is `("CountMen", 0)`."""
         return pass_at_1(self.scores)
 
     @property
     def coverage_sentence(self) -> str:
-        """A description of the coverage of completions, prompts and tasks."""
+        """How much was judged, such as `12 of 80 completions (68 not judged), 5 prompts of 1 task`."""
         prompts = counted(len(self.by_prompt), "prompt")
         return f"{self.results.coverage}, {prompts} of {counted(len(self.scores), 'task')}"
 
@@ -95,7 +95,7 @@ class JudgedRun:
 
     @cached_property
     def checked(self) -> tuple[CheckedPrompt, ...]:
-        """Counts of the completions of each prompt. Empty unless all completions were checked."""
+        """How many completions of each prompt pass the check, the task or both. Empty if any is unchecked."""
         return () if self.table["accepted"].null_count() else count_by_prompt(self.table)
 
 
@@ -113,7 +113,7 @@ def runs_to_draw(runs: Sequence[JudgedRun]) -> tuple[list[JudgedRun], list[str]]
 
 
 def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
-    """Describe the coverage of each run for captions. If all runs have the same, describe it once."""
+    """Say for captions how much of each run was judged, or say it once if this is the same for all runs."""
     sentences: dict[str, list[str]] = {}
     for run in runs:
         sentences.setdefault(run.coverage_sentence, []).append(run.name)
@@ -168,7 +168,7 @@ def _extend_duplicates(names: Sequence[str], longer: Sequence[str]) -> list[str]
 
 
 def price_runs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> list[JudgedRun]:
-    """Return the runs with the price given for the folder, name or model of each.
+    """Give each run the price that `prices` has for its folder, name or model.
 
     Raises UserError if a price is for none of the runs.
     """

@@ -41,7 +41,7 @@ def note(name: str) -> str:
 
 
 class Column(NamedTuple):
-    """Defines a column of a table."""
+    """A column of a table: its heading and the kind of its cells."""
 
     head: str
     kind: ColumnKind = "text"  # "class" is a class of failures; "share" is from 0 to 1
@@ -59,14 +59,14 @@ class Sheet(NamedTuple):
 def sheet(
     name: str, rows: Sequence[Sequence[Any]], *, notes: Sequence[str] = (), shares: Sequence[str] = ()
 ) -> Sheet:
-    """Create a table that page.yaml describes. `shares` adds columns of shares, such as one per model."""
+    """Create a table with the columns in page.yaml. `shares` are the heads of more columns, one per model."""
     kinds = page_text("tables", name)["columns"]
     columns = [Column(head, kind) for part in kinds for kind, heads in part.items() for head in heads]
     return Sheet(name, [*columns, *(Column(head, "share") for head in shares)], rows, notes)
 
 
 class ReportFigure(NamedTuple):
-    """A figure of a report, which is drawn when needed."""
+    """A figure of a report, with the function that draws it when the report is written."""
 
     name: str  # the key in page.yaml and the name of the files
     draw: Callable[[], Figure]
@@ -86,7 +86,7 @@ class Groups(NamedTuple):
 
 
 class Card(NamedTuple):
-    """Summarises a run."""
+    """A run in brief: its pass@1, coverage, cost and most frequent failure."""
 
     name: str
     passed: Estimate  # pass@1
@@ -147,7 +147,7 @@ def _heads(columns: Sequence[Column]) -> list[str]:
 
 
 def format_cell(cell: Cell, kind: ColumnKind) -> str:
-    """Format a cell for readers."""
+    """Format a cell by the kind of its column: 0.5 is `0.500` as a share, and `+0.500` as a difference."""
     if cell is None or isinstance(cell, str):
         return "-" if cell is None else label_of(cell) if kind == "class" else cell
     match kind:

@@ -162,7 +162,7 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
 
 
 def expect_no_others(out: Path) -> None:
-    """Raise UserError if a folder is neither empty nor a report."""
+    """Raise UserError if a folder is neither empty nor a report, because a report replaces files."""
     if not out.is_dir():
         return
     others = sorted(one.name for one in out.iterdir() if not one.name.startswith("."))
@@ -175,5 +175,5 @@ def expect_no_others(out: Path) -> None:
 
 
 def pieces(sections: Sequence[Section]) -> int:
-    """Count the names that `write_report` yields."""
+    """Count the names that `write_report` yields, to show its progress."""
     return 1 + sum(isinstance(part, Sheet | ReportFigure) for section in sections for part in section.parts)

@@ -17,7 +17,7 @@ from roboeval.web.serializers import RunList, completion_details, entry_data, ru
 from roboeval.web.snapshot import CompletionFilter
 
 MAX_PAGE_SIZE = 1_000
-"""Completions per response."""
+"""The largest number of completions in a response."""
 
 REPORT_POLICY = (
     "sandbox allow-downloads; default-src 'none'; style-src 'unsafe-inline'; img-src data:; "
@@ -34,7 +34,7 @@ EvaluationQuery: TypeAlias = Annotated[
 
 
 def router(store: RunStore, all_runs: RunList) -> APIRouter:
-    """Create the routes of the API."""
+    """Create the routes below `/api/runs`."""
     api = APIRouter(
         prefix="/api/runs",
         tags=["runs"],

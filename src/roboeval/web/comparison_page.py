@@ -153,7 +153,7 @@ def _find_differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[C
 
 @dataclass(frozen=True)
 class Difference:
-    """The difference between two judged runs."""
+    """Which of two judged runs is better, in a sentence and, for a single pair, by task."""
 
     runs: tuple[Snapshot, Snapshot]
     sentence: str  # states which run is better, and how significant the difference is

@@ -21,7 +21,7 @@ EMPTY_CELL = {"text": "", "shade": "none"}
 
 
 def shade(share: float | None, *, bad: bool) -> str:
-    """Return the CSS class of a cell. Its share is from 0 to 1, or None if it is unknown."""
+    """Return a cell's CSS class: `s7` for 0.7, or `f7` if a high share is `bad`, and `waits` for None."""
     if share is None:
         return "waits"
     step = round(share * SHADE_STEPS)
@@ -54,7 +54,7 @@ def failure_text(chosen: CompletionFilter) -> str | None:
 
 
 def verb_of(chosen: CompletionFilter) -> str:
-    """Say in a verb what the completions that a filter selects have done; by default, they passed."""
+    """Return what the selected completions did: `passed`, `failed` or, for example, `ended in NameError`."""
     if (by := failure_text(chosen)) is not None:
         return f"ended {by}"
     return "failed" if chosen.passed is False else "passed"
@@ -80,7 +80,7 @@ class TaskCells:
         return [{"name": "mean", "title": "mean over the prompts"}, *numbers]
 
     def row(self, task: str) -> list[dict[str, Any]]:
-        """Return the cells of a task."""
+        """Return the cells of a task: its mean, and one for each prompt."""
         prompts = self.tasks.get(task)
         if prompts is None:
             return [{**EMPTY_CELL, "text": "no completions", "span": 1 + self._prompts}]
@@ -116,7 +116,7 @@ class TaskCells:
 
 
 def failure_rows(runs: Sequence[Snapshot]) -> list[dict[str, Any]]:
-    """Return the rows of failures by run: each class followed by its kinds, most frequent first."""
+    """Return a row for each class and kind of failure, with a cell for each run. Frequent ones come first."""
     largest: dict[tuple[str, str | None], float] = {}
     for run in runs:
         largest |= {key: max(one.share, largest.get(key, 0.0)) for key, one in run.failures.items()}

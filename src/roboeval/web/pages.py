@@ -25,7 +25,7 @@ from roboeval.web.widgets import page_of
 
 
 def pages(suites: Sequence[Suite] = ()) -> Pages:
-    """Create the pages. `suites` are available in addition to the suites in the package."""
+    """Create the pages of the benchmark. Runs may be judged by `suites` as well as by built-in suites."""
 
     def add(site: Site) -> None:
         store = RunStore(site.runs, suites)
@@ -65,4 +65,4 @@ def _redirect_to_runs(request: Request) -> RedirectResponse:
 
 
 PAGES = pages()
-"""The entry point refers to this name."""
+"""The pages that `codebotler serve` finds by the entry point `codebotler.pages`."""

@@ -31,7 +31,7 @@ class MissingError(UserError):
 
 
 class RunStore:
-    """Provides the runs in a folder, which may itself be a run or not exist yet. It is thread-safe."""
+    """Finds and reads the runs in a folder. The folder may be a run itself, or not exist yet. Thread-safe."""
 
     def __init__(self, folder: Path, suites: Sequence[Suite] = ()) -> None:
         self.folder = folder
@@ -43,11 +43,11 @@ class RunStore:
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """Read a run, or reuse a snapshot. By default, `key` is the first evaluation that is no ablation."""
+        """Read a run, or reuse its snapshot. `key` is an evaluation, by default one that is no ablation."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:
-        """Return the version of a run without reading the run."""
+        """Return a value that changes when a file of the run changes. The run is not read."""
         return self._reader(name, None).version()
 
     def report(self, name: str, part: str = REPORT_PAGE) -> bytes:
@@ -63,7 +63,7 @@ class RunStore:
         raise MissingError("this run has no such report or table")
 
     def has_report(self, name: str) -> bool:
-        """Whether the folder of a run contains a report."""
+        """Whether a run has a report that is small enough to show."""
         try:
             self.report(name)
         except UserError:

@@ -35,7 +35,7 @@ class RunState(StrEnum):
 
 
 def state_of(run: Snapshot) -> RunState:
-    """Determine the progress of a run."""
+    """Find out how far a run is: for example, `unfinished` if a completion is missing or not judged."""
     written, coverage = len(run.results.completions), run.results.coverage
     lacks = coverage.there < coverage.total
     unjudged = run.judged < run.results.scope.total
@@ -50,7 +50,7 @@ def state_of(run: Snapshot) -> RunState:
 
 
 def run_data(run: Snapshot) -> dict[str, Any]:
-    """Summarise a run as plain data."""
+    """Summarise a run for JSON, with its models, suite, progress, pass@1 and problems."""
     results, mean, coverage = run.results, run.pass_at_1, run.results.coverage
     return {
         "run": run.name,
@@ -77,7 +77,7 @@ def run_data(run: Snapshot) -> dict[str, Any]:
 
 
 def settings_text(about: Mapping[str, Any]) -> str:
-    """Format the settings in run.json, except those that were not sent to the model."""
+    """Format the settings in run.json that were sent to the model, such as `temperature 0.2, top-p 0.95`."""
     settings = about.get("settings")
     how = {name: about[name] for name in ("mode", "max_turns") if name in about}
     named = {**how, **(settings if isinstance(settings, dict) else {})}.items()
@@ -121,7 +121,7 @@ class RunList:
         self._known: dict[str, tuple[Hashable, dict[str, Any]]] = {}
 
     def data(self, seconds: float = math.inf) -> list[dict[str, Any]]:
-        """Summarise all runs, or say why a run cannot be read. After `seconds`, read no further runs."""
+        """Summarise all runs, or say why one cannot be read. After `seconds`, use only known data."""
         until = time.monotonic() + seconds
         return [self._run_data(name, may_read=time.monotonic() < until) for name in self._store.names()]
 
@@ -142,7 +142,7 @@ class RunList:
 
 
 def run_details(run: Snapshot) -> dict[str, Any]:
-    """Return a run with its tasks, prompts and kinds of failure."""
+    """Return `run_data` with pass@1 of each task and prompt, and the number of failures of each kind."""
     means = {score.task: score.pass_at(1).mean for score in run.scores}
     tasks: dict[str, list[dict[str, Any]]] = {}
     for prompt in run.prompts(CompletionFilter(passed=True)):
@@ -168,7 +168,7 @@ def run_details(run: Snapshot) -> dict[str, Any]:
 
 
 def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Summarise a completion, given its row in `Snapshot.completions`."""
+    """Summarise a completion for a list, given its row in `Snapshot.completions`."""
     failure = {name: row[f"failure_{name}"] for name in ("class", "kind", "world", "check")}
     return {
         **{name: row[name] for name in (*KEY, "passed")},

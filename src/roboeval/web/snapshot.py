@@ -47,7 +47,7 @@ INT64_LIMIT = 2**63
 
 @dataclass(frozen=True)
 class CompletionFilter:
-    """Selects completions by the values of columns. Pages and the API accept a filter as a query."""
+    """Selects completions, such as the failed ones of one task. Pages and the API read it from their URL."""
 
     task: Annotated[str | None, Query(description="Only this task.")] = None
     prompt: Annotated[
@@ -59,17 +59,17 @@ class CompletionFilter:
 
     @property
     def condition(self) -> pl.Expr:
-        """The condition on `Snapshot.completions` that corresponds to the filter."""
+        """The filter as a Polars condition on the rows of `Snapshot.completions`."""
         conditions = [pl.col(name) == value for name, value in asdict(self).items() if value is not None]
         return pl.all_horizontal(pl.lit(value=True), *conditions)
 
     @property
     def verdict(self) -> Self:
-        """The same filter for all tasks and prompts."""
+        """This filter without its task and prompt, so that it selects by verdict and failure only."""
         return replace(self, task=None, prompt=None)
 
     def query(self, evaluation: str | None) -> str:
-        """Return the query of a URL, which is empty for all completions of the default evaluation."""
+        """Return the end of a URL for this filter, such as `?task=CountMen&passed=false`; empty for all."""
         values = {"evaluation": evaluation, **asdict(self)}
         if self.passed is not None:
             values["passed"] = str(self.passed).lower()
@@ -79,7 +79,7 @@ class CompletionFilter:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """The state of one evaluation of a run at the time when it was read."""
+    """A run and one of its evaluations, with all completions and verdicts at the time of reading."""
 
     results: Results
     evaluations: tuple[str, ...]  # the names of all evaluations of the run
@@ -98,7 +98,7 @@ class Snapshot:
 
     @cached_property
     def models(self) -> list[str]:
-        """The recorded models that wrote the completions."""
+        """The names of the models that wrote the completions, without those that were not recorded."""
         return sorted({c.model for c in self.results.completions.values() if c.model is not None})
 
     @cached_property

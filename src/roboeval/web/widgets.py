@@ -100,7 +100,7 @@ def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = 
 
 
 def count_text(data: Mapping[str, Any]) -> str:
-    """Format the coverage of a run briefly, for a table."""
+    """Format how many completions there are, such as `12 of 80 judged`."""
     if "completions" not in data:
         return MISSING
     coverage = Coverage(data["judged"], data["to_judge"], data["requested"])
@@ -109,7 +109,7 @@ def count_text(data: Mapping[str, Any]) -> str:
 
 
 def tasks_text(data: Mapping[str, Any]) -> str:
-    """Format the number of tasks that have completions and the number of tasks in the suite."""
+    """Format how many tasks of the suite have completions, such as `3 of 16`."""
     if "tasks_there" not in data:
         return MISSING
     total = data["tasks_of_suite"]
@@ -117,7 +117,7 @@ def tasks_text(data: Mapping[str, Any]) -> str:
 
 
 def date_text(data: Mapping[str, Any]) -> str:
-    """Format the start time of a run in UTC."""
+    """Format the start time of a run in UTC, such as `2026-11-29 12:30`."""
     return (data.get("date") or MISSING)[:16].replace("T", " ")
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class RunSettings(NamedTuple):
-    """The values that `run` and `continue` derive from their shared options."""
+    """Two functions that `run` and `continue` call, with the options that both share filled in."""
 
     request: Callable[..., Request]  # takes the other fields of a request
     open_console: Callable[..., Console]
@@ -35,7 +35,7 @@ def run_settings(
     recover: options.RecoverOption = 0,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> RunSettings:
-    """Return the request and the console that the options describe, without what they do not share."""
+    """Fill in the options that `run` and `continue` share, such as --model. Each adds options of its own."""
     from functools import partial
 
     from codebotler.cli.operating.run import Request

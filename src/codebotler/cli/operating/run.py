@@ -73,7 +73,7 @@ class Request:
             raise UserError("the program uses standard input, so approval cannot be read; add --yes")
 
     def order_on(self, console: Console) -> MissionOrder:
-        """Return the order for a mission."""
+        """Convert the request to an order for the console. A program file or standard input is read now."""
         program = read_program(self.what) if self.is_program else ""
         if self.past is not None:
             return console.rest_of(self.past, program)
@@ -240,12 +240,12 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
 
 
 def choose_past(console: Console, name: str, program: str) -> MissionPast:
-    """Read the past of a mission, show it, and ask whether an unsure step happened.
+    """Read what a mission did, show it, and ask a person about a step that may have happened or not.
 
     Args:
-        console: the console with the robot, which is asked where it is if a step is unsure.
+        console: the console with the robot. If a step is unsure, the robot is asked where it is.
         name: the ID of the mission, or `last`.
-        program: the file with the rest; `-` means that standard input holds it, and no answer.
+        program: the file with the rest; `-` means standard input, which then cannot hold answers.
 
     Raises:
         UserError: there is no such mission, it cannot be continued, it has no instruction and no

@@ -27,8 +27,8 @@ def open_console(
 ) -> Console:
     """Return a console with the robot and the models that the options name.
 
-    By default, its models are the chosen one and the recorded ones. `shared` holds the options for the
-    settings of the robot and of the models. The other arguments are those of the console.
+    Without `model`, the console has the default model and the recorded ones. `shared` holds the options of
+    `robot_settings` and `model_settings` by name. The other arguments are those of `Console`.
     """
     kind, settings, rules, within = options.robot_settings(**options_for(options.robot_settings, shared))
     if kind == "sim" and shared["world"] is None:

@@ -32,7 +32,7 @@ PROOF_STYLES = {"never": "green", "possible": "red", "unknown": "yellow"}
 
 
 def read_program(name: str) -> str:
-    """Read a program from a file or standard input (`-`), where it may be part of a model's reply."""
+    """Read a program file, or find the program in standard input (`-`), which may be a model's reply."""
     if name != "-":
         if not name:
             raise UserError("the file name is empty; name a file, or - for standard input")
@@ -140,7 +140,7 @@ def contract_view(contract: Contract, skills: SkillTable) -> Group:
 
 
 def write_contract(file: Path | None, contract: Contract | None) -> None:
-    """Write a contract to a new file, if one is named. Raise UserError if there is none, or if it exists."""
+    """Write a contract to a new file, if given. Raise UserError if it exists, or without a contract."""
     if file is None:
         return
     if contract is None:

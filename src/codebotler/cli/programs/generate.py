@@ -50,7 +50,7 @@ def write(
     retries: int,
     repair: bool,
 ) -> bool:
-    """Have a model write a program, print it, and return whether the check, set as `how`, accepts it."""
+    """Have a model write a program, and print it. Return whether it passes the check with settings `how`."""
     with busy(f"asking {model}"):
         opened = open_model(model, settings)
         generation = write_checked_program(
@@ -116,18 +116,18 @@ def choose_candidate(
     count: int,
     ask: Callable[[str], str] | None,
 ) -> str | None:
-    """Return the program that a person means, or None if they want none of them.
+    """Get several programs from a model, and return the one that a person chooses, or None.
 
-    After the first "none of these", they may add a sentence to the instruction for a second round.
+    If the person first wants none of them, a sentence added to the instruction begins a second round.
 
     Args:
         opener: opens the model.
         make_prompt: makes the prompt for an instruction.
-        instruction: the instruction.
+        instruction: what the robot should do, in plain words.
         settings: the settings for runs in imagined worlds.
         room_map: the rooms; by default those that the programs name.
         count: how many programs to request.
-        ask: asks the person for a line, which is empty at the end; None if nobody can answer.
+        ask: asks the person for a line, which is empty at the end; None takes the most frequent behaviour.
 
     Raises:
         UserError: all programs of the second round do what the person did not mean.

@@ -27,7 +27,7 @@ NO_EFFECT = "not at all"
 
 
 def find_replayed_files(paths: Sequence[Path]) -> list[Path]:
-    """Return the programs, logs and missions at some paths, or raise UserError if a path has none."""
+    """Find programs, logs and missions in files and folders. Raise UserError if a path has none."""
     found: list[Path] = []
     for path in paths:
         if not path.exists():
@@ -47,7 +47,7 @@ def _is_replayed(path: Path) -> bool:
 def replay(
     files: Sequence[Path], rules: Sequence[Rule], world: World | None, skills: SkillTable
 ) -> dict[Path, RuleEffect]:
-    """Run programs and read logs under house rules, and return the effect on each file."""
+    """Return for each file which house rule it would break, and when. Programs are run, logs are read."""
     effects = {file: RuleEffect("unreadable") for file in files}  # in this order
     programs: dict[Path, str] = {}
     for file in effects:
@@ -66,7 +66,7 @@ def replay(
 
 
 def replay_data(effects: Mapping[Path, RuleEffect], rules: Sequence[Rule]) -> dict[str, Any]:
-    """Return the effects and their numbers as plain data."""
+    """Return for JSON what the rules do to each file, and how many files break each rule."""
     times = Counter(effect.when or NO_EFFECT for effect in effects.values())
     pairs = Counter((effect.rule, effect.when) for effect in effects.values())
     return {
@@ -77,7 +77,7 @@ def replay_data(effects: Mapping[Path, RuleEffect], rules: Sequence[Rule]) -> di
 
 
 def replay_view(effects: Mapping[Path, RuleEffect], rules: Sequence[Rule]) -> Group:
-    """Show the effect on each file in a line, and their numbers."""
+    """Show a line for each file with the rule that it breaks, and then how many files break each rule."""
     files, numbers = grid("left", "left", "left", "left", "left"), grid("left", "right", "right", "right")
     for file, effect in effects.items():
         line = "" if effect.line is None else f"line {effect.line}: "

@@ -31,7 +31,7 @@ WHEN_WORDS = {
 
 
 def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
-    """Read a rules file, if given, and warn if programs could evade the rules; raise UserError if invalid."""
+    """Read a rules file, if given, and warn if programs can evade a rule. Raise UserError if invalid."""
     rules = () if path is None else read_rules(path, skills, rooms_of(world))
     for sentence in find_evasions(rules, rooms_of(world), skills):
         note(sentence)
@@ -83,7 +83,7 @@ def is_drive(event: Event) -> bool:
 
 
 def step_sentence(event: Event, room: str = "") -> str:
-    """Describe a step of an example, but omit the start of a drive if it is `room`, the current room."""
+    """Describe a step, such as `drives to "kitchen" from office`, but without the start if it is `room`."""
 
     def show(text: str) -> str:
         return "…" if text in ANY_ARGUMENT else visible(text)
@@ -99,7 +99,7 @@ def step_sentence(event: Event, room: str = "") -> str:
 
 
 def review_data(found: Sequence[Review]) -> list[dict[str, object]]:
-    """Return rules with their examples and warnings as plain data."""
+    """Return rules with their examples and warnings, for JSON."""
     return [
         {
             "name": one.rule.name,

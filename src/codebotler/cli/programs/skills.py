@@ -33,7 +33,7 @@ SKILLS_TEMPLATE = Path(__file__).with_name("new-skills.txt").read_text()
 
 @dataclass(frozen=True)
 class SkillTrial:
-    """An outcome of a skill that occurs in some of the sampled worlds."""
+    """One outcome of the call that a skill gives as its example, and the first world with this outcome."""
 
     outcome: str  # the outcome as a phrase, such as `returns True`
     facts: tuple[str, ...]  # the facts in the first world with this outcome
@@ -50,7 +50,7 @@ def write_new(path: Path, text: str) -> None:
 
 
 def try_skill(row: Skill, skills: SkillTable) -> list[SkillTrial]:
-    """Call the example of a skill in sampled worlds, and return each different outcome once."""
+    """Call a skill with its example in 40 sampled worlds, and return each different outcome once."""
     arguments = _example(row)
     found: dict[str, SkillTrial] = {}
     earlier = [one for one in skills.rows[: skills.rows.index(row)] if one not in SKILLS.rows]
@@ -119,7 +119,7 @@ def _lines(rows: Sequence[Skill], skills: SkillTable) -> Iterator[RenderableType
 
 
 def skills_data(skills: SkillTable) -> list[dict[str, Any]]:
-    """Return the skills and their outcomes as plain data."""
+    """Return the skills, each with the outcomes of its example, for JSON."""
     return [
         {
             "name": row.name,

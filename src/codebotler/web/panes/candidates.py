@@ -26,7 +26,7 @@ class CandidatesPane:
         self._box = DrawnBox("which", self._draw)
 
     def show(self, view: SessionView) -> None:
-        """Update the pane for a view."""
+        """Show the question that the mission asks, or hide the pane if it asks none."""
         self._box.show(view.question if view.waits_for_answer else None)
 
     def _draw(self, question: ClarifyingQuestion) -> None:

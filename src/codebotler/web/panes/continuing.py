@@ -26,14 +26,14 @@ EARLY_ENDS = frozenset({MissionState.FAILED, MissionState.STOPPED, MissionState.
 
 
 class ContinueButton(Button):
-    """A button that begins the rest of a mission."""
+    """A button to continue a mission that ended early. It first asks about a step that may have happened."""
 
     def __init__(self, console: Console, mission: str = "") -> None:
         super().__init__("Continue", self._continue, "primary")
         self._console, self._mission = console, mission
 
     def show(self, view: SessionView) -> None:
-        """Offer to continue the mission of a view, or that before it, if it has begun and ended early."""
+        """Show the button if this mission, or else an unfinished one before it, can be continued."""
         is_other = not (has_rest(view) or view.progress.has_begun or view.past)
         aside = self._console.unfinished if is_other else ""
         self._mission = aside or view.id or ("" if view.past is None else view.past.mission)
@@ -54,19 +54,19 @@ class ContinueButton(Button):
 
 
 def has_rest(view: SessionView) -> bool:
-    """Return whether a mission, or one that it was to continue, has moved the robot but ended early."""
+    """Return whether a mission ended early, and it or the mission that it continues had begun to run."""
     has_past = view.progress.has_begun or view.past is not None
     is_early = view.state in EARLY_ENDS or view.state is None  # without a state, the robot was busy
     return view.is_over and is_early and has_past
 
 
 def is_unfinished(view: SessionView) -> bool:
-    """Return whether the program of a view has moved the robot, but ended early."""
+    """Return whether the mission's own program began to run on the robot, but ended early."""
     return has_rest(view) and view.progress.has_begun
 
 
 def can_be_continued(summary: MissionSummary) -> bool:
-    """Return whether a mission has moved the robot, or was to do the rest of one that had."""
+    """Return whether a mission has run on the robot, or was to continue a mission that had."""
     return bool(summary.if_tool_dies or summary.continues)
 
 
@@ -106,7 +106,7 @@ def _begin(console: Console, past: MissionPast) -> None:
 
 
 def draw_past(past: MissionPast) -> None:
-    """Draw what was done before the mission that a session continues."""
+    """Draw the steps of the mission that this one continues."""
     PlainText("h3", "Done so far")
     steps = [*zip(past.steps, past.trace, strict=True)]
     if earlier := steps[-_MAX_STEPS:-MAX_OPEN_STEPS]:
@@ -127,7 +127,7 @@ def _draw_steps(steps: Sequence[tuple[str, Event]]) -> None:
 
 
 def origin_text(view: SessionView) -> str:
-    """Say which mission a session continues, and whether a person must write the rest."""
+    """Return a sentence about the mission that this one continues, or an empty string if there is none."""
     if view.past is None:
         return ""
     why = shortened(view.past.why, _MAX_STEP_CHARACTERS)
@@ -138,7 +138,7 @@ def origin_text(view: SessionView) -> str:
 
 
 def storyboard_title(view: SessionView) -> str:
-    """Return the title of the storyboard."""
+    """Return the title of the storyboard, such as `Still to do` for the rest of a mission."""
     if view.is_over:
         return "What the check expected"
     return "What the robot would do" if view.past is None else "Still to do"

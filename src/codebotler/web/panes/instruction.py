@@ -82,7 +82,7 @@ class InstructionPane:
             self._recent.show(texts or None)
 
     def show(self, view: SessionView) -> None:
-        """Update the pane for a view."""
+        """Show the mission's instruction and its error, but keep an instruction that is being typed."""
         if view.number != self._number:
             self._number = view.number
             if (self._text.value or "").strip() in {"", self._asked}:  # keep text that is being typed

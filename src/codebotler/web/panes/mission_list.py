@@ -27,7 +27,7 @@ _NO_MISSIONS = "No missions yet."
 
 
 def add(console: Console, frame: Frame) -> None:
-    """Add the page."""
+    """Add the page `/missions`."""
 
     @ui.page(_MISSIONS_PATH)
     async def list_missions(text: str = "") -> None:
@@ -92,7 +92,7 @@ class _MissionList:
 
 
 def state_words(summary: MissionSummary, view: SessionView) -> str:
-    """Return the state of a mission, or that it waits for a person's answer, given the current view."""
+    """Return a mission's state, such as `done` or `waits for approval`. `view` is the current mission."""
     if summary.id == view.id and view.waits_for_answer:
         return "waits for an answer"
     return "waits for approval" if summary.state is MissionState.CHECKED else str(summary.state)

@@ -24,7 +24,7 @@ MAX_LISTED_EVENTS, _MAX_CODE_CHARACTERS = 1_000, 200
 
 
 def add(console: Console, frame: Frame) -> None:
-    """Add the page."""
+    """Add the page of one mission, `/missions/ID`."""
 
     @ui.page("/missions/{mission}")
     async def one(mission: str) -> None:

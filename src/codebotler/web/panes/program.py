@@ -39,7 +39,7 @@ _CALL = re.compile(r"\b([^\W\d]\w*)(?=\s*\()")
 _MAX_MARKS, _MAX_ESCAPES = 400, 2_000
 _MAX_PROBLEMS = 20
 REVIEW_SECONDS = 1.5
-"""How long a program that replaces another one cannot be approved."""
+"""After a program replaces another one, a click within this time may be meant for the old program."""
 
 
 class ProgramPane:
@@ -82,7 +82,7 @@ class ProgramPane:
         ui.run_javascript(f"programEditor.start({self._editor.id})")
 
     def show(self, view: SessionView) -> None:
-        """Update the pane for a view."""
+        """Show the mission's program with its problems, and the buttons that make sense now."""
         current = view.number, view.program
         if view.program and current != self._shown:
             if self._shown[1] and current != self._typed_here:  # a click may be meant for the one before

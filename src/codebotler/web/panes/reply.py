@@ -1,4 +1,4 @@
-"""The pane with a model's reply, which is shown while it arrives and if it contains no program."""
+"""The pane with a model's reply. It is shown while the reply arrives, and if it has no program."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from codebotler.missions.display.view import SessionView
 from codebotler.web.frame import PlainText
 
 _MAX_CHARACTERS = 6_000
-"""The maximum length of what is shown of a reply: its end while it arrives, then its beginning."""
+"""Of a longer reply, the pane shows the end while the reply arrives, and the beginning afterwards."""
 
 
 class ReplyPane:
@@ -20,7 +20,7 @@ class ReplyPane:
         self._reasoning = _Folded("The model's reasoning", is_open=False)
 
     def show(self, view: SessionView) -> None:
-        """Update the pane for a view."""
+        """Show the reply while it arrives. Afterwards, say why it contains no program, or hide the pane."""
         why = text = reasoning = ""
         none = view.programless
         if view.is_written:

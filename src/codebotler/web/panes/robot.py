@@ -56,7 +56,7 @@ class RobotPane:
             self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')
 
     def show(self, view: SessionView) -> None:
-        """Update the pane for a view."""
+        """Show the mission's state, the robot on its map, and what has happened so far."""
         self._interrupted.show(self._console.interrupted or None)
         progress = view.progress
         self._state.say(_headline(view))
@@ -126,7 +126,7 @@ def _headline(view: SessionView) -> str:
 
 
 def map_state(view: SessionView, world: World) -> MapState:
-    """Return the contents of the map for a view."""
+    """Return where the robot is and was, and what it has found, with the names of rooms in `world`."""
     progress, rooms = view.progress, laid_out(world).rooms
     room_map = view.room_map or RoomMap.of(world)
 

@@ -116,7 +116,7 @@ class Access:
 
     @property
     def path(self) -> str:
-        """The path to which the cookie belongs. Browsers send cookies to servers on other ports, too."""
+        """A secret path for the page and its cookie, which servers on other ports would otherwise receive."""
         return f"/{self._cookie_value('path')[:SECRET_BYTES]}"
 
     def _cookie_value(self, token: str) -> str:
@@ -134,7 +134,7 @@ class Access:
 
 
 def read_cookie_secret(home: Path) -> bytes:
-    """Return the secret that makes cookies unguessable, which the first call stores for later starts.
+    """Return the secret from which cookies are made. The first call creates and stores it.
 
     Raises:
         UserError: the file is damaged.

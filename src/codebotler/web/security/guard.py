@@ -81,7 +81,7 @@ class RefusedError(Exception):
 
 
 class Guard:
-    """ASGI middleware that accepts or refuses requests."""
+    """ASGI middleware that refuses a request with a wrong host, origin, token, role or size."""
 
     def __init__(
         self, app: ASGIApp, access: Access, place: PageAddress, port: int, has_page: Callable[[str], bool]

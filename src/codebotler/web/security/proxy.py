@@ -1,4 +1,4 @@
-"""Support reverse proxies: parse the page's addresses there, and restore forwarded requests."""
+"""Support reverse proxies: parse the page's public addresses, and restore requests that they changed."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class OuterAddress:
         return f"{self.scheme}://{self.host}{self.prefix}/"
 
     def seen_from_outside(self, scope: Scope) -> dict[str, Any]:
-        """Return a request with the scheme and path of the browser, even if the proxy removed the prefix."""
+        """Return a request with the scheme and path that the browser used, such as https and `/robot/api`."""
         path, raw = scope["path"], scope.get("raw_path") or b""
         if self.prefix and path != self.prefix and not path.startswith(f"{self.prefix}/"):
             path, raw = self.prefix + path, self.prefix.encode() + raw
@@ -114,12 +114,12 @@ def addresses_by_host(addresses: Iterable[OuterAddress]) -> Mapping[str, OuterAd
 
 
 def prefix_of(scope: Mapping[str, Any]) -> str:
-    """Return the path of the page at the proxy, or an empty string without a proxy."""
+    """Return what precedes our paths in the browser: a proxy's prefix, and the secret path, if used."""
     prefix: str = scope.get("app_root_path", scope.get("root_path", ""))  # a mounted app changes root_path
     return prefix
 
 
 def path_of(scope: Mapping[str, Any]) -> str:
-    """Return the path of a request, without the prefix of a proxy."""
+    """Return the path of a request without this prefix, such as `/missions`."""
     path: str = scope["path"]
     return path.removeprefix(prefix_of(scope))

@@ -69,7 +69,7 @@ def _whisker(cap: float) -> dict[str, Any]:
 
 
 def draw_task_scores(runs: Sequence[JudgedRun]) -> Figure:
-    """Draw pass@1 by task and model, with intervals over prompts. A second panel shows ablated tasks."""
+    """Draw pass@1 by task and model, with intervals over prompts. A second panel judges common sense only."""
     tasks = tasks_of(runs)
     judged = {score.task for run in runs for score in run.ablated_scores}
     ablated = [task for task in runs[0].suite.tasks if task in judged]
@@ -171,7 +171,7 @@ def draw_heat_map(
 
 
 def draw_causes(found: Sequence[tuple[str, Causes]]) -> Figure:
-    """Draw the outcomes of completions by class, and the kinds of failure within each class."""
+    """Draw how often each class of outcome occurs in each run, and the kinds of failure in each class."""
     happened = {name for _, one in found for name, share in one.classes.items() if share}
     shown = classes_to_show(happened)
     kinds = {name: kinds_in_order([one for _, one in found], name) for name in shown}

@@ -80,7 +80,7 @@ def short_name(name: str, most: int = MAX_FIGURE_NAME) -> str:
 
 
 def share_axis(axes: Axes, *, along: str = "y") -> None:
-    """Scale an axis from 0 to 100%."""
+    """Scale the y-axis, or the axis `along`, from 0 to 100%."""
     axis = axes.yaxis if along == "y" else axes.xaxis
     (axes.set_ylim if along == "y" else axes.set_xlim)(0, 1)
     axis.set_ticks([0, 0.25, 0.5, 0.75, 1], ["0", "25", "50", "75", "100%"])

@@ -25,7 +25,7 @@ MAX_DISTINCT_WORDS = 12
 
 
 def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of pass@1, with its interval over tasks, and of causes of failures by ability."""
+    """Build the table of pass@1 and causes of failures for the tasks of each ability, such as perception."""
     tasks = runs[0].suite.tasks
     found: list[tuple[list[Cell], dict[str, float]]] = []
     for ability in dict.fromkeys(ability for task in tasks.values() for ability in task.abilities):
@@ -45,7 +45,7 @@ def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table that compares the tasks that end with a report to all others, if there are any."""
+    """Build the table that compares tasks in which the robot must come back and report with all others."""
     reporting = {one.name for one in runs[0].suite.tasks.values() if REPORT_ABILITY in one.abilities}
     rows: list[list[Cell]] = []
     for run in runs:
@@ -84,7 +84,7 @@ def never_returned(row: Row) -> bool:
 
 
 def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of the spread of pass@1 over the prompts of each task and run, widest spread first.
+    """Build the table of the best and worst prompt of each task and run, largest difference first.
 
     If several prompts are equally good or bad, the first of them is shown.
     """

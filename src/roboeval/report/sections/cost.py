@@ -24,7 +24,7 @@ from roboeval.report.sheets import Cell, ReportFigure, Section, Sheet, section, 
 
 
 def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on rejection sampling, for runs whose programs were checked."""
+    """Build the section on rejection sampling: asking the model again until the check accepts a program."""
     checked = {run.name: run.checked for run in runs if run.checked}
     points = {name: retry_curves(prompts) for name, prompts in checked.items()}
     shares = {name: accepted_after(prompts, LIMITS[-1]) for name, prompts in checked.items()}
@@ -54,7 +54,7 @@ def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
 
 
 def retry_curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float, float]]]:
-    """Compute, for each limit on retries, the share of prompts that reach each threshold of pass@1."""
+    """Return for each limit on retries a curve: the share of prompts that reach each pass@1."""
     found = {limit: resample(prompts, limit).by_prompt for limit in LIMITS}
     return {limit: threshold_curve([one.passed for one in each]) for limit, each in found.items()}
 
@@ -119,7 +119,7 @@ def cost_sentence(run: JudgedRun) -> str:
 
 
 class Budget(NamedTuple):
-    """The number of passing programs that a budget yields with rejection sampling."""
+    """How many passing programs one gets for requests, tokens or money, if the model is asked again."""
 
     retries: int
     requests: float  # mean number per program

@@ -16,7 +16,7 @@ from roboeval.report.sheets import Cell, Sheet, sheet
 
 
 def mode_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of the success rate and the costs of missions by run, if any run is of an agent."""
+    """Build the table of the success rate and costs of each run's missions. It is empty without agents."""
     rows: list[list[Cell]] = []
     for run in runs if any(has_missions(run.table) for run in runs) else ():
         completions, missions = run.completions, per_mission(_table(run))

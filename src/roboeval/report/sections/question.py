@@ -1,4 +1,4 @@
-"""Builds the section on what one question about candidate programs gains."""
+"""Builds the section on how much a person's answer to one question about candidate programs helps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from roboeval.report.sheets import Cell, Prose, Section, section, sheet
 
 
 def question(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on one question, for runs that `roboeval clarify` has measured."""
+    """Build the section on asking a person one question, for runs that `roboeval clarify` has measured."""
     found = [(run.name, *each) for run in runs for each in read_measurements(run.results)]
     rows: list[list[Cell]] = []
     by_prompt: list[list[Cell]] = []
