@@ -68,7 +68,7 @@ class FailureGroup:
 
 
 def group_failures(failed: Iterable[Row], programs: Mapping[CompletionKey, str]) -> list[list[Row]]:
-    """Group failing completions, with the largest groups first.
+    """Group completions with the same failure and similar programs, the largest groups first.
 
     Replies without a program form one group for each task and kind of failure.
     """
@@ -133,7 +133,7 @@ def _group_similar(
 
 
 def group_data(group: FailureGroup) -> dict[str, Any]:
-    """Convert a group to plain data."""
+    """Convert a group to JSON data, for `roboeval find --json`."""
     fix = group.fix
     return {
         "task": group.task,
@@ -154,7 +154,7 @@ def group_data(group: FailureGroup) -> dict[str, Any]:
 
 
 def normalised_lines(program: str) -> ProgramLines:
-    """Normalise a program to lines that are independent of names, comments and layout."""
+    """Return a program's lines for comparison: names become `name1`, comments and layout are dropped."""
     tree = parse_program(program) if len(program) <= MAX_COMPARED_CHARACTERS else None
     if isinstance(tree, ast.Module):
         with suppress(RecursionError, MemoryError, ValueError):
@@ -196,7 +196,7 @@ def similarity(one: Counter[str], other: Counter[str]) -> float:
 
 
 def passing_programs(named: Iterable[tuple[str, str]]) -> dict[ProgramLines, str]:
-    """Return the names of distinct programs by their lines. A program with several names keeps the first."""
+    """Map the lines of each distinct program to its name. A program with several names keeps the first."""
     first: dict[ProgramLines, str] = {}
     for name, program in named:
         first.setdefault(_split(program), name)

@@ -14,7 +14,7 @@ Clusters: TypeAlias = Sequence[Sequence[float]]
 """Values grouped by cluster: one value per prompt, or the values of all prompts of a task."""
 
 SamplingUnit: TypeAlias = Literal["prompts", "tasks"]
-"""The unit that is assumed to be sampled at random."""
+"""What an interval assumes to be a random sample: single prompts, or tasks with all their prompts."""
 
 SHARE, DIFFERENCE = (0.0, 1.0), (-1.0, 1.0)  # lowest and highest values
 CONFIDENCE = 0.95  # level of all confidence intervals
@@ -49,7 +49,7 @@ class Estimate:
         mean: The mean of the values.
         low: The lower end of the interval.
         high: The upper end of the interval.
-        over: The unit that is assumed to be sampled at random.
+        over: What the interval assumes to be a random sample.
     """
 
     mean: float

@@ -66,7 +66,7 @@ def final_chances(prompt: CheckedPrompt, retries: int) -> Chances:
 
 
 def mean_requests(rejected: float, retries: int) -> float:
-    """Return the mean number of requests per program for a share of rejected completions."""
+    """Return the mean number of requests per program: 1.5 if half are rejected and one retry is allowed."""
     return sum(rejected**number for number in range(retries + 1))
 
 

@@ -14,7 +14,7 @@ from roboeval.evaluation.runs.traces import trace_of
 
 @dataclass(frozen=True)
 class TraceQuery:
-    """Describes which traces to search for."""
+    """Selects the traces to search for by formula, task and world."""
 
     formula: Formula | None = None  # None matches every trace
     negated: bool = False  # whether to find traces that do not satisfy the formula
@@ -33,7 +33,7 @@ class TraceMatch:
 
 
 def match_row(row: Mapping[str, Any], query: TraceQuery) -> TraceMatch:
-    """Match the traces of one completion, given its row."""
+    """Return the worlds in which a completion matches a query, given its row."""
     formula = query.formula
     worlds, cut = [], []
     verdicts = [*_verdicts_in_scope(row, query)]

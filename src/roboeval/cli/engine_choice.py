@@ -17,9 +17,9 @@ MIN_PROGRAMS_FOR_PROCESSES = 5_000  # with fewer programs, starting processes co
 def engine_named(
     name: Literal["local", "ray"], workers: int | None, **isolation: bool
 ) -> Iterator[Callable[[int], OpenEngine]]:
-    """Yield a function that returns the named engine, given the number of programs to run.
+    """Yield a function that takes the number of programs to run and returns the engine for them.
 
-    A worker starts in parallel with the block; `WorkerPool` documents the isolation arguments.
+    For `local`, that is a pool or, for many programs, several processes. `WorkerPool` documents `isolation`.
     """
     if name == "local":
         from codebotler.simulator.pool import WorkerPool, cores

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from roboeval.suites.load import Suite
 
 Selection: TypeAlias = tuple[str, *tuple[int, ...]]
-"""The first parts of keys: a task, a prompt of it, or the key of a completion."""
+"""A part of a run: a task, a prompt such as `("LunchTime", 0)`, or the key of a completion."""
 
 
 def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
@@ -41,7 +41,7 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
 
 
 def parse_selection(text: str, suite: Suite) -> Selection:
-    """Parse TASK, TASK/PROMPT or TASK/PROMPT/INDEX."""
+    """Parse a part of a run: TASK, TASK/PROMPT or TASK/PROMPT/INDEX, such as `LunchTime/0/12`."""
     name, *numbers = text.removesuffix("/").split("/")
     if len(numbers) > 2 or not all(n.isascii() and n.isdecimal() and len(n) < 10 for n in numbers):  # noqa: PLR2004 - parts
         raise UserError(
@@ -65,14 +65,14 @@ def expect_judged(selection: Selection, judged: Iterable[CompletionKey]) -> None
 
 
 def names_completion(text: str) -> bool:
-    """Whether a selection names one completion, because it has all three parts."""
+    """Whether a text such as `LunchTime/0/12` names one completion: a task, a prompt and an index."""
     return text.removesuffix("/").count("/") == 2  # noqa: PLR2004 - two slashes separate three parts
 
 
 def command(
     verb: str, *arguments: object, suite: str, ablated: bool = False, rules: Path | None = None
 ) -> str:
-    """Return a command line that can be pasted into a shell."""
+    """Return a command line for a shell, such as `roboeval show my-run --suite plus`."""
     words = ["roboeval", verb, *map(str, arguments)]
     words += [] if suite == "paper" else ["--suite", suite]
     words += ["--ablation"] if ablated else []
@@ -159,7 +159,7 @@ def find_gap(results: Results, suite_name: str, rules: Path | None) -> str | Non
 
 
 def evaluate_again(results: Results, suite_name: str, rules: Path | None = None) -> str:
-    """Return the command that continues an evaluation."""
+    """Return the command line of `roboeval evaluate` that continues an evaluation with its options."""
     from roboeval.evaluation.runs.folder import tasks_to_judge
 
     words, suite, ablated = [], results.known_suite, results.is_ablated

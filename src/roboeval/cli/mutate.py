@@ -97,7 +97,7 @@ def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Or
 
 
 def show_scores(scores: Sequence[MutationScore], suite: str, *, brief: bool) -> None:
-    """Print the table, the survivors and any warnings."""
+    """Print the table of scores, the mutants that survived, and any warnings."""
     from rich.console import Group
 
     from roboeval.mutation.report import scores_view, survivors_view

@@ -35,7 +35,7 @@ def show_progress(items: Iterable[Watched], doing: str, total: int) -> Iterator[
 
 @contextmanager
 def progress_meter(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, str], None]]:
-    """Show progress from `before` on. Yield a function to call with the number of items done and a remark."""
+    """Show progress if `before` items are done. Yield a function that takes the number done and a remark."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     more_column = TextColumn("{task.fields[more]}", markup=False)
@@ -57,7 +57,7 @@ def progress_meter(doing: str, total: int, before: int = 0) -> Iterator[Callable
 
 @contextmanager
 def stoppable(sentence: str = "the same command continues where it stopped") -> Iterator[None]:
-    """After Ctrl-C in the block, print how to go on, and exit."""
+    """After Ctrl-C in the block, print `sentence`, which says how to go on, and exit."""
     try:
         yield
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""Measure what one question about candidate programs gains, with a simulated person who answers it."""
+"""Measures how much more often programs pass if a simulated person answers one question about them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ DRAWS_PER_PROMPT = 20
 
 @dataclass(frozen=True)
 class ClarifySettings:
-    """The settings of a measurement.
+    """The settings of `clarify`.
 
     Args:
         candidates: the number of candidates in a group, at least 2.
@@ -48,10 +48,10 @@ class ClarifySettings:
 
 
 class ClarifyShares(TypedDict):
-    """Shares of groups of candidates. Prompts count equally.
+    """Pass rates with and without a question, and how often it is asked. Prompts count equally.
 
-    `mattered` is the share of the questions whose answer changed the verdict on the largest cluster. It is
-    null if there was no question.
+    `mattered` is the share of questions after which the chosen program passes but that of the largest cluster
+    fails, or the reverse. It is null if there was no question.
     """
 
     one: float  # of the candidates that pass
@@ -63,7 +63,7 @@ class ClarifyShares(TypedDict):
 
 
 class PromptShares(ClarifyShares):
-    """Shares of the groups of a prompt."""
+    """The `ClarifyShares` of one prompt."""
 
     task: str
     prompt: int
@@ -83,7 +83,7 @@ class ClarifyMeasurement(ClarifyShares):
 def clarify(
     completions: Iterable[Completion], suite: Suite, pool: WorkerPool, settings: ClarifySettings
 ) -> Iterator[PromptShares]:
-    """Yield the results of each prompt that has several completions.
+    """Yield the shares of each prompt that has enough completions for a group of candidates.
 
     Candidates are compared in imagined worlds only. The worlds of the task are only for the verdicts and for
     the simulated person, who takes the first option that passes.
@@ -181,7 +181,7 @@ def measurement_data(
     settings: ClarifySettings,
     prompts: Sequence[PromptShares],
 ) -> dict[str, Any]:
-    """Return a measurement as plain data, which depends only on the arguments."""
+    """Return a measurement as JSON data: settings, means over the prompts, and the shares of each prompt."""
     questions = [(one["asked"], one["mattered"]) for one in prompts if one["mattered"] is not None]
     asked = sum(share for share, _ in questions)
     tokens = [one["tokens"] for one in prompts if one["tokens"] is not None]

@@ -104,7 +104,7 @@ def evaluation_metadata(
 
 
 def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:
-    """Return the content of KEY.json, or None if it is missing. Raise UserError if suite or tool differ."""
+    """Return what KEY.json contains, or None if it is missing. Raise UserError if suite or tool changed."""
     key = evaluation_key(suite, ablated=ablated)
     path, rows = run.manifest(key), run.rows(key)
     if not path.exists():

@@ -25,21 +25,21 @@ from roboeval.evaluation.runs.endings import OUTSIDE_CONTRACT
 from roboeval.suites.load import Suite
 
 Call: TypeAlias = tuple[str, Sequence[Argument]]
-"""A skill and its arguments."""
+"""A skill's name and its arguments, such as `("go_to", ("kitchen",))`."""
 
 SLEEP = "time.sleep"
-"""The name of a call that lets time pass, until its only argument in seconds since the start."""
+"""The name of a recorded pause. Its argument is the time when the pause ends, in seconds since the start."""
 
 FAULTS = {
     GOTO: ("GoToInvalidLocation", "the door is locked"),
     ASK: ("AskNoPerson", "the person is gone"),
     PICK: ("PickInvalidObject", "the thing was moved"),
 }
-"""The kind and the reason of the error by which a skill fails, by the kind of event that it records."""
+"""The kind and message of the error if a skill is made to fail, by the kind of event of the skill."""
 
 
 class RecordingRobot(SimulatedRobot):
-    """A simulated robot that records its calls, and has made some already.
+    """A simulated robot that writes each call as a line of a program, such as `go_to("kitchen")`.
 
     Args:
         world: the world.
@@ -74,11 +74,11 @@ class RecordingRobot(SimulatedRobot):
 
     @property
     def skill_calls(self) -> int:
-        """The number of calls of skills."""
+        """The number of skill calls so far, without pauses."""
         return sum(name != SLEEP for name, _ in self.calls)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Record a call and make it. If it fails, say so in its events, which the rest of a mission reads."""
+        """Record a call and make it. If it fails, mark its events with the kind of the error."""
         if self._fault is not None and self.skill_calls == self._fault:
             self._fault, row = None, self.skills[skill]
             kind = "" if row.recording is None else row.recording.kind

@@ -32,7 +32,7 @@ from roboeval.suites.load import Scenario, Suite
 
 @dataclass(frozen=True)
 class FaultResult:
-    """What became of a mission one of whose calls failed."""
+    """The result of one mission in which one skill call was made to fail."""
 
     task: str
     world: int  # the index of its world
@@ -46,7 +46,7 @@ class FaultResult:
 
 @dataclass(frozen=True)
 class Interruption:
-    """A mission that a fault ended."""
+    """A mission that ended because a skill call failed, with what a model needs to write the rest."""
 
     result: FaultResult  # which mission, and which fault
     scenario: Scenario = field(repr=False)  # its world, and what its prompt asks for
@@ -56,24 +56,24 @@ class Interruption:
 
     @property
     def room_map(self) -> RoomMap:
-        """The rooms, with what the mission did and saw."""
+        """The map of the rooms, with what the mission did and saw there."""
         return self.past.add_to(RoomMap.of(self.scenario.world), self.past.place)[0]
 
     def prompt(self, suite: Suite) -> Prompt:
-        """Return the request for the rest of the mission."""
+        """Return the prompt that asks a model to write a program for the rest of the mission."""
         rules, rooms = suite.house_sentences, self.room_map.described
         whole = prompt_for(self.past.instruction, rooms=rooms, rules=rules, skills=suite.skills)
         return rest_prompt(self.past, whole)
 
 
 def rest_prompt(past: MissionPast, request: Prompt) -> Prompt:
-    """Return the request for the rest of a mission, given the request for the whole."""
+    """Turn the prompt for a whole mission, `request`, into a prompt for the rest of the mission."""
     last_step = (past.done or [""])[-1]
     return request.to_continue(past.program, past.steps, past.why, past.here(past.place), last_step)
 
 
 def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[Interruption | FaultResult]:
-    """Let each call of a program fail once, in each world in which the program ends.
+    """Run a program once for each of its skill calls, and let that call fail, in each world.
 
     Returns the missions that ended, and a result for each error that the program handled itself. The list is
     empty if the program is wrong.
@@ -101,7 +101,7 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
 def find_first_right(
     worker: Worker, suite: Suite, completions: Iterable[Completion]
 ) -> Iterator[list[Interruption | FaultResult]]:
-    """Yield the faults of each completion, or none if its task has had a right program before."""
+    """Yield `find_interruptions` of the first right program of each task, and [] for other completions."""
     done: set[str] = set()
     for one in completions:
         found = [] if one.task in done else find_interruptions(worker, suite, one)
@@ -110,14 +110,14 @@ def find_first_right(
 
 
 def check_rest(worker: Worker, suite: Suite, program: str, room_map: RoomMap, begun: str) -> CheckResult:
-    """Check a program for the rest of a mission as `codebotler continue` does."""
+    """Check a program for the rest of a mission. `begun` is the interrupted program."""
     settings = CheckSettings(skills=suite.skills, house_rules=suite.house_rules)
     left = remaining_outcomes(begun, room_map, suite.skills, worker=worker)
     return hold_to_past(check_on(worker, program, room_map, settings), begun, left)
 
 
 def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: str | None) -> FaultResult:
-    """Check a continuation and, if it is accepted, run it where the mission ended, and judge the whole."""
+    """Check a program for the rest of a mission. If it is accepted, run it and judge the whole mission."""
     if program is None:
         return replace(one.result, end="missing")
     problems = check_rest(worker, suite, program, one.room_map, one.past.program).problems
@@ -169,7 +169,7 @@ def write_continuations(
 
 
 def recovery_data(results: Sequence[FaultResult]) -> dict[str, int | float | None]:
-    """Count results. Shares are of the missions that had a continuation, steps of those that passed."""
+    """Count results. Shares refer to the missions with a continuation, steps to those that passed."""
     ends = Counter(one.end for one in results)
     passed = [one for one in results if one.end == "passed"]
     continued = len(results) - ends["handled"] - ends["missing"]

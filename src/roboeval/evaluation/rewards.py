@@ -132,7 +132,7 @@ class Components:
 
 
 def components_of(outcomes: Sequence[Outcome], asked: AskedWorlds, *, parses: bool = True) -> Components:
-    """Compute the reward and its components from what happened in some worlds.
+    """Compute the reward and its components from a program's outcome in each world.
 
     `parses` says whether the program is valid Python.
     """
@@ -150,7 +150,7 @@ def components_of(outcomes: Sequence[Outcome], asked: AskedWorlds, *, parses: bo
 
 
 class RewardWork(NamedTuple):
-    """A program to judge."""
+    """A program whose reward `judge_works` computes."""
 
     name: bytes  # the same for equal programs with equal requirements
     program: str

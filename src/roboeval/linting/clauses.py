@@ -19,8 +19,8 @@ Span = tuple[int, int]
 def uncovered_clauses(task: Task) -> Iterator[tuple[int, str]]:
     """Yield the clauses of prompts that no check covers, each with the number of its prompt.
 
-    A clause is covered if a requirement quotes one of its words, or if a fact in `covered_by`, which names
-    checks or a reason why there is none, has a regex that matches one of its words other than by `.*`.
+    A clause is covered if a requirement quotes one of its words. It is also covered if a regex of a fact in
+    `covered_by` matches one of its words, not counting words that `.*` matches.
     """
     for number, prompt in enumerate(task.prompts):
         text = " ".join(prompt.split())

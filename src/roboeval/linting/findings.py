@@ -29,7 +29,7 @@ FindingKind = Literal[
 
 @dataclass(frozen=True)
 class Finding:
-    """A likely mistake in a task."""
+    """A likely mistake in a task. The task file may accept it with a reason."""
 
     kind: FindingKind
     subject: str  # identifies the finding among those of its kind

@@ -1,7 +1,7 @@
 """Finds likely mistakes in the requirements of one world: conflicts, implications and dead regexes.
 
-`codebotler.rtl.reasoning` decides whether requirements are unsatisfiable or implied, for a robot whose visits
-each name one room of the world.
+`codebotler.rtl.reasoning` decides whether requirements are unsatisfiable or implied. It assumes that
+each drive is one of the requests that lead to a room of the world.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class JudgedWorld:
 
     @property
     def name(self) -> str:
-        """Return the name of the world for messages."""
+        """Return the name of the world for messages, such as `world 2` or `the ablation of world 2`."""
         return f"{'the ablation of ' if self.ablated else ''}world {self.number}"
 
     @property
@@ -49,7 +49,7 @@ class JudgedWorld:
         return YamlFile.read(self.task.path).line(("worlds", self.number - 1))
 
     def finding(self, kind: FindingKind, subject: str, message: str, line: int | None) -> Finding:
-        """Create a finding with the path of the task file."""
+        """Create a finding about this task, with the path of its file."""
         return Finding(kind, subject, message, self.task.path, line)
 
     def findings(self) -> Iterator[Finding]:
@@ -111,7 +111,7 @@ class JudgedWorld:
         return [next((t for t in samples(r) if self._room_for(t) == r), r) for r in self._rooms]
 
     def dead_regexes(self, requirement: Requirement) -> Iterator[Finding]:
-        """Yield findings about regexes in a requirement that match nothing, and visits that lead nowhere."""
+        """Yield findings about regexes that match no text, and regexes for drives that match no room."""
         line = next(check.line for check in self.task.checks if check.name == requirement.check)
         for element in dict.fromkeys(elements(requirement.formula)):
             for text in [element.text] if element.options is None else [element.text, element.options]:
@@ -124,7 +124,7 @@ class JudgedWorld:
                     yield self.finding("dead-regex", subject, message, line)
 
     def by_prompt(self) -> list[JudgedWorld]:
-        """Return a copy of the world for each distinct set of requirements of a prompt."""
+        """Return a copy of the world for each distinct set of requirements that a prompt asks for."""
         asked = {self.scenario.asked_by(prompt): None for prompt in range(len(self.task.prompts))}
         return [replace(self, scenario=scenario) for scenario in asked]
 

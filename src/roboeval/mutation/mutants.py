@@ -22,7 +22,7 @@ MUTATION_OPERATORS = tuple(chain.from_iterable(map(operators_in, OPERATOR_MODULE
 
 @dataclass(frozen=True)
 class Original:
-    """A program to be mutated."""
+    """A program from which mutants are made if it is right."""
 
     name: str
     program: str
@@ -41,7 +41,7 @@ class Original:
 
 @dataclass(frozen=True)
 class Mutant:
-    """A program that was changed by an operator."""
+    """An original with one mistake that an operator has made."""
 
     operator: str
     original: Original
@@ -55,7 +55,7 @@ class Mutant:
 
     @property
     def key(self) -> tuple[str, str]:
-        """The key that identifies the mutant in the list of equivalent mutants."""
+        """The operator and the diff, which identify the mutant in the list of equivalent mutants."""
         return self.operator, bare_diff(self.diff)
 
 

@@ -50,7 +50,7 @@ Condition: TypeAlias = Callable[[Context], bool]
 
 @dataclass(frozen=True)
 class Operator:
-    """A mutation operator, which introduces one kind of mistake that models make."""
+    """A mutation operator. It makes one kind of mistake that models make, such as a missing drive."""
 
     name: str  # such as `drop-the-return`
     about: str
@@ -58,14 +58,14 @@ class Operator:
 
 
 def operators_in(module: ModuleType) -> Iterator[Operator]:
-    """Yield an operator for each public function of a module."""
+    """Yield an operator for each public function of a module, described by the function's docstring."""
     for name, function in vars(module).items():
         if isfunction(function) and function.__module__ == module.__name__ and not name.startswith("_"):
             yield Operator(name.replace("_", "-"), function.__doc__ or "", function)
 
 
 def only_if(condition: Condition) -> Callable[[Mutate], Mutate]:
-    """Apply an operator only to tasks that meet a condition. Other tasks do not require what it changes."""
+    """Limit an operator to tasks that meet a condition, such as prompts that ask the robot to come back."""
 
     def conditional(edits: Mutate) -> Mutate:
         @wraps(edits)
@@ -78,13 +78,13 @@ def only_if(condition: Condition) -> Callable[[Mutate], Mutate]:
 
 
 def prompt_matches(pattern: str) -> Condition:
-    """Return a condition that holds if any prompt matches, so that only what prompts ask for is changed."""
+    """Return a condition for `only_if`: whether a regex matches any prompt, or the task has no prompts."""
     compiled = re.compile(pattern)
     return lambda context: not context.prompts or any(map(compiled.search, context.prompts))
 
 
 def next_names(names: Sequence[str], name: str, most: int = 2) -> tuple[str, ...]:
-    """Return up to `most` names that follow a name in a list, and start over at the end of the list."""
+    """Return up to `most` names after a name in a list, such as `c` and `a` after `b` in `a, b, c`."""
     folded = [one.lower() for one in names]
     at = folded.index(name.lower()) if name.lower() in folded else -1
     around = [*names[at + 1 :], *names[: max(at, 0)]]

@@ -13,7 +13,7 @@ MAX_EQUIVALENT_SHARE = 0.15  # largest share of equivalent mutants for which the
 
 
 class MutantStatus(StrEnum):
-    """Whether the checks reject a mutant, or the reason why it is not counted."""
+    """Whether the checks reject a mutant (killed) or not (survived), or why it is not counted."""
 
     KILLED = "killed"
     SURVIVED = "survived"
@@ -40,7 +40,7 @@ class TriedMutant(NamedTuple):
     result: MutantResult
 
     def row(self) -> dict[str, Any]:
-        """Return the mutant's row in mutants.jsonl."""
+        """Return the mutant's row in mutants/TASK.jsonl."""
         return {
             "operator": self.mutant.operator,
             "original": self.mutant.original.name,

@@ -85,7 +85,7 @@ def _satisfied(scenarios: Sequence[Scenario], faults: Sequence[MutantResult | No
 
 
 def mutation_worlds(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
-    """Return the worlds for mutants. If worlds are sampled, they have another seed than the suite's."""
+    """Return the worlds in which mutants run. Sampled worlds get another seed than those of the suite."""
     if suite.worlds is None and count is None:
         return task.scenarios
     sampled = suite.with_worlds(count or DEFAULT_MUTANT_WORLDS, seed + 1 + (suite.seed or 0))
@@ -101,7 +101,7 @@ def find_failure(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> 
 def judge_mutant(
     outcomes: Iterable[Outcome], before: Sequence[Outcome], scenarios: Sequence[Scenario]
 ) -> MutantResult:
-    """Judge a mutant, reading its outcomes only until a check fails.
+    """Judge a mutant, reading its outcomes only until a check fails. `before` are those of its original.
 
     A mutant that crashes in every world does not count as killed, because no check is needed to reject it.
     """

@@ -78,7 +78,7 @@ def known_suites() -> tuple[str, ...]:
 
 
 def suite_folder(name: str) -> Path:
-    """Return the folder of a built-in or installed suite, or a folder's path. Otherwise, raise UserError."""
+    """Return the folder of a suite, given its name or the folder itself. Otherwise, raise UserError."""
     if name in shipped_suites():
         return SUITES / name
     if SUITE_NAME.fullmatch(name) and (installed := installed_folder(name)) is not None:

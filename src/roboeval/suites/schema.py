@@ -44,7 +44,7 @@ class StrictForm(BaseModel):
 
 
 class CheckFile(StrictForm):
-    """A check in a task file.
+    """A check in a task file: a formula that requirements name, such as `asks_in(room)`.
 
     Args:
         means: how explanations describe the check's texts, by kind of event. A single string is for `say`.
@@ -60,7 +60,7 @@ class CheckFile(StrictForm):
 
 
 class TaskFact(StrictForm):
-    """A fact about an instruction that the requirements of its task depend on.
+    """A fact in an instruction, such as "she is in her office", on which requirements depend.
 
     Args:
         words: regexes; every prompt must match at least one of them, or none if the fact is common sense.
@@ -124,21 +124,21 @@ class SampledPersonFile(StrictForm):
 
 
 class SampledThingFile(StrictForm):
-    """A thing that may be in sampled worlds."""
+    """An object in sampled worlds. Each world puts it into one room of the list `in`, or `nowhere`."""
 
     label: NamePattern | None = None
     where: Levels = Field(alias="in")
 
 
 class CornerFile(StrictForm):
-    """A world with some values set by hand. Other values default to the first entry of their list."""
+    """A sampled task's world with some values set by hand. Other values are the first of their list."""
 
     about: Name
     set: dict[Name, AnswerFile | Annotated[int, Field(strict=True)]] = {}
 
 
 class SampledWorldsFile(StrictForm):
-    """Describes the worlds of a task, which are sampled from this description."""
+    """Lists the rooms, people and things from which the worlds of a task are sampled."""
 
     robot: Levels
     rooms: Annotated[list[NamePattern], Field(min_length=1)]
@@ -175,7 +175,7 @@ class SampledTaskFile(_AnyTaskFile):
 
 
 class LimitsFile(StrictForm):
-    """The limits in a suite file."""
+    """The limits in suite.yaml after which the run of a program ends."""
 
     seconds: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] = 3600.0
     calls: Annotated[int, Field(strict=True, gt=0, le=1_000_000_000)] = 1_000

@@ -62,7 +62,7 @@ def equivalent_mutants(task: Task) -> Mapping[tuple[str, str], str]:
 
 
 def bare_diff(diff: str) -> str:
-    """Remove line numbers from a diff."""
+    """Remove line numbers from a diff, so that it stays the same when other lines of a program move."""
     return "\n".join("@@" if line.startswith("@@") else line.rstrip() for line in diff.strip().splitlines())
 
 

@@ -33,7 +33,7 @@ SUITES = Path(__file__).parent
 
 @dataclass(frozen=True)
 class HouseRules:
-    """The house rules in a file."""
+    """The house rules in a file. Evaluations stop a program before it breaks one of them."""
 
     name: str  # the file name without its ending, used in evaluation names; empty for a suite's own rules
     rules: tuple[Rule, ...]  # the rules, in file order
@@ -90,7 +90,7 @@ class Suite:
 
     @property
     def house_rules(self) -> tuple[Rule, ...]:
-        """Return the house rules, or none."""
+        """Return the house rules, or an empty tuple if there are none."""
         return () if self.house is None else self.house.rules
 
     @property
@@ -121,7 +121,7 @@ class Suite:
         return read_suite(self.folder, self.skills, count or self.worlds, seed).with_house_rules(self.house)
 
     def with_own_worlds(self) -> Suite:
-        """Return the suite with the worlds that its file specifies."""
+        """Return the suite with the number and seed of worlds in its suite.yaml."""
         if self.worlds is None or self.folder is None:
             return self
         return read_suite(self.folder, self.skills)

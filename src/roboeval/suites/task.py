@@ -24,7 +24,7 @@ class Requirement:
 
     Args:
         words: the prompts that ask for it, as pairs of number and words; empty if all prompts do.
-        arguments: what the check's parameters are.
+        arguments: the values for the check's parameters, such as `amy` in `greets("amy")`.
     """
 
     text: str  # the requirement in the task file, such as `not greets("amy")`
@@ -57,7 +57,7 @@ class Scenario:
 
 @dataclass(frozen=True)
 class TaskCheck:
-    """A named formula in a task that requirements refer to.
+    """A named formula in a task, such as `asks_in(room)`. Requirements call it with arguments.
 
     Args:
         means: how explanations describe its texts, by kind of event, with `{parameter}` as in `rtl`.
@@ -117,14 +117,14 @@ def check_label(text: str) -> str:
 def world_title(number: int, total: int | None, about: str) -> str:
     """Return the title of a world, without the number that starts a sampled world's description.
 
-    An only world has no number, since that of an agent's mission may be any of its task.
+    If `total` is 1, the title has no number, because an agent's only world may be any world of its task.
     """
     which = "" if total == 1 else f" {number}" if total is None else f" {number} of {total}"
     return f"World{which}: {about.removeprefix(f'{number}: ')}"
 
 
 def describe_contents(world: World, room: Room) -> list[str]:
-    """Describe each thing and person in a room or at a place, with their properties."""
+    """Describe each thing and person in a room or at a place, such as `cup` and `Amy (answers yes)`."""
     traits = {
         name: [f"{key} {', '.join(value) if isinstance(value, tuple) else value}" for key, value in of]
         for name, of in world.traits

@@ -1,4 +1,4 @@
-"""Generates missions for training, in which a policy calls skills one at a time, with their rewards."""
+"""Generates missions for training, where a policy calls skills one at a time, and computes their rewards."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def load_missions(
 ) -> list[dict[str, Any]]:
     """Generate any number of missions, each in one world of a task. The result is reproducible.
 
-    The arguments and the errors are those of `load_prompts`, which gives the tasks.
+    The arguments and errors are those of `load_prompts`, and the tasks are the same.
 
     Returns:
         Rows with `prompt` (messages with `role` and `content`), with `tools` (functions with JSON Schemas),
@@ -55,7 +55,7 @@ def mission_tools() -> list[dict[str, Any]]:
 
 @dataclass
 class TrainingMission:
-    """A mission in which each call of a tool is an action. Equal calls always have equal results.
+    """A policy's mission: `call` skills until it `is_over`. Equal calls always have equal results.
 
     Args:
         family: the family of the task.
@@ -103,7 +103,7 @@ class TrainingMission:
             self._mission.answer(text)
 
     def stop(self) -> None:
-        """End the mission because the policy may not go on."""
+        """End the mission early, as if the policy had reached the limit of calls."""
         if not self.is_over:
             self._mission.end(TURN_LIMIT)
 

@@ -76,7 +76,7 @@ def _row(families: Sequence[str], seed: int, form: PromptForm) -> dict[str, Any]
 
 
 def program_in(completion: PolicyReply, opening: str = "") -> str:
-    """Extract the program from a policy's completion.
+    """Extract the program from a policy's completion, such as the code block in a chat message.
 
     Args:
         completion: a string, or messages that end with the policy's message.

@@ -100,7 +100,7 @@ def has_missions(table: pl.DataFrame) -> bool:
 
 
 def per_mission(table: pl.DataFrame) -> pl.DataFrame:
-    """Return a table of a run in which each completion in each world counts as one, with its own failure."""
+    """Return a run's table in which each row, a completion in one world, counts as a whole completion."""
     kept = pl.col("failure_class").is_in([NO_PROGRAM_CLASS, AGENT_ERROR_CLASS])
     is_check = pl.col("failed_checks").is_not_null()
     is_robots = pl.col("status") == Status.ROBOT_ERROR.value
@@ -120,12 +120,12 @@ def per_mission(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def comparable_tables(*tables: pl.DataFrame) -> Sequence[pl.DataFrame]:
-    """Return the tables of runs: of missions, if an agent carried out those of any run."""
+    """Return the tables of runs to compare. If any run has missions of an agent, apply `per_mission`."""
     return [*map(per_mission, tables)] if any(map(has_missions, tables)) else tables
 
 
 def compare_tables(first: pl.DataFrame, second: pl.DataFrame) -> Comparison:
-    """Compare two runs with `compare_scores`, by missions if an agent carried out those of any run."""
+    """Compare two runs with `compare_scores`. If one has missions of an agent, count both by mission."""
     found = compare_scores(*(pass_at_1(task_scores(table)) for table in comparable_tables(first, second)))
     if not (has_missions(first) or has_missions(second)):
         return found
@@ -190,7 +190,7 @@ MISSIONS_COMPARED = "each program or agent in each world counts as one mission"
 
 
 def other_differences(first: Results, second: Results) -> list[str]:
-    """Describe differences other than the model that may explain why the results of two runs differ."""
+    """Describe what else differs between two runs, such as "temperature differs: 0.2 and 1.0"."""
     runs, found = (first, second), []
     modes = [run.about.get("mode", "program") for run in runs]
     if modes[0] != modes[1]:
@@ -216,12 +216,12 @@ def _short(value: object) -> str:
 
 
 def failure_shares(table: pl.DataFrame) -> dict[str, float]:
-    """Return the shares of judged completions, by class of failure."""
+    """Return the share of judged completions that fail, for each class of failure."""
     return {one.name: one.share for one in failures(tally_of(table))}
 
 
 def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:
-    """Convert a comparison to plain data."""
+    """Convert a comparison to JSON data, for `roboeval compare --json`."""
     return {
         "first": {"name": names[0], "pass@1": comparison.first},
         "second": {"name": names[1], "pass@1": comparison.second},

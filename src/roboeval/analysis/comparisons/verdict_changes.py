@@ -19,7 +19,7 @@ from roboeval.evaluation.runs.results import Results
 
 @dataclass(frozen=True)
 class TaskChanges:
-    """Counts the completions of a task by the suites under which they pass."""
+    """Counts a task's completions that pass under both suites, under one of them, or under neither."""
 
     task: str
     both: int
@@ -155,7 +155,7 @@ def warn_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
 
 
 def changes_data(found: Sequence[VerdictChanges]) -> dict[str, Any]:
-    """Convert the changes of all runs to plain data."""
+    """Convert the changes of all runs to JSON data, for `roboeval compare --suites --json`."""
     return {
         "suites": list(found[0].suites),
         "runs": [_run_data(one, found) for one in found],

@@ -45,7 +45,7 @@ def count_broken_rules(table: pl.DataFrame, without: pl.DataFrame | None = None)
 
 
 def broken_rules_data(found: BrokenRules) -> dict[str, Any]:
-    """Convert the statistics to plain data."""
+    """Convert the counts of broken rules to JSON data, for `roboeval show --json`."""
     return {
         "broken": vars(found.broken),
         "programs_by_rule": dict(found.by_rule),

@@ -17,7 +17,7 @@ Tally: TypeAlias = Counter[tuple[str, int, bool, str | None, str | None]]
 
 
 def outcome_of(row: Row) -> tuple[str, int, bool, str | None, str | None]:
-    """Return the entry of a tally that counts a judged completion."""
+    """Return the key under which a `Tally` counts a judged completion."""
     why = row["failure"]
     failed = (None, None) if why is None else (why["class"], why["kind"])
     return row["task"], row["prompt"], why is None, *failed

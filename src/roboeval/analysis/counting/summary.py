@@ -125,14 +125,14 @@ def causes(tally: Tally) -> Causes:
 
 
 def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
-    """Return the kinds of failure that occur in a class, with known kinds first."""
+    """Return the kinds of failure of a class that occur in any of `found`, with known kinds first."""
     occurring = {kind for one in found for kind in one.kinds.get(name, {})}
     known = [kind for kind in FAILURE_CLASSES[name].kinds if kind in occurring]
     return [*known, *sorted(occurring - {*known})]
 
 
 def summary_data(summary: EvaluationSummary) -> dict[str, Any]:
-    """Convert a summary to plain data."""
+    """Convert a summary to JSON data, for `roboeval show --json`."""
     return {
         "models": sorted(model for model in summary.scope.models if model is not None),
         "judged": summary.judged,

@@ -159,7 +159,7 @@ def resample(
 
 
 def check_run(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
-    """Check the programs of a run, save the results, and return the run's table with these results."""
+    """Check the programs of a run, save the results, and return the run's table with them in `accepted`."""
     from roboeval.evaluation.runs.table import with_answers
 
     completions = [results.completions[key] for key in results.places]

@@ -89,9 +89,9 @@ def report(
 def judged_run(
     results: Results, suite: str, *, beside: str | None, rules: Path | None, engine: OpenEngine | None
 ) -> JudgedRun:
-    """Read a run with any verdicts of its ablation, of another suite and with house rules.
+    """Return a run with further verdicts on it, if any: of its ablation, a second suite and house rules.
 
-    The engine checks the programs. Without an engine, earlier results of the check are left out, too.
+    The engine checks the programs. Without an engine, the report has no results of the check.
     """
     import polars as pl
 

@@ -1,4 +1,4 @@
-"""A conversation in which a model carries out one mission, by calls or by one program after another."""
+"""Talks with a model that carries out one mission, by calls of skills or by one program after another."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ MAX_REASONING = 200_000
 
 @dataclass(frozen=True)
 class TurnLimits:
-    """When a mission ends at the latest."""
+    """The numbers of replies and tokens after which a mission ends."""
 
     turns: int  # the number of replies
     tokens: int | None = None  # of all turns, as far as the model counts them
 
 
 class Conversation(ABC):
-    """A mission that goes on as long as it has a prompt. The same replies always lead to the same end."""
+    """A mission as a conversation: send `prompt`, `add` the reply, and repeat until `prompt` is None."""
 
     def __init__(self, mission: AgentMission, prompt: Prompt, limits: TurnLimits) -> None:
         self.mission, self.limits = mission, limits
@@ -40,7 +40,7 @@ class Conversation(ABC):
         self.result: str | None = None  # of the calls in the last reply
 
     def add(self, reply: Reply) -> None:
-        """Do what a reply says, or end the mission if it says nothing."""
+        """Make the call or run the program in a reply. End the mission if the reply contains neither."""
         self.replies.append(reply)
         self.result = None
         if reply.no_program is None:
@@ -49,7 +49,7 @@ class Conversation(ABC):
             self.end(reply.no_program)
 
     def end(self, ending: str, why: str = "") -> None:
-        """End the mission for a reason outside of it."""
+        """End the mission with one of `ENDINGS`, such as `Rejected` after the server refused a request."""
         self.prompt = None
         self.mission.end(ending, why)
 
@@ -59,14 +59,14 @@ class Conversation(ABC):
 
     @property
     def limit(self) -> str | None:
-        """The ending of the limit that is reached, or None."""
+        """The ending if a limit is reached, `TurnLimit` or `TokenLimit`, or None."""
         if len(self.replies) >= self.limits.turns:
             return TURN_LIMIT
         used = sum(reply.usage.total for reply in self.replies)
         return TOKEN_LIMIT if self.limits.tokens is not None and used >= self.limits.tokens else None
 
     def data(self) -> dict[str, Any]:
-        """Return the mission as entries of a row: what was done, how it ended, and what all turns took."""
+        """Return the mission as entries of completions.jsonl, such as `program`, `ending` and `usage`."""
         last, latencies = self.replies[-1], [reply.latency_s or 0 for reply in self.replies]
         return {
             **mission_data(self.mission),
@@ -81,7 +81,7 @@ class Conversation(ABC):
 
 
 class AgentConversation(Conversation):
-    """Lets a model call skills. Every reply is one call, or else the end of the mission."""
+    """Lets a model call skills, one in each reply. A reply without a call ends the mission."""
 
     def _act(self, reply: Reply) -> Prompt | None:
         if not reply.calls:
@@ -102,7 +102,7 @@ class AgentConversation(Conversation):
 
 
 def mission_data(mission: AgentMission) -> dict[str, Any]:
-    """Return the entries of a row that say what was done, and how it ended."""
+    """Return a mission's calls as `program`, its `ending`, and the counts of mistakes as `tool_errors`."""
     return {
         "program": mission.program,
         "ending": mission.ending,

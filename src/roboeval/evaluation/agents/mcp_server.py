@@ -47,7 +47,7 @@ class MissionDesk:
     _calls: int = 0
 
     def tools(self) -> list[ClientTool]:
-        """Return the tools: the robot's skills, and those that begin and end a mission."""
+        """Return the tools for the client: the robot's skills, `next_mission` and `finish_mission`."""
         answer = object_schema({"answer": {"type": "string"}})
         offered = [
             (NEXT, "Get the next mission. Call this first, and after each mission.", object_schema({})),
@@ -60,7 +60,7 @@ class MissionDesk:
         ]
 
     def call(self, name: str, arguments: dict[str, Any]) -> str:
-        """Make one call, and return its result for the client."""
+        """Make one call of a tool, and return its result as text for the client."""
         if self._current is None:
             return self._begin() if name == NEXT else f"There is no mission; call {NEXT}."
         key, mission = self._current
@@ -108,7 +108,7 @@ class MissionDesk:
 
 @contextlib.contextmanager
 def open_desk(run: RunFolder, plan: AgentPlan, model: str) -> Iterator[MissionDesk]:
-    """Open a run whose missions an MCP client carries out. Those that are done stay as they are."""
+    """Open a run whose missions an MCP client carries out. Missions that are done stay as they are."""
     with run.writing():
         about, _, todo = begin_batch(run, plan, model, UNKNOWN_SETTINGS)
         write_whole(run.about, to_text(about))

@@ -1,4 +1,4 @@
-"""One mission of an agent, which calls skills in one world of a task; each call becomes a line of source."""
+"""Carries out an agent's mission in one world of a task. Each call of a skill becomes a line of a program."""
 
 from __future__ import annotations
 
@@ -38,17 +38,17 @@ MAX_MISTAKES = 3
 """The number of mistakes in a row after which a mission ends."""
 
 MAX_REPEATS = 100
-"""The number of equal calls with equal results after which a mission ends. Nobody is waited for that long."""
+"""The number of equal calls with equal results after which a mission ends. Waits in between do not count."""
 
 LONGEST_WAIT = 1_000_000
-"""The longest time that one call waits."""
+"""The longest time that one call of `wait` may take, in seconds."""
 
 _TASK = "def task_program():\n"
 
 
 @dataclass
 class AgentMission:
-    """What an agent does in one world, until the mission ends.
+    """Makes an agent's calls in one world until the mission ends, and writes them as a program.
 
     Args:
         suite: the suite with the skills, the house rules and the settings of the simulation.
@@ -69,7 +69,7 @@ class AgentMission:
         self._ledger = Ledger(self.robot)
 
     def call(self, name: str, arguments: str | Mapping[str, object]) -> str:
-        """Make one call, and return what the agent is told. The call may end the mission."""
+        """Make one call, and return its result as text, such as `done`. The call may end the mission."""
         if self.ending is not None:
             raise UserError("this mission is over")
         try:
@@ -93,7 +93,7 @@ class AgentMission:
         return text
 
     def refuse(self, kind: str, sentence: str, what: str) -> str:
-        """Count a mistake, of which too many in a row end the mission, and return what the agent is told."""
+        """Count a mistake and return a message for the agent. Too many in a row end the mission."""
         self.mistakes[kind] += 1
         self._in_a_row += 1
         self._note(f"{kind}: {what}")
@@ -116,13 +116,13 @@ class AgentMission:
             self._note(f"In the end: {text}")
 
     def end(self, ending: str, why: str = "") -> None:
-        """End the mission for a reason outside of it."""
+        """End the mission with one of `ENDINGS`, such as `TurnLimit`, and note `why` in the program."""
         self.ending = ending
         if why:
             self._note(f"{ending}: {why}")
 
     def give_up(self, reason: str) -> str:
-        """End the mission: with the robot's error if the last call failed, since that is the cause."""
+        """End the mission. If the last call failed, the ending is that error, since it is the cause."""
         at, lines = self.robot.try_at, self.robot.lines
         self.ending = GAVE_UP if at is None else ERROR
         if at is not None:
@@ -133,7 +133,7 @@ class AgentMission:
 
     @property
     def program(self) -> str:
-        """The calls as a program, which does the same in this world."""
+        """The calls so far as a program that does the same in this world."""
         lines = self.robot.lines
         needs_time = any("time.sleep(" in line for line in lines)
         is_empty = all(line.startswith("#") for line in lines)
@@ -142,7 +142,7 @@ class AgentMission:
 
     @property
     def outcome(self) -> Outcome:
-        """The outcome so far, which is that of the program."""
+        """The outcome of the calls so far, to judge the mission like a program."""
         kind = "robot-error" if self.ending == ERROR else "finished"
         end = {"end": kind, "number": len(self._ledger.errors) - 1}
         outcome = judge_end(self._ledger.outcome_at_end(end), self.robot)

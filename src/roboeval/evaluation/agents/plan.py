@@ -45,7 +45,7 @@ class AgentPlan(GenerationPlan):
     has_turns: ClassVar[bool] = True
 
     def keys(self) -> list[CompletionKey]:
-        """Return all keys. The index counts worlds first: those of the first missions, then of the second."""
+        """Return all keys. With 3 worlds, indexes 0 to 2 are the first mission in each, 3 to 5 the second."""
         first = GenerationPlan(self.suite, self.tasks, 1)
         prompts = [(task, prompt) for task, prompt, _ in first.keys()]  # noqa: SIM118 - a plan is no mapping
         return [
@@ -56,7 +56,7 @@ class AgentPlan(GenerationPlan):
         ]
 
     def describe(self) -> dict[str, Any]:
-        """Return entries of run.json that all completions of the run share."""
+        """Return the entries of run.json that the plan determines, such as `mode` and `max_turns`."""
         is_agent = self.mode == "agent"
         hashed = agent_template_hash if is_agent else template_hash
         return {
@@ -70,7 +70,7 @@ class AgentPlan(GenerationPlan):
     async def complete(
         self, key: CompletionKey, model: str, ask: Ask, earlier: Sequence[Reply] = ()
     ) -> dict[str, Any]:
-        """Let the model carry out a mission, beginning with the replies that it gave earlier."""
+        """Let the model carry out a mission. Its `earlier` replies are replayed, with the same effects."""
         conversation = self.begin(key)
         for reply in earlier:
             await asyncio.to_thread(conversation.add, reply)
@@ -88,12 +88,12 @@ class AgentPlan(GenerationPlan):
         return row_for(key, self.instruction(key), model, where | conversation.data())
 
     def begin(self, key: CompletionKey) -> Conversation:
-        """Begin the conversation about a mission."""
+        """Return a new conversation in which the model carries out the mission of a key."""
         kind = AgentConversation if self.mode == "agent" else ReplanConversation
         return kind(self.begin_mission(key), self.prompt(key), self.limits)
 
     def begin_mission(self, key: CompletionKey) -> AgentMission:
-        """Begin a mission without a conversation."""
+        """Return a new mission in the world of a key, judged by the requirements of its prompt."""
         contracts = () if self.contract is None else (self.contract,)
         scenario = self.suite.tasks[key[0]].scenarios[self.world(key)].asked_by(key[1])
         return AgentMission(self.suite, scenario, contracts)

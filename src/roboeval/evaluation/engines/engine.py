@@ -1,4 +1,4 @@
-"""Defines engines, which run programs on this machine or on a Ray cluster."""
+"""Defines what an engine does, and the engine that runs programs on this machine."""
 
 from __future__ import annotations
 

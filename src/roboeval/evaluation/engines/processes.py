@@ -29,11 +29,11 @@ from roboeval.evaluation.engines.engine import (
 
 
 class Processes:
-    """Runs programs in several processes, each of which replays and judges the programs of its own worker.
+    """Runs programs in several processes. Each process has a worker, and judges what its worker runs.
 
-    With threads instead of processes, a single core would replay and judge for all workers. A process starts
-    when there is work for it, and they end when the results are exhausted. The caller must warn if programs
-    are not fully isolated.
+    With threads instead of processes, a single core would simulate and judge for all workers. A process
+    starts when there is work for it, and all end when the results are exhausted. The caller must warn if
+    programs are not fully isolated.
     """
 
     def __init__(self, workers: int, **isolation: bool) -> None:
@@ -94,7 +94,7 @@ def exit_with_parent(pipe: Connection) -> None:
 
 
 def run_batch(functions: bytes, isolation: Mapping[str, bool], works: Sequence[Work]) -> list[Any]:
-    """Run programs on the worker of this process."""
+    """Run and judge programs in this process, with its own worker. `functions` are pickled."""
     function, then = load_functions(functions)
     return [then(ran) for ran in function(own_worker(**isolation), works)]
 

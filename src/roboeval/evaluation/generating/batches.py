@@ -74,7 +74,7 @@ def request_id(about: Mapping[str, Any], key: CompletionKey, instruction: str) -
 
 @dataclass(frozen=True)
 class ImportResult:
-    """The state of a run after an import of answers."""
+    """Counts a run's completions after an import of answers."""
 
     new: int  # completions that the import added
     total: int  # completions that the run should have

@@ -40,7 +40,7 @@ class Pace:
 
 @dataclass
 class GenerationProgress:
-    """Progress towards the completions that a run should have."""
+    """Counts the completions that a run should have and those it has so far."""
 
     total: int
     found: int  # completions present at the start
@@ -54,7 +54,7 @@ class GenerationProgress:
 
     @property
     def missing(self) -> str | None:
-        """Say how many completions are missing, and why, or why generation stopped; None if all is well."""
+        """Return a sentence such as "3 completions are missing: timed out", or None if all is well."""
         left = self.total - self.done
         reason = self.stopped or next(iter(self.failures.values()), "they were not requested")
         return f"{how_many(left)} {'is' if left == 1 else 'are'} missing: {reason}" if left else self.stopped

@@ -29,7 +29,7 @@ from roboeval.evaluation.runs.folder import RunFolder, load_json_object
 from roboeval.suites.load import Suite
 
 Ask: TypeAlias = Callable[[Prompt], Awaitable[Reply]]
-"""Requests a reply."""
+"""A function that sends a prompt to the model and returns the reply."""
 
 WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change a model's replies
 OPTIONAL_SETTINGS = ("reasoning_effort", "extra_body")  # left out of run.json if unset
@@ -64,21 +64,21 @@ class GenerationPlan:
         return prompt_for(self.instruction(key), rules=rules, skills=skills)
 
     def sample(self, key: CompletionKey) -> int:
-        """Return the number of the sample, which determines its seed."""
+        """Return the number of the sample, on which its random seed depends."""
         return key[2]
 
     def given(self) -> Iterable[Completion]:
-        """Return the completions to copy from another run."""
+        """Return the completions to copy from the previous round, here none."""
         return ()
 
     def describe(self) -> dict[str, Any]:
-        """Return entries of run.json that all completions of the run share."""
+        """Return the entries of run.json that the plan determines: the hash of the prompt template."""
         return {"template": template_hash(self.suite.skills)}
 
     async def complete(
         self, key: CompletionKey, model: str, ask: Ask, earlier: Sequence[Reply] = ()
     ) -> dict[str, Any]:
-        """Request a completion from the model of this name, unless it replied earlier, and return its row."""
+        """Return the row of a completion. Ask the model for a reply, unless `earlier` contains one."""
         reply = earlier[-1] if earlier else await ask(self.prompt(key))
         return row_for(key, self.instruction(key), model, reply.data())
 
@@ -119,7 +119,7 @@ class RoundPlan(GenerationPlan):
         return first.after(program, self.problems[key]) if self.repairs and program.strip() else first
 
     def sample(self, key: CompletionKey) -> int:
-        """Return the number of the sample, which determines its random seed."""
+        """Return the number of the sample, shifted for each round so that all random seeds differ."""
         return key[2] + self.number * SAMPLE_STRIDE
 
     def given(self) -> Iterator[Completion]:
@@ -137,7 +137,7 @@ def no_usage() -> Counter[str]:
 
 
 def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> None:
-    """Add the token counts of a row to the total. They are null if the model does not count tokens."""
+    """Add the token counts of a row to `total`. A count that is missing or null adds nothing."""
     for name in total:
         total[name] += (usage or {}).get(name) or 0
 
@@ -145,7 +145,7 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
 def begin_batch(
     run: RunFolder, plan: GenerationPlan, model: str, settings: SamplingSettings
 ) -> tuple[dict[str, Any], set[CompletionKey], list[CompletionKey]]:
-    """Return the content of run.json with the batch of a plan, the keys that are done, and those to request.
+    """Return the new content of run.json, the keys of existing completions, and the keys to request.
 
     Raises UserError if existing completions have other settings.
     """
@@ -238,15 +238,15 @@ def _brief(value: object) -> str:
 
 
 def timestamp() -> str:
-    """Return the current time, to the second."""
+    """Return the current time in UTC, such as `2026-03-01T09:30:00+00:00`."""
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 class RequestLog:
-    """Logs each request before it is sent, and each end of a request without a completion.
+    """Logs requests, to count those that an interruption left pending and that may be billed twice.
 
-    A request with neither an end nor a completion was pending when the run was interrupted, and may be billed
-    twice. The file starts anew with each command, and is deleted when a run ends normally.
+    Each request is logged before it is sent, and again if it ends without a completion. Any other request
+    without a completion was pending. Each command starts a new file, and deletes it at a normal end.
     """
 
     def __init__(self, path: Path, done: set[CompletionKey]) -> None:
@@ -278,7 +278,7 @@ class RequestLog:
             self._file.append(to_line({"ended": key}))
 
     def kept(self, key: CompletionKey) -> None:
-        """Forget a request whose completion has been saved."""
+        """Count a request as no longer pending, because its completion has been saved."""
         self.under_way.remove(key)
 
     def _read(self) -> set[CompletionKey]:

@@ -66,7 +66,7 @@ def suite_instruction(suite: Suite | None, task: str, prompt: int) -> str | None
 
 
 def instruction_shown(recorded: str | None, of_suite: str | None) -> tuple[str | None, str | None]:
-    """Return a note on the origin of an instruction, and the instruction. Each is None if there is none."""
+    """Return a note such as "instruction not recorded", and the instruction to show. Each may be None."""
     if recorded is not None or of_suite is None:
         return INSTRUCTION_NOT_RECORDED if recorded is None else None, recorded
     return f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}", of_suite

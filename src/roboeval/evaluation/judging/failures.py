@@ -116,7 +116,7 @@ class Verdict:
     satisfied: bool
 
     def on(self, prompt: int) -> Verdict:
-        """Return the verdict for one prompt, which may have fewer requirements than all prompts together."""
+        """Return the verdict for one prompt, without requirements that only other prompts ask for."""
         asked = tuple(requirement for requirement in self.failed if requirement.is_asked_by(prompt))
         if len(asked) == len(self.failed):
             return self

@@ -148,7 +148,7 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
 
 
 class Ran(NamedTuple):
-    """What a program did in the worlds in which it is judged."""
+    """The outcomes of a program, one for each world in which it is judged."""
 
     task: str
     acted: Acted | None  # where an agent acted; None for a program, which is judged in all worlds
@@ -185,14 +185,14 @@ def robot_in(world: World, suite: Suite) -> SimulatedRobot:
 
 
 def guard_of(suite: Suite, contracts: Sequence[Contract] = ()) -> RuleGuard | None:
-    """Return what holds calls against the house rules of a suite and some contracts, or None without any."""
+    """Return a guard that stops calls against house rules or contracts, or None if there are neither."""
     if suite.house is None and not contracts:
         return None
     return RuleGuard(suite.house_rules, contracts=contracts)
 
 
 def run_in(worker: Worker, program: str, scenarios: Iterable[Scenario], suite: Suite) -> list[Outcome]:
-    """Run a program in each of some worlds."""
+    """Run a program in the world of each scenario, and return the outcomes in that order."""
     robots = [partial(robot_in, scenario.world, suite) for scenario in scenarios]
     return worker.run_all([(program, robots)])[0]
 

@@ -29,9 +29,9 @@ FAILED_PREFIX = b'{"passed": false, '  # how `judgement` starts a failed judgeme
 
 
 def add_reply_fault(completion: Completion, judgement_json: bytes) -> bytes:
-    """Set the failure in a judgement, given as JSON, to the lack of a program or of calls, if that is why.
+    """Replace the failure in a judgement if the reply has no program, or if an agent never called a skill.
 
-    Running such a reply ends in an error or a failed check, but that is not why the completion fails.
+    Running the reply ends in an error or a failed check, but that is not why the completion fails.
     """
     if not judgement_json.startswith(FAILED_PREFIX):
         return judgement_json
@@ -47,7 +47,7 @@ def add_reply_fault(completion: Completion, judgement_json: bytes) -> bytes:
 
 
 def row_line(completion: Completion, judgement_json: bytes) -> bytes:
-    """Return the row of a completion as a line, given its judgement as JSON."""
+    """Return a completion's row as a line of JSON: its key and hash, followed by its judgement."""
     identity = {
         "task": completion.task,
         "prompt": completion.prompt,
@@ -73,7 +73,7 @@ def judgements_for(verdicts: list[Verdict], prompts: int) -> tuple[bytes, ...]:
 
 
 def judgement(verdicts: list[Verdict]) -> bytes:
-    """Return the judgement on a program as JSON that fits into a row."""
+    """Return `passed`, `failure` and the `verdicts` of all worlds as JSON that fits into a row."""
     why = failure_of_verdicts(verdicts)
     return limit_size(
         {
@@ -85,7 +85,7 @@ def judgement(verdicts: list[Verdict]) -> bytes:
 
 
 def verdict_data(verdict: Verdict) -> dict[str, Any]:
-    """Convert a verdict to an entry of a row."""
+    """Convert the verdict in one world to an entry of `verdicts` in a row."""
     outcome = outcome_data(verdict.outcome)
     return {
         "world": verdict.world,

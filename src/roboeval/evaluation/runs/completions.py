@@ -29,7 +29,7 @@ NO_PROGRAM_COLUMN = "no_program"  # the table column for replies without a progr
 
 
 class Acted(NamedTuple):
-    """Where an agent acted, instead of writing a program for all worlds, and how its mission ended."""
+    """The only world in which an agent carried out a mission, and how the mission ended."""
 
     world: int  # the index of the world in its task
     ending: str  # one of `ENDINGS`
@@ -100,7 +100,7 @@ class Completion:
 
     @property
     def finish_reason(self) -> str | None:
-        """Return why the reply ended, in the server's words, or None if that was not recorded."""
+        """Return the server's reason why the reply ended, such as `stop` or `length`, or None if unknown."""
         reason = self.more.get("finish_reason")
         return reason if isinstance(reason, str) else None
 
@@ -111,19 +111,19 @@ class Completion:
 
     @property
     def acted(self) -> Acted | None:
-        """Return where an agent acted and how that ended, or None for a program."""
+        """Return the world and the ending of an agent's mission, or None if the model wrote a program."""
         world, ending = self.more.get("world"), self.more.get("ending")
         is_valid = type(world) is int and 0 <= world < NUMBER_LIMIT and ending in ENDINGS
         return Acted(world, ending) if is_valid else None  # type: ignore[arg-type]  # `is_valid` has checked them
 
     @property
     def mode(self) -> str:
-        """Return how the model was used: to write a program, as an agent, or to write programs again."""
+        """Return how the model was used: `program`, `agent`, or `replan` for one program after another."""
         return str(self.more.get("mode", "program"))
 
     @property
     def turns(self) -> int:
-        """Return the number of replies that it took."""
+        """Return the number of model replies: 1 for a program, often more for a mission of an agent."""
         turns = self.more.get("turns", 1)
         return turns if type(turns) is int else 1
 
@@ -150,7 +150,7 @@ class Completion:
 
 
 def row_for(key: CompletionKey, instruction: str, model: str, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a row of completions.jsonl: what was asked of which model, and what came of it."""
+    """Return a row of completions.jsonl. `more` holds the entries about the reply, such as `program`."""
     return {**dict(zip(KEY, key, strict=True)), "instruction": instruction, "model": model, **more}
 
 
@@ -221,7 +221,7 @@ def check_length(row: Mapping[str, Any], file: str | None) -> None:
 
 
 def find_key_fault(key: CompletionKey, suite: Suite) -> str | None:
-    """Return an error message if a suite lacks a task or prompt, or None. Their types may also be wrong."""
+    """Return an error message if a suite lacks the task or prompt of a key, or None if it has both."""
     task = suite.tasks.get(str(key[0]))
     if task is None:
         return f'the suite "{suite.name}" has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
@@ -233,7 +233,7 @@ def find_key_fault(key: CompletionKey, suite: Suite) -> str | None:
 
 
 def name_of(key: CompletionKey) -> str:
-    """Format a key as TASK/PROMPT/INDEX."""
+    """Format a key as TASK/PROMPT/INDEX, such as `LunchTime/0/12`."""
     return "/".join(map(str, key))
 
 
@@ -243,7 +243,7 @@ def how_many(count: int) -> str:
 
 
 def recorded_suffix(models: Collection[str | None]) -> str:
-    """Return a suffix for titles that marks programs written by hand, or an empty string."""
+    """Return ` (programs written by hand)` for a title if models are recorded, or else an empty string."""
     recorded = [model for model in models if model is not None and model.startswith("recorded:")]
     if not recorded:
         return ""

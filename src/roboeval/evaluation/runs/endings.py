@@ -9,7 +9,7 @@ from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 
 FINAL_ANSWER, ERROR, TIMEOUT = "answer", "error", "TimeoutError"
-"""The endings that programs have, too: a normal end, an error of the robot or a rule, and a limit."""
+"""Endings of agents and programs alike: a normal end, an error of the robot or a rule, and a limit."""
 
 NO_CALL, GAVE_UP, OUTSIDE_CONTRACT = "NoCall", "GaveUp", "OutsideContract"
 UNKNOWN_TOOL, WRONG_ARGUMENTS, SEVERAL_CALLS = "UnknownTool", "WrongArguments", "SeveralCalls"
@@ -28,7 +28,7 @@ AGENT_SENTENCES: Mapping[str, str] = {
     SERVER_REJECTED: "The server rejected the conversation, which may have become too long.",
     OUTSIDE_CONTRACT: "The agent wanted to do what the contract does not allow.",
 }
-"""What each kind of ending means that only agents have, in a sentence."""
+"""A sentence that explains each ending that only missions of agents have."""
 
 ENDINGS = (FINAL_ANSWER, ERROR, TIMEOUT, *AGENT_SENTENCES, *NO_PROGRAM_SENTENCES)
 _SENTENCES = {**AGENT_SENTENCES, **{str(kind): text for kind, text in NO_PROGRAM_SENTENCES.items()}}
@@ -37,9 +37,9 @@ _NORMAL = {FINAL_ANSWER, ERROR, NO_CALL}
 
 
 def apply_ending(outcome: Outcome, ending: str) -> Outcome:
-    """Return the outcome of an agent's mission, given that of the program that makes the same calls.
+    """Return the outcome of an agent's mission. A mission that ended badly, such as by giving up, fails.
 
-    A limit counts like a program's limit. Giving up, mistakes and replies without a call are errors.
+    `outcome` is that of a program with the same calls. A limit is a timeout; other bad endings are errors.
     """
     if ending in _NORMAL or outcome.status is not Status.FINISHED:
         return outcome

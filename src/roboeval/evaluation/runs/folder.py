@@ -56,7 +56,7 @@ class RunFolder:
         return self.path / "evaluations" / f"{key}.json"
 
     def checks(self, key: str) -> Path:
-        """Return the path of the problems that the check found, given the key of an evaluation."""
+        """Return the path of the file with the problems that the check found in each program."""
         return self.path / "checks" / f"{key}.jsonl"
 
     def checks_manifest(self, key: str) -> Path:
@@ -64,11 +64,11 @@ class RunFolder:
         return self.path / "checks" / f"{key}.json"
 
     def questions(self, key: str) -> Path:
-        """Return the folder of what `roboeval clarify` measured, given the key of an evaluation."""
+        """Return the folder in which `roboeval clarify` saves its results for an evaluation."""
         return self.path / "clarify" / key
 
     def judged_by(self) -> list[str]:
-        """Return the sorted names of the evaluations, except ablations."""
+        """Return the sorted names of the evaluations. The suffix of an ablation is left out."""
         keys = (path.stem for path in self.rows("").parent.glob("*.jsonl"))
         return sorted({key.removesuffix(ABLATED) for key in keys})
 
@@ -184,7 +184,7 @@ def load_json_object(path: Path) -> dict[str, Any]:
 
 
 def selected_tasks(manifest: Mapping[str, Any]) -> frozenset[str] | None:
-    """Return the tasks selected in the content of KEY.json, or None for all."""
+    """Return the tasks that KEY.json says were selected for the evaluation, or None for all."""
     tasks = manifest.get("tasks")
     return None if tasks is None else frozenset(tasks)
 
@@ -195,7 +195,7 @@ def about_of(run: RunFolder) -> dict[str, Any]:
 
 
 def evaluation_key(suite: Suite, *, ablated: bool) -> str:
-    """Return the name with which the files of an evaluation start."""
+    """Return the file name of an evaluation without its ending, such as `plus` or `plus-rules-night`."""
     named = suite.house is not None and suite.house.name
     rules = f"{RULES_INFIX}{named}" if named else ""
     return suite.name + rules + ABLATED * ablated
@@ -216,7 +216,7 @@ def tasks_to_judge(
 
 
 def with_judged_worlds(run: RunFolder, suite: Suite, *, ablated: bool) -> Suite:
-    """Return the suite with the sampled worlds in which the run was judged."""
+    """Return the suite with the number and seed of worlds that KEY.json says the run was judged with."""
     path = run.manifest(evaluation_key(suite, ablated=ablated))
     drawn = suite.worlds, suite.seed
     if suite.worlds is None or not path.is_file():

@@ -80,12 +80,12 @@ class Results:
 
     @cached_property
     def passed(self) -> Sequence[CompletionKey]:
-        """Return the completions that passed."""
+        """Return the keys of the completions that passed."""
         return keys_where(self.table, pl.col("passed"))
 
     @cached_property
     def failed(self) -> Sequence[CompletionKey]:
-        """Return the completions that failed."""
+        """Return the keys of the completions that failed."""
         return keys_where(self.table, ~pl.col("passed"))
 
     @property

@@ -1,4 +1,4 @@
-"""Defines and reads the rows of an evaluation, and the seal of a finished file."""
+"""Defines and reads the rows of an evaluation, and the hash that reveals changes to a finished file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ESCAPES = re.compile(rb"\\\\|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(\\u[dD][89a-fA-
 Failure = TypedDict("Failure", {"class": str, "kind": str, "world": int, "check": str | None})
 """Why a completion fails (paper, section V.B).
 
-`class` is one of `CLASSES`, `world` is the first unsatisfied world, from 0, and `check` is None for an error.
+`class` is a key of `FAILURE_CLASSES`, `world` the first failing world (from 0), `check` None for an error.
 """
 
 
@@ -98,7 +98,7 @@ def key_of(row: Mapping[str, Any]) -> CompletionKey:
 
 
 def failure_of(row: Row) -> Failure:
-    """Return the failure of a failed row."""
+    """Return the failure in a row, whose program must have failed."""
     assert row["failure"] is not None, "this program passed"
     return row["failure"]
 
@@ -152,7 +152,7 @@ class LocatedRow:
 def read_lines_of(
     path: Path, manifest: Mapping[str, Any], *, seal: Seal | None = None, task: str | None = None
 ) -> Iterator[LocatedRow]:
-    """Read the rows of all tasks, or of one task. Ignore an incomplete last line."""
+    """Read the rows of all tasks or of one. Ignore an incomplete last line. `seal` hashes all lines."""
     name = b"" if task is None else to_line(task).removesuffix(b"\n")
     seal = seal or Seal()
     at = 0
@@ -186,7 +186,7 @@ def take_judged(left: dict[CompletionKey, Completion], line: LocatedRow, file: P
 
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
-    """Yield the key of each checked program, which is its task and its hash, and its problems."""
+    """Yield the task and hash of each checked program, with the problems that the check found."""
     for number, row in read_rows(path, growing=True):
         match row:
             case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:
@@ -196,7 +196,7 @@ def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
 
 
 class Seal:
-    """The row count and hash of a file of rows, which KEY.json records when an evaluation is finished."""
+    """The row count and hash of an evaluation's file. KEY.json stores them, so that changes are noticed."""
 
     def __init__(self) -> None:
         self._count, self._hash = 0, hashlib.sha256()

@@ -41,7 +41,7 @@ class Coverage:
 
 @dataclass(frozen=True)
 class JudgingScope:
-    """The completions that an evaluation should judge."""
+    """Counts the completions that an evaluation should judge, by task and by how they ended."""
 
     completions: Mapping[str, int]  # the number for each task, selected or not
     tasks: frozenset[str] | None = None  # selected tasks; None for all
@@ -60,7 +60,7 @@ class JudgingScope:
         about: Mapping[str, Any] = {},
         suite: Suite | None = None,
     ) -> JudgingScope:
-        """Count the completions of the selected tasks, or of all if `tasks` is None."""
+        """Count completions. Models, cut-off replies and missions count for `tasks` only; None means all."""
         every = list(completions)
         selected = [one for one in every if tasks is None or one.task in tasks]
         missions = [(one.acted.ending, one.turns) for one in selected if one.acted is not None]
@@ -97,7 +97,7 @@ class JudgingScope:
 
     @property
     def cut_off_warning(self) -> str | None:
-        """Return a warning that says what to do, or None if only few replies were cut off."""
+        """Return a warning with advice if many replies ended at the token limit, or else None."""
         share = self.cut_off / self.total if self.total else 0.0
         if share <= MAX_CUT_OFF_SHARE:
             return None

@@ -96,7 +96,7 @@ def keys_where(table: pl.DataFrame, condition: pl.Expr) -> list[CompletionKey]:
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
-    """Return the table with the column `accepted`, which says whether the check found no problem."""
+    """Return the table with `accepted` filled in: whether the check found no problem in the program."""
     names = ["task", "program_sha256"]
     answers = [(*key, not found) for key, found in problems.items()]
     accepted = pl.DataFrame(
@@ -109,7 +109,7 @@ def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequenc
 class TableBuilder:
     """Builds the table that `load_results` describes from the rows of an evaluation.
 
-    `categories` are those of requirements, by task and text.
+    `categories` maps each pair of a task and a requirement's text to the requirement's category.
     """
 
     def __init__(self, categories: Mapping[tuple[str, str], str] = {}) -> None:
@@ -123,7 +123,7 @@ class TableBuilder:
         self._counts: list[int] = []
 
     def add(self, row: Row, written: Completion | None = None) -> None:
-        """Add the verdict in each world on a completion, which tells more if it is given."""
+        """Add the verdicts of a row. `written` is the judged completion, for columns such as `program`."""
         if len(self._worlds) >= CHUNK_ROWS:
             self._store()
         key = dict(zip(KEY, key_of(row), strict=True))
@@ -184,7 +184,7 @@ def _known_of(written: Completion) -> dict[str, Any]:
 
 
 def storable(text: str) -> str:
-    """Escape the lone surrogates of a string, which UTF-8 cannot encode."""
+    """Escape the lone surrogates of a string, since tables store strings in UTF-8, which has none."""
     return text.encode(errors="backslashreplace").decode()
 
 

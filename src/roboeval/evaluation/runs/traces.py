@@ -12,7 +12,7 @@ CIRCUMSTANCES = ("places", "holding", "to", "destinations")
 
 
 def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
-    """Return the changes in the circumstances that formulas refer to. Events are numbered from 1.
+    """Return when the robot's room, what it holds and whom it asks change. Events are numbered from 1.
 
     `places` is always present. The other entries are present only if they are not empty:
 

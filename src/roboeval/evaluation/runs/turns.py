@@ -1,4 +1,4 @@
-"""The log of the turns of agents, which lets an interrupted mission go on without paying twice."""
+"""Logs the replies to agents, so that an interrupted mission goes on without paying for them twice."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from roboeval.evaluation.runs.rows import key_of
 
 
 class TurnLog:
-    """Saves each reply to an agent as soon as it arrives, and knows those of missions that have not ended."""
+    """Saves each reply to an agent at once, so that an interrupted mission goes on where it stopped."""
 
     def __init__(self, path: Path, done: Collection[CompletionKey]) -> None:
         self._replies: dict[CompletionKey, list[Reply]] = {}
@@ -31,7 +31,7 @@ class TurnLog:
         self._file = Appender(path)
 
     def replies(self, key: CompletionKey) -> list[Reply]:
-        """Return the replies to a mission that has not ended."""
+        """Return the replies that were saved for a mission, or none if its completion has been saved."""
         return list(self._replies.get(key, ()))
 
     def forget(self, key: CompletionKey) -> None:
@@ -39,7 +39,7 @@ class TurnLog:
         self._replies.pop(key, None)
 
     async def keep(self, key: CompletionKey, reply: Reply) -> None:
-        """Save a reply."""
+        """Append a reply to the file, and wait until it is on disk."""
         self._replies.setdefault(key, []).append(reply)
         self._file.append(to_line({**dict(zip(KEY, key, strict=True)), "reply": asdict(reply)}))
         await asyncio.to_thread(self._file.sync)

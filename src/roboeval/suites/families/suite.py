@@ -20,17 +20,17 @@ from roboeval.suites.task import Task
 
 SEEDS_PER_SPLIT = 1_000_000_000
 FIRST_SEEDS = {"train": 0, "validation": SEEDS_PER_SPLIT, "test": 2 * SEEDS_PER_SPLIT}
-"""The first seed of each split, which has SEEDS_PER_SPLIT seeds."""
+"""The first seed of each split. A split has SEEDS_PER_SPLIT seeds."""
 
 MAX_FAMILY_TASKS = 100
 FAMILY_SUITE_NAME = re.compile(r"families-([a-z]+)-(\d{1,9})(?:-(\d{1,3}))?", re.ASCII)
 
 
 def first_seed(split: str, seed: int, count: int, what: str) -> int:
-    """Return the first of `count` consecutive seeds of a split.
+    """Return the first of `count` consecutive seeds of a split, such as 30 for `train`, seed 3 and count 10.
 
-    Each `seed` selects entirely different ones. Raises UserError, in which `what` names the counted items, if
-    the split does not exist or a number is out of range.
+    With the same count, each `seed` gives entirely different ones. Raises UserError if the split does not
+    exist or a number is out of range. The message calls the counted items `what`.
     """
     if split not in FIRST_SEEDS:
         raise UserError(f'unknown split "{split}"; use {listed(list(FIRST_SEEDS))}')
@@ -93,7 +93,7 @@ def family_tasks_named(name: str) -> FamilyTasks | None:
 
 @lru_cache(maxsize=8)
 def family_suite(which: FamilyTasks, skills: SkillTable = SKILLS) -> Suite:
-    """Build a suite from generated tasks. The result is reproducible."""
+    """Build the suite of generated tasks that `which` describes. Equal arguments give equal suites."""
     head = suite_file()
     made = {name: trained_task(family, seed) for name, family, seed in sorted(which.seeds())}
     digests = [f"{name} {one.suite.digest}" for name, one in made.items()]

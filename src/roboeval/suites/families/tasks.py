@@ -78,7 +78,7 @@ class FamilyFile(StrictForm):
 
 @dataclass(frozen=True)
 class TrainedTask:
-    """A task generated from a family, with one correct program and several incorrect ones."""
+    """A task generated from a family for one seed, with one correct program and several incorrect ones."""
 
     suite: Suite  # a suite that contains only this task
     name: str  # the family and the seed, such as `BringThing-17`
@@ -103,7 +103,7 @@ def family_names() -> tuple[str, ...]:
 
 
 def family_file(family: str) -> Path:
-    """Return the path of one of `family_names()` or of a `.yaml` file. Otherwise, raise UserError."""
+    """Return the file of a family, given its name or a `.yaml` file. Otherwise, raise UserError."""
     if family.endswith(".yaml") and Path(family).is_file():
         return Path(family)
     if family not in family_names():

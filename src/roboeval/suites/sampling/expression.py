@@ -62,7 +62,7 @@ def parse_cached(text: str) -> ast.expr:
 
 
 def evaluate(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - strings, numbers, lists of them
-    """Compute the value of an expression. Raise ExpressionError if that is not possible."""
+    """Compute the value of an expression, given the values of names. Raise ExpressionError on failure."""
     try:
         return _checked_value(node, names)
     except ExpressionError:
@@ -141,7 +141,7 @@ def _compute(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR091
 
 
 def iterate_loop(loop: ast.comprehension, names: Names) -> Iterator[Names]:
-    """Yield the names for each iteration of a loop such as `for person in people if person.room`."""
+    """Yield `names` with the loop variable, for each iteration of a loop like `for p in people if p.room`."""
     if not isinstance(loop.target, ast.Name) or loop.is_async:
         raise ExpressionError(f'"{ast.unparse(loop.target)}" is not a single name; write for NAME in ...')
     items = _checked_value(loop.iter, names)

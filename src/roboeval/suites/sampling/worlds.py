@@ -31,7 +31,7 @@ _TRIES = 50  # attempts to sample a new world
 
 @dataclass(frozen=True)
 class Setting:
-    """The level of each factor in one world."""
+    """The choices that make one world, such as `kitchen` for `alice.in`, the room where Alice is."""
 
     about: str
     chosen: Mapping[str, FactorLevel]
@@ -49,7 +49,7 @@ class Setting:
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """Return a key that is equal for equivalent worlds. It ignores the answers of absent people."""
+        """Return a key that is equal for worlds that differ only in the answers of absent people."""
         absent = {_owner(factor) for factor, level in self.chosen.items() if level == IN_NO_ROOM}
         chosen = self.chosen.items()
         return self.rooms, *(one for one in chosen if one[1] == IN_NO_ROOM or _owner(one[0]) not in absent)
@@ -64,7 +64,7 @@ class WorldSampler:
 
     @cached_property
     def factors(self) -> dict[str, tuple[FactorLevel, ...]]:
-        """Return the levels of each factor, whose names are like `alice.in` and `alice.answer 1`."""
+        """Return the possible values of each factor, such as the rooms where Alice may be for `alice.in`."""
         found = {ROBOT_FACTOR: self._rooms(self.form.worlds.robot, ROBOT_FACTOR)}
         for name, person in self.form.worlds.people.items():
             found[f"{name}.in"] = self._rooms(person.where, "people", name, "in")
@@ -90,7 +90,7 @@ class WorldSampler:
         return _levels(where)
 
     def settings(self, count: int, seed: int) -> Iterator[Setting]:
-        """Yield the corners, then worlds that cover all pairs of levels.
+        """Yield the worlds set by hand (corners), then random worlds that cover all pairs of factors' values.
 
         At least `count` worlds are yielded, unless fewer exist.
         """
