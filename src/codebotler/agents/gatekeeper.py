@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from secrets import compare_digest
 from threading import Thread
@@ -196,6 +196,7 @@ class Gatekeeper:
         events = [] if session is None else session.events()
         seen = min(len(events), after + MAX_REPORTED_EVENTS)
         checked, contract = view.check, self.contract_text(view.contract)
+        past = view.past and replace(view.past, trace=view.past.trace[-MAX_REPORTED_EVENTS:])
         return MissionReport(
             mission=view.id,
             state=view.phase,
@@ -205,7 +206,7 @@ class Gatekeeper:
             remarks=[*view.unknown_rooms, *view.remarks],
             events=[text for text in map(event_text, events[after:seen]) if text],
             event_count=seen,
-            done_before=[] if view.past is None else view.past.steps[-MAX_REPORTED_EVENTS:],
+            done_before=[] if past is None else past.steps,
             is_over=view.is_over,
             next=self._next(view),
         )
@@ -235,7 +236,8 @@ class Gatekeeper:
             return view.error or "The program is not ready: call follow_mission, or propose another one."
         if not view.can_run:
             return "This program cannot run. Mend it, and propose it again."
-        where = f"on the page {self.page}, whose link with its token was printed at the start"
+        why = "Since a person pressed STOP, a" if self.console.is_held else "A"
+        where = f"on the open page, or by the link to {self.page} that was printed at the start"
         if self.may_ask_client(view):
             where = f"in the dialog that run_mission opens, if this client has dialogs, or {where}"
-        return f"A person must approve this program {where}. Then call run_mission with its digest."
+        return f"{why} person must approve this program {where}. Then call run_mission with its digest."

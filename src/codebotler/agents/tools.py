@@ -264,7 +264,7 @@ async def stop(ctx: AgentContext) -> MissionReport:
     """
     gatekeeper = gatekeeper_of(ctx)
     session = gatekeeper.console.session
-    if gatekeeper.console.stop(agent_name(ctx), holds=False) and session is not None:
+    if gatekeeper.console.stop(agent_name(ctx)) and session is not None:
         await gatekeeper.console.notifier.until(lambda: session.view.is_over, 15)
     return gatekeeper.report(session)
 

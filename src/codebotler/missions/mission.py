@@ -97,7 +97,7 @@ class Mission:
         self._writing = threading.RLock()  # held while writing an event, but not while cancelling the robot
         self._has_program = False  # also true for an empty program
         self._live: LiveRobot | None = None
-        self._stuck: threading.Thread | None = None
+        self.stuck: threading.Thread | None = None  # runs a skill that has not returned since a stop
         self._logged_rule: dict[str, object] = {}
         self._is_over = threading.Event()
         self._fault: Exception | None = None
@@ -135,11 +135,6 @@ class Mission:
     def has_ended(self) -> bool:
         """Whether the mission has reached a final state."""
         return self.summary.has_ended
-
-    @property
-    def is_stuck(self) -> bool:
-        """Whether a skill still runs after a stop that the robot did not confirm, so the robot may move."""
-        return self._stuck is not None and self._stuck.is_alive()
 
     def draft(self, program: str, model: str = "") -> None:
         """Set or replace the program, written by `model` or a person. Raise MissionError once approved."""
@@ -261,7 +256,7 @@ class Mission:
             raise
         finally:
             if not self._is_over.wait(STOP_GRACE_SECONDS):
-                self._stuck = work
+                self.stuck = work
                 self._end(live, MissionState.FAILED, UNCONFIRMED_STOP, None, is_lost=True)
         if self._fault is not None:
             raise self._fault

@@ -21,7 +21,6 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.core.world import World
 from codebotler.missions.authoring import ModelAuthor, prompt_of
-from codebotler.missions.display.progress import Progress
 from codebotler.missions.display.shared_view import SharedView
 from codebotler.missions.display.view import CHECKING, UNCHECKED, MissionOrder, SessionView, program_digest
 from codebotler.missions.drafts import examine_draft
@@ -71,20 +70,7 @@ class MissionSession(SharedView):
         world: World | None = None,
         within: Contract | None = None,
     ) -> None:
-        view = SessionView(
-            number,
-            instruction=order.instruction,
-            model=order.model,
-            program=order.program,
-            author=order.author,
-            busy="waiting",
-            rules=rules,
-            within=within,
-            past=order.past,
-            progress=Progress() if order.past is None else order.past.progress,
-            is_over=False,
-        )
-        super().__init__(view, changed)
+        super().__init__(order.first_view(number, rules, within), changed)
         self._robot, self._home, self._order = robot, home, order
         self._before, self._world = before, world
         self._author = ModelAuthor(open_model, order.model)
@@ -163,6 +149,7 @@ class MissionSession(SharedView):
                 raise MissionError("this question is no longer asked")
             if isinstance(answer, int) and not 0 <= answer < len(question.options):
                 raise MissionError(f"there is no option {answer + 1}; there are {len(question.options)}")
+            self.is_changed_by_person |= bool(more.strip())
             self._next_task = partial(
                 self._take_answer, question=question, answer=answer, more=" ".join(more.split())
             )
@@ -200,7 +187,8 @@ class MissionSession(SharedView):
     @property
     def is_stuck(self) -> bool:
         """Whether a skill still runs after a stop that the robot did not confirm, so the robot may move."""
-        return self._mission is not None and self._mission.is_stuck
+        stuck = None if self._mission is None else self._mission.stuck
+        return stuck is not None and stuck.is_alive()
 
     def reject(self, reason: str) -> None:
         """End the mission as failed, before it runs, and log the reason."""
@@ -299,6 +287,9 @@ class MissionSession(SharedView):
             drive = self._order.drive if mission.summary.program == self._order.program else None
             contracts = [one for one in (view.contract, view.within) if one is not None]
             mission.run(reserved, place, rules=rules, room_map=room_map, contracts=contracts, drive=drive)
+        if mission.stuck is not None:  # no other process may use the robot meanwhile
+            self._show(is_over=True)
+            mission.stuck.join()
 
     @property
     def _is_stopped(self) -> bool:

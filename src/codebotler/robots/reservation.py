@@ -19,7 +19,7 @@ from codebotler.core.files import make_folder
 from codebotler.robots.base import NotReadyError, Robot
 
 DEFAULT_PORTS = {"ws": 80, "wss": 443, "http": 80, "https": 443}
-LOOPBACK_ADDRESS, RUNTIME_FOLDERS, TEMPORARY_FOLDER = "127.0.0.1", Path("/run/user"), Path("/tmp")  # noqa: S108 - a private folder there
+LOOPBACK_ADDRESS, LOCKS_IN = "127.0.0.1", Path("/tmp")  # noqa: S108 - a private folder there
 
 
 class Reservation:
@@ -94,9 +94,9 @@ def lock_folder() -> Path:
         NotReadyError: other users can write to the folder.
         OSError: the folder cannot be created.
     """
-    # It depends on no variable, since clients of agents start their servers without those of a shell.
-    runtime = RUNTIME_FOLDERS / str(os.getuid())
-    folder = runtime / "codebotler" if _is_ours(runtime) else TEMPORARY_FOLDER / f"codebotler-{os.getuid()}"
+    # No variable chooses it, since clients of agents start their servers without those of a shell, and it is
+    # not below /run/user, which begins and ends with logins.
+    folder = LOCKS_IN / f"codebotler-{os.getuid()}"
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
     if not _is_ours(folder):

@@ -217,7 +217,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
         ] = False,
     ) -> dict[str, Any]:
         """Stop the current mission, and return whether there was one to stop."""
-        return {"stopping": console.stop(BY_PAGE, only_moving=only_moving)}
+        return {"stopping": console.stop(BY_PAGE, only_moving=only_moving, holds=True)}
 
     @api.get("/missions/{mission}/events", response_class=StreamingResponse)
     async def events(mission: str, last_event_id: Annotated[int, Header(ge=0)] = 0) -> StreamingResponse:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import threading
+import time
 from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import aclosing, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Self
+from urllib.parse import quote
 
 from codebotler.checking.check import check
 from codebotler.checking.problems import CheckResult
@@ -26,6 +28,7 @@ from codebotler.missions.storage.store import find_interrupted, find_mission
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
+from codebotler.robots.reservation import normalize_address
 from codebotler.simulator.guard.contract import Contract
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.pool import SHARED_POOL
@@ -72,15 +75,16 @@ class Console:
         self._lock = threading.RLock()  # held briefly, and again by a signal handler
         self.session: MissionSession | None = None  # the current session, or else the last one
         self._may_recover: MissionSession | None = None  # the current session, unless somebody pressed STOP
-        self._held_since: int | None = None  # the session, or 0, at which a person pressed STOP
         self.unfinished = ""  # the mission that had begun and ended early before another one was written
         self._checking = threading.Lock()
-        self._hold_file = home / "held"
+        which = quote(f"{robot.name} {normalize_address(robot.address)}", safe="", errors="replace")
+        self._hold_file = home / "robots" / f"{which[:200]}.held"  # the time at which a person pressed STOP
+        self._began = 0.0  # the time at which the current session began
 
     def __enter__(self) -> Self:
         self.interrupted = tuple(find_interrupted(self.home))
-        self._held_since = 0 if self._hold_file.exists() else None
         make_folder(self.home / "missions")
+        make_folder(self._hold_file.parent)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -157,6 +161,7 @@ class Console:
                 world=self.world,
                 within=self.within,
             )
+            self._began = time.time()
             session.start()
         if before is not None:
             before.stop_soon("another instruction")
@@ -215,21 +220,22 @@ class Console:
     @property
     def is_held(self) -> bool:
         """Whether a person must approve the next mission, after a person's STOP, even before a restart."""
-        return self._held_since is not None
+        return self._hold_file.exists()
 
     def _end_hold(self) -> None:
         """End the hold after a person's STOP if a person has approved the mission that began after it."""
-        session, since = self.session, self._held_since
-        if session and since is not None and session.is_approved_by_person and session.view.number > since:
-            self._held_since = None
-            self._hold_file.unlink(missing_ok=True)
+        session = self.session
+        if session is not None and session.is_approved_by_person and self.is_held:
+            with suppress(OSError, ValueError):
+                if self._began > float(self._hold_file.read_text()):
+                    self._hold_file.unlink()
 
     def dismiss(self) -> None:
         """Dismiss the notice about interrupted missions."""
         self.interrupted = ()
         self.notifier.change()
 
-    def stop(self, by: str, *, only_moving: bool = False, holds: bool = True) -> bool:
+    def stop(self, by: str, *, only_moving: bool = False, holds: bool = False) -> bool:
         """Ask the current mission to stop. Return at once whether there was a mission to stop.
 
         `only_moving` spares a mission without approval. With `holds`, a person must approve the next one.
@@ -238,9 +244,8 @@ class Console:
             session, self._may_recover = self.session, None
             stops = session is not None and session.view.is_approved
             if holds and (stops or not only_moving):
-                self._held_since = 0 if session is None else session.view.number
                 with suppress(OSError):  # the robot must stop, whatever the disk does
-                    self._hold_file.touch()
+                    self._hold_file.write_text(repr(time.time()))
         if session is None or session.view.is_over or not (stops or not only_moving):
             return False
         session.stop_soon(by)

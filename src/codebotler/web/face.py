@@ -75,7 +75,7 @@ def router(console: Console, face: Face) -> APIRouter:
     @routes.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
         """Stop a mission that is approved or runs, and return whether there was one to stop."""
-        return {"stopping": console.stop(BY_FACE, only_moving=True)}
+        return {"stopping": console.stop(BY_FACE, only_moving=True, holds=True)}
 
     @routes.websocket("/api/face/live")
     async def live(socket: WebSocket) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import signal
 import socket
 import time
 from collections.abc import Callable, Coroutine, Sequence
@@ -97,7 +98,10 @@ def serve(
         note(_links(place, port, access, console))
         if companion is not None:
             companion.announce(_address(place, port))
-        _Server(settings, console, companion).run([bound])
+        server = _Server(settings, console, companion)
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as it is with `nohup`
+            signal.signal(signal.SIGHUP, server.handle_exit)
+        server.run([bound])
 
 
 def _links(place: PageAddress, port: int, access: Access, console: Console | None) -> str:

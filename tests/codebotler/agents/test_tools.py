@@ -28,6 +28,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.display.view import MissionOrder, SessionView, program_digest
 from codebotler.missions.display.wording import event_text
+from codebotler.missions.mission import BY_SHUTDOWN
 from codebotler.missions.preflight import known_instructions
 from codebotler.missions.session import MissionSession
 from codebotler.missions.storage.log import MissionState, MissionSummary
@@ -1038,6 +1039,7 @@ def test_a_person_chooses_a_behaviour_in_the_dialog(
         if program:
             found = await agent.call("choose_behaviour")
             assert (found["state"], found["check"]["program"]) == ("checked", program)
+            assert session_of(made).is_changed_by_person == bool(content and content.get("more"))
         else:
             await agent.fails("choose_behaviour")
             assert view_of(made).waits_for_answer
@@ -1121,15 +1123,15 @@ def test_after_a_persons_stop_the_contract_of_the_start_approves_nothing(gatekee
 
         await agent.call("stop")
         assert await state(SOON) == "done", "an agent's own stop holds nothing"
-        gatekeeper.console.stop("a person")
+        gatekeeper.console.stop("a person", holds=True)
         assert await state(0.05) == "checked"
         approve(gatekeeper)
-        gatekeeper.console.stop("a person, at the same time")
+        gatekeeper.console.stop("a person, at the same time", holds=True)
         await until(gatekeeper, lambda view: view.is_over)
         assert await state(0.05) == "checked"
         approve(gatekeeper)
         await until(gatekeeper, lambda view: view.is_over)
-        gatekeeper.console.stop("Escape, while nothing moves", only_moving=True)
+        gatekeeper.console.stop("Escape, while nothing moves", only_moving=True, holds=True)
         assert await state(SOON) == "done", "a person has approved one since"
 
     use(gatekeeper, act)
@@ -1137,16 +1139,20 @@ def test_after_a_persons_stop_the_contract_of_the_start_approves_nothing(gatekee
 
 def test_a_persons_stop_outlives_the_process(tmp_path: Path) -> None:
     with gatekeeper_at(tmp_path).console as console:
-        console.stop("a person")
-    again = gatekeeper_at(tmp_path)
+        console.stop(BY_SHUTDOWN)
+        assert not console.is_held, "only a person holds"
+        console.stop("a person", holds=True)
+    again, beside = gatekeeper_at(tmp_path), gatekeeper_at(tmp_path)
 
     async def act(agent: Agent) -> None:
-        await agent.call("propose_mission", program=QUIET)
+        proposed = await agent.call("propose_mission", program=QUIET)
+        assert "pressed STOP" in proposed["next"]
         approve(again)
         await until(again, lambda view: view.is_over)
 
     with again.console as console:
         assert console.is_held
+        assert beside.console.is_held
         use(again, act)
     with gatekeeper_at(tmp_path).console as console:
         assert not console.is_held

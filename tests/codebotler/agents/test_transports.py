@@ -388,7 +388,9 @@ def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ending", ["signal", "early signal", "closed input", "closed input, nothing read"])
+@pytest.mark.parametrize(
+    "ending", ["signal", "early signal", "closed terminal", "closed input", "closed input, nothing read"]
+)
 def test_a_running_robot_stops_with_the_server(folder: Path, ending: str) -> None:
     with subprocess.Popen(
         command(),
@@ -415,8 +417,8 @@ def test_a_running_robot_stops_with_the_server(folder: Path, ending: str) -> Non
         running.stdin.write(lines({"jsonrpc": "2.0", "id": message["id"], "result": result}))
         running.stdin.flush()
         wait_for(folder, "running" if ending == "early signal" else "skill")
-        if ending.endswith("signal"):
-            running.send_signal(signal.SIGTERM)
+        if ending.endswith(("signal", "terminal")):
+            running.send_signal(signal.SIGHUP if ending == "closed terminal" else signal.SIGTERM)
             running.wait(SOON)
         elif ending == "closed input, nothing read":
             running.stdin.write(lines(*(tool(number, "read_robot") for number in range(4, 300))))

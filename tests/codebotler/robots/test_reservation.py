@@ -86,42 +86,27 @@ def test_any_address_can_be_locked(address: str, tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder that stands for /run/user and /tmp, with the runtime folder of this user."""
-    monkeypatch.setattr("codebotler.robots.reservation.RUNTIME_FOLDERS", tmp_path)
-    monkeypatch.setattr("codebotler.robots.reservation.TEMPORARY_FOLDER", tmp_path)
-    (tmp_path / str(os.getuid())).mkdir(mode=0o700)
-    return tmp_path
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of locks, in another one than /tmp."""
+    monkeypatch.setattr("codebotler.robots.reservation.LOCKS_IN", tmp_path)
+    return tmp_path / f"codebotler-{os.getuid()}"
 
 
-def test_locks_lie_where_nobody_else_can_write(folders: Path) -> None:
-    assert lock_folder() == folders / str(os.getuid()) / "codebotler"
-    assert lock_folder().stat().st_mode & 0o777 == 0o700
-
-
-def test_no_variable_moves_the_locks(folders: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = lock_folder()
-    for variable in ("XDG_RUNTIME_DIR", "TMPDIR", "HOME"):
-        monkeypatch.setenv(variable, str(folders / str(os.getuid())))
+def test_locks_lie_where_nobody_else_can_write(folder: Path) -> None:
     assert lock_folder() == folder
+    assert folder.stat().st_mode & 0o777 == 0o700
 
 
-@pytest.mark.parametrize("mode", [None, 0o777])
-def test_without_a_runtime_folder_locks_are_temporary(folders: Path, mode: int | None) -> None:
-    runtime = folders / str(os.getuid())
-    if mode is None:
-        runtime.rmdir()
-    else:
-        runtime.chmod(mode)
-    assert lock_folder() == folders / f"codebotler-{os.getuid()}"
+def test_no_variable_moves_the_locks(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for variable in ("XDG_RUNTIME_DIR", "TMPDIR", "HOME"):
+        monkeypatch.setenv(variable, str(folder.parent))
+    assert lock_folder() == folder
 
 
 @pytest.mark.parametrize("what", ["link", "file", "open", "somebody else's"])
 def test_folder_of_locks_that_is_not_ours_is_refused(
-    what: str, folders: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    what: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (folders / str(os.getuid())).rmdir()
-    folder = folders / f"codebotler-{os.getuid()}"
     match what:
         case "link":
             folder.symlink_to(tmp_path)

@@ -29,7 +29,8 @@ from codebotler.models.open import open_model
 from codebotler.models.recorded import open_recorded
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
-from codebotler.robots.base import CancelledError, Robot, RobotResult
+from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotResult
+from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console, Notifier
@@ -485,6 +486,8 @@ def test_nothing_begins_while_a_skill_has_not_ended_since_a_stop(
         until(console, lambda view: view.is_over)
         with pytest.raises(MissionError):
             console.begin(MissionOrder(program=HELLO))
+        with pytest.raises(NotReadyError):  # as another process would
+            Reservation(console.robot, tmp_path).__enter__()
         may_answer.set()
         ends = time.monotonic() + 30
         while console.session is not None and console.session.is_stuck:

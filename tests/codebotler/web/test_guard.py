@@ -84,7 +84,8 @@ def test_the_link_opens_the_page_and_leaves_no_token_in_it(server: PageServer) -
     path = server.path
     assert (answer.status, answer.headers["location"]) == (303, f"{path}/missions?a=b")
     cookie = answer.headers["set-cookie"]
-    assert cookie.startswith(f"codebotler-{server.port}="), "pages of one machine share its cookies"
+    assert cookie.startswith(f"codebotler-{server.port}-operator-"), "pages of one machine share its cookies"
+    assert path[1:9] in cookie.partition("=")[0], "a server on another port must not make one of this name"
     assert server.token not in cookie
     parts = {part.strip().lower() for part in cookie.split(";")}
     assert {"httponly", "samesite=strict", f"path={path}"} <= parts
@@ -155,8 +156,11 @@ def test_the_secret_of_cookies_outlives_a_restart(tmp_path: Path) -> None:
 def test_wrong_tokens_and_cookies_open_nothing(server: PageServer) -> None:
     assert server.ask("GET", "/?token=wrong").status == 401
     assert server.ask("GET", "/api/robot", authorization="Bearer wrong").status == 401
-    assert server.ask("GET", "/", cookie=f"codebotler-{server.port}=wrong").status == 401
-    assert server.ask("GET", "/", cookie=f"codebotler-{server.port}={server.token}").status == 401
+    name = server.cookie.partition("=")[0]
+    assert server.ask("GET", "/", cookie=f"{name}=wrong").status == 401
+    assert server.ask("GET", "/", cookie=f"{name}={server.token}").status == 401
+    beside = f"{server.cookie}; codebotler-{server.port}=x; {name.replace('operator', 'face')}=x"
+    assert server.ask("GET", "/", cookie=beside).status == 200
     assert server.ask("GET", "/", cookie=f"{server.cookie}x").status == 401
     assert server.ask("GET", "/", cookie="{=;;=").status == 401
 

@@ -57,6 +57,22 @@ class MissionOrder:
         if not self.has_program:
             clean_instruction(self.instruction)
 
+    def first_view(self, number: int, rules: tuple[Rule, ...], within: Contract | None) -> SessionView:
+        """Return the view of a session, with its number, that has just begun to carry out this order."""
+        return SessionView(
+            number,
+            instruction=self.instruction,
+            model=self.model,
+            program=self.program,
+            author=self.author,
+            busy="waiting",
+            rules=rules,
+            within=within,
+            past=self.past,
+            progress=Progress() if self.past is None else self.past.progress,
+            is_over=False,
+        )
+
     @property
     def has_program(self) -> bool:
         """Whether the order contains the program, so that no model needs to write one."""

@@ -88,7 +88,7 @@ class Guard:
     ) -> None:
         self._app, self._access, self._has_page = app, access, has_page
         self._hosts, self._takes_addresses = place.hosts, not place.is_loopback
-        self._proxies, self._cookie = addresses_by_host(place.proxies), f"codebotler-{port}"
+        self._proxies, self._port = addresses_by_host(place.proxies), port
         self._has_noted = False
         self._agent_requests = 0  # that are being answered
 
@@ -175,8 +175,13 @@ class Guard:
             if role is None:
                 raise RefusedError(HTTPStatus.UNAUTHORIZED, _WRONG)
             return role
-        role = self._access.of_cookie(request.cookies.get(self._cookie, ""))
+        cookies = (request.cookies.get(self._cookie(role), "") for role in (Role.OPERATOR, Role.FACE))
+        role = next(filter(None, map(self._access.of_cookie, cookies)), None)
         return Role.OPERATOR if role is None and self._access.operator is None else role
+
+    def _cookie(self, role: Role) -> str:
+        """Return the name of a role's cookie, which no server on another port can guess."""
+        return f"codebotler-{self._port}-{role}-{self._access.path[1:9]}"
 
     def _of_token(self, token: str, request: HTTPConnection) -> Role | None:
         try:
@@ -208,7 +213,7 @@ class Guard:
             value = self._access.cookie(role)
             is_secure = request.scope["scheme"] == "https"
             answer.set_cookie(
-                self._cookie,
+                self._cookie(role),
                 value,
                 path=prefix,
                 secure=is_secure,
