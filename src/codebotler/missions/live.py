@@ -115,7 +115,8 @@ class LiveRobot:
     def _execute(self, row: Skill, arguments: Sequence[Argument]) -> Result:
         is_drive = row.is_drive
         if is_drive:  # rules must judge exactly the text that the robot receives
-            arguments = [one.strip() if isinstance(one, str) else one for one in arguments]
+            given = zip(row.parameters, arguments, strict=True)
+            arguments = [self._listed(one) if is_goal(row, to.name) else one for to, one in given]
         event = attempted_event(row, arguments, place=self._place, time=self.now, holding=self._held)
         self._judge_call(row, arguments)
         room = "" if event is None else self._judge(event, is_drive=is_drive)
@@ -142,6 +143,13 @@ class LiveRobot:
             self._held = ""
         self._report(self._events[-1], room, is_drive=is_drive)
         return result if chosen is None else chosen
+
+    def _listed(self, goal: Argument) -> Argument:
+        """Return the only listed room that a robot with its own planner may mean by a goal, or the goal."""
+        if not isinstance(goal, str):
+            return goal
+        rooms = self._room_map.possible_rooms(goal) if self._room_map and self._room_map.plain else []
+        return rooms[0] if len(rooms) == 1 else goal.strip()
 
     # --- rules
 

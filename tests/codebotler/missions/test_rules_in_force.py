@@ -495,6 +495,24 @@ def test_the_robot_is_told_the_words_that_were_judged(tmp_path: Path, request_: 
     assert robot.done[0] == "acme inc"
 
 
+@pytest.mark.parametrize(
+    ("request_", "received"),
+    [
+        ("the stairs behind the kitchen", "kitchen"),
+        ("Kitchen", "kitchen"),
+        ("kitchen, hall", "kitchen, hall"),
+        (" cellar ", "cellar"),
+    ],
+)
+def test_a_robot_with_its_own_planner_is_sent_the_only_listed_room(
+    tmp_path: Path, request_: str, received: str
+) -> None:
+    rooms, robot = RoomMap(("hall", "kitchen"), "hall", plain=True), knowing("hall")
+    rule = Rule("acme", "Stay out.", parse('not tr.Exists(goto("acme"))'))
+    ran(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", [rule], rooms)
+    assert robot.done[0] == received
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "formula",
