@@ -17,7 +17,7 @@ from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.files import make_folder
 from codebotler.core.world import World
-from codebotler.missions.display.view import CHECKING, MissionOrder, SessionView
+from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.display.wording import BY_PAGE
 from codebotler.missions.mission import BY_SHUTDOWN, STOP_GRACE_SECONDS, MissionError
 from codebotler.missions.recovery import PriorApproval, past_to_recover
@@ -165,8 +165,6 @@ class Console:
             session.start()
         if before is not None:
             before.stop_soon("another instruction")
-            if before.view.busy == CHECKING and not self._checking.locked():  # nobody waits for its check
-                threading.Thread(target=SHARED_POOL.end, daemon=True).start()
         self.interrupted = ()
         self.notifier.change()
         return session

@@ -565,19 +565,6 @@ def test_a_draft_that_nobody_saw_is_no_draft_before(tmp_path: Path, monkeypatch:
 
 
 @pytest.mark.slow
-def test_a_dropped_check_does_not_delay_the_next_mission(tmp_path: Path) -> None:
-    looks = "".join(f"    if is_in_room('t{number}'):\n        say('{number}')\n" for number in range(12))
-    slow = f"def task_program():\n    for i in range(20):\n        sum(range(7 * 10**6))\n{looks}"
-    with desk_of(tmp_path) as console:
-        console.begin(MissionOrder(program=slow))
-        until(console, lambda view: view.busy == "checking" and bool(view.id))
-        time.sleep(0.3)
-        began = time.monotonic()
-        checked(console, HELLO)
-        assert time.monotonic() - began < 10
-
-
-@pytest.mark.slow
 def test_a_check_does_not_delay_the_end(tmp_path: Path) -> None:
     slow = "def task_program():\n    while True:\n        sum(range(10**9))\n"
     with desk_of(tmp_path) as console:
