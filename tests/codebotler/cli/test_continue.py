@@ -74,6 +74,17 @@ def missions(folder: Path) -> list[dict[str, Any]]:
     return found
 
 
+def crashed(folder: Path, skill: str) -> dict[str, Any]:
+    """The only mission, as if the tool had crashed during the first call of a skill."""
+    (mission,) = missions(folder)
+    home = folder / "home" / "missions" / mission["id"]
+    log = (home / EVENTS_FILE).read_text().splitlines(keepends=True)
+    calls = next(n for n, line in enumerate(log, 1) if f'"skill": "{skill}"' in line)
+    (home / EVENTS_FILE).write_text("".join(log[:calls]))
+    (home / SUMMARY_FILE).write_text(json.dumps({**mission, "state": "running", "ended": None}))
+    return mission
+
+
 def calls(folder: Path, mission: str) -> list[str]:
     """The skills that a mission called, with their first argument."""
     log = (folder / "home" / "missions" / mission / EVENTS_FILE).read_text().splitlines()
@@ -190,12 +201,7 @@ def test_the_rest_of_a_typed_program_must_be_typed(folder: Path) -> None:
 
 def test_an_unsure_step_needs_a_persons_word(folder: Path) -> None:
     ended(folder, "run", "begun.py", "--yes")
-    (mission,) = missions(folder)
-    home = folder / "home" / "missions" / mission["id"]
-    log = (home / EVENTS_FILE).read_text().splitlines(keepends=True)
-    picks = next(n for n, line in enumerate(log, 1) if '"skill": "pick"' in line)
-    (home / EVENTS_FILE).write_text("".join(log[:picks]))
-    (home / SUMMARY_FILE).write_text(json.dumps({**mission, "state": "running", "ended": None}))
+    mission = crashed(folder, "pick")
     program = folder / "place.py"
     program.write_text('def task_program():\n    place("mug")\n')
     assert ended(folder, "continue", "last", program, "--yes").status == 2
@@ -211,12 +217,7 @@ def test_an_unsure_step_needs_a_persons_word(folder: Path) -> None:
 def test_a_wrong_answer_is_asked_for_again(folder: Path) -> None:
     (folder / "begun.py").write_text("def task_program():\n    ask('', 'Tea?', ['yes', 'no'])\n")
     ended(folder, "run", "begun.py", "--yes", "--despite-problems")
-    (mission,) = missions(folder)
-    home = folder / "home" / "missions" / mission["id"]
-    log = (home / EVENTS_FILE).read_text().splitlines(keepends=True)
-    asks = next(n for n, line in enumerate(log, 1) if '"skill": "ask"' in line)
-    (home / EVENTS_FILE).write_text("".join(log[:asks]))
-    (home / SUMMARY_FILE).write_text(json.dumps({**mission, "state": "running", "ended": None}))
+    crashed(folder, "ask")
     program = folder / "say.py"
     program.write_text("def task_program():\n    say('thanks')\n")
     assert ended(folder, "continue", "last", program, "--yes", given="y\nyea\nyes\n").status == 0

@@ -9,8 +9,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from itertools import count, islice, takewhile
 from pathlib import Path
@@ -25,7 +25,7 @@ from codebotler.core.world import Room, World
 from codebotler.simulator import pool
 from codebotler.simulator.engine import digest, run
 from codebotler.simulator.ledger import SkillAnswer
-from codebotler.simulator.pool import MIN_BATCH_KEYS, WorkerPool
+from codebotler.simulator.pool import MAX_KEYS_AHEAD, MIN_BATCH_KEYS, WorkerPool, map_batches
 from codebotler.simulator.process import spawn
 from codebotler.simulator.process.errors import LostProcessError
 from codebotler.simulator.process.fork_server_client import BatchServer
@@ -157,12 +157,21 @@ def test_a_pool_that_nobody_enters_ends_with_the_process() -> None:
 
 
 @pytest.mark.shared_engine
-def test_pairs_are_read_only_a_little_ahead() -> None:
-    read = count()
-    outcomes = run(((saying(str(next(read))), WORLD) for _ in count()), workers=1)
-    assert [said(outcome) for outcome in islice(outcomes, 30)] == [[str(number)] for number in range(30)]
-    outcomes.close()  # type: ignore[attr-defined]  # it is a generator
-    assert next(read) < 200  # two batches of at most 64 ahead
+@pytest.mark.parametrize(("batches", "most"), [(2, 100), (10_000, MAX_KEYS_AHEAD + 30)])
+def test_pairs_are_read_only_a_little_ahead(batches: int, most: int) -> None:
+    """Results of the first batches come at once, and others never."""
+    read, sent = count(), count(1)
+
+    def submit(some: Sequence[int]) -> Future[Sequence[int]]:
+        future = Future[Sequence[int]]()
+        if next(sent) <= batches:
+            future.set_result(some)
+        return future
+
+    results = map_batches(submit, read, workers=1, name=lambda number: number.to_bytes(2))
+    assert [*islice(results, 30)] == [*range(30)]
+    results.close()  # type: ignore[attr-defined]  # it is a generator
+    assert next(read) < most
 
 
 @pytest.mark.shared_engine
