@@ -19,7 +19,7 @@ from codebotler.checking.contracts.file import contract_from
 from codebotler.checking.contracts.text import contract_sentence
 from codebotler.core.errors import UserError
 from codebotler.core.program import MAX_PROGRAM_LENGTH
-from codebotler.core.text.words import brief
+from codebotler.core.text.words import brief_part
 from codebotler.missions.authoring import ModelAuthor
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.display.wording import event_text
@@ -135,7 +135,7 @@ class Gatekeeper:
         """Describe all that a program can do at most, or return "" if this is unknown."""
         if contract is None:
             return ""
-        whole = partial(brief, most=MAX_PROGRAM_LENGTH)
+        whole = partial(brief_part, most=MAX_PROGRAM_LENGTH)
         return contract_sentence(contract, self.console.robot.skills, whole, is_short=False)
 
     def may_ask_client(self, view: SessionView) -> bool:

@@ -7,12 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-from codebotler.candidates.behaviour import (
-    Behaviour,
-    behaviour_of,
-    names_in,
-    rooms_with_several,
-)
+from codebotler.candidates.behaviour import Behaviour, behaviour_of, names_in, rooms_with_several
 from codebotler.checking.check import check_on
 from codebotler.checking.problems import Sample
 from codebotler.checking.sampled import (

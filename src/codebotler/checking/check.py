@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from codebotler.checking.contracts.of_program import derive_contract
@@ -49,6 +49,7 @@ def check(
     room_map: RoomMap | None = None,
     house_rules: Sequence[Rule] = (),
     explores: bool = False,
+    is_wanted: Callable[[], bool] = lambda: True,
 ) -> CheckResult:
     """Find the problems of a program by static analysis and by runs in sampled worlds.
 
@@ -65,14 +66,16 @@ def check(
         house_rules: the rules that the program must keep in every world.
         explores: whether to explore all worlds that the program can tell apart, up to a budget, for its
             contract and for a proof of each rule.
+        is_wanted: called before each run, from another thread; False ends the check.
 
     Raises:
+        UnwantedCheckError: the check is no longer wanted.
         UserError: a room's name is not a regular expression, the start is not a room, or the number of
             samples is out of range.
         EngineError: no isolated process could be started.
     """
     expect_list(rooms, "the rooms")
-    settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, tuple(house_rules))
+    settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, tuple(house_rules), is_wanted)
     if room_map is None and (rooms, start) != (None, None):
         room_map = room_map_for(program, rooms, start, skills=skills)
     opened = pool or shared_pool()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -39,10 +39,15 @@ class CheckSettings:
     simulation: SimulationSettings = AS_WRITTEN
     skills: SkillTable = SKILLS
     house_rules: tuple[Rule, ...] = ()  # rules that the program must keep in every world
+    is_wanted: Callable[[], bool] = lambda: True  # asked before each run, since a check may take minutes
 
     def __post_init__(self) -> None:
         if not 1 <= self.samples <= MAX_SAMPLES:
             raise UserError(f"the number of samples must be from 1 to {MAX_SAMPLES:,}, not {self.samples:,}")
+
+
+class UnwantedCheckError(Exception):
+    """Raised before the next run of a check that is no longer wanted."""
 
 
 class SampledRuns:
@@ -78,6 +83,8 @@ class SampledRuns:
 
     def _new_robot(self, number: int) -> SampledRobot:
         how, sampler, guard = self.settings, self.samplers[number], self.new_guard()
+        if not how.is_wanted():
+            raise UnwantedCheckError
         robot = SampledRobot(self.room_map, sampler, how.simulation, how.skills, guard=guard)
         self.robots[number] = robot
         return robot

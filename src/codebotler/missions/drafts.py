@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +14,9 @@ from codebotler.missions.preflight import missing_skills, unknown_rooms
 from codebotler.robots.base import Robot
 
 
-def examine_draft(program: str, view: SessionView, order: MissionOrder, robot: Robot) -> dict[str, Any]:
+def examine_draft(
+    program: str, view: SessionView, order: MissionOrder, robot: Robot, is_wanted: Callable[[], bool]
+) -> dict[str, Any]:
     """Check a program, and return the results as values for fields of `SessionView`, such as `check`.
 
     Args:
@@ -21,9 +24,17 @@ def examine_draft(program: str, view: SessionView, order: MissionOrder, robot: R
         view: the view of the session.
         order: the order. If its `drive` replaces this program, its contract replaces the program's.
         robot: the connected robot.
+        is_wanted: whether the result is still wanted, or else UnwantedCheckError is raised.
     """
     rules, skills = view.rules_in_force, robot.skills
-    found = check(program, room_map=view.room_map, house_rules=rules, skills=skills, explores=True)
+    found = check(
+        program,
+        room_map=view.room_map,
+        house_rules=rules,
+        skills=skills,
+        explores=True,
+        is_wanted=is_wanted,
+    )
     if view.past is not None:
         begun, before = view.past.program, view.past.before
         left = remaining_outcomes(begun, found.room_map, skills, first=before)

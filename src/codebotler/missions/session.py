@@ -16,7 +16,7 @@ from pathlib import Path
 
 from codebotler.candidates.clusters import compare_candidates
 from codebotler.candidates.question import ClarifyingAnswer, ClarifyingQuestion, question_about
-from codebotler.checking.sampled import CheckSettings
+from codebotler.checking.sampled import CheckSettings, UnwantedCheckError
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.core.world import World
@@ -295,6 +295,10 @@ class MissionSession(SharedView):
     def _is_stopped(self) -> bool:
         return self._stop_button.by is not None
 
+    def _is_wanted(self) -> bool:
+        """Whether the current check is still wanted: the mission is open and no newer program waits."""
+        return self._next_task is None and self._mission is not None and not self._mission.has_ended
+
     def _ask(self, mission: Mission, *, repair: bool) -> None:
         """Ask the model for a program and check it. Keep the previous program if the reply has none."""
         before, count = self._view, 1 if repair else self._order.candidates
@@ -333,11 +337,13 @@ class MissionSession(SharedView):
         """Take one of several programs, or ask the person which one is meant if they differ."""
         self._show(busy="comparing the programs")
         refused = () if self._rejected is None else self._rejected.programs
-        how = CheckSettings(skills=self._robot.skills, house_rules=self._view.rules_in_force)
+        how = CheckSettings(
+            skills=self._robot.skills, house_rules=self._view.rules_in_force, is_wanted=self._is_wanted
+        )
         try:
             groups = compare_candidates(programs, how, self._view.room_map, refused)
-        except UserError:
-            if self._next_task is None:  # else a person has written a program meanwhile
+        except (UserError, UnwantedCheckError):
+            if self._is_wanted():
                 raise
             return
         is_second = self._rejected is not None
@@ -379,10 +385,10 @@ class MissionSession(SharedView):
             view = self._view
         try:
             mission.draft(program, view.author)
-            found = examine_draft(program, view, self._order, self._robot)
+            found = examine_draft(program, view, self._order, self._robot, self._is_wanted)
             mission.check(replace(view, **found).problems)
-        except MissionError:
-            if not mission.has_ended:
+        except (MissionError, UnwantedCheckError):
+            if self._is_wanted():
                 raise
             return
         with self._lock:

@@ -9,7 +9,7 @@ import pytest
 
 from codebotler.checking.check import check, check_on, check_together
 from codebotler.checking.problems import CheckResult
-from codebotler.checking.sampled import MAX_EXTRA_WORLDS, CheckSettings
+from codebotler.checking.sampled import MAX_EXTRA_WORLDS, CheckSettings, UnwantedCheckError
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Status
 from codebotler.simulator.pool import WorkerPool
@@ -408,3 +408,12 @@ def test_a_drive_that_could_mean_several_rooms_lists_them() -> None:
     (problem,) = result.problems
     assert (problem.kind, problem.line) == ("GoToInvalidLocation", 2)
     assert '"kitchen" or "shelf"' in problem.message
+
+
+def test_a_check_ends_once_nobody_wants_it(pool: WorkerPool) -> None:
+    answers = iter([True, True, True, False])
+    slow = START + "if is_in_room('cup'):\n        sum(range(10**6))\n    say('hello')\n"
+    with pytest.raises(UnwantedCheckError):
+        check(slow, rooms=ROOMS, pool=pool, is_wanted=lambda: next(answers))
+    assert next(answers, None) is None
+    assert not check(slow, rooms=ROOMS, pool=pool).problems

@@ -289,6 +289,8 @@ def test_gaps_are_shown_first_and_never_shortened_away() -> None:
     long = TextTemplate(("x" * 200, "y"))
     hidden = Contract({"say": SkillBound((("message", (*many, long)),))})
     assert "[...]" in contract_sentence(hidden, SKILLS)
+    spaced = Contract({"say": SkillBound((("message", (TextTemplate(("a mug in ", "\n and more")),)),))})
+    assert '"a mug in [...] and more"' in contract_sentence(spaced, SKILLS)
     whole = contract_sentence(hidden, SKILLS, is_short=False)
     assert all(f'"{letter}"' in whole for letter in "abcdefgh")
     anything = Contract({"go_to": SkillBound((("location", (*many, TextTemplate((" ", "")))),))})

@@ -565,6 +565,22 @@ def test_a_draft_that_nobody_saw_is_no_draft_before(tmp_path: Path, monkeypatch:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("is_edit", [False, True])
+def test_a_check_that_nobody_wants_ends(tmp_path: Path, *, is_edit: bool) -> None:
+    looks = "".join(f"    if is_in_room('t{number}'):\n        say('{number}')\n" for number in range(12))
+    slow = f"def task_program():\n    for i in range(20):\n        sum(range(7 * 10**6))\n{looks}"
+    with desk_of(tmp_path) as console:
+        session = console.begin(MissionOrder(program=slow))
+        until(console, lambda view: view.busy == "checking" and bool(view.id))
+        time.sleep(0.3)
+        if is_edit:
+            session.edit(HELLO)
+        else:
+            console.begin(MissionOrder(program=HELLO))
+        until(console, lambda view: view.may_be_approved and view.program == HELLO)
+
+
+@pytest.mark.slow
 def test_a_check_does_not_delay_the_end(tmp_path: Path) -> None:
     slow = "def task_program():\n    while True:\n        sum(range(10**9))\n"
     with desk_of(tmp_path) as console:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE, SAY
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.text.phrases import verb
-from codebotler.core.text.words import brief, counted, elide_list, listed
+from codebotler.core.text.words import brief_part, counted, elide_list, listed
 from codebotler.simulator.guard.contract import TELLING_SKILLS, Contract, SkillBound, is_goal
 
 NEVER = {
@@ -26,7 +26,7 @@ LONG_TEXT = 30  # characters
 
 
 def contract_rows(
-    contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief, *, is_short: bool = False
+    contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief_part, *, is_short: bool = False
 ) -> Iterator[tuple[str, str, str]]:
     """Yield three texts per skill: verb, objects, limit: ("pick up", '"mug" in "office"', "at most 2 times").
 
@@ -43,7 +43,7 @@ def contract_rows(
 
 
 def contract_sentence(
-    contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief, *, is_short: bool = True
+    contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief_part, *, is_short: bool = True
 ) -> str:
     """Say in a sentence or two what a program may do at most, and what it never does.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 
@@ -37,5 +38,10 @@ def times(number: int) -> str:
 
 def brief(text: str, most: int = 70) -> str:
     """Put a string on one line, and shorten it to at most `most` characters."""
-    line = " ".join(text.split())
+    return brief_part(text.strip(), most)
+
+
+def brief_part(text: str, most: int = 70) -> str:
+    """Shorten a part of a longer text as `brief` does, but keep the spaces at its ends."""
+    line = re.sub(r"\s+", " ", text)
     return line if len(line) <= most else f"{line[: most - 1].rstrip()}…"
