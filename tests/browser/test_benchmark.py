@@ -21,7 +21,7 @@ from command_line import forked
 from evil import EVIL, NAMES, OWN_TAGS
 from pageserver import PageServer
 from roboeval.evaluation.runs.folder import RunFolder
-from roboeval.suites.task import check_label
+from roboeval.suites.task import plain_check
 from runs_server import serving
 from seals import unseal
 from viewing import DESK, PHONE, SCREENS, OpenPage, Screen, Shoot, expect_no_grave_fault
@@ -146,7 +146,7 @@ def test_the_page_tells_what_show_tells(served: PageServer, real: Path, opened: 
         expect(article.locator(".state")).to_have_text("satisfied" if world["satisfied"] else "not satisfied")
         expect(article.locator(".scenes")).to_have_count(0 if world["satisfied"] else 1)
         for check in world["failed_checks"]:
-            expect(article.locator(".failed-check")).to_contain_text(check_label(check["check"]))
+            expect(article.locator(".failed-check")).to_contain_text(plain_check(check["check"]))
             expect(article.locator(".failed-check")).to_contain_text(check["explanation"])
 
 

@@ -22,7 +22,7 @@ from codebotler.missions.session import MissionSession
 from codebotler.missions.storage.past import MissionPast
 from codebotler.models.base import ModelError
 
-MAX_ARGUMENT = 10_000
+MAX_WORDING = 10_000
 """The limit for an instruction, in characters."""
 
 AgentContext: TypeAlias = Context[Gatekeeper, Any]
@@ -44,7 +44,7 @@ class Choice(BaseModel):
     """The dialog in which a person chooses between the behaviours of different programs."""
 
     answer: Literal["1", "2", "3", "none", "you decide"] = Field(title="Which did you mean?")
-    more: str = Field(default="", max_length=MAX_ARGUMENT, title="If none: what should be different?")
+    more: str = Field(default="", max_length=MAX_WORDING, title="If none: what should be different?")
 
 
 class StepWord(BaseModel):
@@ -109,7 +109,7 @@ class ProposedProgram(NamedTuple):
     disabled_rules: tuple[str, ...]
 
 
-async def find_program(digest: str, ctx: AgentContext) -> ProposedProgram:
+async def find_proposed(digest: str, ctx: AgentContext) -> ProposedProgram:
     """Return the current mission. Raise ToolError if its program has another digest."""
     with as_tool_errors():
         session = gatekeeper_of(ctx).find_session(digest)
@@ -118,7 +118,7 @@ async def find_program(digest: str, ctx: AgentContext) -> ProposedProgram:
 
 
 def ask_person(
-    proposed: Annotated[ProposedProgram, Resolve(find_program)], ctx: AgentContext
+    proposed: Annotated[ProposedProgram, Resolve(find_proposed)], ctx: AgentContext
 ) -> Elicit[Consent] | NotAsked:
     """Open a dialog of the client to approve a program, if that is needed and the client has dialogs."""
     gatekeeper, session = gatekeeper_of(ctx), proposed.session

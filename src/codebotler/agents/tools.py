@@ -14,7 +14,7 @@ from mcp.server.mcpserver.resolve import Resolve
 from pydantic import Field
 
 from codebotler.agents.dialogs import (
-    MAX_ARGUMENT,
+    MAX_WORDING,
     AgentContext,
     Choice,
     Consent,
@@ -27,7 +27,7 @@ from codebotler.agents.dialogs import (
     ask_person,
     ask_whether,
     ask_which_behaviour,
-    find_program,
+    find_proposed,
     find_question,
     gatekeeper_of,
     read_last_past,
@@ -53,7 +53,8 @@ MAX_UNREAD_SECONDS = 2.0
 """How long a client may leave a message about progress unread."""
 
 _Instruction = Annotated[
-    str, Field(max_length=MAX_ARGUMENT, description="What the robot should do, in plain words for people.")
+    str,
+    Field(max_length=MAX_WORDING, description="What the robot should do, in plain words for people."),
 ]
 _Program = Annotated[
     str,
@@ -197,7 +198,7 @@ async def begin_steps(
 async def run_mission(
     digest: _Digest,
     ctx: AgentContext,
-    proposed: Annotated[ProposedProgram, Resolve(find_program)],
+    proposed: Annotated[ProposedProgram, Resolve(find_proposed)],
     answer: Annotated[ElicitationResult[Consent | NotAsked], Resolve(ask_person)],
     seconds: _Seconds = 45,
 ) -> MissionReport:

@@ -86,7 +86,7 @@ class LiveRobot:
 
     @property
     def trace(self) -> Trace:
-        """What the robot has done, seen and said so far, in order."""
+        """The events of the mission so far, in order."""
         return tuple(self._events)
 
     def stop(self) -> None:

@@ -39,7 +39,7 @@ def read_key(variable: str) -> str | None:
 
 
 @contextmanager
-def unset(variables: Iterable[str]) -> Iterator[None]:
+def hide_variables(variables: Iterable[str]) -> Iterator[None]:
     """Hide environment variables from libraries during a `with` block, and restore them afterwards."""
     before = {name: os.environ.pop(name) for name in variables if name in os.environ}
     try:

@@ -76,7 +76,7 @@ class PerceptionError(Exception):
         self.sentence = sentence
 
 
-def check_label(label: str) -> str:
+def clean_label(label: str) -> str:
     """Return the label as one line, or raise UserError if it is empty, too long or not printable."""
     words = " ".join(label.split())
     if not (0 < len(words) <= MAX_LABEL_CHARACTERS and words.isprintable()):

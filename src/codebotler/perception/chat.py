@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 from codebotler.models.base import Model, ModelError
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.servers.server_errors import error_text
-from codebotler.perception.base import PerceptionError, Sighting, check_label
+from codebotler.perception.base import PerceptionError, Sighting, clean_label
 from codebotler.perception.image import jpeg_of
 from codebotler.prompts import PictureMessage, Prompt, PromptMessage
 
@@ -35,7 +35,7 @@ class ChatDetector:
 
     def look(self, image: Image, label: str) -> Sighting:
         """Show the image to the model, and ask again if the reply is invalid."""
-        question = PictureMessage("user", json.dumps(check_label(label)), jpeg_of(image))
+        question = PictureMessage("user", json.dumps(clean_label(label)), jpeg_of(image))
         messages: tuple[PromptMessage, ...] = (PromptMessage("system", DETECTOR_PROMPT), question)
         fault = text = ""
         for number in range(MAX_REPLIES):

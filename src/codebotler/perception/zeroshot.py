@@ -13,7 +13,7 @@ from codebotler.core.errors import UserError
 from codebotler.models.keys import guard_logs
 from codebotler.models.local import find_source
 from codebotler.models.servers.server_errors import error_text
-from codebotler.perception.base import PerceptionError, Sighting, check_label
+from codebotler.perception.base import PerceptionError, Sighting, clean_label
 
 PIPELINE_TASK = "zero-shot-object-detection"
 
@@ -42,7 +42,7 @@ class ZeroShotDetector:
 
     def look(self, image: Image, label: str) -> Sighting:
         """Return the best match for a label. It counts as found if its score is at least `least_score`."""
-        words = check_label(label)
+        words = clean_label(label)
         self._check_length(words)
         try:
             # Pass a list because the pipeline splits a string at commas.

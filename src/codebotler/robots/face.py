@@ -53,7 +53,7 @@ class FaceQuestion:
 
 @dataclass(frozen=True)
 class FaceState:
-    """What every screen shows: the last sentences, the open question, and the question that ended last."""
+    """The state of all screens: the last sentences, the open question, and the question that ended last."""
 
     said: tuple[FaceSentence, ...] = ()
     question: FaceQuestion | None = None

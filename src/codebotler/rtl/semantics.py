@@ -47,7 +47,7 @@ def holds(formula: formulas.Formula, trace: Trace) -> bool:
     return _test_holds(formula, trace)
 
 
-def visible(trace: Trace) -> tuple[object, ...]:
+def compared_fields(trace: Trace) -> tuple[object, ...]:
     """Return only those fields of each event that formulas can compare, such as its text but not its time."""
     return tuple(
         (e.kind, e.text, e.options, e.answer, e.found, e.place, e.holding, e.to, e.more) for e in trace

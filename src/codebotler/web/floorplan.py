@@ -21,7 +21,7 @@ _MAX_LABEL_CHARACTERS, _MAX_FINDS = 60, 3
 
 @dataclass(frozen=True)
 class MapState:
-    """What a map shows besides rooms: where the robot is and was, what it holds, and what it has found.
+    """The changing part of a map: where the robot is and was, what it holds, and what it has found.
 
     Args:
         at: the robot's position in metres, if known.

@@ -50,7 +50,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Strip:
-    """What the robot would do in one imagined world: its visits to rooms, and how the program ends."""
+    """The robot's visits to rooms in one imagined world, and how the program ends there."""
 
     world: str  # a description of the world, as the first half of a sentence
     scenes: tuple[Scene, ...]
@@ -59,7 +59,7 @@ class Strip:
 
 
 class Storyboard(NamedTuple):
-    """What the check expects the robot to do, and how far the real robot has come."""
+    """The expected course of a mission, from its check, and how far the real robot has come."""
 
     check: CheckResult
     title: str

@@ -14,7 +14,7 @@ Clusters: TypeAlias = Sequence[Sequence[float]]
 """Values grouped by cluster: one value per prompt, or the values of all prompts of a task."""
 
 SamplingUnit: TypeAlias = Literal["prompts", "tasks"]
-"""What an interval assumes to be a random sample: single prompts, or tasks with all their prompts."""
+"""The unit of random sampling that an interval assumes: a single prompt, or a task with all its prompts."""
 
 SHARE, DIFFERENCE = (0.0, 1.0), (-1.0, 1.0)  # lowest and highest values
 CONFIDENCE = 0.95  # level of all confidence intervals

@@ -24,7 +24,7 @@ from roboeval.linting.findings import Finding
 from roboeval.linting.world_findings import judged_worlds
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
 from roboeval.suites.solutions import locate_solution, solutions
-from roboeval.suites.task import check_label
+from roboeval.suites.task import plain_check
 
 Verdicts: TypeAlias = Sequence[Verdict]  # verdicts on a program in all worlds of a task or of its ablation
 
@@ -84,7 +84,7 @@ def _unworded(task: Task) -> Iterator[Finding]:
     unclear = {
         requirement.check
         for requirement in _required(task)
-        if not all(map(is_clear, elements(requirement.formula))) or UNCLEAR in check_label(requirement.text)
+        if not all(map(is_clear, elements(requirement.formula))) or UNCLEAR in plain_check(requirement.text)
     }
     for check in task.checks:
         if check.name in unclear:

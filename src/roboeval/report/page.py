@@ -28,7 +28,7 @@ from roboeval.report.sheets import (
     format_cell,
     page_text,
 )
-from roboeval.suites.task import check_label
+from roboeval.suites.task import plain_check
 
 MAX_TEXT, MAX_REPORTED_PROGRAM, MAX_DIFF_LINES = 500, 6_000, 80  # limits for text written by models
 MAX_TABLE_ROWS = 1_000  # rows on the page; the CSV file contains all rows
@@ -187,7 +187,7 @@ def _failure_group(model: str, group: FailureGroup) -> str:
     data = {"model": model, "task": group.task, "kind": kind, "size": str(size)}
     attributes = "".join(f' data-{name}="{_text(value)}"' for name, value in data.items())
     check = group.failure["check"]
-    why = shortened(f"{check_label(check)}: {group.why}" if check else group.why, MAX_TEXT, str)
+    why = shortened(f"{plain_check(check)}: {group.why}" if check else group.why, MAX_TEXT, str)
     return (
         f'<details class="group"{attributes}><summary><b>{size:,}</b><span>{_text(model)}, '
         f'{_text(group.task)}, {_text(kind)}<br><span class="why">{_text(why)}</span></span>'

@@ -107,7 +107,7 @@ class Task:
         return (self.ablation or ()) if ablated else self.scenarios
 
 
-def check_label(text: str) -> str:
+def plain_check(text: str) -> str:
     """Shorten a requirement for display: replace regexes by examples, as in `offers("bread")`."""
     return _STRINGS.sub(
         lambda found: json.dumps(first_choice(literal_eval(found[0])), ensure_ascii=False), text

@@ -27,7 +27,7 @@ from roboeval.evaluation.judging.explanation import (
 from roboeval.evaluation.judging.failures import label_of, no_program_sentence
 from roboeval.evaluation.runs.completions import CompletionKey, name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_facts
-from roboeval.suites.task import check_label, describe_contents, world_title
+from roboeval.suites.task import describe_contents, plain_check, world_title
 from roboeval.web.heat_map import MAX_NAME, run_address
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import completion_details
@@ -162,7 +162,7 @@ def _draw_reasons(data: Mapping[str, Any], anchor: str) -> None:
     with ui.element("ul").classes("failed-checks"):
         for check in data["failed_checks"]:
             with ui.element("li").classes("failed-check"):
-                PlainText("code", shortened(check_label(check["check"])))
+                PlainText("code", shortened(plain_check(check["check"])))
                 if check["explanation"] is not None:
                     PlainText("span", shortened(check["explanation"], MAX_SENTENCE))
                 if check["step"] is not None:

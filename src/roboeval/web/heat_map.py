@@ -65,7 +65,7 @@ class TaskCells:
 
     def __init__(self, run: Snapshot, chosen: CompletionFilter, evaluation: str | None = None) -> None:
         self._run, self._filter, self._evaluation = run, chosen, evaluation
-        counted = CompletionFilter(passed=True) if chosen.verdict == CompletionFilter() else chosen
+        counted = CompletionFilter(passed=True) if chosen.without_prompt == CompletionFilter() else chosen
         self._bad = not counted.passed
         self._verb = verb_of(counted)
         self.tasks: dict[str, dict[int, dict[str, Any]]] = {}

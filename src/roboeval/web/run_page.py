@@ -131,7 +131,7 @@ class _RunPage:
                     kind: _Kind(name, kind, self._choose_kind) for kind, (name, _) in counts.items()
                 }
         for kind, (_, count) in counts.items():
-            self._kinds[kind].show(count, run.judged, is_here=kind == self._chosen.verdict)
+            self._kinds[kind].show(count, run.judged, is_here=kind == self._chosen.without_prompt)
 
 
 class _Kind:
@@ -185,6 +185,6 @@ def _heading(chosen: CompletionFilter) -> str:
         parts.append(f"of {shortened(chosen.task, MAX_NAME)}")
     if chosen.prompt is not None:
         parts.append(f"prompt {chosen.prompt}")
-    if chosen.verdict != CompletionFilter():
+    if chosen.without_prompt != CompletionFilter():
         parts.append(f"that {verb_of(chosen)}")
     return f"Completions {', '.join(parts)}".rstrip()

@@ -20,7 +20,7 @@ from roboeval.evaluation.runs.completions import KEY, CompletionKey
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.table import storable
 from roboeval.suites.load import Suite
-from roboeval.suites.task import check_label
+from roboeval.suites.task import plain_check
 
 HAS_NO_PROGRAM = pl.col("failure_class").eq_missing(NO_PROGRAM_CLASS)
 # The sign for the result of a program in a world is + if satisfied, - if not satisfied, and ! for an error.
@@ -37,7 +37,7 @@ FAILURE_CAUSE = (
     pl.when(HAS_NO_PROGRAM)
     .then(pl.col("failure_kind").replace(dict(NO_PROGRAM_SENTENCES)))
     .when(pl.col("failure_check").is_not_null())
-    .then(pl.col("failure_check").map_elements(check_label, return_dtype=pl.String))
+    .then(pl.col("failure_check").map_elements(plain_check, return_dtype=pl.String))
     .when((pl.col("status") == "timeout") & ERROR_MESSAGE.str.contains(r"^\d"))
     .then(pl.format("stopped after {} (limit)", ERROR_MESSAGE))
     .otherwise(ERROR_MESSAGE)
@@ -64,7 +64,7 @@ class CompletionFilter:
         return pl.all_horizontal(pl.lit(value=True), *conditions)
 
     @property
-    def verdict(self) -> Self:
+    def without_prompt(self) -> Self:
         """This filter without its task and prompt, so that it selects by verdict and failure only."""
         return replace(self, task=None, prompt=None)
 
@@ -152,7 +152,7 @@ class Snapshot:
         counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
             written=pl.len(),
             judged=pl.col("passed").count(),
-            counted=chosen.verdict.condition.sum(),
+            counted=chosen.without_prompt.condition.sum(),
         )
         return counts.with_columns(share=pl.col("counted") / pl.when(judged > 0).then(judged)).to_dicts()
 

@@ -37,7 +37,7 @@ from codebotler.rtl import (
     holds,
     parse,
 )
-from codebotler.rtl.semantics import positions_in_scopes, visible
+from codebotler.rtl.semantics import compared_fields, positions_in_scopes
 
 Placed = list[tuple[int, Event]]
 """A copied part of a trace, each event with its position in the whole."""
@@ -299,7 +299,7 @@ def test_all_that_formulas_compare_of_an_event_is_visible() -> None:
     hidden = {"time", "destination", "failed"}
     for name in (one.name for one in fields(Event)):
         changed = replace(event, **{name: getattr(other, name)})
-        assert (visible((changed,)) == visible((event,))) == (name in hidden), name
+        assert (compared_fields((changed,)) == compared_fields((event,))) == (name in hidden), name
 
 
 @given(st.data())
@@ -308,7 +308,7 @@ def test_a_formula_holds_of_all_traces_in_which_the_same_is_visible(
 ) -> None:
     formula, trace = data.draw(formulas), data.draw(traces)
     later = tuple(replace(event, time=9.0 + at) for at, event in enumerate(trace))
-    assert visible(later) == visible(trace)
+    assert compared_fields(later) == compared_fields(trace)
     assert holds(formula, later) == holds(formula, trace)
 
 

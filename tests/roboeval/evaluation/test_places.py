@@ -19,7 +19,7 @@ from codebotler.core.skills.table import SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
-from codebotler.rtl.semantics import visible
+from codebotler.rtl.semantics import compared_fields
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
@@ -256,7 +256,7 @@ def test_runs_that_a_rule_ends(worker: Worker) -> None:
     (verdict,) = row["verdicts"]
     assert (verdict["status"], verdict["error"]["kind"]) == ("robot-error", "RuleViolation")
     assert trace_of(verdict) == outcome.trace
-    assert visible(trace_of(verdict)) == visible(outcome.trace)
+    assert compared_fields(trace_of(verdict)) == compared_fields(outcome.trace)
     assert (verdict["places"], verdict["holding"]) == ([[1, "kitchen"], [3, "office"]], [[2, "mug"]])
     assert expect_agreement(worker, suite, program) == [True]
 
@@ -274,7 +274,7 @@ def test_both_kinds_of_processes_say_where_events_happen(worker: Worker) -> None
     other, same = judge(alone, suite, PROGRAM)
     alone.close()
     assert row == same
-    assert visible(other.trace) == visible(outcome.trace)
+    assert compared_fields(other.trace) == compared_fields(outcome.trace)
     assert circumstances(outcome.trace) == {
         "places": [[1, "kitchen"], [3, "office"], [66, "kitchen"]],
         "holding": [[2, "mug"], [5, ""]],

@@ -11,7 +11,7 @@ from codebotler.core.trace import Trace
 from codebotler.rtl import explain
 from roboeval.linting.task_findings import judge_solutions
 from roboeval.suites.load import Suite, Task, load_suite
-from roboeval.suites.task import check_label
+from roboeval.suites.task import plain_check
 
 REGEX = re.compile(r"\\[bBdDsSwW]|\.[*+]|\(\?|\||\[[^\]]*\]|\w[?*+]")
 OPTIONS = re.compile(r"\[[ |]*\]")  # of a question, without their texts
@@ -53,7 +53,7 @@ def test_explanations_of_all_wrong_solutions(name: str, every: int) -> None:
 @pytest.mark.parametrize("name", SUITES)
 def test_titles_of_worlds_and_labels_of_checks(name: str) -> None:
     worlds = [world for task in load_suite(name).tasks.values() for world in task.scenarios]
-    labels = {check_label(requirement.text) for world in worlds for requirement in world.require}
+    labels = {plain_check(requirement.text) for world in worlds for requirement in world.require}
     assert [text for text in {*labels, *(world.world.about for world in worlds)} if REGEX.search(text)] == []
 
 
@@ -67,4 +67,4 @@ def test_titles_of_worlds_and_labels_of_checks(name: str) -> None:
     ],
 )
 def test_a_label_shows_words(text: str, label: str) -> None:
-    assert check_label(text) == label
+    assert plain_check(text) == label

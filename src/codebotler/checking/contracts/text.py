@@ -17,7 +17,7 @@ NEVER = {
     ASK: "asks nobody",
     SAY: "says nothing",
 }
-"""What a program never does if its contract lacks a skill, by the kind of event that the skill records."""
+"""Words for a program whose contract lacks a skill, by the kind of event that the skill records."""
 
 ANYBODY = "anybody"  # a question to "" may be answered by any person in the room
 GAP = "[...]"

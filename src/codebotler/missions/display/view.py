@@ -120,7 +120,7 @@ class SessionView:
 
     @property
     def contract(self) -> Contract | None:
-        """What the program may do at most, according to its check; None if it was not checked."""
+        """The program's contract, as its check derived it; None if it was not checked."""
         return None if self.check is None else self.check.contract
 
     @property
@@ -135,7 +135,7 @@ class SessionView:
 
     @property
     def arriving(self) -> PartialReply:
-        """What a model has sent so far of its reply, split into text and code."""
+        """The part of a model's reply that has arrived, split into text and code."""
         return split_partial(self.reply)
 
     @property
@@ -145,7 +145,7 @@ class SessionView:
 
     @property
     def phase(self) -> Phase:
-        """What the session does now, such as `writing` or `checking`, or the final state of its mission."""
+        """The session's current work, such as `writing` or `checking`, or the final state of its mission."""
         if self.is_over or self.is_running:
             return "" if self.state is None else self.state
         if self.is_written:

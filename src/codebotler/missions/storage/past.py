@@ -41,7 +41,7 @@ DONE_EVENTS = frozenset({"result", "late"})
 
 @dataclass(frozen=True)
 class MissionPast:
-    """What an ended mission, and the missions that it continued, did. A new mission can do the rest.
+    """The steps of an ended mission and of those that it continued. A new mission can do the rest.
 
     Args:
         mission: the ID of the ended mission.

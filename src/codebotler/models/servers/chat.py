@@ -23,7 +23,7 @@ from pydantic_ai.settings import ModelSettings, ThinkingEffort
 
 from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError, Reply, TextListener, Usage, ignore_text, make_reply
-from codebotler.models.keys import guard_logs, read_key, remove_keys, unset
+from codebotler.models.keys import guard_logs, hide_variables, read_key, remove_keys
 from codebotler.models.sampling import CHAT_MAX_TOKENS, SamplingSettings
 from codebotler.models.servers.chat_messages import definition_of, to_messages, turn_of
 from codebotler.models.servers.http_client import (
@@ -291,7 +291,7 @@ def _open_model(name: str, settings: SamplingSettings, http_client: object) -> M
     provider = name.partition(":")[0]
     try:
         blank = [variable for variable in _key_variables(provider) if read_key(variable) is None]
-        with unset(blank):  # since libraries only test whether a variable exists
+        with hide_variables(blank):  # since libraries only test whether a variable exists
             with without_proxy(settings.base_url):
                 model = infer_model(
                     name,

@@ -14,7 +14,7 @@ from urllib.request import getproxies, proxy_bypass
 
 from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError
-from codebotler.models.keys import redact, unset
+from codebotler.models.keys import hide_variables, redact
 from codebotler.models.servers.server_errors import FIRST_ERROR, error_in_reply, error_text, model_error
 
 HTTPClient = TypeVar("HTTPClient", bound=Any)  # of httpx or httpx2, which share no type
@@ -107,7 +107,7 @@ def _limit_stream(stream: Any, name: str, limit: int) -> Any:  # noqa: ANN401 - 
 def without_proxy(url: str | None) -> AbstractContextManager[None]:
     """Return a context for creating an HTTP client that uses no proxy if `url` is on this machine."""
     is_local = url is not None and _is_loopback(urlsplit(url).hostname or "")
-    return unset([name for name in os.environ if is_local and name.lower().endswith("_proxy")])
+    return hide_variables([name for name in os.environ if is_local and name.lower().endswith("_proxy")])
 
 
 def mention_proxy(error: ModelError, url: str | None) -> ModelError:

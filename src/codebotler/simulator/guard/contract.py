@@ -69,7 +69,7 @@ def has_place(row: Skill) -> bool:
 
 @dataclass(frozen=True)
 class SkillBound:
-    """What a program may do at most with one skill.
+    """The limits within which a program may call one skill.
 
     Args:
         texts: the allowed texts of each argument, by the parameter's name.
@@ -116,7 +116,7 @@ class SkillBound:
 
 @dataclass(frozen=True)
 class Contract:
-    """What a program may do at most.
+    """The limits of a program: the skills that it may call, with which arguments, where and how often.
 
     Args:
         skills: the bound of each skill that may be called; no other skill may be called.

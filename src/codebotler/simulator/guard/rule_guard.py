@@ -37,7 +37,7 @@ def rooms_meant(robot: SimulatedRobot, request: str) -> list[str]:
     return [name_of(robot.full_names.get(room, room), request) for room in robot.possible_rooms(request)]
 
 
-def goals_meant(robot: SimulatedRobot, row: Skill, arguments: Sequence[Argument]) -> list[str]:
+def goals_of_call(robot: SimulatedRobot, row: Skill, arguments: Sequence[Argument]) -> list[str]:
     """Return the rooms that a call may drive to, by the names that rules compare; none if it is no drive."""
     goals = (
         one for parameter, one in zip(row.parameters, arguments, strict=True) if is_goal(row, parameter.name)
@@ -110,7 +110,7 @@ class RuleGuard:
         row, start = robot.skills[skill], len(robot.events)
         holding = "" if robot.held is None else self._history.holding or robot.held
         place = self._history.names.get(robot.place, robot.place)
-        self.judge_call(row, arguments, goals_meant(robot, row, arguments), place)
+        self.judge_call(row, arguments, goals_of_call(robot, row, arguments), place)
         attempt = attempted_event(row, arguments, place=place, time=robot.now, holding=holding)
         if attempt is not None:
             attempts = _attempts(robot, attempt, arguments, is_drive=row.is_drive)

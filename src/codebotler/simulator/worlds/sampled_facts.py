@@ -41,7 +41,7 @@ def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True)
 
 @dataclass
 class ExploredRoom:
-    """What a program has found out about one room. All names are from `normalized`."""
+    """A program's knowledge about one room. All names are from `normalized`."""
 
     missed: set[str] = field(default_factory=set)  # looked for and not found
     gone: set[str] = field(default_factory=set)  # picked up here

@@ -99,7 +99,7 @@ class SampledRobot(SimulatedRobot):
 
     @property
     def here(self) -> ExploredRoom:
-        """What the program knows about the robot's current room."""
+        """The program's knowledge about the robot's current room."""
         return self.explored[self.room]
 
     def search(self, name: str) -> RoomSearch:

@@ -24,7 +24,7 @@ from roboeval.evaluation.judging.explanation import (
 from roboeval.evaluation.judging.failures import label_of, no_program_sentence
 from roboeval.evaluation.runs.completions import name_of, recorded_suffix
 from roboeval.evaluation.runs.replies import reply_facts
-from roboeval.suites.task import check_label, world_title
+from roboeval.suites.task import plain_check, world_title
 
 MAX_EXPLANATION = 2_000  # characters
 ALL_STEPS = "--all shows what the robot did in satisfied worlds."
@@ -54,7 +54,7 @@ def _program_line(program: Mapping[str, Any]) -> Text:
     if program["explanation"] is None:
         why = shortened(error_sentence(program))
     else:
-        label = visible(check_label(program["failure"]["check"]))
+        label = visible(plain_check(program["failure"]["check"]))
         why = f"{label}: {shortened(program['explanation'], MAX_EXPLANATION)}"
     return text.append(f"\n{why}" if why else "")
 
@@ -146,7 +146,7 @@ def _world(world: Mapping[str, Any]) -> list[RenderableType]:
     for check in world["failed_checks"]:
         text = Text.assemble(
             ("failed ", "red"),
-            visible(check_label(check["check"])),
+            visible(plain_check(check["check"])),
             f": {shortened(check['explanation'], MAX_EXPLANATION)}",
         )
         parts.append(Padding(text, (0, 0, 0, 2)))

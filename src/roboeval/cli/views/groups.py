@@ -18,7 +18,7 @@ from roboeval.cli.views.completions import kind_view
 from roboeval.cli.views.results import ruled
 from roboeval.evaluation.runs.completions import CompletionKey, how_many, name_of
 from roboeval.evaluation.runs.scope import Coverage
-from roboeval.suites.task import check_label
+from roboeval.suites.task import plain_check
 
 MAX_PRINTED_CHANGES = 60  # lines of a diff between programs
 
@@ -27,7 +27,7 @@ def found_view(
     found: Sequence[TraceMatch],
     passed: Container[CompletionKey],
     total: int,
-    told: Sequence[FailureGroup],
+    shown: Sequence[FailureGroup],
     *,
     groups: int,
     is_search: bool,
@@ -41,11 +41,11 @@ def found_view(
     if failed or not is_search:
         of = "these" if is_search else f"{total:,}"
         grouped = f", in {counted(groups, 'group')}" * (groups > 0)
-        parts.append(Text(f"{how_many(failed)} of {of} failed{grouped}{':' * bool(told)}", "bold"))
-    if told:
-        parts += [Text(), *map(failure_group_view, told)]
-        if groups > len(told):
-            parts.append(Text(f"{groups - len(told):,} more groups; --groups shows more of them", "dim"))
+        parts.append(Text(f"{how_many(failed)} of {of} failed{grouped}{':' * bool(shown)}", "bold"))
+    if shown:
+        parts += [Text(), *map(failure_group_view, shown)]
+        if groups > len(shown):
+            parts.append(Text(f"{groups - len(shown):,} more groups; --groups shows more of them", "dim"))
     return Group(*parts)
 
 
@@ -70,7 +70,7 @@ def failure_group_view(group: FailureGroup) -> RenderableType:
     world = "" if group.has_no_program else f', in "{visible(str(group.reason["world"]))}"'
     lines = [Text(f"such as {name}{world}", "dim")]
     check = group.failure["check"]
-    lines.append(Text(shortened(f"{check_label(check)}: {group.why}" if check else group.why)))
+    lines.append(Text(shortened(f"{plain_check(check)}: {group.why}" if check else group.why)))
     if (fix := group.fix) is not None:
         changed = f"{fix.changed} line{'s' * (fix.changed != 1)}"
         lines.append(Text(f"{visible(fix.name)} passes, and differs in {changed}:", "dim"))

@@ -13,7 +13,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome, Status, Trace
 from codebotler.core.world import World
 from codebotler.rtl import Inconclusive, holds
-from codebotler.rtl.semantics import visible
+from codebotler.rtl.semantics import compared_fields
 from codebotler.simulator.guard.contract import Contract
 from codebotler.simulator.guard.rule_guard import RuleGuard
 from codebotler.simulator.worker import Worker
@@ -57,7 +57,7 @@ def are_met(outcome: Outcome, scenario: Scenario) -> tuple[bool, ...]:
         return tuple([is_met(one, outcome.trace) for one in scenario.require])
 
     formulas = [id(one.formula) for one in scenario.require]
-    return REQUIREMENT_CACHE.of((visible(outcome.trace), *formulas), scenario, [outcome], check)
+    return REQUIREMENT_CACHE.of((compared_fields(outcome.trace), *formulas), scenario, [outcome], check)
 
 
 def is_met(requirement: Requirement, trace: Trace) -> bool:

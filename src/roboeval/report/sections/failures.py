@@ -16,7 +16,7 @@ from roboeval.report import paper
 from roboeval.report.figures import bars as figures
 from roboeval.report.runs import JudgedRun, coverage_of, runs_to_draw
 from roboeval.report.sheets import Cell, Groups, Prose, ReportFigure, Section, Sheet, note, section, sheet
-from roboeval.suites.task import check_label
+from roboeval.suites.task import plain_check
 
 MAX_GROUPS_PER_RUN, MIN_GROUPS_PER_RUN = 100, 4  # number of groups of a run on the page
 MAX_GROUPS_SHOWN = 200  # number of groups on the page
@@ -101,7 +101,7 @@ def failures_section(runs: Sequence[JudgedRun]) -> Section:
 
 def _cells(one: FailureGroup) -> list[Cell]:
     check = one.failure["check"]
-    ground = [one.failure["class"], one.failure["kind"], check and check_label(check)]
+    ground = [one.failure["class"], one.failure["kind"], check and plain_check(check)]
     return [one.task, *ground, one.why, name_of(one.representative)]
 
 
