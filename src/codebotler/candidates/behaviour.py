@@ -102,6 +102,11 @@ def statements(trace: Trace) -> Iterator[tuple[str, str]]:
             yield said[0].place, "\n".join(one.text for one in said)[:MAX_STATEMENT_LENGTH]
 
 
+def wording(trace: Trace) -> frozenset[str]:
+    """Return all that the robot says and asks, in lower case."""
+    return frozenset(_plain(one.text) for one in trace if one.kind in {SAY, ASK})
+
+
 def rooms_with_several(traces: Iterable[Trace]) -> frozenset[str]:
     """Return the rooms in which runs ask people with different names."""
     people: dict[str, set[str]] = {}

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-from codebotler.candidates.behaviour import Behaviour, behaviour_of, names_in, rooms_with_several
+from codebotler.candidates.behaviour import Behaviour, behaviour_of, names_in, rooms_with_several, wording
 from codebotler.checking.check import check_on
 from codebotler.checking.problems import Sample
 from codebotler.checking.sampled import (
@@ -119,16 +119,16 @@ def cluster_candidates(
         tuple(behaviour_of(sample.outcome, rooms.start, names, several) for sample in samples)
         for samples in runs
     ]
-    unwanted = behaviours[len(accepted) :]
+    texts = [[wording(sample.outcome.trace) for sample in samples] for samples in runs]
+    rejected = len(programs) - sum(counts[one] for one in accepted)
     together: dict[tuple[Behaviour, ...], list[int]] = {}
-    for number, seen in enumerate(behaviours[: len(accepted)]):
-        if seen not in unwanted:
-            together.setdefault(seen, []).append(number)
+    # A person may have meant other words only, so if nothing else differs, the words count.
+    for number in _wanted(behaviours, len(accepted)) or _wanted(texts, len(accepted)):
+        together.setdefault(behaviours[number], []).append(number)
     if not together:
-        again = counted(len(accepted), "program")
+        again = counted(len(programs) - rejected, "program")
         raise UserError(f"{again} would do again what was not meant; give the instruction in other words")
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
-    rejected = len(programs) - sum(counts[one] for one in accepted)
     unwanted_count = len(programs) - rejected - sum(one.size for one in clusters)
     return CandidateClusters(tuple(sorted(clusters, key=lambda one: -one.size)), rejected, unwanted_count)
 
@@ -142,6 +142,11 @@ def compare_candidates(
     """Group candidates on a worker of this process's pool; see `cluster_candidates`."""
     pool = shared_pool()
     return pool.call(lambda: cluster_candidates(pool.here(), programs, settings, room_map, refused))
+
+
+def _wanted(seen: Sequence[object], count: int) -> list[int]:
+    """Return the positions of the first `count` entries that equal none of the refused ones after them."""
+    return [number for number in range(count) if seen[number] not in seen[count:]]
 
 
 def _cluster(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
@@ -15,7 +15,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.text.phrases import phrase
 from codebotler.core.text.words import brief, counted, listed
-from codebotler.core.trace import Event
+from codebotler.core.trace import Event, Trace
 from codebotler.models.recorded import is_recorded
 from codebotler.simulator.worlds.matching import SOMEBODY, means_person, normalized
 
@@ -128,7 +128,8 @@ def question_about(
     if len(groups.clusters) == 1 or largest.size >= dominant_share * groups.total:
         return None
     every = range(len(largest.samples))
-    worlds = [one for one in every if _is_possible([each.samples[one] for each in groups.clusters])] or every
+    conflicts = [_count_conflicts([each.samples[one] for each in groups.clusters]) for one in every]
+    worlds = [one for one in every if conflicts[one] == min(conflicts)]
     number = max(worlds, key=lambda one: _rank(_distinct_clusters(groups.clusters, one), one))
     shown = _distinct_clusters(groups.clusters, number)
     samples = [one.samples[number] for one in shown]
@@ -143,12 +144,27 @@ def question_about(
     return ClarifyingQuestion(tuple(options), facts, groups.total, number, why_last)
 
 
-def _is_possible(samples: Iterable[Sample]) -> bool:
-    """Return whether no candidate meets a person in a room where another one finds nobody."""
-    events = [event for sample in samples for event in sample.outcome.trace if event.kind in {ASK, CHECK}]
-    met = {one.place for one in events if one.answer or (one.found and means_person(one.text))}
-    empty = {one.place for one in events if one.found is False and normalized(one.text) == SOMEBODY}
-    return met.isdisjoint(empty)
+def _count_conflicts(samples: Iterable[Sample]) -> int:
+    """Count contradictions: a name that one run meets and another misses, or a person in several rooms."""
+    seen = {one for sample in samples for one in _encounters(sample.outcome.trace)}
+    met, missed = ({one[:2] for one in seen if one[2] is is_there} for is_there in (True, False))
+    named = {(name, room) for name, room, is_there, is_person in seen if is_there and is_person}
+    rooms = Counter(name for name, _ in named if name != SOMEBODY)
+    met |= {(SOMEBODY, room) for _, room in named}
+    return len(met & missed) + sum(count - 1 for count in rooms.values())
+
+
+def _encounters(trace: Trace) -> Iterator[tuple[str, str, bool, bool]]:
+    """Yield each name that the run has not moved: its room, whether it is there, whether it is a person."""
+    moved: set[str] = set()
+    for one in trace:
+        name = normalized(one.to or SOMEBODY if one.kind == ASK else one.text)
+        is_person = one.kind == ASK or means_person(one.text)
+        is_known = one.kind in {CHECK, PICK} or (one.kind == ASK and bool(one.answer))
+        if is_known and name not in moved and not one.failed:
+            yield name, one.place, one.found is not False, is_person
+        if one.kind in {PICK, PLACE}:
+            moved.add(name)
 
 
 def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:
@@ -184,24 +200,37 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
 
 
 def describe_differences(samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> list[str]:
-    """Say of each run in one world only what differs from the other runs, such as "ends in kitchen"."""
+    """Say of each run in one world how it differs from the other runs, such as "ends in kitchen"."""
     seen = [_aspects(behaviour) for behaviour in behaviours]
-    shown = sorted(_telling_first(seen)[:MAX_SHOWN_DIFFERENCES], key=lambda key: key[0] == "room")  # the end
-    return [listed([_words(key, sample) for key in shown]) for sample in samples]
-
-
-def _telling_first(seen: Sequence[Mapping[Aspect, object]]) -> list[Aspect]:
-    """Return the aspects in which options differ, beginning with those that tell all of them apart."""
-
-    def kinds(*keys: Aspect) -> int:
-        return len({tuple(aspects.get(key) for key in keys) for aspects in seen})
-
-    differing = [key for key in dict.fromkeys(key for aspects in seen for key in aspects) if kinds(key) > 1]
-    telling: list[Aspect] = []
-    for key in sorted(differing, key=kinds, reverse=True):
-        if kinds(*telling, key) > kinds(*telling):
+    differing = [
+        key for key in dict.fromkeys(key for aspects in seen for key in aspects) if _kinds(seen, key) > 1
+    ]
+    telling: list[Aspect] = []  # tell all runs apart
+    for key in sorted(differing, key=lambda key: _kinds(seen, key), reverse=True):
+        if _kinds(seen, *telling, key) > _kinds(seen, *telling):
             telling.append(key)
-    return [*dict.fromkeys([*telling, *differing])]
+    return [
+        _difference(
+            telling, [key for key in differing if key in aspects and key not in telling], sample, aspects
+        )
+        for sample, aspects in zip(samples, seen, strict=True)
+    ]
+
+
+def _kinds(seen: Sequence[Mapping[Aspect, object]], *keys: Aspect) -> int:
+    return len({tuple(aspects.get(key) for key in keys) for aspects in seen})
+
+
+def _difference(
+    telling: Sequence[Aspect], others: Sequence[Aspect], sample: Sample, aspects: Mapping[Aspect, object]
+) -> str:
+    """Describe the telling aspects and a few others, beginning with what the run does, its last room last."""
+    shown = [*telling, *others][: max(MAX_SHOWN_DIFFERENCES, len(telling))]
+    words = [
+        _words(key, sample) for key in sorted(shown, key=lambda key: (key[0] == "room", key not in aspects))
+    ]
+    left = len(telling) + len(others) - len(shown)
+    return listed([*words, *([f"{left} more"] if left else [])])
 
 
 def _aspects(behaviour: Behaviour) -> dict[Aspect, object]:

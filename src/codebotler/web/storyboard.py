@@ -162,7 +162,8 @@ def strips(check: CheckResult) -> list[Strip]:
 
 def _strip(sample: Sample, check: CheckResult) -> Strip:
     error = sample.outcome.error
-    if sample.in_vain:
+    is_harmless = sample.in_vain and sample.number not in check.evidence
+    if is_harmless:
         ending = "The robot waits or searches without success; this does not count as a problem."
     elif error is not None:
         ending = f"Fails: {shortened(error.message, _MAX_STEP_TEXT)} ({shortened(error.kind)})"
@@ -174,7 +175,7 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
         step["is_repeated"] = event in sample.repeated
     needed = [step["step"] for step in steps if step["is_repeated"]]
     shown = scenes(steps, check.room_map.start, needed)
-    return Strip(world, shown, ending, error is None or sample.in_vain)
+    return Strip(world, shown, ending, error is None or is_harmless)
 
 
 def scenes(

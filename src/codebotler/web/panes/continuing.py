@@ -18,7 +18,7 @@ from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.storage.log import MissionState, MissionSummary
 from codebotler.missions.storage.past import MissionPast
 from codebotler.web.console import Console
-from codebotler.web.frame import Button, PlainText, outside, scroll_up
+from codebotler.web.frame import Button, PlainText, scroll_up
 
 MAX_OPEN_STEPS = 12
 _MAX_STEPS, _MAX_STEP_CHARACTERS, _MAX_ANSWERS = 500, 300, 8
@@ -102,7 +102,7 @@ def _begin(console: Console, past: MissionPast) -> None:
     if ui.context.client.page.path == "/":
         scroll_up()
     else:
-        ui.navigate.to(outside("/"))
+        ui.navigate.to("/")  # NiceGUI adds the prefix of the page
 
 
 def draw_past(past: MissionPast) -> None:
@@ -117,7 +117,6 @@ def draw_past(past: MissionPast) -> None:
     if not steps:
         PlainText("p", "No step was finished.")
     PlainText("p", capitalize(past.testimony), "quiet")
-    PlainText("p", "A step that would happen again in the same room is marked below.", "quiet")
 
 
 def _draw_steps(steps: Sequence[tuple[str, Event]]) -> None:

@@ -88,7 +88,9 @@ def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
     from roboeval.evaluation.recovery import recovery_data
 
     shares = "passed", "rejected", "failed"
-    table = ruled("task", "faults", "handled", "missing", "continued", *shares, "steps", "fewest", "repeated")
+    table = ruled(
+        "task", "faults", "handled", "missing", "continued", *shares, "steps", "no fault", "repeated"
+    )
     for task in [*dict.fromkeys(one.task for one in results), "all"]:
         data = recovery_data([one for one in results if task in {one.task, "all"}])
         cells = (
@@ -100,7 +102,7 @@ def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
         "faults: calls made to fail, one in each mission; continued: those for which the model had a rest",
         "handled: faults that the program handled itself; missing: missions for which the model had no rest",
         "passed, rejected (by the check), failed: shares of the continued missions, without the missing ones",
-        "steps: those of the missions that passed; fewest: without a fault",
+        "steps: those of the missions that passed; no fault: those of the same missions without a fault",
         "repeated: how often robots spoke, picked up or put down more than without a fault",
     ]
     return Group(Text(title, "bold"), Text(), table, *(Text(line, "dim") for line in lines))
