@@ -123,5 +123,5 @@ def test_robot_with_a_face_needs_no_servers_for_speech(
         expect(face.locator("#said p")).to_have_text(["hello", "here"])
         expect(face.locator("#doing")).to_have_text("I have finished.")
         face.context.close()
-    heard = [said[1] for said in server.said.queue if said[0] == "goal"]
+    heard = [said[1] for said in server.events.queue if said[0] == "goal"]
     assert "study" in heard
