@@ -96,7 +96,7 @@ def replay(worker: Worker, suite: Suite, program: str, scenario: Scenario) -> Re
             turns.append([("wait", {"seconds": until - now})])
             now = until
         else:
-            given = zip(suite.skills[name].parameters, map(written, arguments), strict=True)
+            given = zip(suite.skills[name].parameters, map(as_json, arguments), strict=True)
             turns.append([(name, {parameter.name: value for parameter, value in given})])
     is_limit = outcome.status is Status.TIMEOUT
     if not is_limit:
@@ -106,7 +106,7 @@ def replay(worker: Worker, suite: Suite, program: str, scenario: Scenario) -> Re
     return Replay(outcome, judge(outcome, scenario), turns)
 
 
-def written(value: Argument) -> object:
+def as_json(value: Argument) -> object:
     """Write an argument as JSON does."""
     if not isinstance(value, tuple):
         return value
@@ -123,7 +123,7 @@ class ReplayPlan(AgentPlan):
         return [*type(self).wanted]
 
 
-def by_server(suite: Suite, replays: dict[CompletionKey, Replay]) -> tuple[list[Completion], Iterator[Row]]:
+def send_turns(suite: Suite, replays: dict[CompletionKey, Replay]) -> tuple[list[Completion], Iterator[Row]]:
     """Let a server send the turns to the chat client, and return the completions and their judgements."""
     scripts = {(suite.tasks[key[0]].prompts[0], key[2]): one.turns for key, one in replays.items()}
     agent, server = serve(lambda request: scripts[instruction_of(request), seed_of(request)])
@@ -163,7 +163,7 @@ def show(progress: GenerationProgress) -> None:
         print(f"\r{progress.done:,} of {progress.total:,} missions", end="", flush=True)
 
 
-def directly(suite: Suite, replays: dict[CompletionKey, Replay]) -> tuple[list[Completion], Iterator[Row]]:
+def make_calls(suite: Suite, replays: dict[CompletionKey, Replay]) -> tuple[list[Completion], Iterator[Row]]:
     """Make the calls without a client."""
     completions = []
     for (task, prompt, index), one in replays.items():
@@ -193,7 +193,7 @@ def main() -> int:
             replays[task, 0, next(number)] = replay(worker, suite, program, scenario.asked_by(0))
     worker.close()
     print(f"{len(replays):,} runs of programs in the worlds of {suite.name}")
-    completions, rows = (directly if os.environ.get("DIRECT") else by_server)(suite, replays)
+    completions, rows = (make_calls if os.environ.get("DIRECT") else send_turns)(suite, replays)
     wrong = 0
     for row in rows:
         verdict = row["verdicts"][0]

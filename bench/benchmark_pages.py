@@ -23,7 +23,7 @@ from statistics import median
 
 from playwright.sync_api import Page, sync_playwright
 
-from report import made_up
+from report import make_run
 from roboeval.suites.load import load_suite
 
 OPENS = int(os.environ.get("OPENS", "10"))
@@ -59,14 +59,14 @@ JUMP = """async (share) => {
 }"""
 
 
-def timed(do: Callable[[], object]) -> float:
+def measure(do: Callable[[], object]) -> float:
     """Measure the duration of a call in milliseconds."""
     began = time.perf_counter()
     do()
     return 1000 * (time.perf_counter() - began)
 
 
-def opened(page: Page, address: str, *there: str) -> float:
+def time_opening(page: Page, address: str, *there: str) -> float:
     """Open a page, and return the milliseconds until it is complete."""
 
     def open_it() -> None:
@@ -74,10 +74,10 @@ def opened(page: Page, address: str, *there: str) -> float:
         for one in there:
             page.locator(one).first.wait_for()
 
-    return timed(open_it)
+    return measure(open_it)
 
 
-def chosen(page: Page) -> float:
+def time_filter(page: Page) -> float:
     """Filter by a kind of failure, then show all again. Return how many milliseconds the filter takes."""
 
     def choose() -> None:
@@ -85,7 +85,7 @@ def chosen(page: Page) -> float:
         page.locator("h2", has_text="that failed with SayAtLocation").wait_for()
         page.locator(".completions-view .completion", has_text="SayAtLocation").first.wait_for()
 
-    took = timed(choose)
+    took = measure(choose)
     page.locator("button", has_text="Show all").click()
     page.locator("h2", has_text=re.compile("^Completions$")).wait_for()
     page.locator("#count", has_text="4,000").wait_for()
@@ -96,7 +96,7 @@ def main() -> int:
     """Print all measurements. Return 1 if a target is missed."""
     with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
         folder = Path(name)
-        run = made_up(folder, 0, load_suite())
+        run = make_run(folder, 0, load_suite())
         size = sum(path.stat().st_size for path in run.path.rglob("*") if path.is_file())
         command = [sys.executable, "-m", "roboeval", "serve", str(folder), "--port", "0"]
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as tool, ExitStack() as stack:
@@ -112,13 +112,13 @@ def main() -> int:
             base = link.partition("?")[0]
             whole = (f"{base}runs/{run.path.name}", ".heat td a", ".completions-view a")
             one = (f"{base}runs/{run.path.name}/LunchBreak/0/7", ".program .line", ".world-of")
-            first = opened(page, *whole)
-            opened(page, *one)
-            found = {"all runs": [opened(page, f"{base}runs", ".runs tbody a") for _ in range(OPENS)]}
-            found["one completion"] = [opened(page, *one) for _ in range(OPENS)]
-            found["one run"] = [opened(page, *whole) for _ in range(OPENS)]
+            first = time_opening(page, *whole)
+            time_opening(page, *one)
+            found = {"all runs": [time_opening(page, f"{base}runs", ".runs tbody a") for _ in range(OPENS)]}
+            found["one completion"] = [time_opening(page, *one) for _ in range(OPENS)]
+            found["one run"] = [time_opening(page, *whole) for _ in range(OPENS)]
             page.locator("#count", has_text="4,000").wait_for()
-            found["a filter"] = [chosen(page) for _ in range(OPENS)]
+            found["a filter"] = [time_filter(page) for _ in range(OPENS)]
             places = random.Random(0)
             found["a jump"] = [page.evaluate(JUMP, places.random()) for _ in range(OPENS)]
             page.evaluate(JUMP, 0.0)

@@ -88,21 +88,21 @@ def main() -> None:
         folder = Path(name)
         real = [one for file in models(folder).values() for one in read_completions(file)]
         few, many = folder / "real.jsonl", folder / "many.jsonl"
-        few.write_bytes(b"".join(map(to_line, (one.row for one in numbered(real)))))
-        many.write_bytes(b"".join(map(to_line, (one.row for one in numbered(renamed(real))))))
-        compare(f"evaluate, {len(real):,} completions", evaluated(few), folders)
-        compare(f"evaluate, {MANY:,} completions", evaluated(many), folders)
-        compare("reward under plus", told(REWARD, few), folders)
-        compare("check in 5 worlds", told(CHECK, few), folders)
-        compare("check with a new engine", told(CHECK_ANEW, few), folders)
+        few.write_bytes(b"".join(map(to_line, (one.row for one in renumber(real)))))
+        many.write_bytes(b"".join(map(to_line, (one.row for one in renumber(rename_variables(real))))))
+        compare(f"evaluate, {len(real):,} completions", time_evaluate(few), folders)
+        compare(f"evaluate, {MANY:,} completions", time_evaluate(many), folders)
+        compare("reward under plus", time_script(REWARD, few), folders)
+        compare("check in 5 worlds", time_script(CHECK, few), folders)
+        compare("check with a new engine", time_script(CHECK_ANEW, few), folders)
 
 
-def numbered(completions: list[Completion]) -> Iterator[Completion]:
+def renumber(completions: list[Completion]) -> Iterator[Completion]:
     """Renumber completions so that no two of them have the same key."""
     return (replace(one, index=index) for index, one in enumerate(completions))
 
 
-def renamed(completions: list[Completion]) -> list[Completion]:
+def rename_variables(completions: list[Completion]) -> list[Completion]:
     """Repeat completions until there are MANY. In each copy, the first variable has a different name."""
     found = []
     for number, one in enumerate(islice(cycle(completions), MANY)):
@@ -114,7 +114,7 @@ def renamed(completions: list[Completion]) -> list[Completion]:
     return found
 
 
-def evaluated(file: Path) -> Callable[[Path], float]:
+def time_evaluate(file: Path) -> Callable[[Path], float]:
     """Return a function that times the whole command."""
 
     def time_it(folder: Path) -> float:
@@ -126,7 +126,7 @@ def evaluated(file: Path) -> Callable[[Path], float]:
     return time_it
 
 
-def told(script: str, file: Path) -> Callable[[Path], float]:
+def time_script(script: str, file: Path) -> Callable[[Path], float]:
     """Return a function that runs a script, which measures its own time without imports."""
 
     def time_it(folder: Path) -> float:

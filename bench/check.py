@@ -51,7 +51,7 @@ def real(suite: Suite) -> list[Source]:
     return [*found, *((c.task, c.program) for c in recorded_completions("recorded:hasty", suite))]
 
 
-def by_hand() -> list[Source]:
+def handwritten_programs() -> list[Source]:
     """Return the programs that were written by hand for demonstrations."""
     corpus = os.environ.get("CODEBOTLER_CORPUS")
     return list(rows(Path(corpus, "tasks", "synthetic.jsonl"))) if corpus else []
@@ -104,16 +104,16 @@ def rejections(
     """Return, for each program and seed, whether the check rejects it. A program is compiled once for all."""
     plans = {name: RoomMap.of(task.scenarios[0].world) for name, task in suite.tasks.items()}
 
-    def rejected(source: Source) -> list[bool]:
+    def run_checks(source: Source) -> list[bool]:
         task, program = source
         plan = plans[task] if with_rooms else None
         checks = (check_on(pool.here(), program, plan, CheckSettings(seed=seed)) for seed in seeds)
         return [bool(check.problems) for check in checks]
 
-    def all_rejected(some: Sequence[Source]) -> list[list[bool]]:
-        return list(map(rejected, some))
+    def run_all(some: Sequence[Source]) -> list[list[bool]]:
+        return list(map(run_checks, some))
 
-    return list(pool.map_distinct(all_rejected, sources, name=lambda source: digest(*source)))
+    return list(pool.map_distinct(run_all, sources, name=lambda source: digest(*source)))
 
 
 @dataclass
@@ -128,10 +128,10 @@ class Tally:
     rejected: int = 0
     checks: int = 0
 
-    def add(self, said: Sequence[bool]) -> None:
+    def add(self, results: Sequence[bool]) -> None:
         """Count the checks of one program."""
-        self.rejected += sum(said)
-        self.checks += len(said)
+        self.rejected += sum(results)
+        self.checks += len(results)
 
     @property
     def share(self) -> float:
@@ -165,7 +165,7 @@ class Rates:
 
     @property
     def hold(self) -> bool:
-        """Whether all targets are met."""
+        """Return whether all targets are met."""
         return (
             self.certain.share >= CAUGHT
             and self.right.share <= LOST
@@ -173,10 +173,10 @@ class Rates:
         )
 
 
-def rates(sources: Iterable[Source], true: Iterable[Truth], said: Iterable[Sequence[bool]]) -> Rates:
+def rates(sources: Iterable[Source], true: Iterable[Truth], results: Iterable[Sequence[bool]]) -> Rates:
     """Count rejected programs."""
     found = Rates()
-    for (task, _), truth, rejected in zip(sources, true, said, strict=True):
+    for (task, _), truth, rejected in zip(sources, true, results, strict=True):
         if truth.passed:
             found.right.add(rejected)
             found.by_task[task].add(rejected)
@@ -195,8 +195,8 @@ def report(name: str, sources: Sequence[Source], suite: Suite, pool: WorkerPool)
     """Print how many programs of a collection are rejected. Return whether the targets are met."""
     start = time.perf_counter()
     true = truths(sources, suite)
-    said = rejections(sources, suite, range(SEEDS), pool)
-    found = rates(sources, true, said)
+    flags = rejections(sources, suite, range(SEEDS), pool)
+    found = rates(sources, true, flags)
     spent = time.perf_counter() - start
     print(f"\n{name}: {len(sources)} programs, {SEEDS} seeds, {DEFAULT_SAMPLES} samples each, {spent:.0f} s")
     print(f"  {', '.join(sorted(CERTAIN))} in some world:")
@@ -210,7 +210,7 @@ def report(name: str, sources: Sequence[Source], suite: Suite, pool: WorkerPool)
     for kind, tally in sorted(found.by_kind.items(), key=lambda item: -item[1].checks):
         print(f"    {kind:20} {tally}")
     wrongly = Counter(
-        task for (task, _), truth, each in zip(sources, true, said, strict=True) if truth.passed and any(each)
+        task for (task, _), truth, one in zip(sources, true, flags, strict=True) if truth.passed and any(one)
     )
     print(f"  correct programs that are rejected with some seed: {dict(wrongly) or 'none'}")
     return found.hold
@@ -232,7 +232,7 @@ def report_cost(sources: Sequence[Source], suite: Suite) -> None:
     once = checked = 0.0
     for task, program in sources:
         new_robot = partial(SampledRobot, plans[task], FactSampler())
-        worker.run(program, new_robot)  # compile the program before both measurements
+        worker.run(program, new_robot)  # Compile the program before both measurements.
         start = time.perf_counter()
         worker.run(program, new_robot)
         middle = time.perf_counter()
@@ -251,7 +251,7 @@ def main() -> int:
     """Print all parts. Return 1 if a target is missed."""
     suite = load_suite()
     written = list(dict.fromkeys(real(suite)))[::PART]
-    shown = [source for source in dict.fromkeys(by_hand()) if source not in set(written)][::PART]
+    shown = [source for source in dict.fromkeys(handwritten_programs()) if source not in set(written)][::PART]
     with WorkerPool(WORKERS) as pool:
         hold = report("written by models, and recorded:careful", written, suite, pool)
         if shown:

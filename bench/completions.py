@@ -32,7 +32,7 @@ TASK = "SayGoodDay"
 PROGRAM = "def task_program():\n    say('this is {number}')\n    go_to('lobby')\n"
 
 
-def evaluated(file: Path, workers: str = WORKERS) -> tuple[float, float]:
+def run_command(file: Path, workers: str = WORKERS) -> tuple[float, float]:
     """Judge a file of completions. Return the seconds, and the megabytes of the largest process."""
     command = [
         sys.executable,
@@ -50,13 +50,13 @@ def evaluated(file: Path, workers: str = WORKERS) -> tuple[float, float]:
         "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
     )
     start = time.perf_counter()
-    told = subprocess.run(
+    ended = subprocess.run(
         [sys.executable, "-c", measure, *command], check=True, capture_output=True, text=True
     )
-    return time.perf_counter() - start, int(told.stdout) / 1024
+    return time.perf_counter() - start, int(ended.stdout) / 1024
 
 
-def real(folder: Path) -> None:
+def print_models(folder: Path) -> None:
     """Print the figures for real models."""
     suite = load_suite()
     for name, file in models(folder).items():
@@ -64,7 +64,7 @@ def real(folder: Path) -> None:
         worlds = {task: len(suite.tasks[task].scenarios) for task, _ in rows}
         runs, executed = (sum(worlds[task] for task, _ in some) for some in (rows, set(rows)))
         print(f"{name}: {len(rows)} rows, {runs} runs, {executed} executed")
-        for what, spent in (("the command", evaluated(file)[0]), ("its evaluation", judged(file, suite))):
+        for what, spent in (("the command", run_command(file)[0]), ("its evaluation", judge(file, suite))):
             print(
                 f"    {what} in {spent:.2f} s: {len(rows) / spent:.0f} rows/s, {runs / spent:.0f} runs/s, "
                 f"{executed / spent:.0f} executed/s, "
@@ -72,7 +72,7 @@ def real(folder: Path) -> None:
             )
 
 
-def judged(file: Path, suite: Suite) -> float:
+def judge(file: Path, suite: Suite) -> float:
     """Judge a file of completions in this process, and return the seconds."""
     start = time.perf_counter()
     for _ in evaluate(read_completions(file), suite, workers=int(WORKERS)):
@@ -93,7 +93,7 @@ def models(folder: Path) -> dict[str, Path]:
     return files
 
 
-def growth(folder: Path) -> None:
+def print_growth(folder: Path) -> None:
     """Print time and memory for increasing numbers of rows."""
     for count in ROWS:
         file = folder / f"{count}.jsonl"
@@ -102,7 +102,7 @@ def growth(folder: Path) -> None:
                 program = PROGRAM.format(number=number % (count // DISTINCT))
                 row = {"task": TASK, "prompt": number % 5, "index": number // 5, "program": program}
                 rows.write(json.dumps(row) + "\n")
-        spent, largest = evaluated(file)
+        spent, largest = run_command(file)
         pairs = count // DISTINCT * len(load_suite().tasks[TASK].scenarios)
         print(
             f"{count:7} rows, {pairs:6} distinct pairs: {spent:6.1f} s, "
@@ -110,7 +110,7 @@ def growth(folder: Path) -> None:
         )
 
 
-def scaling(folder: Path) -> None:
+def print_scaling(folder: Path) -> None:
     """Print the time for increasing numbers of workers."""
     file = folder / "different.jsonl"
     with file.open("w") as rows:
@@ -123,18 +123,18 @@ def scaling(folder: Path) -> None:
             }
             rows.write(json.dumps(row) + "\n")
     print(f"{DIFFERENT:,} different completions on {cores()} cores:")
-    alone = evaluated(file, "1")[0]
+    alone = run_command(file, "1")[0]
     for workers in (1, 2, 4, 8):
-        spent = alone if workers == 1 else evaluated(file, str(workers))[0]
+        spent = alone if workers == 1 else run_command(file, str(workers))[0]
         print(f"    {workers} workers: {spent:.1f} s, {alone / spent:.2f} times as fast as one")
 
 
 def main() -> None:
     """Print all parts."""
     with tempfile.TemporaryDirectory() as name:
-        real(Path(name))
-        growth(Path(name))
-        scaling(Path(name))
+        print_models(Path(name))
+        print_growth(Path(name))
+        print_scaling(Path(name))
 
 
 if __name__ == "__main__":

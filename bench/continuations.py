@@ -59,7 +59,7 @@ from roboeval.suites.solutions import solutions
 
 MISSIONS = int(os.environ.get("MISSIONS", "2000"))
 LOGGED = int(os.environ.get("LOGGED", "200"))
-WORLDS = 5  # imagined worlds for the rest of each mission
+WORLDS = 5  # Imagined worlds for the rest of each mission.
 MUTANTS_PER_TASK = 40
 ACCEPTED, REJECTED = 0.95, 0.99
 CONTINUATIONS = Path(__file__).with_name("continuations.yaml")
@@ -71,8 +71,8 @@ SUITE = load_suite()
 
 
 @dataclass
-class Known:
-    """The facts that a trace tells of the world, without use of the code that is measured.
+class KnownFacts:
+    """The facts about the world that a trace shows, found without the measured code.
 
     A step forgets looks that it may contradict: those for longer and shorter names in its room, and all of
     its room if it is about any person.
@@ -82,7 +82,7 @@ class Known:
     answers: dict[tuple[str, str, str], Event] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, trace: Trace) -> Known:
+    def of(cls, trace: Trace) -> KnownFacts:
         """Read a trace."""
         known = cls()
         for event in (one for one in trace if not one.failed):
@@ -95,7 +95,7 @@ class Known:
                 known.answers[event.place, event.to or "", event.text] = event
             elif event.kind in {PICK, PLACE}:
                 known.see(event.place, event.text, is_there=event.kind == PLACE)
-                if event.kind == PICK:  # there may be another one
+                if event.kind == PICK:  # There may be another one.
                     del known.looks[event.place, event.text]
         return known
 
@@ -117,7 +117,7 @@ class Known:
 
 def contradictions(trace: Trace, room_map: RoomMap, place: str, seed: int) -> Iterator[str]:
     """Yield how imagined worlds for the rest contradict a trace."""
-    known, held = Known.of(trace), held_after(trace)
+    known, held = KnownFacts.of(trace), held_after(trace)
     start = room_map.room(place) or room_map.start
     room_map = replace(room_map, past=trace, start=start)
     for number in range(WORLDS):
@@ -204,7 +204,7 @@ def imagined_mission(worker: Worker, chance: random.Random) -> tuple[Trace, Room
 def logged_mission(home: Path, chance: random.Random) -> tuple[Trace, RoomMap, str]:
     """Run a mission on a simulated robot, let its log end at a random line, and read what it did."""
     program, world = random_mission(chance)
-    while "while" in program:  # it may wait forever
+    while "while" in program:  # It may wait forever.
         program, world = random_mission(chance)
     mission = Mission(home, "simulated")
     mission.draft(program)
@@ -234,7 +234,7 @@ def measure_worlds(worker: Worker) -> bool:
             is_logged = number < LOGGED
             mission = logged_mission(Path(folder), chance) if is_logged else imagined_mission(worker, chance)
             found = next(contradictions(*mission, seed=number + 1_000), "")
-            known = Known.of(mission[0])
+            known = KnownFacts.of(mission[0])
             looks, answers = looks + len(known.looks), answers + len(known.answers)
             held += bool(held_after(mission[0]))
             wrong += bool(found)
@@ -245,7 +245,7 @@ def measure_worlds(worker: Worker) -> bool:
     return is_met(f"(a) of {MISSIONS:,} missions, contradicted", wrong, most=0)
 
 
-# --- (b) continuations by somebody who had not seen the check
+# --- (b) continuations from an author who had not seen the check
 
 
 def past_of(robot: SimulatedRobot, program: str) -> MissionPast:
@@ -257,11 +257,11 @@ def calls_until(worker: Worker, program: str, world: World, events: int) -> tupl
     """Return the calls of a program in a world until it has so many events."""
     robot = RecordingRobot(world, SUITE)
     worker.run_alone(program, lambda: robot)
-    count = next(n for n in range(len(robot.calls) + 1) if after(world, robot.calls[:n], events))
+    count = next(n for n in range(len(robot.calls) + 1) if has_events(world, robot.calls[:n], events))
     return tuple(robot.calls[:count])
 
 
-def after(world: World, made: Sequence[Call], events: int) -> bool:
+def has_events(world: World, made: Sequence[Call], events: int) -> bool:
     """Return whether calls have so many events."""
     return len(RecordingRobot(world, SUITE, made=made).trace) >= events
 
@@ -374,7 +374,7 @@ def read_log(
     return read_past(folder, SKILLS)
 
 
-def repeated(crash: Crash, rest: Trace) -> list[str]:
+def find_repeats(crash: Crash, rest: Trace) -> list[str]:
     """Return the steps of a continuation that were done before, unless the whole mission needs them again."""
 
     def keys(trace: Trace) -> Counter[tuple[str, ...]]:
@@ -411,7 +411,7 @@ def measure_crashes(worker: Worker) -> bool:
                         accepted[key] = not found.problems
                     rest = worker.run_alone(program, again).trace[len(robot.trace) :]
                     verdict = "accepted" if accepted[key] else "rejected"
-                    steps = repeated(crash, rest)
+                    steps = find_repeats(crash, rest)
                     counts[verdict] += 1
                     counts[verdict, "repeats"] += bool(steps)
                     if steps and accepted[key] and os.environ.get("VERBOSE"):

@@ -44,7 +44,7 @@ ANYTHING = 1_000  # entries that an argument without a bound counts for
 
 
 @dataclass(frozen=True)
-class Measured:
+class Measurement:
     """The results of one program in the worlds of its task.
 
     Args:
@@ -72,7 +72,7 @@ def worlds_of(task: str) -> Iterator[World]:
         yield scenario.world
 
 
-def measure(worker: Worker, source: Source) -> Measured:
+def measure(worker: Worker, source: Source) -> Measurement:
     """Derive the contracts of a program, and run it in all worlds of its task."""
     task, program = source
     rules = read_rules(RULES)
@@ -107,7 +107,7 @@ def measure(worker: Worker, source: Source) -> Measured:
                 break
             earlier[call.skill] += 1
     each = seconds / max(1, verdicts.total())
-    return Measured(source, int(runs), tuple(outside), len(entries), len(touched), verdicts, each)
+    return Measurement(source, int(runs), tuple(outside), len(entries), len(touched), verdicts, each)
 
 
 def calls_in(worker: Worker, program: str, world: World) -> list[RequestedCall]:
@@ -138,7 +138,7 @@ def touched_by(call: RequestedCall) -> Iterator[tuple[str, ...]]:
         yield from ((call.skill, str(number), text.casefold()) for text in texts)
 
 
-def measure_here(pool: WorkerPool, source: Source) -> Measured:
+def measure_here(pool: WorkerPool, source: Source) -> Measurement:
     """Measure a program on the worker of this thread."""
     return measure(pool.here(), source)
 
@@ -156,7 +156,7 @@ def main() -> bool:
     return report(found)
 
 
-def report(found: list[Measured]) -> bool:
+def report(found: list[Measurement]) -> bool:
     """Print the figures, and return whether the targets are reached."""
     runs, outside = sum(one.runs for one in found), [each for one in found for each in one.outside]
     for one in found:

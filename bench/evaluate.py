@@ -27,7 +27,7 @@ from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.settings import PAPER_SETTINGS, SimulationSettings
 from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.robot import SimulatedRobot
-from in_process import Reused, compiled
+from in_process import Reused, compile_program
 from roboeval.evaluation.engines.engine import Local, Work
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
@@ -59,9 +59,9 @@ def pairs(suite: Suite) -> list[Pair]:
 # --- the three methods
 
 
-def isolated(pool: WorkerPool, settings: SimulationSettings, part: Sequence[Pair]) -> list[Status]:
+def run_isolated(pool: WorkerPool, settings: SimulationSettings, part: Sequence[Pair]) -> list[Status]:
     """Run pairs on our engine, isolated: a few programs per child process, each in all of its worlds."""
-    REPLAYED.clear()  # remove what earlier rounds have left
+    REPLAYED.clear()  # Earlier rounds have left entries.
     programs = [list(same) for _, same in groupby(part, key=lambda pair: pair[0])]
 
     def run_all(worker: Worker, works: Sequence[Work]) -> list[list[Status]]:
@@ -77,7 +77,7 @@ def isolated(pool: WorkerPool, settings: SimulationSettings, part: Sequence[Pair
 
 
 @cache
-def reused(world: World) -> Reused:
+def reused_runner(world: World) -> Reused:
     """Create a runner for this process."""
     return Reused(world)
 
@@ -85,20 +85,20 @@ def reused(world: World) -> Reused:
 @cache
 def forget(time: int) -> None:  # noqa: ARG001 - do this once for each round
     """Forget all compiled programs, because our engine keeps the code of only a few."""
-    compiled.cache_clear()
+    compile_program.cache_clear()
 
 
 def run_bare(part: Sequence[Pair], time: int = 0, settings: SimulationSettings = PAPER_SETTINGS) -> None:
     """Run pairs in this process."""
     forget(time)
     for pair in part:
-        reused(NOWHERE).run(pair, settings)
+        reused_runner(NOWHERE).run(pair, settings)
 
 
 NOWHERE = World((Room("nowhere"),), "nowhere")
 
 
-def in_process(
+def run_in_process(
     processes: ProcessPoolExecutor, times: Iterator[int], settings: SimulationSettings, part: Sequence[Pair]
 ) -> None:
     """Run the same programs without isolation, in as many processes."""
@@ -107,7 +107,7 @@ def in_process(
     list(processes.map(run_bare, shares, repeat(next(times)), repeat(settings)))
 
 
-def fresh_interpreters(threads: ThreadPoolExecutor, part: Sequence[Pair]) -> None:
+def start_interpreters(threads: ThreadPoolExecutor, part: Sequence[Pair]) -> None:
     """Start `python -c pass` once for each pair."""
     command = [sys.executable, "-c", "pass"]
     list(threads.map(lambda _: subprocess.run(command, check=True), part))
@@ -137,23 +137,23 @@ def main() -> None:
     processes = ProcessPoolExecutor(WORKERS, multiprocessing.get_context("fork"))
     list(processes.map(run_bare, [whole[:1]] * 4 * WORKERS))
     with processes, WorkerPool(WORKERS) as pool, ThreadPoolExecutor(WORKERS) as threads:
-        ours = partial(isolated, pool, paper.settings)
+        ours = partial(run_isolated, pool, paper.settings)
         honest, limited = by_limit(ours, whole)
         numbers = count(1)
         compare(
             honest,
             {
                 "isolated (ours)": ours,
-                "in-process, no isolation": partial(in_process, processes, numbers, paper.settings),
-                "one `python -c pass` a run": partial(fresh_interpreters, threads),
+                "in-process, no isolation": partial(run_in_process, processes, numbers, paper.settings),
+                "one `python -c pass` a run": partial(start_interpreters, threads),
             },
         )
-        ours_plus = partial(isolated, pool, plus.settings)
+        ours_plus = partial(run_isolated, pool, plus.settings)
         compare(
             by_limit(ours_plus, every_fourth(pairs(plus)))[0],
             {
                 "under plus, isolated (ours)": ours_plus,
-                "under plus, in-process": partial(in_process, processes, numbers, plus.settings),
+                "under plus, in-process": partial(run_in_process, processes, numbers, plus.settings),
             },
         )
         if limited:
@@ -209,7 +209,7 @@ def ratios(times: dict[str, list[float]], other: int) -> str:
 
 # --- separate reports
 
-COPIES = 12  # of honest programs, so that all workers have work while one of them is blocked
+COPIES = 12  # Copies of honest programs keep the other workers busy while one is blocked.
 HANGS = "def task_program():\n    sum(range(10**12))\n"
 LOOPS = {
     "200,000 turns of a loop": "def task_program():\n    for i in range(199_998): pass\n",

@@ -79,7 +79,7 @@ def ours(name: str, url: str) -> Callable[[], Awaitable[object]]:
     return lambda: model.reply(prompt_for(INSTRUCTION), number=0, on_text=lambda _piece: None)
 
 
-async def paired(count: int, *asks: Callable[[], Awaitable[object]]) -> list[list[float]]:
+async def measure_pairs(count: int, *asks: Callable[[], Awaitable[object]]) -> list[list[float]]:
     """Return the processor time of each request in milliseconds, by client."""
     spent: list[list[float]] = [[] for _ in asks]
     dice = random.Random(0)
@@ -98,7 +98,7 @@ async def compare(count: int, url: str) -> None:
         ("pydantic-ai", "openai-chat:m", bare_chat),
         ("openai", "completions:m", bare_completions),
     ):
-        alone, with_us = await paired(count, bare(url), ours(name, url))
+        alone, with_us = await measure_pairs(count, bare(url), ours(name, url))
         added = statistics.median(after - before for before, after in zip(alone, with_us, strict=True))
         print(
             f"{client}: {statistics.median(alone):.2f} ms bare, {statistics.median(with_us):.2f} ms with us, "

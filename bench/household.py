@@ -32,7 +32,7 @@ RULES, SKILLS, WORLD = (
     EXAMPLES / name for name in ("rules/household.yaml", "skills/household.py", "worlds/kitchen.yaml")
 )
 TEMPLATES = Path(__file__).with_suffix(".yaml")
-PLANS = 100  # of each sort
+PLANS = 100  # Plans of each kind.
 MIN_STOPPED, MAX_DISTURBED = 95, 2
 FEWEST_STEPS, MOST_STEPS = 5, 12
 

@@ -73,7 +73,7 @@ def for_robot(arguments: list[Any]) -> list[Argument]:
 
 
 @lru_cache(maxsize=100_000)
-def compiled(source: str) -> types.CodeType | BaseException:
+def compile_program(source: str) -> types.CodeType | BaseException:
     """Compile a program. Return its code, or the error if it does not compile."""
     try:
         return prepared(source, lowercase=True)[0]
@@ -96,7 +96,7 @@ class Reused(Bare):
     def run(self, pair: tuple[str, World], settings: SimulationSettings = PAPER_SETTINGS) -> None:
         """Run a program in a world."""
         source, world = pair
-        code = compiled(source)
+        code = compile_program(source)
         if isinstance(code, BaseException):
             return
         self.robot, self.now, self.spent, self.entered = SimulatedRobot(world, settings), 0.0, False, False
@@ -108,7 +108,7 @@ class Reused(Bare):
             exec(code, namespace)
             if not self.has_entered(namespace.get("task_program")):
                 exec("task_program()", namespace)
-        except BaseException:  # noqa: BLE001 - however a program ends, its time was measured
+        except BaseException:  # noqa: BLE001 - its time counts, not its end
             return
 
 
@@ -131,7 +131,7 @@ class Unwalled(Bare):
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - as in ProgramRun
         """Execute a skill call as the engine would, within the same limits."""
         given = for_robot(arguments)
-        self.limit = self.limit or self.reached(given)
+        self.limit = self.limit or self.exceeded_limit(given)
         if self.limit:
             super().request(name)
         self.robot.now = float(self.now)
@@ -159,7 +159,7 @@ class Unwalled(Bare):
         self.robot.now = self.limits.seconds
         return f"{self.limits.seconds:,.0f} seconds of simulated time"
 
-    def reached(self, arguments: list[Argument]) -> str | None:
+    def exceeded_limit(self, arguments: list[Argument]) -> str | None:
         """Return the limit that a skill call exceeds, in words, or None."""
         given = [each for one in arguments for each in (one if isinstance(one, tuple) else (one,))]
         texts = [each.text if isinstance(each, Option) else str(each) for each in given]
@@ -188,7 +188,7 @@ class Unwalled(Bare):
         """Return what to execute of a program that parses."""
         return code, run_parameters(self.robot)
 
-    def ended(self, final: dict[str, Any]) -> Outcome:
+    def outcome_from(self, final: dict[str, Any]) -> Outcome:
         """Return the outcome of a run, given the data about its end."""
         status = Status.TIMEOUT if self.limit else Status(final["end"])
         if status is Status.FINISHED:
@@ -293,7 +293,7 @@ def child(stand_in: StandIn, source: str, robot: SimulatedRobot, output: IO[byte
     sys.setrecursionlimit(PROGRAM_RECURSION_LIMIT)
     run = stand_in.run = Unwalled(robot)
     what = run.prepare(source)
-    outcome = what if isinstance(what, Outcome) else run.ended(json.loads(run.execute(*what)))
+    outcome = what if isinstance(what, Outcome) else run.outcome_from(json.loads(run.execute(*what)))
     output.write(pickle.dumps(outcome))
     output.flush()
     os._exit(0)

@@ -28,7 +28,7 @@ PROGRAM = "def task_program():\n    go_to('far away')\n"
 CLICK = "() => { const now = Date.now(); document.getElementById('stop').click(); return now / 1000; }"
 
 
-def stopped(page: Page, home: Path, number: int) -> tuple[float, float]:
+def measure_stop(page: Page, home: Path, number: int) -> tuple[float, float]:
     """Stop a driving robot. Return the seconds until it receives the stop, and until it has stopped."""
     page.locator(".cm-content").click()
     page.keyboard.press("Control+a")
@@ -44,7 +44,7 @@ def stopped(page: Page, home: Path, number: int) -> tuple[float, float]:
     return events["stop"] - start, events["cancelled"] - start
 
 
-def rechecked(page: Page, number: int) -> float:
+def measure_check(page: Page, number: int) -> float:
     """Return the seconds from a program's last key until its problem, new each time, is shown at its line."""
     page.locator(".cm-content").click()
     page.keyboard.press("Control+a")
@@ -55,7 +55,7 @@ def rechecked(page: Page, number: int) -> float:
 
 
 @contextmanager
-def served(home: Path) -> Iterator[str]:
+def serve(home: Path) -> Iterator[str]:
     """Serve a page for a simulated robot whose missions are in a folder, and yield its link."""
     (home / "world.yaml").write_text(WORLD)
     command = [sys.executable, "-m", "codebotler", "serve", "--port", "0", "--world", "world.yaml"]
@@ -73,18 +73,18 @@ def main() -> int:
     with (
         tempfile.TemporaryDirectory() as folder,
         sync_playwright() as playwright,
-        served(Path(folder)) as link,
+        serve(Path(folder)) as link,
         playwright.chromium.launch(
             executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
         ) as browser,
     ):
         page = browser.new_page()
         page.goto(link)
-        times = [stopped(page, Path(folder), number) for number in range(STOPS)]
-        checks = [1000 * rechecked(page, number) for number in range(STOPS)]
-    told, ended = ([1000 * each for each in some] for some in zip(*times, strict=True))
+        times = [measure_stop(page, Path(folder), number) for number in range(STOPS)]
+        checks = [1000 * measure_check(page, number) for number in range(STOPS)]
+    received, ended = ([1000 * each for each in some] for some in zip(*times, strict=True))
     print(f"from a click on STOP, worst of {STOPS}, in ms (target: ended in less than {AIM:.0f})")
-    for what, each in (("heard", told), ("ended", ended)):
+    for what, each in (("heard", received), ("ended", ended)):
         print(f"{what:6} {max(each):7.2f} (median {median(each):.2f})")
     print(f"from the last key to the problem at its line (target: less than {AIM_OF_CHECKS:.0f})")
     print(f"{'shown':6} {max(checks):7.2f} (median {median(checks):.2f})")

@@ -38,7 +38,7 @@ MOST_WORLDS = 20_000  # questions with many options are left out
 RULES = Path(__file__).with_name("rules.yaml")
 
 
-def broken_in(
+def find_broken(
     worker: Worker, program: str, room_map: RoomMap, rules: Sequence[Rule], samplers: Iterable[FactSampler]
 ) -> tuple[set[str], set[tuple[Draw, ...]]]:
     """Return the names of the rules that a program breaks in some worlds, and the facts that it meets."""
@@ -71,12 +71,12 @@ def compare(pool: WorkerPool, source: Source) -> Counter[str]:
     room_map = replace(RoomMap.of(load_suite().tasks[task].scenarios[0].world), things=(), people=())
     found = explore(worker, program, room_map, CheckSettings(1, house_rules=rules))
     samplers = [FactSampler(7, number, strict) for strict in (False, True) for number in range(SAMPLES)]
-    sampled, draws = broken_in(worker, program, room_map, rules, samplers)
+    sampled, draws = find_broken(worker, program, room_map, rules, samplers)
     everywhere: set[str] = set()
     worlds = [one for strict in (False, True) for one in all_worlds(draws, strict=strict)]
     is_small = found.is_complete and len(room_map.rooms) <= ROOMS and bool(worlds)
     if is_small:
-        everywhere, _ = broken_in(worker, program, room_map, rules, worlds)
+        everywhere, _ = find_broken(worker, program, room_map, rules, worlds)
         counts["programs in every world"] = 1
     for rule in rules:
         is_found, is_known = rule.name in found.violations, rule.name in sampled | everywhere

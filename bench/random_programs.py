@@ -88,7 +88,7 @@ class Grammar:
 
 
 def is_tame_rule(text: str) -> bool:
-    """Whether a rule yields tame code if all its parts are tame. Sets are never tame."""
+    """Return whether a rule yields tame code if all its parts are tame. Sets are never tame."""
     if re.search(r"\bSET\b", text):
         return False
     tree = ast.parse(text)
@@ -219,7 +219,7 @@ class Writer(ast.NodeTransformer):
         """Return the scope that is being written."""
         return self.scopes[-1]
 
-    def used(self, kind: str) -> list[tuple[int, str]]:
+    def uses_of(self, kind: str) -> list[tuple[int, str]]:
         """Return the rules of a kind that use what was defined."""
         weight = sum(weight for weight, _ in self.grammar.statements) // 12 if kind == "STATEMENT" else 8
         return [(weight, use) for scope in self.scopes for use in scope.uses.get(kind, ())]
@@ -233,11 +233,11 @@ class Writer(ast.NodeTransformer):
         if self.plain or self.expressions >= DEEPEST_EXPRESSION:
             choices = [*(r for r in given if is_leaf(r[1])), *names]
         else:
-            choices = [*given, *names, *self.used(kind)]
+            choices = [*given, *names, *self.uses_of(kind)]
         if not self.walrus:
             choices = [r for r in choices if ":=" not in r[1]]
         self.expressions += 1
-        node = self.filled(ast.parse(self.pick(choices), mode="eval").body)
+        node = self.fill(ast.parse(self.pick(choices), mode="eval").body)
         self.expressions -= 1
         return node  # type: ignore[no-any-return]  # as `visit` is typed
 
@@ -250,14 +250,14 @@ class Writer(ast.NodeTransformer):
         given = self.grammar.without_blocks if self.blocks >= DEEPEST_BLOCK else self.grammar.statements
         if self.may_be_strange and self.number(9) == 8:  # noqa: PLR2004 - one in nine
             self.may_be_strange, given = False, self.grammar.strange
-        uses = self.used("STATEMENT")
+        uses = self.uses_of("STATEMENT")
         if self.blocks >= DEEPEST_BLOCK:
             uses = [use for use in uses if "BLOCK" not in use[1]]
         rule = self.pick([*given, *uses])
         if rule == "JUMP":
             return [self.jump()]
         self.blocks += 1
-        nodes = self.filled_statements(rule)
+        nodes = self.fill_statements(rule)
         self.blocks -= 1
         return nodes
 
@@ -268,7 +268,7 @@ class Writer(ast.NodeTransformer):
             choices += [(6, "break"), (3, "continue")]
         if self.here.kind != "module":
             choices += [(1, "return"), (1, "return TEXT")]
-        return self.filled_statements(self.pick(choices))[0]
+        return self.fill_statements(self.pick(choices))[0]
 
     def definitions(self) -> list[ast.stmt]:
         """Return random functions and classes for the beginning of a scope."""
@@ -280,7 +280,7 @@ class Writer(ast.NodeTransformer):
         self.defined += 1
         name = f"f{self.defined}"
         blocks, self.blocks = self.blocks, max(self.blocks, 1)
-        nodes = self.filled_statements(re.sub(r"\bF\b", name, definition.text))
+        nodes = self.fill_statements(re.sub(r"\bF\b", name, definition.text))
         self.blocks = blocks
         for kind, use in definition.uses:
             self.here.uses.setdefault(kind, []).append(re.sub(r"\bF\b", name, use))
@@ -288,16 +288,16 @@ class Writer(ast.NodeTransformer):
 
     # --- filling rules
 
-    def filled(self, node: ast.AST) -> Any:  # noqa: ANN401 - a node of the same kind
+    def fill(self, node: ast.AST) -> Any:  # noqa: ANN401 - a node of the same kind
         """Replace the names in capitals in a rule. All uses of `T` in it become the same variable."""
         chosen, self.chosen = self.chosen, {}
         node = self.visit(node)
         self.chosen = chosen
         return node
 
-    def filled_statements(self, rule: str) -> list[ast.stmt]:
+    def fill_statements(self, rule: str) -> list[ast.stmt]:
         """Return the statements of a rule with their names in capitals replaced."""
-        module: ast.Module = self.filled(ast.parse(rule))
+        module: ast.Module = self.fill(ast.parse(rule))
         return module.body
 
     def visit(self, node: ast.AST) -> Any:  # noqa: ANN401 - the replacement may have any type
@@ -310,9 +310,9 @@ class Writer(ast.NodeTransformer):
             case ast.Expr(ast.Name("JUMP")):
                 return [self.jump()]
             case ast.ListComp() | ast.SetComp() | ast.DictComp() | ast.GeneratorExp():
-                self.comprehended(node)
+                self.fill_comprehension(node)
             case ast.For() | ast.While():
-                self.looped(node)
+                self.fill_loop(node)
             case ast.FunctionDef() | ast.Lambda():
                 self.function(node)
             case ast.JoinedStr():  # only names, because f-strings before Python 3.12 cannot nest quotes
@@ -324,7 +324,7 @@ class Writer(ast.NodeTransformer):
         return node
 
     def name(self, node: ast.Name) -> ast.expr:
-        """Return what replaces a name in capitals."""
+        """Return the replacement of a name in capitals."""
         if node.id in self.grammar.weighed:
             return self.expression(node.id)
         if node.id in VARIABLES or node.id == "T2":
@@ -334,13 +334,13 @@ class Writer(ast.NodeTransformer):
             return ast.Name(self.chosen[node.id], node.ctx)
         return ast.Name(f"i{self.items}", node.ctx) if node.id == "ITEM" else node
 
-    def comprehended(self, node: ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp) -> None:
+    def fill_comprehension(self, node: ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp) -> None:
         """Fill a comprehension. Its first iterable cannot use the variables of the comprehension."""
         walrus, self.walrus = self.walrus, False
         first = node.generators[0]
         first.iter = self.visit(first.iter)
         self.items += 1
-        with self.known({"TEXT": [f"i{self.items}"]}):
+        with self.add_names({"TEXT": [f"i{self.items}"]}):
             for generator in node.generators:
                 self.walrus = False
                 generator.target = self.visit(generator.target)
@@ -354,24 +354,24 @@ class Writer(ast.NodeTransformer):
         self.items -= 1
 
     @contextmanager
-    def known(self, names: dict[str, list[str]]) -> Iterator[None]:
+    def add_names(self, names: dict[str, list[str]]) -> Iterator[None]:
         """Let the block read some more names."""
         before = self.here.readable
         self.here.readable = {kind: before[kind] + names.get(kind, []) for kind in before}
         yield
         self.here.readable = before
 
-    def looped(self, node: ast.For | ast.While) -> None:
+    def fill_loop(self, node: ast.For | ast.While) -> None:
         """Fill a loop. Its `else` branch is not inside the loop."""
         for part in ("target", "iter", "test"):
             if hasattr(node, part):
                 setattr(node, part, self.visit(getattr(node, part)))
         self.here.loops += 1
-        node.body = self.visited(node.body)
+        node.body = self.visit_all(node.body)
         self.here.loops -= 1
-        node.orelse = self.visited(node.orelse)
+        node.orelse = self.visit_all(node.orelse)
 
-    def visited(self, body: list[ast.stmt]) -> list[ast.stmt]:
+    def visit_all(self, body: list[ast.stmt]) -> list[ast.stmt]:
         """Return the statements that replace the given ones."""
         module: ast.Module = self.generic_visit(ast.Module(body, []))  # type: ignore[assignment]  # a module
         return module.body
@@ -381,10 +381,10 @@ class Writer(ast.NodeTransformer):
         if isinstance(node, ast.FunctionDef):
             node.decorator_list = [self.visit(one) for one in node.decorator_list]
         node.args = self.visit(node.args)
-        with self.known(parameters(node.args)):
+        with self.add_names(parameters(node.args)):
             if isinstance(node, ast.FunctionDef):
                 given = node.body
-                node.body = self.function_body(lambda: self.visited(given))
+                node.body = self.function_body(lambda: self.visit_all(given))
             else:
                 walrus, self.walrus = self.walrus, False
                 node.body = self.visit(node.body)
@@ -420,7 +420,7 @@ def numbers(below: int) -> st.SearchStrategy[int]:
 
 @cache
 def is_leaf(rule: str) -> bool:
-    """Whether a rule has no names to replace."""
+    """Return whether a rule has no names to replace."""
     return not re.search(r"\b(?:[A-Z]{3,}|[TNLD])\b", rule)
 
 

@@ -29,12 +29,12 @@ def seconds() -> float:
     """Send a goal, wait until it has ended, and return the seconds."""
     done = threading.Event()
 
-    def changed(handle: Any) -> None:
+    def on_change(handle: Any) -> None:
         if handle.get_comm_state() == actionlib.CommState.DONE:
             done.set()
 
     start = time.perf_counter()
-    handle = client.send_goal(goal("hello"), changed)
+    handle = client.send_goal(goal("hello"), on_change)
     assert done.wait(30), handle
     return time.perf_counter() - start
 

@@ -28,7 +28,7 @@ MILLION = 1_000_000
 
 
 @contextmanager
-def opened(engine: Engine) -> Iterator[Engine]:
+def keep_open(engine: Engine) -> Iterator[Engine]:
     """Yield an engine that is already open, and leave it open."""
     yield engine
 
@@ -36,11 +36,11 @@ def opened(engine: Engine) -> Iterator[Engine]:
 def seconds(engine: Engine, completions: list[Completion], suite: Suite) -> tuple[float, list[str]]:
     """Judge completions, and return the seconds and the rows."""
     start = time.perf_counter()
-    rows = [json.dumps(row) for row in evaluate(completions, suite, engine=opened(engine))]
+    rows = [json.dumps(row) for row in evaluate(completions, suite, engine=keep_open(engine))]
     return time.perf_counter() - start, rows
 
 
-def fed(cluster: Engine, row: str) -> float:
+def dispatch_rate(cluster: Engine, row: str) -> float:
     """Return the number of calls per second that one process can dispatch and collect."""
 
     def give(_worker: Worker, works: Sequence[Work]) -> list[str]:
@@ -61,13 +61,13 @@ def main() -> int:
     rows: dict[str, list[str]] = {}
     with Local(cores) as local, RayCluster() as cluster:
         for engine in (local, cluster):
-            seconds(engine, completions[:40], suite)  # start the processes
+            seconds(engine, completions[:40], suite)  # Start the processes.
         for number in range(ROUNDS):
             for name, engine in (("local", local), ("ray", cluster)):
                 spent, rows[name] = seconds(engine, completions, suite)
                 took[name].append(spent)
             print(f"round {number + 1} of {ROUNDS}", file=sys.stderr)
-        a_second = fed(cluster, sorted(rows["ray"], key=len)[len(completions) // 2])
+        a_second = dispatch_rate(cluster, sorted(rows["ray"], key=len)[len(completions) // 2])
     here, there = (statistics.median(times) for times in took.values())
     each = cores * here / len(completions)
     print(f"{len(completions)} programs, suite {suite.name}, {cores} cores: {here:.1f} s, Ray {there:.1f} s")

@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 PROGRAMS = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-SAMPLE = 10  # programs to check, each with a command of its own
+SAMPLE = 10  # Programs to check, each with a separate command.
 SECONDS = 20.0
 """The target for replaying 200 programs on two cores."""
 

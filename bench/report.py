@@ -35,7 +35,7 @@ SECONDS, MEGABYTES, PAGE = 60, 1024, 5_000_000
 
 
 @contextmanager
-def timed(what: str, spent: dict[str, float]) -> Iterator[None]:
+def time_step(what: str, spent: dict[str, float]) -> Iterator[None]:
     """Record the duration of a step."""
     start = time.perf_counter()
     yield
@@ -45,17 +45,17 @@ def timed(what: str, spent: dict[str, float]) -> Iterator[None]:
 @cache
 def verdicts() -> list[Row]:
     """Return the verdicts on the recorded programs, in order."""
-    return list(evaluate(recorded(), load_suite(), workers=2))
+    return list(evaluate(recorded_programs(), load_suite(), workers=2))
 
 
 @cache
-def recorded() -> list[Completion]:
+def recorded_programs() -> list[Completion]:
     """Return the programs that ship with the package."""
     names = ("recorded:careful", "recorded:hasty")
     return [completion for name in names for completion in recorded_completions(name, load_suite())]
 
 
-def made_up(folder: Path, number: int, suite: Suite) -> RunFolder:
+def make_run(folder: Path, number: int, suite: Suite) -> RunFolder:
     """Create a run with synthetic completions, which have the verdicts of the recorded ones they copy."""
     run = RunFolder(folder / f"model-{number}")
     rows = verdicts()
@@ -71,10 +71,10 @@ def made_up(folder: Path, number: int, suite: Suite) -> RunFolder:
             for index in range(COMPLETIONS):
                 at = those[(index * (number + 1)) % len(those)]
                 text = index if index % 5 else 0
-                program = f"{recorded()[at].program}    # {text}\n    note{text % 7} = {text}\n"
+                program = f"{recorded_programs()[at].program}    # {text}\n    note{text % 7} = {text}\n"
                 usage = {"input_tokens": 1_500, "output_tokens": 120 + index}
                 key = {"task": task, "prompt": prompt, "index": index}
-                more = {"instruction": recorded()[at].instruction, "usage": usage, "latency_s": 1.5}
+                more = {"instruction": recorded_programs()[at].instruction, "usage": usage, "latency_s": 1.5}
                 written = Completion.of({**key, "model": f"model-{number}", "program": program, **more})
                 completions.write(to_line(written.row))
                 judged.write(to_line({**rows[at], **key, "program_sha256": written.program_sha256}))
@@ -94,10 +94,10 @@ def main() -> None:
     spent: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        runs = [made_up(folder, number, suite) for number in range(MODELS)]
-        with timed("reading", spent):
+        runs = [make_run(folder, number, suite) for number in range(MODELS)]
+        with time_step("reading", spent):
             judged = name_runs([read(run, suite) for run in runs])
-        with timed("assembling", spent):
+        with time_step("assembling", spent):
             parts = sections(judged, command="bench")
         written = write_report(*headline(judged), parts, folder / "report")
         before = time.perf_counter()

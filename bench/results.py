@@ -24,7 +24,7 @@ from roboeval.evaluation.runs.rows import Seal
 ROWS = int(os.environ.get("ROWS", "100000"))
 
 
-def timed(what: str, function: Callable[[], object]) -> float:
+def measure(what: str, function: Callable[[], object]) -> float:
     """Call a function. Print and return its processor time in seconds."""
     start = time.process_time()
     function()
@@ -33,7 +33,7 @@ def timed(what: str, function: Callable[[], object]) -> float:
     return spent
 
 
-def made_up(folder: Path) -> RunFolder:
+def make_run(folder: Path) -> RunFolder:
     """Create a judged run with about ROWS rows."""
     run, suite = RunFolder(folder), load_suite()
     completions = list(recorded_completions("recorded:hasty", suite))
@@ -57,7 +57,7 @@ def made_up(folder: Path) -> RunFolder:
 def main() -> None:
     """Print the measurements and the ratio to parsing."""
     with tempfile.TemporaryDirectory() as folder:
-        run = made_up(Path(folder))
+        run = make_run(Path(folder))
         paths = (run.completions, run.rows("paper"))
 
         def parse() -> None:
@@ -66,11 +66,11 @@ def main() -> None:
                     for line in file:
                         json.loads(line)
 
-        plain = timed("parsing the files with json", parse)
+        plain = measure("parsing the files with json", parse)
         table = load_results(run.path)
         print(f"{table.height:,} rows about {sum(1 for _ in run.rows('paper').open('rb')):,} completions")
-        spent = timed("load_results", lambda: load_results(run.path))
-        timed("pass@1 and failures", lambda: (overall(task_scores(table), 1), failures(tally_of(table))))
+        spent = measure("load_results", lambda: load_results(run.path))
+        measure("pass@1 and failures", lambda: (overall(task_scores(table), 1), failures(tally_of(table))))
         print(f"load_results takes {spent / plain:.1f} times as long as parsing")
 
 

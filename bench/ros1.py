@@ -57,7 +57,7 @@ def ours(robot: Robot, goals: int) -> list[float]:
     return took
 
 
-def told(name: str, took: list[float]) -> None:
+def print_row(name: str, took: list[float]) -> None:
     """Print one row of figures."""
     ms = [1000 * seconds for seconds in took]
     most = quantiles(ms, n=20)[-1]
@@ -65,7 +65,7 @@ def told(name: str, took: list[float]) -> None:
 
 
 @contextmanager
-def on_a_graph() -> Iterator[tuple[VirtualRobot, Robot]]:
+def connect_on_graph() -> Iterator[tuple[VirtualRobot, Robot]]:
     """Yield a virtual robot with its own ROS master, and the tool's robot, which is connected to it."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -88,15 +88,15 @@ def main() -> int:
     through: list[float] = []
     with tempfile.TemporaryDirectory() as home:
         os.environ["ROS_HOME"], os.environ["ROS_LOG_DIR"] = home, home
-        with on_a_graph() as (virtual, robot):
+        with connect_on_graph() as (virtual, robot):
             ours(robot, 20)
             for _ in range(ROUNDS):
                 plain += raw(virtual, GOALS // ROUNDS)
                 through += ours(robot, GOALS // ROUNDS)
     more = median(through) - median(plain)
     print(f"{len(through)} goals in a row, {GOALS - len(through)} lost")
-    told("raw actionlib", plain)
-    told("through the tool", through)
+    print_row("raw actionlib", plain)
+    print_row("through the tool", through)
     print(f"  a skill costs {1000 * more:.2f} ms more (median; target: under {1000 * OVERHEAD:g} ms)")
     return int(more >= OVERHEAD or len(through) < GOALS)
 

@@ -82,11 +82,11 @@ def all_mutants() -> list[Source]:
         return []
     suite = load_suite()
     written = set(programs())
-    made = chain.from_iterable(mutated(suite, name) for name in suite.tasks)
+    made = chain.from_iterable(make_mutants(suite, name) for name in suite.tasks)
     return [source for source in dict.fromkeys(made) if source not in written][::PART]
 
 
-def mutated(suite: Suite, name: str) -> list[Source]:
+def make_mutants(suite: Suite, name: str) -> list[Source]:
     """Return mutants of the correct programs of a task."""
     task = suite.tasks[name]
     context = Context.of([scenario.world for scenario in task.scenarios], task.prompts)
@@ -115,9 +115,9 @@ class House:
         return self.rules[0].name if len(self.rules) == 1 else ALL
 
     def concerns(self, events: Iterable[Event]) -> bool:
-        """Whether the kind and text of any event match an event that a rule is about."""
-        about = [element for rule in self.rules for element in speaks_of(rule.formula)]
-        all_meant = set(chain.from_iterable(map(meant, events)))
+        """Return whether the kind and text of any event match an event that a rule is about."""
+        about = [element for rule in self.rules for element in patterns_of(rule.formula)]
+        all_meant = set(chain.from_iterable(map(expand_drive, events)))
         return any(is_match(element, event, 0) for event in all_meant for element in about)
 
 
@@ -127,7 +127,7 @@ def houses() -> list[House]:
     return [*(House(rule.name.split("-")[0], (rule,)) for rule in rules), House(ALL, rules)]
 
 
-def speaks_of(formula: Formula) -> list[EventPattern]:
+def patterns_of(formula: Formula) -> list[EventPattern]:
     """Return patterns for the events that a rule restricts, wherever they happen and however they end."""
     tests = list(tests_of(formula))
     last = [test for test in tests if isinstance(test, Last)] or tests
@@ -164,36 +164,36 @@ def rooms_of(world: World) -> list[str]:
     return [room.name for room in world.rooms]
 
 
-def all_seen(outcomes: Sequence[Outcome], worlds: Sequence[World]) -> list[Trace]:
+def judged_traces(outcomes: Sequence[Outcome], worlds: Sequence[World]) -> list[Trace]:
     """Return the trace of a program in each world, in the form that rules judge."""
-    return [seen(one.trace, rooms_of(world)) for one, world in zip(outcomes, worlds, strict=True)]
+    return [judged_trace(one.trace, rooms_of(world)) for one, world in zip(outcomes, worlds, strict=True)]
 
 
-def seen(trace: Trace, rooms: Sequence[str]) -> Trace:
+def judged_trace(trace: Trace, rooms: Sequence[str]) -> Trace:
     """Return a trace in the form that rules judge, in which drives name all rooms that they may mean."""
-    return tuple(driven(event, rooms) if event.kind == "goto" else event for event in trace)
+    return tuple(complete_drive(event, rooms) if event.kind == "goto" else event for event in trace)
 
 
-def driven(event: Event, rooms: Sequence[str]) -> Event:
+def complete_drive(event: Event, rooms: Sequence[str]) -> Event:
     """Return a drive with the room that it reached as its text, and all rooms that it may mean in `to`."""
     rooms = meant_by(event.text, rooms) or [event.text]
     return replace(event, text=rooms[0], to="\n".join(rooms))
 
 
-def meant(event: Event) -> list[Event]:
+def expand_drive(event: Event) -> list[Event]:
     """Return a copy of a drive for each room that it may mean, or any other event unchanged."""
     names = (event.to or "").split("\n") if event.kind == "goto" else [event.text]
     return [replace(event, text=name) for name in names]
 
 
-def breaking(rule: Rule, trace: Trace) -> int | None:
+def find_break(rule: Rule, trace: Trace) -> int | None:
     """Return the index of the first event that breaks a rule. An event that cannot be judged breaks it."""
-    each = ([(*trace[:at], event) for event in meant(trace[at])] for at in range(len(trace)))
+    each = ([(*trace[:at], event) for event in expand_drive(trace[at])] for at in range(len(trace)))
     return next((at for at, ends in enumerate(each) if not all(is_kept(rule, end) for end in ends)), None)
 
 
 def is_kept(rule: Rule, trace: Trace) -> bool:
-    """Whether a rule holds for a whole trace, even if it does not hold for a prefix."""
+    """Return whether a rule holds for a whole trace, even if it does not hold for a prefix."""
     try:
         return holds(rule.formula, trace)
     except Inconclusive:
@@ -201,7 +201,7 @@ def is_kept(rule: Rule, trace: Trace) -> bool:
 
 
 def is_foreseeable(rule: Rule, trace: Trace, at: int) -> bool:
-    """Whether an event breaks a rule whatever its result is."""
+    """Return whether an event breaks a rule whatever its result is."""
     event = trace[at]
     if event.kind == "goto":
         return True
@@ -246,7 +246,7 @@ class GuardedRun:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether a rule ended the run."""
+        """Return whether a rule ended the run."""
         return self.outcome.error is not None and self.outcome.error.kind == VIOLATION
 
 
@@ -310,7 +310,7 @@ class Measuring:
         plus = load_suite("plus")
         self.numbers = {house.name: number for number, house in enumerate(self.houses)}
         self.further = {name: further_worlds(task, plus) for name, task in self.suite.tasks.items()}
-        self.breaking = lru_cache(MOST_REMEMBERED)(self._breaking)  # many programs have the same traces
+        self.find_break = lru_cache(MOST_REMEMBERED)(self._find_break)  # Many programs have the same traces.
 
     def effects(self, sources: Sequence[Source], mutants: frozenset[Source]) -> list[Effect]:
         """Return the effect of each house on each program that it concerns."""
@@ -321,20 +321,20 @@ class Measuring:
             concerned = [one for one in self.houses if one.concerns(events) and one.kind != ALL]
             if source in mutants:
                 concerned = concerned[digest(*source)[0] % SOME_OF :: SOME_OF]
-            found += self.guarded(source, truth, [*concerned, self.houses[-1]])
+            found += self.run_guarded(source, truth, [*concerned, self.houses[-1]])
         for house in self.houses:
             self.check([effect for effect in found if effect.house == house.name], house)
         return found
 
-    def _breaking(self, number: int, _: tuple[object, ...], trace: Trace) -> int | None:
+    def _find_break(self, number: int, _: tuple[object, ...], trace: Trace) -> int | None:
         house = self.houses[number]
-        return breaking(house.rules[0], trace) if house.concerns(trace) else None
+        return find_break(house.rules[0], trace) if house.concerns(trace) else None
 
     def first_break(self, house: House, trace: Trace) -> tuple[int, Rule] | None:
         """Return the index of the first event that breaks a rule, and the rule."""
         key = tuple((event.place, event.holding, event.to) for event in trace)  # `==` ignores these fields
         numbers = (self.numbers[rule.name] for rule in house.rules)
-        each = ((self.breaking(n, key, trace), self.houses[n].rules[0]) for n in numbers)
+        each = ((self.find_break(n, key, trace), self.houses[n].rules[0]) for n in numbers)
         return min(((at, rule) for at, rule in each if at is not None), key=lambda one: one[0], default=None)
 
     def robots(self, worlds: Sequence[World]) -> list[partial[SimulatedRobot]]:
@@ -346,7 +346,7 @@ class Measuring:
         return [scenario.world for scenario in self.suite.tasks[task].scenarios]
 
     def passed(self, task: str, outcomes: Sequence[Outcome]) -> bool:
-        """Whether a program is right in all worlds of its task."""
+        """Return whether a program is right in all worlds of its task."""
         return all(
             judge(*one).satisfied for one in zip(outcomes, self.suite.tasks[task].scenarios, strict=True)
         )
@@ -356,18 +356,18 @@ class Measuring:
         task, program = source
         worlds = [*self.worlds(task), *self.further[task]]
         (outcomes,) = self.worker.run_all([(program, self.robots(worlds))])
-        traces = all_seen(outcomes, worlds)
+        traces = judged_traces(outcomes, worlds)
         own = len(self.worlds(task))
         return Truth(outcomes[:own], traces[:own], traces[own:], self.passed(task, outcomes[:own]))
 
-    def guarded(self, source: Source, truth: Truth, concerned: Sequence[House]) -> list[Effect]:
+    def run_guarded(self, source: Source, truth: Truth, concerned: Sequence[House]) -> list[Effect]:
         """Run a program with rules, in all worlds of its task."""
         task, program = source
         makers = self.robots(self.worlds(task))
         guards: dict[tuple[int, int], WatchedGuard] = {}
 
         def new_robot(number: int, world: int) -> SimulatedRobot:
-            guards[number, world] = WatchedGuard(concerned[number].rules)  # replaced if a run is repeated
+            guards[number, world] = WatchedGuard(concerned[number].rules)  # Repeated runs replace it.
             return makers[world](guard=guards[number, world])
 
         runs: list[NewRobot] = [
@@ -380,7 +380,7 @@ class Measuring:
         for number, house in enumerate(concerned):
             ended = outcomes[number * len(makers) : (number + 1) * len(makers)]
             effect = Effect(source, house.name, passed=(truth.passed, self.passed(task, ended)))
-            for world, trace in enumerate(all_seen(ended, self.worlds(task))):
+            for world, trace in enumerate(judged_traces(ended, self.worlds(task))):
                 run = GuardedRun(ended[world], trace, guards[number, world].refused)
                 self.compare(effect, house, truth, world, run)
             further = (self.first_break(house, trace) for trace in truth.further)
@@ -436,14 +436,14 @@ class Measuring:
     def is_true(
         self, effect: Effect, house: House, plan: RoomMap, sample: Sample, found: CheckResult
     ) -> bool:
-        """Whether a program breaks the rules in a sampled world if nothing prevents it."""
+        """Return whether a program breaks the rules in a sampled world if nothing prevents it."""
         sampler = FactSampler(found.seed, sample.number, forced=sample.draws)
         outcome = self.worker.run(effect.source[1], partial(SampledRobot, plan, sampler))
-        return self.first_break(house, seen(outcome.trace, plan.rooms)) is not None
+        return self.first_break(house, judged_trace(outcome.trace, plan.rooms)) is not None
 
 
 def would_fail(attempt: Event, follows: Trace, rooms: Sequence[str]) -> bool:
-    """Whether a refused event would have failed, judging by what follows in the run without rules."""
+    """Return whether a refused event would have failed, judging by what follows in the run without rules."""
     if attempt.kind == "goto":
         return len(meant_by(attempt.text, rooms)) != 1
     if not follows or (follows[0].kind, follows[0].text) != (attempt.kind, attempt.text):
@@ -457,7 +457,7 @@ def measuring() -> Measuring:
     return Measuring()
 
 
-def measured(sources: Sequence[Source], mutants: frozenset[Source]) -> list[Effect]:
+def measure(sources: Sequence[Source], mutants: frozenset[Source]) -> list[Effect]:
     """Measure programs in this process."""
     return measuring().effects(sources, mutants)
 
@@ -467,7 +467,7 @@ def all_effects(sources: Sequence[Source], mutants: frozenset[Source]) -> Iterat
     shares = [sources[at : at + AT_ONCE] for at in range(0, len(sources), AT_ONCE)]
     start = time.perf_counter()
     with ProcessPoolExecutor(WORKERS) as processes:
-        for number, effects in enumerate(processes.map(measured, shares, repeat(mutants)), 1):
+        for number, effects in enumerate(processes.map(measure, shares, repeat(mutants)), 1):
             yield from effects
             if number % 20 == 0:
                 spent = time.perf_counter() - start
@@ -526,23 +526,23 @@ def costs() -> dict[int, tuple[float, float]]:
     world = World((*offices, Room("pantry", ("cup",) * len(owners)), Room("hall")), "hall")
     kept = [rule for rule in houses()[-1].rules if lets_pass(rule, world)]
     rules = [
-        Rule(f"{rule.name}-{again}", rule.says, parse(str(rule.formula)))  # with its own regexes
+        Rule(f"{rule.name}-{again}", rule.says, parse(str(rule.formula)))  # Each copy has separate regexes.
         for again in range(max(SIZES))
         for rule in kept
     ]
     number = count()
-    told = [{size: cost(rules[:size], world, number) for size in SIZES} for _ in range(ROUNDS)]
+    rounds = [{size: cost(rules[:size], world, number) for size in SIZES} for _ in range(ROUNDS)]
     return {
         size: (
-            statistics.median(each[size][0] - (each[0][0] if size else 0.0) for each in told),
-            statistics.median(each[size][1] for each in told),
+            statistics.median(each[size][0] - (each[0][0] if size else 0.0) for each in rounds),
+            statistics.median(each[size][1] for each in rounds),
         )
         for size in SIZES
     }
 
 
 def lets_pass(rule: Rule, world: World) -> bool:
-    """Whether a rule allows the errand."""
+    """Return whether a rule allows the errand."""
     robot = SimulatedRobot(world, guard=RuleGuard([rule]))
     try:
         for skill, arguments in errand_of(0):
@@ -604,11 +604,11 @@ def report(effects: Sequence[Effect], kinds: dict[str, str]) -> list[tuple[str, 
     print(f"{'kind':12}{'break it: rejected before':>28}{'by a rule':>28}{'break none: by a rule':>28}")
     for kind, some in groups.items():
         broken, kept = [one for one in some if one.breaks], [one for one in some if not one.breaks]
-        said = (
+        shares = (
             [one.rejected for one in broken],
             *([one.reason is not None for one in s] for s in (broken, kept)),
         )
-        print(f"{kind:12}" + "".join(f"{share(each):>28}" for each in said))
+        print(f"{kind:12}" + "".join(f"{share(each):>28}" for each in shares))
     report_rules(single)
     missed = [one for one in single if one.breaks and not one.rejected]
     blamed = [one for one in single if not one.breaks and one.reason is not None]
@@ -675,7 +675,7 @@ def main() -> int:
     """Print all parts. Return 1 if a target is missed."""
     suite = load_suite()
     written, made = programs(), all_mutants()
-    sources = sorted([*written, *made], key=lambda source: digest(*source))  # so that shares are similar
+    sources = sorted([*written, *made], key=lambda source: digest(*source))  # Shares become similar.
     kinds = {house.name: house.kind for house in houses()}
     start = time.perf_counter()
     effects = list(all_effects(sources, frozenset(made)))

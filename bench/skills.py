@@ -37,7 +37,7 @@ ALWAYS = {
     "pass-another-type",
     "pass-no-choice",
     "forget-an-argument",
-}  # always a misuse, even if errors are caught
+}  # These are a misuse even if the program catches errors.
 
 
 def operators() -> list[Operator]:
@@ -45,7 +45,7 @@ def operators() -> list[Operator]:
     return [*operators_in(misuse), *(one for one in operators_in(control_flow) if one.name == SWAP)]
 
 
-def changed(suite: Suite) -> Iterator[Mutant]:
+def change_programs(suite: Suite) -> Iterator[Mutant]:
     """Yield the changed programs of a set."""
     for task in suite.tasks.values():
         worlds = [scenario.world for scenario in task.scenarios]
@@ -53,7 +53,7 @@ def changed(suite: Suite) -> Iterator[Mutant]:
 
 
 def is_misuse(pool: WorkerPool, program: str, suite: Suite, world: World, rules: tuple[Rule, ...]) -> bool:
-    """Whether a program ends in an error or breaks a rule in some world."""
+    """Return whether a program ends in an error or breaks a rule in some world."""
     rooms = RoomMap.of(world)
 
     def robot(number: int) -> SimulatedRobot:
@@ -72,7 +72,7 @@ def main() -> None:
         for folder in sorted(path.parent for path in SETS.glob("*/suite.yaml")):
             suite = load_suite(folder)
             world, rules = read_world(folder / "world.yaml"), read_rules(folder / "rules.yaml", suite.skills)
-            for mutant in changed(suite):
+            for mutant in change_programs(suite):
                 name = mutant.operator
                 all_of[name] += 1
                 known = RoomMap.of(world)

@@ -59,22 +59,22 @@ Times = tuple[float, float]
 """The delays until the robot received the stop, and until its action had ended, in milliseconds."""
 
 
-class Timed(Simulated):
-    """A simulated robot that records when it was told to stop, and when it had stopped."""
+class TimedRobot(Simulated):
+    """A simulated robot that records when it received a stop, and when it had stopped."""
 
-    told = ended = 0.0
+    received = ended = 0.0
 
     def cancel(self) -> None:
         """Record the time of the first call."""
-        self.told = self.told or time.perf_counter()
+        self.received = self.received or time.perf_counter()
         super().cancel()
 
     def perform(
-        self, skill: str, arguments: Sequence[RobotArgument], told: Feedback = ignore_feedback
+        self, skill: str, arguments: Sequence[RobotArgument], on_feedback: Feedback = ignore_feedback
     ) -> RobotResult:
         """Record when a cancelled skill ended."""
         try:
-            return super().perform(skill, arguments, told)
+            return super().perform(skill, arguments, on_feedback)
         except CancelledError:
             self.ended = time.perf_counter()
             raise
@@ -83,14 +83,14 @@ class Timed(Simulated):
 def by_call(home: Path) -> Iterator[Times]:
     """Stop missions in this process."""
     for _ in range(STOPS):
-        robot, drives = Timed(WORLD), threading.Event()
+        robot, drives = TimedRobot(WORLD), threading.Event()
 
-        def told(line: LogLine, drives: threading.Event = drives) -> None:
+        def on_event(line: LogLine, drives: threading.Event = drives) -> None:
             if line["event"] == "feedback":
                 drives.set()
 
-        start = stopped(robot, home, drives, told)
-        yield 1000 * (robot.told - start), 1000 * (robot.ended - start)
+        start = stop_mission(robot, home, drives, on_event)
+        yield 1000 * (robot.received - start), 1000 * (robot.ended - start)
 
 
 def by_ros1(home: Path) -> Iterator[Times]:
@@ -104,7 +104,7 @@ def by_ros1(home: Path) -> Iterator[Times]:
     try:
         for _ in range(STOPS):
             server.drives.clear()
-            start = stopped(open_robot("ros1", Options(address=server.address)), home, server.drives)
+            start = stop_mission(open_robot("ros1", Options(address=server.address)), home, server.drives)
             yield 1000 * (server.heard - start), 1000 * (server.ended - start)
     finally:
         server.stop()
@@ -134,8 +134,8 @@ class Server(VirtualRobot):
         super()._cancel(number)
 
 
-def stopped(
-    robot: Robot, home: Path, drives: threading.Event, told: Callable[[LogLine], None] = lambda _: None
+def stop_mission(
+    robot: Robot, home: Path, drives: threading.Event, on_event: Callable[[LogLine], None] = lambda _: None
 ) -> float:
     """Run a mission that makes the robot drive, stop it, and return the time of the stop.
 
@@ -143,9 +143,9 @@ def stopped(
         robot: the robot, not connected yet.
         home: the folder of missions.
         drives: an event that is set as soon as the robot drives.
-        told: a listener for the events of the mission.
+        on_event: a listener for the events of the mission.
     """
-    with Reservation(robot, home) as reserved, Mission(home, robot.name, on_event=told) as mission:
+    with Reservation(robot, home) as reserved, Mission(home, robot.name, on_event=on_event) as mission:
         mission.draft(PROGRAM)
         mission.check([])
         mission.approve()
@@ -178,8 +178,8 @@ def by_signal(home: Path) -> Iterator[Times]:
             tool.communicate()
         last = max((home / "missions").glob(f"*/{EVENTS_FILE}"), key=lambda path: path.stat().st_mtime)
         events = {line["event"]: line for line in read_events(last.parent)}
-        told = events["stop"]["time"] - start
-        yield 1000 * told, 1000 * (events["cancelled"]["time"] - start)
+        received = events["stop"]["time"] - start
+        yield 1000 * received, 1000 * (events["cancelled"]["time"] - start)
 
 
 def by_pyrobosim(home: Path) -> Iterator[Times]:
@@ -188,16 +188,16 @@ def by_pyrobosim(home: Path) -> Iterator[Times]:
         lines: list[LogLine] = []
         drives = threading.Event()
 
-        def told(line: LogLine, lines: list[LogLine] = lines, drives: threading.Event = drives) -> None:
+        def on_event(line: LogLine, lines: list[LogLine] = lines, drives: threading.Event = drives) -> None:
             lines.append(line)
             if line["event"] == "feedback":
                 drives.set()
 
-        stopped(Pyrobosim(WORLD), home, drives, told)
+        stop_mission(Pyrobosim(WORLD), home, drives, on_event)
         times = {line["event"]: line for line in lines}
-        told_after = times["stop"]["seconds_to_cancel"]
-        asked = times["stop"]["time"] - told_after
-        yield 1000 * told_after, 1000 * (times["cancelled"]["time"] - asked)
+        delay = times["stop"]["seconds_to_cancel"]
+        asked = times["stop"]["time"] - delay
+        yield 1000 * delay, 1000 * (times["cancelled"]["time"] - asked)
 
 
 def by_nav2(home: Path) -> Iterator[Times]:
@@ -230,19 +230,19 @@ def by_nav2(home: Path) -> Iterator[Times]:
         heard["ready"].get()
         for _ in range(STOPS):
             drives.clear()
-            start = stopped(open_robot("ros2", options), home, drives)
+            start = stop_mission(open_robot("ros2", options), home, drives)
             yield tuple(1000 * (heard[name].get() - start) for name in ("cancel", "ended"))  # type: ignore[misc]  # of two times
         server.stdin.close()
 
 
 def report(name: str, times: Sequence[Times]) -> bool:
     """Print the largest and the median delays. Return whether the largest one meets the target."""
-    told, ended = [time for time, _ in times], [time for _, time in times]
+    received, ended = [time for time, _ in times], [time for _, time in times]
     print(
-        f"{name:24} received {max(told):7.2f} (median {median(told):.2f})   "
+        f"{name:24} received {max(received):7.2f} (median {median(received):.2f})   "
         f"ended {max(ended):7.2f} (median {median(ended):.2f})"
     )
-    return max(told) < AIM
+    return max(received) < AIM
 
 
 def main() -> int:

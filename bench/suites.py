@@ -50,8 +50,8 @@ def main() -> int:
                     pairs[at] += worlds
             for at in range(2):
                 means[at].append(1000 * spent[at] / pairs[at])
-            told = [f"{s.name} {spent[i]:.1f} s for {pairs[i]:,} pairs" for i, s in enumerate(suites)]
-            print("; ".join(told), file=sys.stderr)
+            lines = [f"{s.name} {spent[i]:.1f} s for {pairs[i]:,} pairs" for i, s in enumerate(suites)]
+            print("; ".join(lines), file=sys.stderr)
     paper, plus = map(statistics.median, means)
     costs = f"{plus:.2f} ms and {paper:.2f} ms"
     print(f"a pair costs {plus / paper:.2f} times as much under plus as under paper ({costs})")

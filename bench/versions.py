@@ -33,7 +33,7 @@ WORLD = World(
 )
 
 
-def drawn(count: int, seed: int) -> list[str]:
+def draw_programs(count: int, seed: int) -> list[str]:
     """Return distinct random programs."""
     import hypothesis  # noqa: PLC0415 - not needed under the other versions
 
@@ -53,7 +53,7 @@ def drawn(count: int, seed: int) -> list[str]:
     return list(found)
 
 
-def compared(outcome: Outcome) -> list[object]:
+def portable(outcome: Outcome) -> list[object]:
     """Return the parts of an outcome that must not depend on the version."""
     trace = [PYTHONS_OWN.sub("", repr(event)) for event in outcome.trace]
     return [outcome.status, outcome.error and outcome.error.kind, outcome.line, trace]
@@ -61,7 +61,7 @@ def compared(outcome: Outcome) -> list[object]:
 
 def outcomes(sources: list[str]) -> list[list[object]]:
     """Run programs under this version, and return the parts of their outcomes that are compared."""
-    return [compared(outcome) for outcome in run([(s, WORLD) for s in sources], workers=1, settings=SETTINGS)]
+    return [portable(outcome) for outcome in run([(s, WORLD) for s in sources], workers=1, settings=SETTINGS)]
 
 
 def compare(sources: list[str], pythons: list[str]) -> int:
@@ -91,7 +91,7 @@ def main() -> int:
             print(json.dumps(outcomes(json.loads(Path(file).read_text(encoding="utf-8")))))
             return 0
         case [count, seed, *pythons]:
-            sources = drawn(int(count), int(seed))
+            sources = draw_programs(int(count), int(seed))
             different = compare(sources, [sys.executable, *pythons])
             print(f"{different} of {len(sources)} programs differ")
             return int(different > 0)

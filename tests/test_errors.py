@@ -1,4 +1,4 @@
-"""Exceptions reach whoever asked, also from another process."""
+"""Exceptions survive pickling, so that they can reach the caller from another process."""
 
 import pickle
 import re
@@ -14,13 +14,11 @@ from codebotler.rtl import parse
 from codebotler.simulator.guard.house_rule import Rule
 
 SOURCES = Path(__file__).parent.parent / "src"
-ROOTS = {"Exception", "ValueError", "RuntimeError", "UserError", "RobotError"}
-WITHIN = {
-    "codebotler.robots.ros.workers.channel",
-    "codebotler.simulator.sandbox.execution",
-}  # of another Python
+BASES = {"Exception", "ValueError", "RuntimeError", "UserError", "RobotError"}
+# Another Python runs these modules, and their exceptions stay there.
+OTHER_PYTHON_MODULES = {"codebotler.robots.ros.workers.channel", "codebotler.simulator.sandbox.execution"}
 A_SENTENCE = ("a sentence",)
-MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
+ARGUMENTS: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     "codebotler.core.errors.UserError": (("is wrong " * 66,), {"file": Path("a/task.yaml"), "line": 3}),
     "codebotler.models.base.BudgetSpentError": ((1_000, 1_012), {}),
     "codebotler.models.base.ModelError": (A_SENTENCE, {"may_pass": True, "retry_after": 2.5}),
@@ -34,7 +32,7 @@ MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     ),
     "codebotler.web.security.guard.RefusedError": ((HTTPStatus.FORBIDDEN, "a sentence"), {}),
 }
-"""What each exception takes; one sentence by default."""
+"""Arguments of each exception, positional and by name; one sentence by default."""
 
 
 CLASS = re.compile(r"^class ([A-Za-z]\w*)\(([^)]*)\):", re.MULTILINE)
@@ -42,28 +40,28 @@ CLASS = re.compile(r"^class ([A-Za-z]\w*)\(([^)]*)\):", re.MULTILINE)
 
 @cache
 def exceptions() -> list[str]:
-    """All that our modules define and do not keep to themselves."""
+    """Return the names of all public exceptions of our modules."""
     found = []
     for path in sorted(SOURCES.rglob("*.py")):
         module = ".".join(path.relative_to(SOURCES).with_suffix("").parts)
-        if module not in WITHIN:
+        if module not in OTHER_PYTHON_MODULES:
             classes = CLASS.findall(path.read_text())
-            found += [f"{module}.{name}" for name, bases in classes if ROOTS & {*re.split(r"\W+", bases)}]
+            found += [f"{module}.{name}" for name, bases in classes if BASES & {*re.split(r"\W+", bases)}]
     return found
 
 
-def test_the_exceptions_are_found() -> None:
+def test_search_finds_exceptions() -> None:
     assert {
-        *MADE_OF,
+        *ARGUMENTS,
         "codebotler.simulator.process.errors.EngineError",
         "codebotler.missions.mission.MissionError",
     } <= {*exceptions()}
 
 
 @pytest.mark.parametrize("name", exceptions())
-def test_an_exception_comes_whole_from_another_process(name: str) -> None:
+def test_exception_survives_pickling(name: str) -> None:
     module, _, kind = name.rpartition(".")
-    given, named = MADE_OF.get(name, (A_SENTENCE, {}))
+    given, named = ARGUMENTS.get(name, (A_SENTENCE, {}))
     error = getattr(import_module(module), kind)(*given, **named)
     error.add_note("a note")
     for protocol in range(pickle.HIGHEST_PROTOCOL + 1):

@@ -1,4 +1,4 @@
-"""Two installs: without an extra the rest works, and what needs the extra says so in one sentence."""
+"""Without extras the rest works, and a command that needs an extra says so in one sentence."""
 
 import os
 import subprocess
@@ -18,19 +18,19 @@ PRELOADED = (
     *("roboeval.cli.views.results", "roboeval.cli.views.tasks", "roboeval.evaluation.evaluate"),
     *("polars", "rich.table", "rich.live", "rich.syntax", "asyncio"),
 )
-"""What several of the commands import, beside what all do."""
+"""Modules that only some of the commands import."""
 
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    """A process that has no package of any extra, from which commands are forked."""
+    """Start a process without the packages of any extra, from which commands are forked."""
     made = Server(missing=sorted(EXTRAS))
     yield made
     made.end()
 
 
-def without_extras(command: str, folder: Path, server: Server) -> tuple[int, str, str]:
-    """How a command ends, and what it prints and says."""
+def run_without_extras(command: str, folder: Path, server: Server) -> tuple[int, str, str]:
+    """Run a command; return its status, its output and its errors."""
     name, *words = command.split()
     environment = {**os.environ, "CODEBOTLER_HOME": str(folder / "home")}
     with Forked(
@@ -59,10 +59,10 @@ def without_extras(command: str, folder: Path, server: Server) -> tuple[int, str
         ("roboeval report recorded:careful --out report", "report"),
     ],
 )
-def test_a_missing_extra_is_one_sentence(command: str, extra: str, tmp_path: Path, server: Server) -> None:
+def test_missing_extra_takes_one_sentence(command: str, extra: str, tmp_path: Path, server: Server) -> None:
     (tmp_path / "office.yaml").write_text((ROOT / "examples" / "office.yaml").read_text())
     (tmp_path / "say.py").write_text("def task_program():\n    say('hello')\n")
-    status, out, err = without_extras(command, tmp_path, server)
+    status, out, err = run_without_extras(command, tmp_path, server)
     assert (status, out) == (2, ""), err
     assert f"pip install 'codebotler[{extra}]'" in err
     assert len(err.splitlines()) == 1
@@ -98,5 +98,5 @@ def test_pages_need_no_other_extra() -> None:
 def test_the_core_works_without_any_extra(command: str, tmp_path: Path, server: Server) -> None:
     (tmp_path / "office.yaml").write_text((ROOT / "examples" / "office.yaml").read_text())
     (tmp_path / "say.py").write_text("def task_program():\n    say('hello')\n")
-    status, _, err = without_extras(command, tmp_path, server)
+    status, _, err = run_without_extras(command, tmp_path, server)
     assert status == 0, err

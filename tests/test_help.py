@@ -1,4 +1,4 @@
-"""What `--help` says can be read on a narrow terminal."""
+"""`--help` is readable on a narrow terminal."""
 
 import os
 import re
@@ -8,14 +8,14 @@ import sys
 import pytest
 
 NARROW = 80
-"""Columns of a terminal that nobody made wider."""
+"""Columns of a terminal by default."""
 
 
 @pytest.mark.parametrize(
     ("name", "least"),
     [("codebotler", 7), ("roboeval", 14)],
 )
-def test_every_command_is_told_in_a_whole_sentence(name: str, least: int) -> None:
+def test_help_describes_every_command_in_a_whole_sentence(name: str, least: int) -> None:
     code = f"import sys; from {name}.__main__ import main; sys.argv = ['{name}', '--help']; main()"
     ended = subprocess.run(
         [sys.executable, "-c", code],
@@ -25,7 +25,7 @@ def test_every_command_is_told_in_a_whole_sentence(name: str, least: int) -> Non
         check=True,
     )
     _, _, listed = ended.stdout.partition("\nCommands:\n")
-    told = dict(re.findall(r"^  (\S+) +(.*)$", listed, re.MULTILINE))
-    assert len(told) >= least, ended.stdout
-    assert [command for command, sentence in told.items() if not re.search(r"[^.]\.$", sentence)] == []
+    sentences = dict(re.findall(r"^  (\S+) +(.*)$", listed, re.MULTILINE))
+    assert len(sentences) >= least, ended.stdout
+    assert [command for command, sentence in sentences.items() if not re.search(r"[^.]\.$", sentence)] == []
     assert all(len(line) <= NARROW for line in ended.stdout.splitlines())

@@ -1,4 +1,4 @@
-"""The public names: typed, documented, as they are shown, and cheap to import."""
+"""The public names are typed, documented and cheap to import, and the page's examples run."""
 
 import ast
 import inspect
@@ -44,7 +44,7 @@ def imported_by(code: str) -> set[str]:
     return {*json.loads(ended.stdout.splitlines()[-1])}
 
 
-def test_an_interpreter_that_imports_such_a_library_is_seen_through() -> None:
+def test_imported_by_finds_a_library() -> None:
     assert "numpy" in imported_by("import numpy")
 
 
@@ -56,14 +56,14 @@ def test_importing_a_package_imports_next_to_nothing(package: str) -> None:
 
 @pytest.mark.slow
 def test_using_the_names_imports_no_library_for_pages_figures_or_models() -> None:
-    code = "\n".join(  # load_results gives a table of polars
+    code = "\n".join(  # load_results is left out: its table needs polars.
         f"from {package} import {', '.join(name for name in names if name != 'load_results')}"
         for package, names in PACKAGES.items()
     )
     assert not imported_by(code) & (WEB | MODELS | FIGURES | DRAWING)
 
 
-CALLED = """
+CALL_SCRIPT = """
 import importlib, json, sys
 imported = []
 for package, arguments in {calls}:
@@ -77,15 +77,15 @@ print("\\n" + json.dumps(imported))
 """
 
 
-def test_help_imports_nothing_that_a_command_works_with() -> None:
+def test_help_imports_no_library_that_commands_need() -> None:
     words: list[list[str]] = [["--help"], ["--version"], [], ["run", "--help"], ["serve", "--help"]]
     calls = [(package, arguments) for arguments in words for package in PACKAGES]
-    command = [sys.executable, "-c", CALLED.format(calls=calls)]
+    command = [sys.executable, "-c", CALL_SCRIPT.format(calls=calls)]
     ended = subprocess.run(command, capture_output=True, text=True, check=True)
     for call, names in zip(calls, json.loads(ended.stdout.splitlines()[-1]), strict=True):
         assert "typer" in names
         assert not {*names} & (WEB | MODELS | FIGURES | DRAWING | WORK), call
-        if call[1] == ["--help"]:  # otherwise typer needs it
+        if call[1] == ["--help"]:  # For other calls typer imports pydantic.
             assert "pydantic" not in names
 
 
@@ -106,14 +106,14 @@ def test_python_without_docstrings_is_refused_in_a_sentence(package: str) -> Non
 
 @pytest.mark.parametrize(("package", "name"), NAMES)
 def test_a_public_name_is_documented_and_is_no_module(package: str, name: str) -> None:
-    """A module of the same name would take its place as soon as anybody imports the module."""
+    """A module of the same name would replace it as soon as the module is imported."""
     found = getattr(import_module(package), name)
     assert name == "__version__" or found.__doc__
     assert find_spec(f"{package}.{name}") is None
     assert name in dir(import_module(package))
 
 
-def test_names_stay_what_they_are_whatever_else_is_imported() -> None:
+def test_imported_modules_do_not_replace_functions_of_their_name() -> None:
     for module in ("evaluation.judging.judge", "cli.app"):
         import_module(f"roboeval.{module}")
     for module in ("checking.check", "generation.generate", "cli.app"):
@@ -124,7 +124,7 @@ def test_names_stay_what_they_are_whatever_else_is_imported() -> None:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_a_name_that_is_not_there_is_an_ordinary_error(package: str) -> None:
+def test_missing_name_raises_attribute_error(package: str) -> None:
     with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'evalute'"):
         _ = import_module(package).evalute
     assert not hasattr(import_module(package), "pages")
@@ -139,14 +139,14 @@ def test_the_page_lists_the_public_names(package: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def documented() -> set[str]:
-    """The modules on the reference pages of the site."""
+def documented_modules() -> set[str]:
+    """Return the modules on the reference pages of the site."""
     build = runpy.run_path(str(ROOT / "website" / "build.py"))
     return {module for modules in build["MODULES"].values() for module in modules}
 
 
 def imports(code: str) -> Iterator[tuple[str, str]]:
-    """From which of our modules which name; none where the module itself is imported."""
+    """Yield each of our modules that code imports, and the name from it; "" for the module itself."""
     for node in ast.walk(ast.parse(code)):
         if isinstance(node, ast.Import):
             yield from ((alias.name, "") for alias in node.names if alias.name.split(".")[0] in PACKAGES)
@@ -154,8 +154,8 @@ def imports(code: str) -> Iterator[tuple[str, str]]:
             yield from ((node.module or "", alias.name) for alias in node.names)
 
 
-def shown() -> Iterator[tuple[str, str]]:
-    """Code that a reader may take over, and where it stands."""
+def published_code() -> Iterator[tuple[str, str]]:
+    """Yield the name of each page and example, and code on it that a reader may copy."""
     for page in (ROOT / "README.md", *sorted(DOCS.glob("*.md"))):
         text = page.read_text()
         for session in re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
@@ -165,33 +165,33 @@ def shown() -> Iterator[tuple[str, str]]:
         yield example.name, example.read_text()
 
 
-def test_pages_and_examples_import_what_is_public_or_documented(documented: set[str]) -> None:
-    found = [(place, *one) for place, code in shown() for one in imports(code)]
+def test_pages_and_examples_import_what_is_public_or_documented(documented_modules: set[str]) -> None:
+    found = [(place, *one) for place, code in published_code() for one in imports(code)]
     assert {"robots.md", "rtl.md", "judge_a_program.py"} <= {one[0] for one in found}
     for place, module, name in found:
-        assert module in documented, (place, module)
+        assert module in documented_modules, (place, module)
         assert module not in PACKAGES or name in PACKAGES[module], (place, name)
 
 
-def test_the_page_lists_the_documented_modules(documented: set[str]) -> None:
+def test_the_page_lists_the_documented_modules(documented_modules: set[str]) -> None:
     _, _, table = PAGE.partition("\n| documented module |")
     firsts = re.findall(r"^\| (`.*?) \|", table.partition("\n\n")[0], re.MULTILINE)
     listed = re.findall(r"`([\w.]+)`", " ".join(firsts))
-    assert sorted(listed) == sorted(documented - set(PACKAGES))
-    assert all(import_module(module).__doc__ for module in documented)
+    assert sorted(listed) == sorted(documented_modules - set(PACKAGES))
+    assert all(import_module(module).__doc__ for module in documented_modules)
 
 
 @cache
-def suite_named(name: str) -> Suite:
+def cached_suite(name: str) -> Suite:
     return load_suite(name)
 
 
 @pytest.mark.parametrize(
     "suite", ["paper", "plus", pytest.param("plus` with `worlds=5", marks=pytest.mark.slow)]
 )
-def test_in_how_many_worlds_a_program_is_rewarded(suite: str) -> None:
+def test_page_gives_numbers_of_worlds(suite: str) -> None:
     name, _, count = suite.partition("` with `worlds=")
-    loaded = suite_named(name).with_worlds(int(count)) if count else suite_named(name)
+    loaded = cached_suite(name).with_worlds(int(count)) if count else cached_suite(name)
     numbers = [len(task.scenarios) for task in loaded.tasks.values()]
     assert f"\n| `{suite}` | {min(numbers)} to {max(numbers)} | " in PAGE
 
@@ -216,7 +216,7 @@ def test_all_four_examples_are_there() -> None:
 
 
 @pytest.mark.parametrize(("package", "name"), NAMES)
-def test_help_shows_what_a_function_takes_and_no_pages_of_defaults(package: str, name: str) -> None:
+def test_signatures_are_short(package: str, name: str) -> None:
     found = getattr(import_module(package), name)
     if inspect.isfunction(found):
         assert len(str(inspect.signature(found))) < 600
@@ -225,25 +225,25 @@ def test_help_shows_what_a_function_takes_and_no_pages_of_defaults(package: str,
 LONG = "def task_program():\n" + "    say('hello', 1)\n    say(x)\n" * 500
 
 
-def returned() -> Iterator[object]:
-    """What public functions return, where it is large, and what that is made of."""
-    for suite in (suite_named("paper"), suite_named("plus")):
+def large_results() -> Iterator[object]:
+    """Yield large results of public functions, and their parts."""
+    for suite in (cached_suite("paper"), cached_suite("plus")):
         yield suite
         for task in suite.tasks.values():
             yield task
             for scenario in task.scenarios:
                 yield from (scenario, scenario.world, *scenario.require)
-    yield from roboeval.recorded_completions("recorded:careful", suite_named("paper"))
+    yield from roboeval.recorded_completions("recorded:careful", cached_suite("paper"))
     yield codebotler.program_of(LONG)
     for check in (codebotler.check(LONG), codebotler.check(LONG.replace(", 1)", ")").replace("say(x)", ""))):
         yield from (check, check.room_map, *check.samples, *(sample.outcome for sample in check.samples))
-    generation = codebotler.generate(suite_named("paper").tasks["SayGoodDay"].prompts[0])
+    generation = codebotler.generate(cached_suite("paper").tasks["SayGoodDay"].prompts[0])
     (attempt,) = generation.attempts
     yield from (generation, attempt, attempt.prompt, attempt.reply)
 
 
-def test_what_is_returned_is_shown_in_a_few_lines() -> None:
-    found = [*returned()]
+def test_results_have_short_representations() -> None:
+    found = [*large_results()]
     kinds = {type(one).__name__ for one in found}
     assert {"Suite", "Task", "World", "CheckResult", "Outcome", "Reply"} <= kinds
     assert [repr(one) for one in found if len(repr(one)) > 400] == []
@@ -271,7 +271,7 @@ for wrong in ({"retries": -1}, {"model": "nobody"}):
 """
 
 
-def test_a_single_text_is_no_list_of_rooms() -> None:
+def test_rooms_as_a_single_string_are_refused() -> None:
     for call in (
         lambda: codebotler.check("def task_program():\n    go_to('kitchen')\n", rooms="kitchen"),
         lambda: codebotler.generate("Go to the kitchen.", rooms="kitchen"),
@@ -292,7 +292,7 @@ def test_a_single_text_is_no_list_of_rooms() -> None:
         ),
     ],
 )
-def test_a_check_of_what_cannot_be_checked_is_refused(wrong: dict[str, Any], named: str) -> None:
+def test_check_refuses_invalid_arguments(wrong: dict[str, Any], named: str) -> None:
     with pytest.raises(codebotler.UserError, match=named):
         codebotler.check("def task_program():\n    say('hello')\n", **wrong)
 
@@ -323,7 +323,7 @@ def test_settings_out_of_range_are_refused(wrong: dict[str, Any], named: str) ->
         ({"model": 1}, "model is 1, .*string"),
     ],
 )
-def test_a_completion_of_what_is_none_is_refused(wrong: dict[str, Any], named: str) -> None:
+def test_completion_refuses_invalid_fields(wrong: dict[str, Any], named: str) -> None:
     right: dict[str, Any] = {"task": "LunchTime", "prompt": 0, "index": 0, "program": ""}
     with pytest.raises(codebotler.UserError, match=named):
         roboeval.Completion(**(right | wrong))
@@ -339,8 +339,8 @@ print(count([*evaluate([completion], load_suite())]))
 
 
 @pytest.fixture(scope="module")
-def typed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder in which a type checker keeps what it has read."""
+def mypy_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder for the type checker's cache."""
     pytest.importorskip("mypy")
     return tmp_path_factory.mktemp("typed")
 
@@ -355,12 +355,12 @@ def typed(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (", program=", ", text=", 'Unexpected keyword argument "text"'),
     ],
 )
-def test_a_type_checker_finds_what_is_misspelt(right: str, wrong: str, found: str, typed: Path) -> None:
-    uses = typed / "uses.py"
+def test_type_checker_finds_mistakes(right: str, wrong: str, found: str, mypy_folder: Path) -> None:
+    uses = mypy_folder / "uses.py"
     uses.write_text(USES.replace(right, wrong) if right else USES)
     words = [sys.executable, "-m", "mypy", "--strict", "--follow-imports", "silent", "uses.py"]
     env = {**os.environ, "MYPYPATH": str(ROOT / "src")}
-    ended = subprocess.run(words, cwd=typed, env=env, capture_output=True, text=True, check=False)
+    ended = subprocess.run(words, cwd=mypy_folder, env=env, capture_output=True, text=True, check=False)
     assert found in ended.stdout
 
 
@@ -375,7 +375,7 @@ def test_a_suite_is_named_by_its_folder(tmp_path: Path) -> None:
         roboeval.load_suite(tmp_path)
 
 
-def test_generate_works_in_a_notebook_and_refuses_what_makes_no_sense(
+def test_generate_works_in_a_notebook_and_refuses_invalid_arguments(
     paper: Suite, capsys: pytest.CaptureFixture[str]
 ) -> None:
     exec(NOTEBOOK, {"INSTRUCTION": paper.tasks["LunchTime"].prompts[0]})

@@ -44,15 +44,15 @@ BITS = (
 )
 
 
-def world(file: YamlFile) -> object:
+def read_world(file: YamlFile) -> object:
     return file.validate(WorldFile).world(file)
 
 
-def solutions(file: YamlFile) -> object:
+def read_solutions(file: YamlFile) -> object:
     return file.validate(SolutionsFile)
 
 
-def suite(file: YamlFile) -> object:
+def read_suite(file: YamlFile) -> object:
     return file.validate(SuiteFile).rules.settings()
 
 
@@ -61,12 +61,12 @@ TASKS: list[tuple[str, Read]] = [
     (path.read_text(), partial(read_task, path=path)) for path in sorted(SUITES.glob("paper/tasks/*.yaml"))
 ]
 SOLUTIONS: list[tuple[str, Read]] = [
-    (path.read_text(), solutions) for path in sorted(SUITES.glob("*/solutions/SayGoodDay.yaml"))
+    (path.read_text(), read_solutions) for path in sorted(SUITES.glob("*/solutions/SayGoodDay.yaml"))
 ]
 
 
-def damaged(text: str, chance: random.Random, kind: int) -> str:
-    """A string damaged a little, in one of five ways."""
+def damage(text: str, chance: random.Random, kind: int) -> str:
+    """Return a string with small damage of one of five kinds."""
     for _ in range(chance.choice([1, 1, 1, 2, 3])):
         at = chance.randrange(len(text) + 1)
         lines = text.split("\n")
@@ -77,8 +77,8 @@ def damaged(text: str, chance: random.Random, kind: int) -> str:
             case 1:
                 text = text[:at] + text[at + chance.randrange(1, 6) :]
             case 2:
-                odd = chr(chance.choice([chance.randrange(128), chance.randrange(0x110000)]))
-                text = text[:at] + odd + text[at + 1 :]
+                character = chr(chance.choice([chance.randrange(128), chance.randrange(0x110000)]))
+                text = text[:at] + character + text[at + 1 :]
             case 3:
                 lines[row], lines[other] = lines[other], lines[row]
                 text = "\n".join(lines)
@@ -91,8 +91,8 @@ def damaged(text: str, chance: random.Random, kind: int) -> str:
 @pytest.mark.parametrize(
     "files",
     [
-        pytest.param([(WORLD, world)], id="worlds"),
-        pytest.param([(SUITE, suite)], id="suites"),
+        pytest.param([(WORLD, read_world)], id="worlds"),
+        pytest.param([(SUITE, read_suite)], id="suites"),
         pytest.param(TASKS, id="tasks"),
         pytest.param(SOLUTIONS, id="solutions"),
     ],
@@ -102,7 +102,7 @@ def test_a_damaged_file_is_read_or_refused_in_a_sentence_with_a_line(files: list
     refused: Counter[int] = Counter()
     for number in range(75):
         text, read = chance.choice(files)
-        text = damaged(text, chance, kind=number % 5)
+        text = damage(text, chance, kind=number % 5)
         error = refusal(text, read)
         if error is not None:
             refused[number % 5] += 1
@@ -110,7 +110,7 @@ def test_a_damaged_file_is_read_or_refused_in_a_sentence_with_a_line(files: list
             assert 1 <= (error.line or 1) <= len(text.splitlines())
             assert "\n" not in str(error)
             assert len(str(error)) < 700
-    assert len(refused) == 5, "each kind of damage is noticed at times"
+    assert len(refused) == 5, "every kind of damage is refused at least once"
 
 
 def refusal(text: str, read: Read) -> UserError | None:

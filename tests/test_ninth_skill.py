@@ -46,7 +46,7 @@ def test_simulated_robot_performs_it() -> None:
     assert robot.trace == (Event("wave", "alice"), Event("goto", "lab"), Event("wave", "alice"))
 
 
-def test_what_it_says_yes_or_no_to_is_in_the_trace_and_read_in_its_words() -> None:
+def test_its_yes_or_no_result_is_traced_and_worded() -> None:
     verb = Verb("open", "opens", "opened", "opening", results=("it would not move", "it moved"))
 
     @skill(event="open", verb=verb)
@@ -62,7 +62,7 @@ def test_what_it_says_yes_or_no_to_is_in_the_trace_and_read_in_its_words() -> No
     assert str(step_text(steps_of(robot.trace)[1])) == 'opened "gate": it would not move'
 
 
-def test_a_question_of_its_own_is_shown_with_its_options_and_its_answer() -> None:
+def test_own_question_is_shown_with_options_and_answer() -> None:
     vote = Event("vote", "tea?", (Option("yes"), Option("no")), answer="no")
     (step,) = steps_of((vote,))
     assert str(step_text(step)) == 'did vote "tea?" [yes | no] → no'
@@ -85,7 +85,7 @@ def outcomes() -> dict[str, Outcome]:
     return dict(zip(PROGRAMS, run(pairs, workers=1, skills=TABLE), strict=True))
 
 
-def test_program_calls_it_and_it_stands_in_the_trace(outcomes: dict[str, Outcome]) -> None:
+def test_program_calls_it_and_trace_has_it(outcomes: dict[str, Outcome]) -> None:
     assert outcomes["waves"] == Outcome(
         Status.FINISHED, (Event("goto", "lab"), Event("wave", "alice"), Event("wave", "bob"))
     )
@@ -108,7 +108,7 @@ def test_its_own_error_ends_the_run_as_a_robot_error(outcomes: dict[str, Outcome
         ("no text", "wave: person must be text, not int"),
     ],
 )
-def test_wrong_arguments_are_pythons_type_error_and_leave_no_event(
+def test_wrong_arguments_raise_type_error_and_leave_no_event(
     outcomes: dict[str, Outcome], name: str, message: str
 ) -> None:
     assert outcomes[name] == Outcome(Status.PYTHON_ERROR, (), RunError("TypeError", message), 2)
@@ -126,7 +126,7 @@ def test_formula_judges_it(outcomes: dict[str, Outcome]) -> None:
     assert not holds(parse('tr.Exists(wave("carol"))', skills=TABLE), trace)
 
 
-def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others() -> None:
+def test_traces_of_skills_that_ask_or_look_are_written_and_read() -> None:
     asks = Skill(
         "vote",
         (Parameter("about"), Parameter("options", ValueType(is_list=True), is_options=True)),
@@ -144,7 +144,7 @@ def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others() ->
     assert trace_from(trace_data(trace, table)) == trace
 
 
-def test_a_suite_whose_formulas_know_it_draws_other_worlds(tmp_path: Path) -> None:
+def test_suite_with_a_formula_of_it_draws_worlds(tmp_path: Path) -> None:
     shutil.copytree(SUITES / "plus", tmp_path / "plus")
     task = tmp_path / "plus" / "tasks" / "SayGoodDay.yaml"
     for other in {*task.parent.iterdir()} - {task}:
@@ -160,7 +160,7 @@ def test_a_suite_whose_formulas_know_it_draws_other_worlds(tmp_path: Path) -> No
     assert loaded.with_worlds(10).with_own_worlds() == loaded
 
 
-def test_models_are_told_of_it() -> None:
+def test_prompt_documents_it() -> None:
     prompt = prompt_for("Wave at alice.", skills=TABLE)
     for text in (prompt.messages[0].text, prompt.text):
         assert 'def wave(person: str) -> None:\n    """Wave at a person in the room.\n\n' in text

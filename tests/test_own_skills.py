@@ -44,23 +44,23 @@ RULES = {
     "quadruped": "knock",
     "tidy_arm": "no-pens-in-the-bin",
 }
-TASKS = {"gpsr": 30}  # of the sets that do not have three
+TASKS = {"gpsr": 30}  # The other sets have three tasks each.
 
 
-DEAR = {
+EXPENSIVE_TESTS = {
     *("test_tasks_have_no_findings", "test_an_instruction_becomes_a_program_and_a_mission"),
     *("test_the_rule_is_shown_with_examples", "test_a_suite_is_evaluated_and_mutated_from_the_command_line"),
 }
-"""What is quick with the first set only."""
+"""Tests that are marked slow for all sets but the first."""
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "own" in metafunc.fixturenames:
         first, *others = BREAKS
-        is_dear = metafunc.definition.name in DEAR
+        is_expensive = metafunc.definition.name in EXPENSIVE_TESTS
         sets = [
             first,
-            *(pytest.param(one, marks=[pytest.mark.slow] * (is_dear or one in TASKS)) for one in others),
+            *(pytest.param(one, marks=[pytest.mark.slow] * (is_expensive or one in TASKS)) for one in others),
         ]
         metafunc.parametrize("own", sets, indirect=True)
 
@@ -95,7 +95,7 @@ def own_(request: pytest.FixtureRequest) -> Own:
     return Own(SETS / request.param)
 
 
-def asked(*words: str, status: int = 0) -> str:
+def run_command(*words: str, status: int = 0) -> str:
     done = CliRunner().invoke(app, [*words])
     assert done.exit_code == status, done.output
     return done.output
@@ -113,7 +113,7 @@ def test_each_set_has_its_tasks_and_at_most_ten_lines_a_skill() -> None:
             assert len([line for line in source if line.strip()]) <= 10, skill.name
 
 
-def test_right_programs_pass_and_wrong_ones_fail_as_they_say(own: Own) -> None:
+def test_right_programs_pass_and_wrong_ones_fail_with_the_stated_kind(own: Own) -> None:
     written = [(task, one) for task in own.suite.tasks.values() for one in solutions(task)]
     completions = [
         Completion(
@@ -132,7 +132,7 @@ def test_tasks_have_no_findings(own: Own) -> None:
     assert "warning" not in done.stdout
 
 
-def test_the_check_accepts_right_programs_and_finds_errors_that_nobody_handles(own: Own) -> None:
+def test_check_accepts_right_programs_and_finds_unhandled_errors(own: Own) -> None:
     declared = {kind for skill in own.skills.rows for kind, _ in skill.fails}
     for completion in recorded_completions("recorded:careful", own.suite):
         assert own.problems(completion.program) == [], completion.task
@@ -156,33 +156,33 @@ def test_an_instruction_becomes_a_program_and_a_mission(
     task = next(iter(own.suite.tasks.values()))
     model = ["--model", f"recorded:{own.folder / 'solutions'}"]
     instruction = task.prompts[0]
-    program = asked("generate", instruction, *own.options, *model)
+    program = run_command("generate", instruction, *own.options, *model)
     assert "def task_program():" in program
-    told = asked("generate", instruction, *own.options, *model, "--show-prompt")
-    assert all(f"def {skill}(" in told for skill in own.skills)
+    prompt = run_command("generate", instruction, *own.options, *model, "--show-prompt")
+    assert all(f"def {skill}(" in prompt for skill in own.skills)
     rules = ["--rules", str(own.folder / "rules.yaml")]
-    output = asked("run", instruction, *own.options, *model, *rules, "--yes", "--speed", "0")
+    output = run_command("run", instruction, *own.options, *model, *rules, "--yes", "--speed", "0")
     (mission,) = read_missions(tmp_path)
     assert mission.state == "done", output
-    shown = asked("missions", "last", "--skills", str(own.folder / "skills.py"))
+    shown = run_command("missions", "last", "--skills", str(own.folder / "skills.py"))
     words = {skill.verb.third for skill in own.skills.rows[len(SKILLS) :] if skill.verb}
     assert any(word in shown for word in words), shown
-    asked("missions", "last", "--mcap", str(tmp_path / "mission.mcap"))
+    run_command("missions", "last", "--mcap", str(tmp_path / "mission.mcap"))
     with (tmp_path / "mission.mcap").open("rb") as file:
         topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
     assert topics & {f"/skill/{skill.name}" for skill in own.skills.rows[len(SKILLS) :]}
 
 
 def test_the_command_shows_each_skill_and_tries_it(own: Own) -> None:
-    listed: list[dict[str, Any]] = json.loads(asked("skills", str(own.folder / "skills.py"), "--json"))
+    listed: list[dict[str, Any]] = json.loads(run_command("skills", str(own.folder / "skills.py"), "--json"))
     assert [one["name"] for one in listed] == list(own.skills)
     assert all(one["tried"] for one in listed)
-    shown = "".join(asked("skills", str(own.folder / "skills.py")).split())  # it may be wrapped
+    shown = "".join(run_command("skills", str(own.folder / "skills.py")).split())  # Lines may be wrapped.
     assert all("".join(one["signature"].split()) in shown for one in listed[len(SKILLS) :])
 
 
 def test_the_rule_is_shown_with_examples(own: Own) -> None:
-    shown = asked("rules", str(own.folder / "rules.yaml"), *own.options)
+    shown = run_command("rules", str(own.folder / "rules.yaml"), *own.options)
     assert "keeps it" in shown
     assert "breaks it" in shown
     assert "note:" not in shown

@@ -1,4 +1,4 @@
-"""What is given to others: archives with everything inside, and files that put the tool on a robot."""
+"""Archives contain every file, and the files for robots start the tool with valid options."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import pytest
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parent.parent
 PACKAGING = ROOT / "packaging"
-ON_TOP = {
+TOP_LEVEL = {
     *(
         "CHANGELOG.md",
         "CONTRIBUTING.md",
@@ -34,10 +34,10 @@ ON_TOP = {
     *(path.name for path in ROOT.glob("constraints*.txt")),
     *(".ci", "bench", "environments", "docs", "examples", "packaging", "ros", "src", "tests", "website"),
 }
-"""Of what a source archive is made."""
+"""Files and folders at the top of a source archive."""
 
 
-def built(kind: str, source: Path, out: Path) -> Path:
+def build_archive(kind: str, source: Path, out: Path) -> Path:
     command = [sys.executable, "-m", "hatchling", "build", "--target", kind, "--directory", str(out)]
     subprocess.run(command, cwd=source, check=True, capture_output=True)
     (path,) = out.iterdir()
@@ -46,9 +46,9 @@ def built(kind: str, source: Path, out: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The source archive, unpacked."""
+    """Return the folder of the unpacked source archive."""
     folder = tmp_path_factory.mktemp("source")
-    with tarfile.open(built("sdist", ROOT, folder / "dist")) as archive:
+    with tarfile.open(build_archive("sdist", ROOT, folder / "dist")) as archive:
         archive.extractall(folder, filter="data")
     (unpacked,) = (path for path in folder.iterdir() if path.name != "dist")
     return unpacked
@@ -56,38 +56,38 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return built("wheel", ROOT, tmp_path_factory.mktemp("tree") / "dist")
+    return build_archive("wheel", ROOT, tmp_path_factory.mktemp("tree") / "dist")
 
 
-def files(wheel: Path) -> dict[str, bytes]:
+def read_wheel(wheel: Path) -> dict[str, bytes]:
     with zipfile.ZipFile(wheel) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
 
 
 def test_the_wheel_from_the_archive_is_the_wheel_from_the_tree(source: Path, wheel: Path) -> None:
-    assert files(built("wheel", source, source.parent / "wheel")) == files(wheel)
-    assert {path.name for path in source.iterdir()} == ON_TOP
+    assert read_wheel(build_archive("wheel", source, source.parent / "wheel")) == read_wheel(wheel)
+    assert {path.name for path in source.iterdir()} == TOP_LEVEL
 
 
-def test_what_lies_about_is_not_packed(source: Path, tmp_path: Path) -> None:
+def test_stray_files_are_not_packed(source: Path, tmp_path: Path) -> None:
     tree = tmp_path / "tree"
     shutil.copytree(source, tree)
     for stray in (".env", "program.py", "notes/secret.yaml", "office/secret.yaml", "src/.env"):
         (tree / stray).parent.mkdir(exist_ok=True)
         (tree / stray).write_text("key: sk-1")
-    with tarfile.open(built("sdist", tree, tmp_path / "dist")) as archive:
+    with tarfile.open(build_archive("sdist", tree, tmp_path / "dist")) as archive:
         packed = {name.partition("/")[2] for name in archive.getnames()}
     assert packed == {str(path.relative_to(source)) for path in source.rglob("*") if path.is_file()}
 
 
-def test_all_of_the_packages_is_in_the_wheel(wheel: Path) -> None:
-    packed = files(wheel)
+def test_wheel_contains_all_files_of_the_packages(wheel: Path) -> None:
+    packed = read_wheel(wheel)
     made = {"__pycache__"}
     ours = [path for path in (ROOT / "src").rglob("*") if path.is_file() and not made & set(path.parts)]
     assert {str(path.relative_to(ROOT / "src")) for path in ours} == {
         n for n in packed if ".dist-info/" not in n
     }
-    for known in (  # one of each kind that is no Python of ours
+    for known in (  # one file of each kind other than our own modules
         "roboeval/suites/paper/tasks/LunchTime.yaml",
         "roboeval/suites/paper/solutions/LunchTime.yaml",
         "roboeval/suites/plus/solutions/GetDrink.yaml",
@@ -101,7 +101,7 @@ def test_all_of_the_packages_is_in_the_wheel(wheel: Path) -> None:
     assert "roboeval = roboeval.cli.app:main" in entries
 
 
-def test_the_wheel_judges_where_it_is_installed(wheel: Path, tmp_path: Path) -> None:
+def test_installed_wheel_judges_programs(wheel: Path, tmp_path: Path) -> None:
     pip = [
         sys.executable,
         "-m",
@@ -153,7 +153,7 @@ def test_a_shell_completes_commands_options_and_names(name: str, words: str, com
 
 
 @pytest.mark.parametrize("name", ["codebotler", "roboeval"])
-def test_what_completes_is_a_script_of_the_shell(name: str) -> None:
+def test_completion_script_is_valid_bash(name: str) -> None:
     command = f"{shlex.quote(sys.executable)} -m {name} --show-completion bash; true"
     shown = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=True).stdout
     assert f"_{name}_completion {name}" in shown
@@ -164,7 +164,7 @@ def test_what_completes_is_a_script_of_the_shell(name: str) -> None:
 
 
 @pytest.mark.parametrize("target", ["demo", "test-inspect"])
-def test_nothing_is_made_with_a_python_that_is_too_old(tmp_path: Path, target: str) -> None:
+def test_make_refuses_a_python_that_is_too_old(tmp_path: Path, target: str) -> None:
     needed = re.search(
         r'^requires-python = ">=3\.(\d+)"', (ROOT / "pyproject.toml").read_text(), re.MULTILINE
     )
@@ -198,7 +198,7 @@ def options(words: str) -> set[str]:
     return set(re.findall(r"--[a-z-]+", words))
 
 
-def test_files_for_robots_use_options_that_there_are() -> None:
+def test_files_for_robots_use_existing_options() -> None:
     said = subprocess.run(
         [sys.executable, "-m", "codebotler", "serve", "--help"],
         capture_output=True,
@@ -221,7 +221,7 @@ def test_files_for_robots_use_options_that_there_are() -> None:
         assert "UNTESTED" in untested
 
 
-def test_what_roslaunch_adds_does_not_reach_the_command() -> None:
+def test_node_drops_arguments_of_roslaunch() -> None:
     given = ["serve", "a  b", "__name:=page", "", "__log:=/x/y.log", "c"]
     ended = subprocess.run(
         [str(PACKAGING / "codebotler-node"), "-c", "import sys; print(sys.argv[1:])", *given],
@@ -233,13 +233,13 @@ def test_what_roslaunch_adds_does_not_reach_the_command() -> None:
     assert ended.stdout == "['serve', 'a  b', '', 'c']\n"
 
 
-@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd-analyze is not at hand")
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed")
 def test_systemd_takes_the_service(tmp_path: Path) -> None:
     text = (PACKAGING / "codebotler.service").read_text()
     path = tmp_path / "codebotler.service"
     path.write_text(
         text.replace("/opt/codebotler/bin/codebotler", "/bin/true")
-    )  # must be there to be verified
+    )  # systemd-analyze wants a program that exists.
     ended = subprocess.run(
         ["systemd-analyze", "verify", str(path)], capture_output=True, text=True, check=False
     )

@@ -1,4 +1,4 @@
-"""Processor time is that of a test and of the processes it starts, and the dearest tests are listed."""
+"""Processor time includes that of child processes, and the most expensive tests are listed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from processor_time import ProcessorTime, used
 BURN = "import time\nwhile time.process_time() < {}: pass\n"
 
 
-def test_time_of_this_process_is_used() -> None:
+def test_own_time_counts() -> None:
     before = used()
     until = time.process_time() + 0.01
     while time.process_time() < until:
@@ -23,7 +23,7 @@ def test_time_of_this_process_is_used() -> None:
     assert used() - before >= 0.01
 
 
-def test_time_of_a_child_is_used_while_it_lives_and_when_it_has_ended() -> None:
+def test_time_of_a_child_counts_while_it_runs_and_after_it_ended() -> None:
     before = used()
     script = BURN.format(0.03) + "print(flush=True)\ninput()\n"
     with subprocess.Popen([sys.executable, "-S", "-c", script], stdin=-1, stdout=-1) as child:
@@ -35,7 +35,7 @@ def test_time_of_a_child_is_used_while_it_lives_and_when_it_has_ended() -> None:
 
 
 @pytest.mark.slow
-def test_a_child_is_seen_while_threads_end() -> None:
+def test_time_of_a_child_counts_while_threads_end() -> None:
     script = BURN.format(0.05) + "print(flush=True)\ninput()\n"
     has_ended = threading.Event()
 
@@ -56,20 +56,20 @@ def test_a_child_is_seen_while_threads_end() -> None:
     assert least - before >= 0.04
 
 
-def report(name: str, seconds: float, *markers: str) -> pytest.TestReport:
+def make_report(name: str, seconds: float, *markers: str) -> pytest.TestReport:
     keywords: dict[str, Literal[1]] = dict.fromkeys(markers, 1)
     made = pytest.TestReport(name, ("", 0, ""), keywords, "passed", None, "call")
-    made.processor_time = seconds  # type: ignore[attr-defined]  # as makereport does
+    made.processor_time = seconds  # type: ignore[attr-defined]  # like makereport
     return made
 
 
-def test_the_dearest_are_listed_and_those_that_should_be_slow_counted() -> None:
+def test_lines_list_most_expensive_tests_and_count_unmarked_slow_tests() -> None:
     measured = ProcessorTime()
     for number in range(20):
-        measured.pytest_runtest_logreport(report(f"t{number:02}", number / 100))
-    measured.pytest_runtest_logreport(report("setup and call", 0.06))
-    measured.pytest_runtest_logreport(report("setup and call", 0.06))
-    measured.pytest_runtest_logreport(report("marked", 5, "slow"))
+        measured.pytest_runtest_logreport(make_report(f"t{number:02}", number / 100))
+    measured.pytest_runtest_logreport(make_report("setup and call", 0.06))
+    measured.pytest_runtest_logreport(make_report("setup and call", 0.06))
+    measured.pytest_runtest_logreport(make_report("marked", 5, "slow"))
     first, *others = measured.lines()
     assert first.split() == ["5.00", "s", "marked"]
     assert len(others) == 10

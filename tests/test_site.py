@@ -12,7 +12,7 @@ from codebotler.cli.app import app as codebotler
 from roboeval.cli.app import app as roboeval
 
 ROOT = Path(__file__).parent.parent
-MADE = {
+GENERATED_PAGES = {
     "changes.md",
     "codebotler.md",
     "examples.md",
@@ -39,7 +39,7 @@ def pages(nav: Nav) -> list[str]:
 def test_every_page_is_in_the_navigation_once() -> None:
     nav = pages(yaml.safe_load((ROOT / "mkdocs.yml").read_text())["nav"])
     written = [path.name for path in (ROOT / "docs").glob("*.md")]
-    assert sorted(nav) == sorted([*MADE, *written, "decisions/index.md"])
+    assert sorted(nav) == sorted([*GENERATED_PAGES, *written, "decisions/index.md"])
 
 
 def test_every_decision_is_in_the_index_newest_first_and_its_links_lead_somewhere() -> None:
@@ -56,7 +56,7 @@ def test_every_decision_is_in_the_index_newest_first_and_its_links_lead_somewher
             assert (folder / target).exists(), (name, target)
 
 
-def test_every_command_tells_its_help(build: dict[str, Any]) -> None:
+def test_page_of_a_command_shows_its_help(build: dict[str, Any]) -> None:
     for name, app in (("codebotler", codebotler), ("roboeval", roboeval)):
         page = build["_commands"](name, app)
         for command in app.registered_commands:
@@ -87,7 +87,7 @@ def test_links_to_examples_stay_within_the_site(build: dict[str, Any]) -> None:
         ("<base href='https://a.b/'>", "base https://a.b/"),
     ],
 )
-def test_what_would_be_loaded_from_elsewhere_is_found(
+def test_loads_of_pages_from_elsewhere_are_found(
     build: dict[str, Any], tmp_path: Path, page: str, load: str
 ) -> None:
     (tmp_path / "good.html").write_text(
@@ -106,21 +106,21 @@ def test_what_would_be_loaded_from_elsewhere_is_found(
         *("a { background: url(//a.b/c.png) }", 'a { background: image-set("https://a.b/c.png" 1x) }'),
     ],
 )
-def test_what_a_style_sheet_would_load_is_found(build: dict[str, Any], tmp_path: Path, sheet: str) -> None:
+def test_loads_of_style_sheets_are_found(build: dict[str, Any], tmp_path: Path, sheet: str) -> None:
     (tmp_path / "good.css").write_text("a { background: url(data:image/png;base64,AA) }")
     assert [*build["outside_loads"](tmp_path)] == []
     (tmp_path / "bad.css").write_text(sheet)
     assert len([*build["outside_loads"](tmp_path)]) == 1
 
 
-def test_a_drawing_may_load_nothing_either(build: dict[str, Any], tmp_path: Path) -> None:
+def test_loads_of_drawings_are_found(build: dict[str, Any], tmp_path: Path) -> None:
     drawing = '<svg xmlns="http://www.w3.org/2000/svg"><image href="//a.b/c.png"/></svg>'
     (tmp_path / "bad.svg").write_text(drawing)
     assert [*build["outside_loads"](tmp_path)] == ["bad.svg: image //a.b/c.png"]
 
 
 def test_the_site_is_searched_from_a_folder() -> None:
-    """By a worker of our own: without one of its name, the builder would have it loaded from a server."""
+    """Our own worker searches; without it, the builder would load one from a server."""
     configured = yaml.safe_load((ROOT / "mkdocs.yml").read_text())
     assert "offline" in configured["plugins"]
     (worker,) = configured["extra"]["polyfills"]

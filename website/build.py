@@ -23,7 +23,7 @@ import roboeval.cli.app
 ROOT = Path(__file__).parent.parent
 PAGES, SITE = ROOT / "build" / "pages", ROOT / "build" / "site"
 
-WIDTH = 82  # letters in a line of `--help` here
+WIDTH = 82  # Letters in a line of `--help` on the site.
 
 MODULES = {
     "codebotler": (
@@ -50,11 +50,11 @@ MODULES = {
         "roboeval.training.rollouts",
     ),
 }
-"""The packages, whose names are public, and the modules that are documented; see docs/library.md."""
+"""The packages, whose names are public, and their documented modules; see docs/library.md."""
 
 
 def main() -> None:
-    """Put the pages together, build the site, and look for what it would load."""
+    """Collect the pages, build the site, and fail if it would load anything from elsewhere."""
     shutil.rmtree(ROOT / "build" / "pages", ignore_errors=True)
     shutil.rmtree(SITE, ignore_errors=True)
     shutil.copytree(ROOT / "docs", PAGES)
@@ -72,7 +72,7 @@ def main() -> None:
         command, cwd=ROOT, check=False, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
     )
     if ended.returncode != 0 or re.search(r"warning|^griffe:", ended.stdout, re.IGNORECASE | re.MULTILINE):
-        sys.exit(f"{ended.stdout}\nthe site was not built, or with warnings, which are errors")
+        sys.exit(f"{ended.stdout}\nthe site was not built, or has warnings; warnings count as errors")
     if loads := [*outside_loads(SITE)]:
         sys.exit("\n".join(["the site would load from elsewhere:", *loads]))
     print(f"{sum(1 for _ in SITE.rglob('*.html'))} pages are in {SITE}")
@@ -82,7 +82,7 @@ def main() -> None:
 
 
 def _within(text: str) -> str:
-    """A page with links that stay within the site."""
+    """Return a page with links that stay within the site."""
     text = re.sub(r"\]\(\.\./examples/([\w./]+\.\w+)\)", lambda m: f"](examples.md#{_anchor(m[1])})", text)
     text = re.sub(r"\]\(\.\./examples/\w+\)", "](examples.md)", text)
     return text.replace("](../CHANGELOG.md)", "](changes.md)")
@@ -116,7 +116,7 @@ def _python(package: str) -> str:
 
 
 def _commands(name: str, app: typer.Typer) -> str:
-    group: Any = typer.main.get_command(app)  # of click, or of typer's own copy of it, by the version
+    group: Any = typer.main.get_command(app)  # Of click or typer, depending on the version.
     parts = [f"# {name}", f"```text\n{_help(group, name)}\n```"]
     for verb, command in sorted(group.commands.items()):
         parts += [f"## {name} {verb}", f"```text\n{_help(command, f'{name} {verb}')}\n```"]
@@ -128,13 +128,13 @@ def _help(command: Any, name: str) -> str:
     return str(command.get_help(context))
 
 
-# --- what a browser would load
+# --- loads from elsewhere
 
 
-LOADS = {"src", "srcset", "imagesrcset", "poster", "data", "background", "xlink:href"}  # of any element
-HREF_LOADS = {"link", "base", "image", "feimage", "use"}  # of others, `href` only leads somewhere
+LOADS = {"src", "srcset", "imagesrcset", "poster", "data", "background", "xlink:href"}  # Of every element.
+HREF_LOADS = {"link", "base", "image", "feimage", "use"}  # Elsewhere `href` is only a link.
 LISTS = {"srcset", "imagesrcset"}
-NO_LOAD = {"canonical", "next", "prev", "license"}  # a link that is only told
+NO_LOAD = {"canonical", "next", "prev", "license"}  # Browsers load none of these links.
 ELSEWHERE = re.compile(r"(?:https?:|ftp:|wss?:|[\\/]{2})", re.IGNORECASE)
 SHEET_LOADS = re.compile(
     r"(?:@import|url\(|image-set\()\s*(?:url\(\s*)?[\"']?\s*((?:https?:|[\\/]{2})[^\"')\s]+)", re.IGNORECASE
@@ -142,7 +142,7 @@ SHEET_LOADS = re.compile(
 
 
 def _of_sheet(text: str) -> list[str]:
-    """Addresses elsewhere that a style sheet, or a part of one, would load from."""
+    """Return the outside addresses that a style sheet, or a part of one, would load."""
     return [str(address) for address in SHEET_LOADS.findall(re.sub(r"/\*.*?\*/", " ", text, flags=re.DOTALL))]
 
 
@@ -154,9 +154,9 @@ class _Loads(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.in_style = tag == "style"
-        is_told = tag == "link" and dict(attrs).get("rel") in NO_LOAD
+        is_no_load = tag == "link" and dict(attrs).get("rel") in NO_LOAD
         for name, value in attrs:
-            loads = name in LOADS or (name == "href" and tag in HREF_LOADS and not is_told)
+            loads = name in LOADS or (name == "href" and tag in HREF_LOADS and not is_no_load)
             addresses = (value or "").split(",") if name in LISTS else [value or ""]
             near = (address.strip() for address in addresses if loads)
             self.found += [f"{tag} {address}" for address in near if ELSEWHERE.match(address)]
@@ -180,7 +180,7 @@ def _of_page(text: str) -> list[str]:
 
 
 def outside_loads(site: Path) -> Iterator[str]:
-    """What pages, drawings and style sheets of a site would load from elsewhere; of scripts nothing is known.
+    """Yield each outside address that pages, drawings and style sheets of a site load; scripts are not read.
 
     Args:
         site: its folder.

@@ -12,7 +12,7 @@ HEAD = "## All modules\n"
 
 
 def section() -> str:
-    """The section, a table for each room."""
+    """Return the section, with a table for each room."""
     parts = [HEAD.strip(), "The first line of each module; `python website/modules.py` writes this list."]
     for package in ("codebotler", "roboeval"):
         source = ROOT / "src" / package
@@ -37,13 +37,13 @@ def _rows(room: Path) -> Iterator[str]:
 
 
 def first_line(path: Path) -> str:
-    """The first line of a module's docstring."""
+    """Return the first line of a module's docstring."""
     found = re.match(r'"""(.*?)(?:"""|$)', path.read_text(), re.MULTILINE)
     return found[1].replace("|", "\\|") if found else ""
 
 
 def page() -> str:
-    """The page with the section as it should be."""
+    """Return the page with an up-to-date section."""
     return PAGE.read_text().partition(HEAD)[0].rstrip() + "\n\n" + section()
 
 

@@ -10,7 +10,7 @@ from html import escape
 from modules import ROOT, first_line
 
 PICTURE = ROOT / "docs" / "pictures" / "rooms.svg"
-WIDE, GAP, HEAD, LINE = 880, 8, 34, 15  # in pixels: all, between rooms, above a package, a line of text
+WIDE, GAP, HEAD, LINE = 880, 8, 34, 15  # Pixels of the picture, gaps, package heads and lines.
 STYLE = """
 text { font: 12px system-ui, sans-serif; fill: #46525f }
 .room { font-weight: 600; font-size: 14px; fill: #14202c }
@@ -25,7 +25,7 @@ rect { fill: #eef3f8; stroke: #b9c6d3 }
 
 
 def picture() -> str:
-    """Both packages, one below the other; a layer imports only what is below it."""
+    """Return a picture of both packages, where each layer imports only from layers below it."""
     parts, top = [], 0
     for package in ("roboeval", "codebotler"):
         parts.append(f'<text class="package" x="0" y="{top + 20}">{package}</text>')
@@ -50,18 +50,18 @@ def picture() -> str:
 
 
 def _layers(package: str) -> list[str]:
-    """The layers of a package, from the top, as pyproject.toml has them."""
+    """Return the layers of a package in pyproject.toml, from the top."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
     layers: list[str] = next(one["layers"] for one in contracts if one.get("containers") == [package])
     return layers
 
 
 def _layer(package: str, rooms: Sequence[str], top: int) -> tuple[list[str], int]:
-    """A layer, and its height: the text of a room that is alone in it stands beside the name."""
+    """Return a layer and its height; the text of a single room is beside its name, not below."""
     is_alone = len(rooms) == 1
     wide = (WIDE - GAP * (len(rooms) - 1)) // len(rooms)
     right, down = (112, 0) if is_alone else (12, 17)
-    texts = [textwrap.wrap(_what(package, room), (wide - right) // 6 - 6) for room in rooms]
+    texts = [textwrap.wrap(_description(package, room), (wide - right) // 6 - 6) for room in rooms]
     high = LINE * max(map(len, texts)) + down + 17
     drawn = []
     for number, (room, lines) in enumerate(zip(rooms, texts, strict=True)):
@@ -74,7 +74,7 @@ def _layer(package: str, rooms: Sequence[str], top: int) -> tuple[list[str], int
     return drawn, high
 
 
-def _what(package: str, room: str) -> str:
+def _description(package: str, room: str) -> str:
     return first_line(ROOT / "src" / package / room / "__init__.py").replace("`", "").rstrip(".")
 
 

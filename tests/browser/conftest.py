@@ -1,4 +1,4 @@
-"""A real browser (the system's Chromium, by Playwright) in front of the page as a user starts it."""
+"""Fixtures that show the page in a real browser: the system's Chromium, driven by Playwright."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_play
 from pageserver import PageServer
 from viewing import DESK, OpenPage, Shoot, chromium
 
-QUIETLY = [
+CHROMIUM_OPTIONS = [
     "--no-sandbox",
     "--disable-gpu",
     "--disable-background-networking",
     "--disable-sync",
     "--no-first-run",
-    "--ignore-certificate-errors",  # a test's proxy signs its certificate itself
+    "--ignore-certificate-errors",  # A test's proxy has a self-signed certificate.
 ]
-SECONDS = 60.0  # a busy machine is no fault of the page
+TIMEOUT_SECONDS = 60.0  # A busy machine may be slow.
 
 
 ONLY_FOR_SHOTS = {
@@ -37,7 +37,7 @@ ONLY_FOR_SHOTS = {
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Without --shots, look at a large and a small screen, one of them light and one dark."""
+    """Without --shots, test one large and one small screen, one of them light and the other dark."""
     if config.getoption("--shots"):
         return
     left = [item for item in items if item.name in ONLY_FOR_SHOTS]
@@ -50,28 +50,28 @@ def browser() -> Iterator[Browser]:
     path = chromium()
     if path is None:
         pytest.skip("there is no Chromium here: apt-get install chromium-headless-shell")
-    expect.set_options(timeout=SECONDS * 1000)
+    expect.set_options(timeout=TIMEOUT_SECONDS * 1000)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=QUIETLY)
+        browser = playwright.chromium.launch(executable_path=path, args=CHROMIUM_OPTIONS)
         yield browser
         browser.close()
 
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
-    """A page with a simulated robot in a small house, where two seconds pass in one."""
+    """Serve a page with a simulated robot in a small house, at twice the normal speed."""
     with PageServer(tmp_path_factory.mktemp("page"), "--speed", "2") as server:
         yield server
 
 
 @pytest.fixture
-def opened(browser: Browser) -> Iterator[OpenPage]:
-    """Opens pages in browsers of their own, and takes amiss whatever any of them complains about."""
+def open_page(browser: Browser) -> Iterator[OpenPage]:
+    """Open pages in separate browsers, and fail the test if any of them reports an error or a warning."""
     complaints: list[str] = []
 
     expected: list[str] = []
 
-    def heard(message: ConsoleMessage) -> None:
+    def on_console(message: ConsoleMessage) -> None:
         if message.type in {"error", "warning"} and not any(each in message.text for each in expected):
             complaints.append(f"{message.text} at {message.location}")
 
@@ -98,13 +98,13 @@ def opened(browser: Browser) -> Iterator[OpenPage]:
                 contexts.callback(context.close)
             else:
                 context = beside.context
-            context.set_default_timeout(SECONDS * 1000)
+            context.set_default_timeout(TIMEOUT_SECONDS * 1000)
             page = context.new_page()
             page.add_init_script(script)
-            page.on("console", heard)
+            page.on("console", on_console)
             page.on("pageerror", lambda error: complaints.append(str(error)))
             page.goto(link or server.link.replace("/?", f"/{path}?"))
-            # Until then, NiceGUI may send what is typed after the key that is pressed next.
+            # Before the handshake, NiceGUI may send typed text after the key that follows it.
             page.wait_for_function("() => !window.socket || window.did_handshake")
             return page
 
@@ -114,7 +114,7 @@ def opened(browser: Browser) -> Iterator[OpenPage]:
 
 @pytest.fixture
 def shoot(pytestconfig: pytest.Config) -> Shoot:
-    """Takes a screenshot into the folder of --shots, if that is given."""
+    """Return a function that saves a screenshot in the folder of --shots, if there is one."""
     folder = pytestconfig.getoption("--shots")
 
     def shoot(page: Page, name: str, *, full_page: bool = True) -> None:

@@ -1,4 +1,4 @@
-"""Takes the pictures of the guide: python pictures.py SHOTS docs/pictures.
+"""Makes the pictures of the guide: python pictures.py SHOTS docs/pictures.
 
 SHOTS holds the screenshots of tests, and in report/ a report of the programs that ship with the package.
 """
@@ -20,14 +20,14 @@ CHOSEN = {
     "report-tasks": "report/figures/tasks.png",
     "report-causes": "report/figures/causes.png",
 }
-"""Each picture, and what it is made from."""
+"""The source of each picture, in the folder of screenshots."""
 
 WIDEST, TALLEST, COLOURS = 1200, 850, 128
-"""Pixels of a picture; those of a tablet are half as wide and not cut off."""
+"""Limits of a picture, in pixels and colours; narrow screenshots get half the width."""
 
 
 def main() -> None:
-    """Shrink those that are chosen, so that they are quickly loaded."""
+    """Shrink the chosen screenshots, so that they load quickly."""
     shots, pictures = map(Path, sys.argv[1:])
     pictures.mkdir(exist_ok=True)
     for name, path in CHOSEN.items():

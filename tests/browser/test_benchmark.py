@@ -1,4 +1,4 @@
-"""The benchmark in a real browser: from all runs to one failed check, filtered, live, and safe from texts."""
+"""The benchmark in a real browser: navigation, filters, live updates, and texts that stay text."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from viewing import DESK, PHONE, SCREENS, OpenPage, Screen, Shoot, expect_no_gra
 
 TASKS = "SayGoodDay,LunchBreak,StaplerSupply"
 LONGEST = 1_000
-"""A longer text is looked at on a large screen, too."""
+"""Longer texts are tested on a large screen, too."""
 
 
-def made(folder: Path, model: str, *arguments: str, count: int = 3) -> Path:
-    """A run that is made on the spot."""
+def make_run(folder: Path, model: str, *arguments: str, count: int = 3) -> Path:
+    """Make a run of a recorded model; return its folder."""
     path = folder / model
     words = ("--model", f"recorded:{model}", "--num-completions", count, "--no-report", "--out", path)
     ended = forked("roboeval", "run", *map(str, words), *arguments)
@@ -40,8 +40,8 @@ def made(folder: Path, model: str, *arguments: str, count: int = 3) -> Path:
     return path
 
 
-def grown(run: RunFolder, times: int) -> None:
-    """Let a run have each of its completions so many times, with other indices."""
+def repeat_completions(run: RunFolder, times: int) -> None:
+    """Repeat all completions of a run, with other indices."""
     for path in (run.completions, run.rows("paper")):
         rows = [json.loads(line) for line in path.read_bytes().splitlines()]
         most = 1 + max(row["index"] for row in rows)
@@ -52,46 +52,46 @@ def grown(run: RunFolder, times: int) -> None:
 
 
 @pytest.fixture(scope="module")
-def real(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two real runs of all tasks."""
+def real_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with two real runs of all tasks."""
     folder = tmp_path_factory.mktemp("real") / "runs"
     folder.mkdir()
-    made(folder, "hasty")
-    made(folder, "careful", count=1)
+    make_run(folder, "hasty")
+    make_run(folder, "careful", count=1)
     return folder
 
 
 @pytest.fixture(scope="module")
-def served(real: Path) -> Iterator[PageServer]:
-    with serving(real) as server:
+def real_server(real_runs: Path) -> Iterator[PageServer]:
+    with serving(real_runs) as server:
         yield server
 
 
 @pytest.fixture
-def runs(real: Path, tmp_path: Path) -> Path:
-    """A folder with a copy of one, to be changed at will."""
+def hasty_copy(real_runs: Path, tmp_path: Path) -> Path:
+    """Return a folder with a copy of one real run, which a test may change."""
     folder = tmp_path / "runs"
-    shutil.copytree(real / "hasty", folder / "hasty")
+    shutil.copytree(real_runs / "hasty", folder / "hasty")
     return folder
 
 
 @pytest.fixture(scope="module")
-def few(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small run."""
+def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a small run."""
     folder = tmp_path_factory.mktemp("few")
-    return made(folder, "hasty", "--tasks", TASKS, count=1)
+    return make_run(folder, "hasty", "--tasks", TASKS, count=1)
 
 
 @pytest.fixture
-def few_runs(few: Path, tmp_path: Path) -> Path:
-    """A folder with a copy of it, to be changed at will."""
+def small_copy(small_run: Path, tmp_path: Path) -> Path:
+    """Return a folder with a copy of the small run, which a test may change."""
     folder = tmp_path / "runs"
-    shutil.copytree(few, folder / "hasty")
+    shutil.copytree(small_run, folder / "hasty")
     return folder
 
 
-def test_from_all_runs_to_one_failed_check(served: PageServer, opened: OpenPage) -> None:
-    page = opened(served)
+def test_from_all_runs_to_one_failed_check(real_server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(real_server)
     expect(page.locator(".runs tbody tr")).to_have_count(2)
     expect(page.locator(".runs tbody tr", has_text="hasty")).to_contain_text("programs written by hand")
     for box in page.get_by_role("checkbox").all():
@@ -133,9 +133,9 @@ def test_from_all_runs_to_one_failed_check(served: PageServer, opened: OpenPage)
     expect(page.locator("#count")).to_have_text("18 completions")
 
 
-def test_the_page_tells_what_show_tells(served: PageServer, real: Path, opened: OpenPage) -> None:
-    shown = json.loads(forked("roboeval", "show", real / "hasty", "CountSavory/0/1", "--json").out)
-    page = opened(served, "runs/hasty/CountSavory/0/1")
+def test_page_shows_output_of_show(real_server: PageServer, real_runs: Path, open_page: OpenPage) -> None:
+    shown = json.loads(forked("roboeval", "show", real_runs / "hasty", "CountSavory/0/1", "--json").out)
+    page = open_page(real_server, "runs/hasty/CountSavory/0/1")
     expect(page.locator(".instruction")).to_have_text(shown["instruction"])
     program = "\n".join(page.locator(".program .line .text").all_inner_texts())
     assert program == shown["program"].rstrip("\n")
@@ -150,16 +150,16 @@ def test_the_page_tells_what_show_tells(served: PageServer, real: Path, opened: 
             expect(article.locator(".failed-check")).to_contain_text(check["explanation"])
 
 
-def test_a_line_that_ends_a_program_is_marked(served: PageServer, opened: OpenPage) -> None:
-    page = opened(served, "runs/hasty/LunchBreak/0/0")
+def test_a_line_that_ends_a_program_is_marked(real_server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(real_server, "runs/hasty/LunchBreak/0/0")
     expect(page.locator(".program .marked")).to_contain_text("go_to")
     expect(page.locator(".world-of .trouble").first).to_contain_text("there is no room")
 
 
 def test_reply_without_a_program_is_explained_and_its_texts_are_folded(
-    few_runs: Path, opened: OpenPage
+    small_copy: Path, open_page: OpenPage
 ) -> None:
-    run = RunFolder(few_runs / "hasty")
+    run = RunFolder(small_copy / "hasty")
     said = {"no_program": "cut-off", "finish_reason": "length", "latency_s": 2.5}
     said |= {"usage": {"input_tokens": 900, "output_tokens": 512, "reasoning_tokens": 400}}
     said |= {"reasoning": "Let me think <b>hard</b>.", "raw_reply": "I will"}
@@ -175,8 +175,8 @@ def test_reply_without_a_program_is_explained_and_its_texts_are_folded(
             row["verdicts"][0]["satisfied"] = False
     run.rows("paper").write_bytes(b"".join(map(to_line, judged)))
     unseal(run.path)
-    with serving(few_runs) as server:
-        page = opened(server, f"runs/hasty/{name}")
+    with serving(small_copy) as server:
+        page = open_page(server, f"runs/hasty/{name}")
         expect(page.locator(".facts .state")).to_have_text("no program: cut-off")
         expect(page.locator(".worlds-of .trouble")).to_have_text(NO_PROGRAM_SENTENCES["cut-off"])
         expect(page.locator(".world-of")).to_have_count(0)
@@ -192,8 +192,8 @@ def test_reply_without_a_program_is_explained_and_its_texts_are_folded(
         page.context.close()
 
 
-def test_what_is_chosen_stands_in_the_address(served: PageServer, opened: OpenPage) -> None:
-    page = opened(served, "runs/hasty")
+def test_address_keeps_the_selection(real_server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(real_server, "runs/hasty")
     page.get_by_role("link", name=re.compile("^SayGoodDay, prompt 3")).click()
     expect(page.locator(".completions-view a")).to_have_text([f"SayGoodDay/3/{n}" for n in range(3)])
     assert page.url.endswith("/runs/hasty?task=SayGoodDay&prompt=3")
@@ -202,8 +202,8 @@ def test_what_is_chosen_stands_in_the_address(served: PageServer, opened: OpenPa
     expect(page.locator("[aria-current=true]", has_text=re.compile(r"^\d+$"))).to_have_count(1)
 
 
-def test_everything_is_reached_with_the_keyboard(served: PageServer, opened: OpenPage) -> None:
-    page = opened(served, "runs/hasty")
+def test_everything_works_with_the_keyboard(real_server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(real_server, "runs/hasty")
     page.get_by_role("link", name=re.compile("^LunchBreak, prompt 1")).focus()
     page.keyboard.press("Enter")
     expect(page.locator("#count")).to_have_text("3 completions")
@@ -226,10 +226,10 @@ def test_everything_is_reached_with_the_keyboard(served: PageServer, opened: Ope
     expect(page.locator("h1")).to_have_text("WeatherPoll/4/2")
 
 
-def test_a_long_list_has_few_rows_in_the_page(runs: Path, opened: OpenPage) -> None:
-    grown(RunFolder(runs / "hasty"), 17)
-    with serving(runs) as server:
-        page = opened(server, "runs/hasty")
+def test_a_long_list_has_few_rows_in_the_page(hasty_copy: Path, open_page: OpenPage) -> None:
+    repeat_completions(RunFolder(hasty_copy / "hasty"), 17)
+    with serving(hasty_copy) as server:
+        page = open_page(server, "runs/hasty")
         expect(page.locator("#count")).to_have_text("4,080 completions")
         for share, wanted in ((1.0, 4081), (0.5, None), (0.0, 2)):
             page.locator(".completions-view").evaluate(
@@ -243,9 +243,9 @@ def test_a_long_list_has_few_rows_in_the_page(runs: Path, opened: OpenPage) -> N
         page.context.close()
 
 
-def test_a_run_is_followed_while_it_is_made(runs: Path, opened: OpenPage) -> None:
-    """The test writes what a model's slow replies would, line by line, under the lock of a writer."""
-    whole, run = RunFolder(runs / "hasty"), RunFolder(runs / "growing")
+def test_a_run_is_followed_while_it_is_made(hasty_copy: Path, open_page: OpenPage) -> None:
+    """Write lines in steps, as for slow replies of a model, under the lock of a writer."""
+    whole, run = RunFolder(hasty_copy / "hasty"), RunFolder(hasty_copy / "growing")
     lines = {
         path: (whole.path / path).read_bytes().splitlines(keepends=True)
         for path in ("completions.jsonl", "evaluations/paper.jsonl")
@@ -258,10 +258,10 @@ def test_a_run_is_followed_while_it_is_made(runs: Path, opened: OpenPage) -> Non
 
     run.path.mkdir()
     shutil.copy(whole.about, run.about)
-    with serving(runs) as server:
+    with serving(hasty_copy) as server:
         with run.writing():
             write("completions.jsonl", 0, 60)
-            everything, page = opened(server), opened(server, "runs/growing")
+            everything, page = open_page(server), open_page(server, "runs/growing")
             row = everything.locator(".runs tbody tr", has_text="growing")
             expect(row.locator(".state")).to_have_text("being generated")
             expect(row).to_contain_text("60 of 240 written")
@@ -287,11 +287,11 @@ def test_a_run_is_followed_while_it_is_made(runs: Path, opened: OpenPage) -> Non
             each.context.close()
 
 
-def test_a_real_run_appears_as_it_is_made(tmp_path: Path, opened: OpenPage) -> None:
+def test_a_real_run_appears_as_it_is_made(tmp_path: Path, open_page: OpenPage) -> None:
     folder = tmp_path / "runs"
     folder.mkdir()
     with serving(folder) as server:
-        page = opened(server)
+        page = open_page(server)
         expect(page.get_by_text("There are no runs yet.")).to_be_visible()
         command = [
             "run",
@@ -319,11 +319,11 @@ def test_a_real_run_appears_as_it_is_made(tmp_path: Path, opened: OpenPage) -> N
         page.context.close()
 
 
-def test_a_run_that_is_deleted_while_it_is_looked_at(few_runs: Path, opened: OpenPage) -> None:
-    with serving(few_runs) as server:
-        page = opened(server, "runs/hasty", expecting="404")
+def test_open_page_reports_that_its_run_was_deleted(small_copy: Path, open_page: OpenPage) -> None:
+    with serving(small_copy) as server:
+        page = open_page(server, "runs/hasty", expecting="404")
         expect(page.locator("#count")).to_have_text("15 completions")
-        shutil.rmtree(few_runs / "hasty")
+        shutil.rmtree(small_copy / "hasty")
         expect(page.get_by_role("alert")).to_have_text(re.compile("^This run was deleted"))
         expect(page.locator(".heat td").first).to_be_visible()
         page.reload()
@@ -333,31 +333,31 @@ def test_a_run_that_is_deleted_while_it_is_looked_at(few_runs: Path, opened: Ope
         page.context.close()
 
 
-def test_a_damaged_row_is_said(few_runs: Path, opened: OpenPage) -> None:
-    rows = RunFolder(few_runs / "hasty").rows("paper")
+def test_damaged_row_is_reported(small_copy: Path, open_page: OpenPage) -> None:
+    rows = RunFolder(small_copy / "hasty").rows("paper")
     lines = rows.read_bytes().splitlines(keepends=True)
     rows.write_bytes(b"".join([*lines[:10], b"{broken\n", *lines[11:]]))
-    with serving(few_runs) as server:
-        page = opened(server, "runs/hasty")
+    with serving(small_copy) as server:
+        page = open_page(server, "runs/hasty")
         expect(page.get_by_role("alert")).to_contain_text("paper.jsonl, line 11: this line is not an eval")
         page.context.close()
 
 
-def test_an_address_of_nothing_says_so(served: PageServer, opened: OpenPage) -> None:
+def test_unknown_addresses_are_reported(real_server: PageServer, open_page: OpenPage) -> None:
     for path, sentence in (
         ("runs/none", 'this folder has no run "none"; it may have been deleted'),
         ("runs/hasty/LunchBreak/0/99", 'this run has no completion "LunchBreak/0/99"'),
         ("runs/hasty?evaluation=none", '"hasty" has no evaluation "none"'),
     ):
-        page = opened(served, expecting="404")
-        page.goto(f"{served.inside}/{path}")
+        page = open_page(real_server, expecting="404")
+        page.goto(f"{real_server.inside}/{path}")
         expect(page.get_by_role("alert")).to_have_text(sentence)
 
 
-# --- texts
+# --- hostile texts
 
 
-def changed(run: RunFolder, change: Callable[[dict[str, Any], dict[str, Any]], None]) -> None:
+def rewrite_run(run: RunFolder, change: Callable[[dict[str, Any], dict[str, Any]], None]) -> None:
     """Rewrite a run's completions and their rows."""
     completions = [json.loads(line) for line in run.completions.read_bytes().splitlines()]
     rows = [json.loads(line) for line in run.rows("paper").read_bytes().splitlines()]
@@ -379,12 +379,12 @@ def expect_unharmed(page: Page, before: int) -> None:
 
 
 @pytest.mark.parametrize("evil", EVIL, ids=NAMES)
-def test_no_text_becomes_more_than_text(few: Path, tmp_path: Path, opened: OpenPage, evil: str) -> None:
-    """A program, a model, an instruction, an error, a check, a world, a room, a task, a run, a file."""
+def test_hostile_text_stays_text(small_run: Path, tmp_path: Path, open_page: OpenPage, evil: str) -> None:
+    """Programs, models, instructions, errors, checks, worlds, rooms, tasks, runs and files have the text."""
     name = "".join(c for c in evil if c.isprintable()).replace("/", "|")[:80].strip()
-    whole = evil.encode(errors="replace").decode()  # a name in an address holds no half character
+    whole = evil.encode(errors="replace").decode()  # An address cannot hold lone surrogates.
     run = RunFolder(tmp_path / "runs" / name)
-    shutil.copytree(few, run.path)
+    shutil.copytree(small_run, run.path)
 
     def make_evil(completion: dict[str, Any], row: dict[str, Any]) -> None:
         completion |= {"program": evil * 3, "model": evil, "instruction": evil}
@@ -405,13 +405,13 @@ def test_no_text_becomes_more_than_text(few: Path, tmp_path: Path, opened: OpenP
             check = row["failure"]["check"] and evil
             row["failure"] |= {"class": whole[:300], "kind": whole[:300], "check": check}
 
-    changed(run, make_evil)
+    rewrite_run(run, make_evil)
     head = json.loads(run.manifest("paper").read_text())
     shutil.copy(run.rows("paper"), run.rows(name))
     shutil.copy(run.manifest("paper"), run.manifest(name))
     with serving(run.path.parent) as server:
         for size in (DESK, PHONE) if len(evil) > LONGEST else (PHONE,):
-            page = opened(server, size=size)
+            page = open_page(server, size=size)
             expect(page.locator(".runs tbody tr")).to_have_count(1)
             count = page.locator(OWN_TAGS).count()
             expect_unharmed(page, count)
@@ -426,7 +426,7 @@ def test_no_text_becomes_more_than_text(few: Path, tmp_path: Path, opened: OpenP
             page.locator("summary", has_text="All steps").first.click()
             expect(page.locator(".unfolded pre")).to_be_visible()
             shown = page.locator(".program").inner_text()
-            assert "".join(shown.split())[1:8] == "".join(visible(evil).split())[:7]
+            assert "".join(shown.split())[1:8] == "".join(escape_invisible(evil).split())[:7]
             expect_unharmed(page, count)
             page.goto(f"{server.inside}/runs")
             page.get_by_role("checkbox").check()
@@ -437,16 +437,16 @@ def test_no_text_becomes_more_than_text(few: Path, tmp_path: Path, opened: OpenP
     assert head["suite"] == "paper"
 
 
-def visible(text: str) -> str:
+def escape_invisible(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def test_nothing_runs_in_a_report_that_comes_with_a_run(
-    served: PageServer, real: Path, opened: OpenPage
+    real_server: PageServer, real_runs: Path, open_page: OpenPage
 ) -> None:
-    report = real / "hasty" / "report"
-    page = opened(served, expecting="Blocked script execution")
-    page.goto(f"{served.inside}/runs/hasty")
+    report = real_runs / "hasty" / "report"
+    page = open_page(real_server, expecting="Blocked script execution")
+    page.goto(f"{real_server.inside}/runs/hasty")
     expect(page.locator(".completions-view a").first).to_be_visible()
     assert page.get_by_text("Report of this run").count() == 0
     report.mkdir()
@@ -460,13 +460,13 @@ def test_nothing_runs_in_a_report_that_comes_with_a_run(
     shutil.rmtree(report)
 
 
-def test_three_runs_are_compared_pair_by_pair(few: Path, tmp_path: Path, opened: OpenPage) -> None:
+def test_three_runs_are_compared_pair_by_pair(small_run: Path, tmp_path: Path, open_page: OpenPage) -> None:
     folder = tmp_path / "runs"
     for name in ("a", "b"):
-        shutil.copytree(few, folder / name)
-    made(folder, "careful", "--tasks", "SayGoodDay", count=1)
+        shutil.copytree(small_run, folder / name)
+    make_run(folder, "careful", "--tasks", "SayGoodDay", count=1)
     with serving(folder) as server:
-        page = opened(server)
+        page = open_page(server)
         page.goto(f"{server.inside}/side-by-side?run=a&run=b&run=careful")
         expect(page.locator(".pairs li")).to_have_count(3)
         expect(page.locator(".heat td", has_text="no completions")).to_have_count(2)
@@ -477,17 +477,17 @@ def test_three_runs_are_compared_pair_by_pair(few: Path, tmp_path: Path, opened:
         page.context.close()
 
 
-# --- looks
+# --- layout
 
 
 @pytest.mark.parametrize("size", [(1366, 900), PHONE])
-def test_nothing_is_squeezed_or_hidden(served: PageServer, opened: OpenPage, size: tuple[int, int]) -> None:
-    page = opened(served, size=size)
+def test_layout_shows_everything(real_server: PageServer, open_page: OpenPage, size: tuple[int, int]) -> None:
+    page = open_page(real_server, size=size)
     expect(page.locator(".bar .pages")).to_be_visible(visible=size != PHONE)
-    page.goto(f"{served.inside}/runs/hasty")
+    page.goto(f"{real_server.inside}/runs/hasty")
     expect(page.locator(".kind", has_text="failed checks")).to_be_visible()
     assert page.locator(".ends").evaluate("e => e.scrollHeight <= e.clientHeight")
-    page.goto(f"{served.inside}/side-by-side?run=careful&run=hasty")
+    page.goto(f"{real_server.inside}/side-by-side?run=careful&run=hasty")
     expect(page.locator(".differences tbody tr").first).to_be_visible()
     heights = page.locator(".differences tbody tr").evaluate_all("rows => rows.map(row => row.clientHeight)")
     assert max(heights) < 60
@@ -498,9 +498,9 @@ def test_nothing_is_squeezed_or_hidden(served: PageServer, opened: OpenPage, siz
 
 
 @pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])
-def test_pages(served: PageServer, opened: OpenPage, shoot: Shoot, screen: Screen) -> None:
+def test_pages(real_server: PageServer, open_page: OpenPage, shoot: Shoot, screen: Screen) -> None:
     which, size, dark = screen
-    page = opened(served, size=size, dark=dark)
+    page = open_page(real_server, size=size, dark=dark)
 
     def look(name: str) -> None:
         page.evaluate("scrollTo(0, 0)")

@@ -64,8 +64,8 @@ def ask(server: PageServer) -> None:
     server.call("POST", "/api/missions", {"instruction": INSTRUCTION})
 
 
-def test_a_card_for_each_behaviour_and_one_answer(server: PageServer, opened: OpenPage, shoot: Shoot) -> None:
-    page = opened(server)
+def test_page_offers_a_card_for_each_behaviour(server: PageServer, open_page: OpenPage, shoot: Shoot) -> None:
+    page = open_page(server)
     ask(server)
     cards = page.locator(".which .card")
     expect(cards).to_have_count(3)
@@ -88,15 +88,15 @@ def test_a_card_for_each_behaviour_and_one_answer(server: PageServer, opened: Op
 
 @pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
 def test_a_recorded_model_offers_no_field_for_a_sentence(
-    server: PageServer, opened: OpenPage, shoot: Shoot, size: tuple[int, int]
+    server: PageServer, open_page: OpenPage, shoot: Shoot, size: tuple[int, int]
 ) -> None:
-    page = opened(server, size=size, dark=True)
+    page = open_page(server, size=size, dark=True)
     ask(server)
     expect(page.locator(".which")).to_contain_text("A recorded model writes no new programs")
     expect(page.get_by_label("What should be different?")).to_have_count(0)
     expect_no_grave_fault(page)
     shoot(page, f"candidates-recorded-{size[0]}")
-    other = opened(server, "missions", size=size)
+    other = open_page(server, "missions", size=size)
     expect(other.locator(".rows .state").first).to_have_text("waits for an answer")
     shoot(other, f"candidates-waits-{size[0]}")
     page.get_by_role("button", name="None of these").click()
@@ -104,17 +104,17 @@ def test_a_recorded_model_offers_no_field_for_a_sentence(
     expect(other.locator(".rows .state").first).to_have_text("failed")
 
 
-def test_none_of_these_needs_a_sentence(tmp_path: Path, opened: OpenPage) -> None:
-    said: dict[int, str] = {}  # by request, of which the server may ask twice
+def test_none_of_these_needs_a_sentence(tmp_path: Path, open_page: OpenPage) -> None:
+    texts: dict[int, str] = {}  # By request, because the server may ask for the same answer twice.
 
     def answer(request: Request) -> str:
-        text = said.setdefault(id(request), f"There are {len(said)} mugs")
+        text = texts.setdefault(id(request), f"There are {len(texts)} mugs")
         return f"```python\ndef task_program():\n    say('{text}')\n```\n"
 
     with Server(answer=answer) as model:
         settings = ("--model", "openai-chat:m", "--base-url", model.url, "--candidates", "2")
         with PageServer(tmp_path, *settings) as server:
-            page = opened(server)
+            page = open_page(server)
             ask(server)
             page.get_by_role("button", name="None of these").click()
             expect(page.get_by_text("Say what should be different")).to_be_visible()
@@ -127,8 +127,8 @@ def test_none_of_these_needs_a_sentence(tmp_path: Path, opened: OpenPage) -> Non
             page.close()
 
 
-def test_the_api_shows_the_question_and_takes_an_answer(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
+def test_the_api_shows_the_question_and_takes_an_answer(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
     ask(server)
     expect(page.locator(".which .card")).to_have_count(3)
     question = server.call("GET", "/api/missions/current").data["question"]

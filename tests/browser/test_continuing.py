@@ -1,4 +1,4 @@
-"""On the page, a mission that ended early goes on: what was done is shown, and nothing happens twice."""
+"""The page continues a mission that ended early: it shows the finished steps and repeats none."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def look(page: Page, shoot: Shoot, name: str) -> None:
 
 
 @pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])
-def test_continue(tmp_path: Path, opened: OpenPage, shoot: Shoot, screen: Screen) -> None:
+def test_continue(tmp_path: Path, open_page: OpenPage, shoot: Shoot, screen: Screen) -> None:
     which, size, dark = screen
     with PageServer(tmp_path, "--speed", "3", serve=("codebotler", "serve")) as server:
-        page = opened(server, size=size, dark=dark)
+        page = open_page(server, size=size, dark=dark)
         expect(page.get_by_role("button", name="Continue")).to_be_hidden()
         page.locator("textarea").fill(STAPLERS)
         press(page, "Write the program")
@@ -64,18 +64,18 @@ def test_continue(tmp_path: Path, opened: OpenPage, shoot: Shoot, screen: Screen
         press(page, "Run it on the robot")
         expect(page.locator(".headline")).to_have_text("Done")
         expect(page.get_by_role("button", name="Continue", exact=True)).to_be_hidden()
-        expect(page.get_by_role("button", name="Prepare another run")).to_be_hidden()  # of the rest alone
-        page.close()  # before the server ends, to which it would try to connect again
+        expect(page.get_by_role("button", name="Prepare another run")).to_be_hidden()  # It is only the rest.
+        page.close()  # The page would reconnect after the server ends.
 
 
 @pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
 def test_a_person_is_asked_about_an_unsure_step_and_types_the_rest(
-    tmp_path: Path, opened: OpenPage, shoot: Shoot, size: tuple[int, int]
+    tmp_path: Path, open_page: OpenPage, shoot: Shoot, size: tuple[int, int]
 ) -> None:
     folder = failed_mission(tmp_path / "home", BRING, SMALL, "")
     cut(folder, line_of(folder, "pick", "skill"), MissionState.RUNNING)
     with PageServer(tmp_path, "--speed", "40") as server:
-        page, other = opened(server, size=size), opened(server)
+        page, other = open_page(server, size=size), open_page(server)
         if size == PHONE:
             expect(page.locator(".interrupted .primary")).to_be_in_viewport(ratio=1)
         press(page, f"Continue mission {folder.name}")
@@ -94,7 +94,7 @@ def test_a_person_is_asked_about_an_unsure_step_and_types_the_rest(
         assert evidence["y"] + evidence["height"] <= button["y"], "the buttons cover what the robot says"
         shoot(page, f"continue-asks-{size[0]}", full_page=False)
         expect_no_grave_fault(page)
-        late = opened(server, f"missions/{folder.name}")
+        late = open_page(server, f"missions/{folder.name}")
         press(late, "Continue")
         expect(late.get_by_role("button", name="It did not happen", exact=True)).to_be_visible()
         press(page, "It happened")
@@ -121,16 +121,16 @@ def test_a_person_is_asked_about_an_unsure_step_and_types_the_rest(
 
 @pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
 def test_missions_link_to_those_they_continue(
-    tmp_path: Path, opened: OpenPage, shoot: Shoot, size: tuple[int, int]
+    tmp_path: Path, open_page: OpenPage, shoot: Shoot, size: tuple[int, int]
 ) -> None:
     first = failed_mission(tmp_path / "home", BRING, SMALL, "").name
     with PageServer(tmp_path, "--speed", "40") as server:
         second = server.call("POST", f"/api/missions/{first}/continue", {}).data["id"]
         server.rest()
-        page = opened(server, "missions", size=size)
+        page = open_page(server, "missions", size=size)
         expect(page.locator(".rows .outcome").first).to_contain_text(f"mission {second}")
         expect(page.locator(".rows .outcome").first).to_contain_text(f"continues mission {first}")
-        expect(page.locator(".rows .outcome").last).not_to_contain_text("continued by")  # it did not run
+        expect(page.locator(".rows .outcome").last).not_to_contain_text("continued by")  # It did not run.
         look(page, shoot, f"continue-list-{size[0]}")
         page.locator(".rows a").first.click()
         expect(page.locator(".chain")).to_have_count(1)
@@ -140,7 +140,7 @@ def test_missions_link_to_those_they_continue(
         expect(page.locator(".chain")).to_have_count(0)
         folder = tmp_path / "home" / "missions" / second
         summary = MissionSummary.read(folder)
-        summary.if_tool_dies = "the robot stops"  # as if it had run
+        summary.if_tool_dies = "the robot stops"  # Missions that ran have this field.
         summary.write(folder)
         page.reload()
         expect(page.locator(".chain")).to_contain_text(second)
@@ -149,17 +149,17 @@ def test_missions_link_to_those_they_continue(
 
 @pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
 def test_a_mission_in_another_world_is_not_continued(
-    tmp_path: Path, opened: OpenPage, shoot: Shoot, size: tuple[int, int]
+    tmp_path: Path, open_page: OpenPage, shoot: Shoot, size: tuple[int, int]
 ) -> None:
     with PageServer(tmp_path, "--speed", "1") as server:
         server.run("def task_program():\n    go_to('study')\n    go_to('kitchen')\n    go_to('study')\n")
-        page = opened(server)
+        page = open_page(server)
         expect(page.locator(".doing")).to_be_visible()
         page.close()
         mission = server.call("GET", "/api/robot").data["mission"]
         server.end(signal.SIGKILL)
     with PageServer(tmp_path, world="robot: hall\nrooms: [hall, kitchen]\n") as server:
-        page = opened(server, size=size)
+        page = open_page(server, size=size)
         press(page, f"Continue mission {mission}")
         expect(page.get_by_text("ran on another map")).to_be_visible()
         look(page, shoot, f"other-world-{size[0]}")
@@ -170,14 +170,14 @@ def test_a_mission_in_another_world_is_not_continued(
         page.close()
 
 
-def test_many_steps_are_folded(tmp_path: Path, opened: OpenPage) -> None:
+def test_many_steps_are_folded(tmp_path: Path, open_page: OpenPage) -> None:
     words = "def task_program():\n    for n in range(20):\n        say(str(n))\n    go_to('nowhere')\n"
     failed_mission(tmp_path / "home", words, SMALL, "")
     with PageServer(tmp_path, "--speed", "40") as server:
-        page = opened(server)
+        page = open_page(server)
         server.call("POST", "/api/missions/last/continue", {})
         expect(page.locator(".done-before > ol li")).to_have_count(12)
         expect(page.locator(".done-before details li").first).to_be_hidden()
         page.get_by_text("9 earlier steps").click()
         expect(page.locator(".done-before details li").first).to_have_text('in "hall": said "0"')
-        page.close()  # before the server ends, to which it would try to connect again
+        page.close()  # The page would reconnect after the server ends.

@@ -1,4 +1,4 @@
-"""The contract on the page: what a person sees of it before an approval, and after an edit."""
+"""The page shows a contract before its approval, and highlights its changes after an edit."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from viewing import OpenPage, write
 GREET = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
 
 
-def test_a_contract_is_shown_and_an_edit_shows_what_is_new(tmp_path: Path, opened: OpenPage) -> None:
+def test_a_contract_is_shown_and_an_edit_shows_what_is_new(tmp_path: Path, open_page: OpenPage) -> None:
     with PageServer(tmp_path, "--speed", "40") as server:
-        page = opened(server)
+        page = open_page(server)
         pane = page.locator(".contract")
         expect(pane).to_be_hidden()
         write(page, GREET)
@@ -29,11 +29,11 @@ def test_a_contract_is_shown_and_an_edit_shows_what_is_new(tmp_path: Path, opene
         expect(pane.locator("tr")).to_have_text(['go to"kitchen"at most 1 time'])
 
 
-def test_long_texts_hide_no_other_skill(tmp_path: Path, opened: OpenPage) -> None:
+def test_long_texts_hide_no_other_skill(tmp_path: Path, open_page: OpenPage) -> None:
     looks = "".join(f"    is_in_room('{letter * 600}')\n" for letter in "abc")
     program = f"def task_program():\n{looks}    pick(get_current_location())\n"
     with PageServer(tmp_path) as server:
-        page = opened(server)
+        page = open_page(server)
         write(page, program)
         expect(page.locator(".contract > p")).to_contain_text("pick up")
         expect(page.locator(".contract > p")).to_contain_text("says nothing.")

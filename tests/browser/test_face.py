@@ -1,4 +1,4 @@
-"""The robot's face on a screen of its own: people are told there what it does and says, and asked."""
+"""The robot's face on a separate screen: people see what it does and says, and answer its questions."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
 
 
 @pytest.fixture(autouse=True)
-def at_rest(server: PageServer) -> None:
-    """Every test begins with a robot that does nothing."""
+def stop_robot(server: PageServer) -> None:
+    """Start every test with a robot that does nothing."""
     server.rest()
 
 
-def test_from_an_instruction_to_an_answer_on_the_face(tmp_path: Path, opened: OpenPage) -> None:
-    """In two browsers: that of an operator, and that of the robot's tablet."""
+def test_from_an_instruction_to_an_answer_on_the_face(tmp_path: Path, open_page: OpenPage) -> None:
+    """Two browsers are open: the operator's and the robot's tablet."""
     world = (Path(__file__).parents[2] / "examples" / "office.yaml").read_text()
     instruction = "Ask alice in her office whether she wants a stapler, and tell me here what she says."
     program = (
@@ -51,7 +51,7 @@ def test_from_an_instruction_to_an_answer_on_the_face(tmp_path: Path, opened: Op
             world=world,
         ) as server,
     ):
-        operator, face = opened(server), face_of(server, opened)
+        operator, face = open_page(server), face_of(server, open_page)
         expect(face.locator("#doing")).to_have_text("Hello. I have nothing to do right now.")
         operator.locator("textarea").fill(instruction)
         operator.get_by_role("button", name="Write the program").click()
@@ -72,8 +72,8 @@ def test_from_an_instruction_to_an_answer_on_the_face(tmp_path: Path, opened: Op
             page.context.close()
 
 
-def test_what_the_robot_does_is_seen(server: PageServer, opened: OpenPage) -> None:
-    face = face_of(server, opened)
+def test_face_shows_what_the_robot_does(server: PageServer, open_page: OpenPage) -> None:
+    face = face_of(server, open_page)
     server.run(FAR)
     expect(face.locator("#doing")).to_have_text("On my way to kitchen")
     expect(face.locator("body[data-doing=moving]")).to_be_visible()
@@ -84,13 +84,13 @@ def test_what_the_robot_does_is_seen(server: PageServer, opened: OpenPage) -> No
     assert server.call("GET", "/api/robot").data["reason"] == "stopped by a person at the face"
 
 
-def test_stop_needs_nothing_of_the_rest_of_the_face(server: PageServer, opened: OpenPage) -> None:
-    face = face_of(server, opened)
+def test_stop_works_before_the_script_of_the_face_arrives(server: PageServer, open_page: OpenPage) -> None:
+    face = face_of(server, open_page)
     server.run(FAR)
     expect(face.locator("#doing")).to_have_text("On my way to kitchen")
     held: list[Route] = []
 
-    def hold(route: Route) -> None:  # Playwright wants a function of Python's own
+    def hold(route: Route) -> None:  # Playwright rejects built-in functions.
         held.append(route)
 
     face.route("**/static/face.js", hold)
@@ -101,14 +101,14 @@ def test_stop_needs_nothing_of_the_rest_of_the_face(server: PageServer, opened: 
     expect(face.locator("#doing")).to_be_empty()
 
 
-def test_two_faces_are_in_step_and_the_first_answer_counts(server: PageServer, opened: OpenPage) -> None:
-    one, other = face_of(server, opened), face_of(server, opened, PHONE, expecting=REFUSED)
+def test_two_faces_are_in_step_and_the_first_answer_counts(server: PageServer, open_page: OpenPage) -> None:
+    one, other = face_of(server, open_page), face_of(server, open_page, PHONE, expecting=REFUSED)
     server.run(ASKS)
     for face in (one, other):
         expect(option(face, "Yes")).to_be_enabled()
     held: list[Route] = []
 
-    def hold(route: Route) -> None:  # Playwright wants a function of Python's own
+    def hold(route: Route) -> None:  # Playwright rejects built-in functions.
         held.append(route)
 
     other.route("**/api/face/answer", hold)
@@ -121,8 +121,8 @@ def test_two_faces_are_in_step_and_the_first_answer_counts(server: PageServer, o
     expect(other.locator("#ended")).to_contain_text('already answered: "No, thank you"')
 
 
-def test_a_stop_takes_the_question_back(server: PageServer, opened: OpenPage) -> None:
-    operator, face = opened(server), face_of(server, opened)
+def test_stop_withdraws_the_question(server: PageServer, open_page: OpenPage) -> None:
+    operator, face = open_page(server), face_of(server, open_page)
     server.run(ASKS)
     expect(option(face, "Yes")).to_be_enabled()
     operator.locator("#stop").click()
@@ -132,9 +132,9 @@ def test_a_stop_takes_the_question_back(server: PageServer, opened: OpenPage) ->
     assert face.evaluate("window.hushed") > 0
 
 
-def test_a_question_that_nobody_answers_ends(tmp_path: Path, opened: OpenPage) -> None:
+def test_a_question_that_nobody_answers_ends(tmp_path: Path, open_page: OpenPage) -> None:
     with PageServer(tmp_path, "--face", "--speed", "0", "--face-timeout", "2") as server:
-        operator, face = opened(server), face_of(server, opened)
+        operator, face = open_page(server), face_of(server, open_page)
         server.run(ASKS)
         expect(face.locator("#left")).to_have_text(re.compile(r"^[12] s left to answer$"))
         expect(face.locator("#ended")).to_have_text("Nobody answered in time.")
@@ -145,8 +145,8 @@ def test_a_question_that_nobody_answers_ends(tmp_path: Path, opened: OpenPage) -
             page.context.close()
 
 
-def test_the_operator_sees_that_no_face_is_open_and_can_answer(server: PageServer, opened: OpenPage) -> None:
-    operator = opened(server)
+def test_operator_sees_that_no_face_is_open_and_can_answer(server: PageServer, open_page: OpenPage) -> None:
+    operator = open_page(server)
     server.run(ASKS)
     expect(operator.get_by_text("Open the robot's face")).to_be_visible()
     operator.locator(".asking").get_by_role("button", name="Yes").click()
@@ -154,18 +154,18 @@ def test_the_operator_sees_that_no_face_is_open_and_can_answer(server: PageServe
     expect(operator.locator(".asking")).to_be_hidden()
 
 
-def test_a_face_that_comes_late_shows_what_is_asked(server: PageServer, opened: OpenPage) -> None:
+def test_face_that_opens_late_shows_the_question(server: PageServer, open_page: OpenPage) -> None:
     server.run(ASKS)
-    face = face_of(server, opened)
+    face = face_of(server, open_page)
     expect(option(face, "Yes")).to_be_enabled()
     face.reload()
     option(face, "Yes").click()
     expect(said(face)).to_have_text("She says Yes")
-    assert "Good morning" not in face.evaluate("window.spoken"), "that was before it was opened"
+    assert "Good morning" not in face.evaluate("window.spoken"), "a new face does not repeat old speech"
 
 
-def test_a_touch_for_one_question_answers_no_other(server: PageServer, opened: OpenPage) -> None:
-    face = face_of(server, opened)
+def test_a_touch_for_one_question_answers_no_other(server: PageServer, open_page: OpenPage) -> None:
+    face = face_of(server, open_page)
     server.run(TWICE)
     expect(option(face, "Yes")).to_be_enabled()
     face.evaluate(TOUCHES)
@@ -179,8 +179,8 @@ def test_a_touch_for_one_question_answers_no_other(server: PageServer, opened: O
 # --- without a mouse
 
 
-def test_questions_are_answered_by_number_keys(server: PageServer, opened: OpenPage) -> None:
-    face = face_of(server, opened)
+def test_questions_are_answered_by_number_keys(server: PageServer, open_page: OpenPage) -> None:
+    face = face_of(server, open_page)
     server.run(ASKS)
     expect(option(face, "Yes")).to_be_enabled()
     face.keyboard.press("9")
@@ -190,8 +190,8 @@ def test_questions_are_answered_by_number_keys(server: PageServer, opened: OpenP
     expect(said(face)).to_have_text("She says No, thank you")
 
 
-def test_questions_are_answered_by_tab_and_enter(server: PageServer, opened: OpenPage) -> None:
-    face = face_of(server, opened)
+def test_questions_are_answered_by_tab_and_enter(server: PageServer, open_page: OpenPage) -> None:
+    face = face_of(server, open_page)
     server.run(ASKS)
     expect(option(face, "Yes")).to_be_enabled()
     for _ in range(10):
@@ -202,16 +202,16 @@ def test_questions_are_answered_by_tab_and_enter(server: PageServer, opened: Ope
     expect(said(face)).to_have_text("She says Yes")
 
 
-def test_escape_stops_the_robot(server: PageServer, opened: OpenPage) -> None:
-    face = face_of(server, opened)
+def test_escape_stops_the_robot(server: PageServer, open_page: OpenPage) -> None:
+    face = face_of(server, open_page)
     server.run(FAR)
     expect(face.locator("#doing")).to_have_text("On my way to kitchen")
     face.keyboard.press("Escape")
     expect(face.locator("#stop-told")).to_have_text("The robot has stopped.")
 
 
-def test_what_happens_is_announced_to_who_sees_no_screen(server: PageServer, opened: OpenPage) -> None:
-    face = face_of(server, opened)
+def test_face_announces_events_to_screen_readers(server: PageServer, open_page: OpenPage) -> None:
+    face = face_of(server, open_page)
     for where, live in (("#said", "log"), ("#doing", "status"), ("#announce", "alert"), ("#ended", "status")):
         assert face.locator(where).get_attribute("role") == live
     server.run(ASKS)
@@ -223,17 +223,17 @@ def test_what_happens_is_announced_to_who_sees_no_screen(server: PageServer, ope
     expect(face.locator("#options button").first).to_be_enabled()
     face.keyboard.press("1")
     expect(said(face)).to_have_text("She says Yes")
-    assert line.evaluate("e => e.mark") == 1, "what was announced is not written anew"
+    assert line.evaluate("e => e.mark") == 1, "an announcement is not written again"
 
 
-# --- who comes and goes
+# --- lost and slow connections
 
 
-def test_a_tool_that_is_gone_is_said_and_found_again(tmp_path: Path, opened: OpenPage) -> None:
+def test_face_reports_a_lost_tool_and_reconnects(tmp_path: Path, open_page: OpenPage) -> None:
     tokens = ["--face-token", "the tablet's own", "--token", "the operator's own"]
     with PageServer(tmp_path, "--face", *tokens) as server:
         port = server.port
-        face = opened(
+        face = open_page(
             server,
             link=f"http://localhost:{port}/face?token=the+tablet's+own",
             script=SPEAKING,
@@ -251,8 +251,8 @@ def test_a_tool_that_is_gone_is_said_and_found_again(tmp_path: Path, opened: Ope
         face.context.close()
 
 
-def test_a_face_that_is_slow_holds_nothing_up(server: PageServer, opened: OpenPage) -> None:
-    slow, quick = face_of(server, opened), face_of(server, opened)
+def test_slow_face_delays_nobody(server: PageServer, open_page: OpenPage) -> None:
+    slow, quick = face_of(server, open_page), face_of(server, open_page)
     slow.context.new_cdp_session(slow).send("Emulation.setCPUThrottlingRate", {"rate": 20})
     server.run(ASKS)
     option(quick, "Yes").click()

@@ -1,4 +1,4 @@
-"""The face at every size, light and dark: nobody is shut out, nothing is cut off, and there are pictures."""
+"""The face is accessible and complete at every size, light and dark; screenshots are taken."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def office(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
 
 
 def expect_in_sight(page: Page) -> None:
-    """STOP is where it always is, nothing is wider than the screen, and no answer lies under anything."""
+    """Expect STOP in its place, nothing wider than the screen, and no covered answer."""
     size = page.viewport_size
     assert size is not None
     assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
@@ -51,7 +51,7 @@ def expect_in_sight(page: Page) -> None:
 
 
 def expect_names_beside_stop(page: Page) -> None:
-    """The names of all pages and parts can be read, each in one line, however small the screen."""
+    """Expect the names of all pages and parts to be readable, each in one line."""
     stop, size = page.locator("#stop").bounding_box(), page.viewport_size
     assert stop is not None
     assert size is not None
@@ -68,11 +68,11 @@ def expect_names_beside_stop(page: Page) -> None:
 
 
 @pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])
-def test_face(office: PageServer, opened: OpenPage, shoot: Shoot, screen: Screen) -> None:
+def test_face(office: PageServer, open_page: OpenPage, shoot: Shoot, screen: Screen) -> None:
     which, size, dark = screen
     office.rest()
-    page = opened(office, size=size, dark=dark, link=office.face_link, script=SPEAKING + HEARING)
-    operator = opened(office, size=size, dark=dark)
+    page = open_page(office, size=size, dark=dark, link=office.face_link, script=SPEAKING + HEARING)
+    operator = open_page(office, size=size, dark=dark)
 
     def look(name: str, at: Page = page) -> None:
         at.wait_for_timeout(500)

@@ -1,6 +1,6 @@
-"""The same on a real ROS graph: the virtual robot drives there, and speaks and asks on its face.
+"""The virtual robot drives on a real ROS graph, and speaks and asks on its face.
 
-Where there is no ROS 1, this is skipped and says so.
+Without ROS 1, these tests are skipped and say so.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Graph]:
 
 @pytest.fixture
 def virtual(graph: Graph, tmp_path: Path) -> Iterator[Path]:
-    """The virtual robot as a user starts it; what it prints."""
+    """Start the virtual robot like a user does; return the file of its output."""
     (tmp_path / "house.yaml").write_text(WORLD)
     said = tmp_path / "virtual.txt"
     command = [sys.executable, "-u", "-m", "codebotler", "virtual-robot", "--world", "house.yaml"]
@@ -81,15 +81,15 @@ def virtual(graph: Graph, tmp_path: Path) -> Iterator[Path]:
 
 
 def test_from_an_instruction_to_an_answer_on_a_real_graph(
-    graph: Graph, virtual: Path, tmp_path: Path, opened: OpenPage
+    graph: Graph, virtual: Path, tmp_path: Path, open_page: OpenPage
 ) -> None:
     robot = ("--robot", "ros1", "--address", graph.uri, "--speed", "10", "--face")
     with (
         Server(answer=lambda _: TEA) as model,
         PageServer(tmp_path, *robot, "--model", "completions:m", "--base-url", model.url) as server,
     ):
-        operator = opened(server)
-        face = opened(server, link=server.face_link, size=TABLET, script=SPEAKING)
+        operator = open_page(server)
+        face = open_page(server, link=server.face_link, size=TABLET, script=SPEAKING)
         operator.locator("textarea").fill("Ask ann in the study whether she would like tea.")
         operator.get_by_role("button", name="Write the program").click()
         expect(operator.get_by_text("Checked: no problems.")).to_be_visible()
@@ -113,15 +113,15 @@ def test_from_an_instruction_to_an_answer_on_a_real_graph(
     assert "say(" not in done
 
 
-def test_a_robot_on_a_graph_needs_no_servers_for_what_its_face_says(
-    graph: Graph, tmp_path: Path, opened: OpenPage
+def test_robot_with_a_face_needs_no_servers_for_speech(
+    graph: Graph, tmp_path: Path, open_page: OpenPage
 ) -> None:
     server = graph.serve(*without_speech().rows)
     with PageServer(tmp_path, "--robot", "ros1", "--address", graph.uri, "--face", world=WORLD) as page:
-        face = opened(page, link=page.face_link, script=SPEAKING)
+        face = open_page(page, link=page.face_link, script=SPEAKING)
         page.run("def task_program():\n    say('hello')\n    go_to('study')\n    say('here')\n")
         expect(face.locator("#said p")).to_have_text(["hello", "here"])
         expect(face.locator("#doing")).to_have_text("I have finished.")
         face.context.close()
-    heard = [said[1] for said in server.said.queue if said[0] == "goal"]
+    heard = [said[1] for said in server.events.queue if said[0] == "goal"]
     assert "study" in heard

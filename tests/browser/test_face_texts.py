@@ -1,4 +1,4 @@
-"""Whatever a program has the robot say and ask is text on its face, and on the operator's page beside it."""
+"""Texts that the robot says and asks stay text on its face and on the operator's page."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
 
 
 def program_of(text: str) -> str:
-    """Says and asks it, drives there, and fails with it."""
+    """Return a program that says and asks a text, drives to it, and fails with it."""
     said = json.dumps(text[:LONGEST])
     return f"""def task_program():
     say({said})
@@ -41,31 +41,31 @@ def program_of(text: str) -> str:
 def expect_unharmed(page: Page, before: int) -> None:
     assert page.evaluate("window.owned") is None
     assert page.locator(OWN_TAGS).count() == before
-    assert page.evaluate("document.documentElement.scrollWidth") <= page.viewport_size["width"]  # type: ignore[index]  # it has one
+    assert page.evaluate("document.documentElement.scrollWidth") <= page.viewport_size["width"]  # type: ignore[index]  # It has one.
 
 
 LONGEST = 9_000
-"""A program may say no more at once."""
+"""Most characters that a program may say at once."""
 
 
-def squeezed(text: str) -> str:
+def squeeze(text: str) -> str:
     return "".join(text.split())
 
 
 @pytest.mark.parametrize("evil", EVIL, ids=NAMES)
-def test_no_text_becomes_more_than_text(server: PageServer, opened: OpenPage, evil: str) -> None:
-    operator = opened(server)
-    face = opened(server, link=server.face_link, size=PHONE, script=SPEAKING + HEARING)
+def test_hostile_text_stays_text(server: PageServer, open_page: OpenPage, evil: str) -> None:
+    operator = open_page(server)
+    face = open_page(server, link=server.face_link, size=PHONE, script=SPEAKING + HEARING)
     expect(face.locator("#doing")).not_to_be_empty()
     expect(operator.locator(".headline")).to_be_visible()
     before, beside = face.locator(OWN_TAGS).count(), operator.locator(OWN_TAGS).count()
     server.run(program_of(evil), despite_problems=True)
     expect(face.locator("#options button")).to_have_count(3)
-    shown = squeezed(screen_text(evil[:LONGEST], 300))
-    assert squeezed(face.locator("#said p").last.inner_text())[:200] == squeezed(screen_text(evil))[:200]
-    assert squeezed(face.locator("#question").inner_text())[:200] == squeezed(screen_text(evil))[:200]
-    assert squeezed(face.locator("#person").inner_text()) == f"For{shown}"
-    assert squeezed(face.locator("#options span").first.inner_text()) == shown
+    shown = squeeze(screen_text(evil[:LONGEST], 300))
+    assert squeeze(face.locator("#said p").last.inner_text())[:200] == squeeze(screen_text(evil))[:200]
+    assert squeeze(face.locator("#question").inner_text())[:200] == squeeze(screen_text(evil))[:200]
+    assert squeeze(face.locator("#person").inner_text()) == f"For{shown}"
+    assert squeeze(face.locator("#options span").first.inner_text()) == shown
     expect(operator.locator(".asking button")).to_have_count(3)
     for page, count in ((face, before), (operator, beside)):
         expect_unharmed(page, count)
@@ -83,7 +83,7 @@ def test_no_text_becomes_more_than_text(server: PageServer, opened: OpenPage, ev
     expect_unharmed(face, before)
     face.locator("#options button").last.click()
     expect(operator.locator(".headline")).to_have_text("Failed")
-    assert squeezed(face.locator("#ended").inner_text()) == f"Thankyou:{shown}"
+    assert squeeze(face.locator("#ended").inner_text()) == f"Thankyou:{shown}"
     for page, count in ((face, before), (operator, beside)):
         expect_unharmed(page, count)
         page.reload()
@@ -91,9 +91,9 @@ def test_no_text_becomes_more_than_text(server: PageServer, opened: OpenPage, ev
         expect_unharmed(page, count)
 
 
-def test_answers_that_are_hard_to_tell_apart_can_be_chosen(server: PageServer, opened: OpenPage) -> None:
-    """Empty ones, the same twice, and more than a screen holds."""
-    face = opened(server, link=server.face_link, script=SPEAKING)
+def test_answers_that_are_hard_to_tell_apart_can_be_chosen(server: PageServer, open_page: OpenPage) -> None:
+    """Answers may be empty, equal, or more than a screen holds."""
+    face = open_page(server, link=server.face_link, script=SPEAKING)
     options = ["", " ", "no", "no", *map(str, range(60))]
     server.run(f"def task_program():\n    say('[' + ask('', '', {options}) + ']')\n", despite_problems=True)
     expect(face.locator("#options button")).to_have_count(50)
@@ -106,8 +106,8 @@ def test_answers_that_are_hard_to_tell_apart_can_be_chosen(server: PageServer, o
 
 
 @pytest.mark.parametrize("evil", EVIL, ids=NAMES)
-def test_the_page_itself_makes_no_markup_of_a_text(server: PageServer, opened: OpenPage, evil: str) -> None:
-    """As it came, and 100 KB of it: by a stand-in for the tool, which would never send that."""
+def test_face_itself_escapes_texts(server: PageServer, open_page: OpenPage, evil: str) -> None:
+    """A stand-in for the tool sends the text raw, and 100 KB of it; the tool never would."""
     raw = evil.encode(errors="replace").decode()
     told = {
         "doing": "asking",
@@ -120,10 +120,10 @@ def test_the_page_itself_makes_no_markup_of_a_text(server: PageServer, opened: O
         "is_over": False,
         "reason": "",
     }
-    face = opened(server, link="about:blank", size=PHONE)
+    face = open_page(server, link="about:blank", size=PHONE)
     sent: list[WebSocketRoute] = []
 
-    def hold(route: WebSocketRoute) -> None:  # Playwright wants a function of Python's own
+    def hold(route: WebSocketRoute) -> None:  # Playwright rejects built-in functions.
         sent.append(route)
 
     face.route_web_socket("**/api/face/live", hold)
@@ -132,7 +132,7 @@ def test_the_page_itself_makes_no_markup_of_a_text(server: PageServer, opened: O
     before = face.locator(OWN_TAGS).count()
     sent[0].send(json.dumps(told))
     expect(face.locator("#options button")).to_have_count(2)
-    assert squeezed(face.locator("#question").inner_text())[:99] == squeezed(raw)[:99]
+    assert squeeze(face.locator("#question").inner_text())[:99] == squeeze(raw)[:99]
     expect_unharmed(face, before)
     over = {"question": None, "ended": {"number": 2, "how": "answered", "answer": raw}, "reason": raw}
     for change in (over, {**over, "doing": "moving"}, {**over, "doing": "idle", "is_over": True}):

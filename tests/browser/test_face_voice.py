@@ -1,4 +1,4 @@
-"""The robot's face speaks aloud, and hears; by stand-ins, since a browser under test can do neither."""
+"""The robot's face speaks and listens, with stand-ins, because a browser under test does neither."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
 
 
 @pytest.fixture(autouse=True)
-def at_rest(server: PageServer) -> None:
-    """Every test begins with a robot that does nothing."""
+def stop_robot(server: PageServer) -> None:
+    """Start every test with a robot that does nothing."""
     server.rest()
 
 
-# --- aloud
+# --- speech
 
 
-def test_muting_is_remembered(server: PageServer, opened: OpenPage) -> None:
-    face = face_of(server, opened)
+def test_muting_is_remembered(server: PageServer, open_page: OpenPage) -> None:
+    face = face_of(server, open_page)
     aloud = face.get_by_role("switch", name="Speak aloud")
     expect(aloud).to_be_checked()
     aloud.click()
@@ -47,8 +47,8 @@ def test_muting_is_remembered(server: PageServer, opened: OpenPage) -> None:
     until(face, "window.spoken.includes('She says Yes')")
 
 
-def test_who_answers_needs_not_hear_the_question_to_its_end(server: PageServer, opened: OpenPage) -> None:
-    face = face_of(server, opened)
+def test_answer_ends_the_spoken_question(server: PageServer, open_page: OpenPage) -> None:
+    face = face_of(server, open_page)
     server.run(ASKS)
     expect(option(face, "Yes")).to_be_enabled()
     assert face.evaluate("window.hushed") == 0
@@ -56,18 +56,18 @@ def test_who_answers_needs_not_hear_the_question_to_its_end(server: PageServer, 
     until(face, "window.hushed === 1")
 
 
-def test_a_browser_that_waits_for_a_touch_says_so(server: PageServer, opened: OpenPage) -> None:
-    """With the browser's own speech synthesis, which nobody hears here."""
-    face = face_of(server, opened, script="")
+def test_face_asks_for_a_touch_to_turn_on_the_sound(server: PageServer, open_page: OpenPage) -> None:
+    """The browser's own speech synthesis is silent in tests."""
+    face = face_of(server, open_page, script="")
     expect(face.locator("#hint")).to_have_text("Tap the screen once to turn on the sound.")
     size = face.locator("#hint").evaluate("e => parseFloat(getComputedStyle(e).fontSize)")
-    assert size >= 30, "it is read from some steps away"
+    assert size >= 30, "the hint must be readable from some steps away"
     face.locator("h1").click(force=True)
     expect(face.locator("#hint")).to_be_hidden()
 
 
-def test_a_browser_without_a_voice_still_shows_all(server: PageServer, opened: OpenPage) -> None:
-    face = face_of(server, opened, script=MUTE)
+def test_a_browser_without_a_voice_still_shows_all(server: PageServer, open_page: OpenPage) -> None:
+    face = face_of(server, open_page, script=MUTE)
     expect(face.locator("#aloud")).to_be_hidden()
     expect(face.locator("#voice")).to_be_hidden()
     expect(face.locator("#hint")).to_be_hidden()
@@ -76,15 +76,15 @@ def test_a_browser_without_a_voice_still_shows_all(server: PageServer, opened: O
     expect(said(face)).to_have_text("She says Yes")
 
 
-# --- by voice, with a stand-in for the browser's speech recognition
+# --- answers by voice, with a stand-in for the browser's speech recognition
 
 
-def hearing(server: PageServer, opened: OpenPage) -> Page:
-    return face_of(server, opened, script=SPEAKING + HEARING)
+def open_hearing_face(server: PageServer, open_page: OpenPage) -> Page:
+    return face_of(server, open_page, script=SPEAKING + HEARING)
 
 
-def test_nobody_is_listened_to_before_somebody_switches_it_on(server: PageServer, opened: OpenPage) -> None:
-    face = hearing(server, opened)
+def test_face_listens_only_after_it_is_switched_on(server: PageServer, open_page: OpenPage) -> None:
+    face = open_hearing_face(server, open_page)
     voice = face.get_by_role("switch", name="Answer by voice")
     expect(voice).not_to_be_checked()
     expect(voice).to_have_accessible_description(re.compile("many browsers send your voice to their vendor"))
@@ -98,11 +98,11 @@ def test_nobody_is_listened_to_before_somebody_switches_it_on(server: PageServer
     face.reload()
     expect(voice).not_to_be_checked()
     expect(option(face, "Yes")).to_be_enabled()
-    assert face.evaluate("window.listening.length") == 0, "who comes next has not agreed"
+    assert face.evaluate("window.listening.length") == 0, "the next person has not agreed"
 
 
-def test_the_robot_does_not_listen_to_itself(server: PageServer, opened: OpenPage) -> None:
-    face = face_of(server, opened, script=f"window.isSlow = true;{SPEAKING}{HEARING}")
+def test_the_robot_does_not_listen_to_itself(server: PageServer, open_page: OpenPage) -> None:
+    face = face_of(server, open_page, script=f"window.isSlow = true;{SPEAKING}{HEARING}")
     face.get_by_role("switch", name="Answer by voice").click()
     server.run(ASKS.replace('    say("Good morning")\n', ""))
     expect(option(face, "Yes")).to_be_enabled()
@@ -113,8 +113,8 @@ def test_the_robot_does_not_listen_to_itself(server: PageServer, opened: OpenPag
     expect(face.locator("body.speaks")).to_be_hidden()
 
 
-def test_a_spoken_answer_is_shown_before_it_is_taken(server: PageServer, opened: OpenPage) -> None:
-    face = hearing(server, opened)
+def test_a_spoken_answer_is_shown_before_it_is_taken(server: PageServer, open_page: OpenPage) -> None:
+    face = open_hearing_face(server, open_page)
     face.get_by_role("switch", name="Answer by voice").click()
     server.run(ASKS)
     until(face, "window.listening.length === 1")
@@ -137,8 +137,8 @@ def test_a_spoken_answer_is_shown_before_it_is_taken(server: PageServer, opened:
     assert face.evaluate("window.listening.length") == 0
 
 
-def test_a_spoken_answer_is_not_taken_for_another_question(server: PageServer, opened: OpenPage) -> None:
-    face = hearing(server, opened)
+def test_spoken_answer_counts_only_for_its_question(server: PageServer, open_page: OpenPage) -> None:
+    face = open_hearing_face(server, open_page)
     face.get_by_role("switch", name="Answer by voice").click()
     server.run(TWICE)
     until(face, "window.listening.length === 1")
@@ -149,8 +149,8 @@ def test_a_spoken_answer_is_not_taken_for_another_question(server: PageServer, o
     expect(face.locator("#heard")).to_be_hidden()
 
 
-def test_a_browser_that_may_not_listen_says_so(server: PageServer, opened: OpenPage) -> None:
-    face = hearing(server, opened)
+def test_face_reports_that_the_browser_may_not_listen(server: PageServer, open_page: OpenPage) -> None:
+    face = open_hearing_face(server, open_page)
     voice = face.get_by_role("switch", name="Answer by voice")
     voice.click()
     server.run(ASKS)

@@ -1,4 +1,4 @@
-"""What the site's search works by where it was opened from a folder, and no browser starts a worker."""
+"""The site's search works when opened from a folder, where browsers start no worker."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MISSING = """() => new Promise((failed) => {
 
 
 def test_a_worker_answers_in_a_folder(browser: Browser, tmp_path: Path) -> None:
-    """Messages are copied, as a worker's are, and nothing is left when it has ended."""
+    """Messages are copied, like those of a worker, and nothing is left after its end."""
     folder = tmp_path / 'a "folder" & more'
     folder.mkdir()
     shutil.copy(ROOT / "website" / "iframe-worker.js", folder)

@@ -15,7 +15,7 @@ from viewing import PHONE, OpenPage
 
 FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('study')\n"
 
-GRACE = 10  # seconds; a page takes some to load where many tests run at the same time
+GRACE = 10  # Seconds; a page loads slowly while many tests run.
 
 
 @pytest.fixture
@@ -28,16 +28,16 @@ def state(server: PageServer) -> str:
     return str(server.call("GET", "/api/robot").data["state"])
 
 
-def until_over(server: PageServer) -> None:
+def wait_until_over(server: PageServer) -> None:
     ends = time.monotonic() + 60
     while not server.call("GET", "/api/robot").data["is_over"]:
         assert time.monotonic() < ends
         time.sleep(0.02)
 
 
-def test_the_robot_is_stopped_when_the_last_operator_leaves(server: PageServer, opened: OpenPage) -> None:
-    first, second = opened(server), opened(server, size=PHONE)
-    face = opened(server, link=server.face_link)
+def test_the_robot_is_stopped_when_the_last_operator_leaves(server: PageServer, open_page: OpenPage) -> None:
+    first, second = open_page(server), open_page(server, size=PHONE)
+    face = open_page(server, link=server.face_link)
     server.run(FAR)
     for page in (first, second):
         expect(page.locator(".headline")).to_have_text("Running")
@@ -47,18 +47,18 @@ def test_the_robot_is_stopped_when_the_last_operator_leaves(server: PageServer, 
     second.goto(f"{server.inside}/missions")
     expect(second.locator("h1")).to_have_text("Missions")
     second.wait_for_timeout(1000 * (GRACE + 1))
-    assert state(server) == "running", "somebody is there"
+    assert state(server) == "running", "an operator is still there"
     second.context.close()
     expect(face.locator("#doing")).to_have_text("I was stopped.")
-    until_over(server)
+    wait_until_over(server)
     assert (
         read_missions(server.home)[-1].reason
         == "stopped by CodeBotler, because the last operator closed the page"
     )
 
 
-def test_who_comes_back_in_time_finds_it_running(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
+def test_operator_who_returns_in_time_keeps_it_running(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
     expect(page.locator(".headline")).to_be_visible()
     server.run(FAR)
     page.goto("about:blank")
@@ -68,8 +68,8 @@ def test_who_comes_back_in_time_finds_it_running(server: PageServer, opened: Ope
     assert state(server) == "running"
 
 
-def test_a_mission_that_only_waits_is_left_alone(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
+def test_a_mission_that_only_waits_is_left_alone(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
     expect(page.locator(".headline")).to_be_visible()
     server.call("POST", "/api/missions", {"program": FAR})
     expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
@@ -78,10 +78,8 @@ def test_a_mission_that_only_waits_is_left_alone(server: PageServer, opened: Ope
     assert state(server) == "checked"
 
 
-def test_a_browser_that_is_cut_off_holds_nothing_up_and_catches_up(
-    server: PageServer, opened: OpenPage
-) -> None:
-    away, here = opened(server, expecting="ERR_INTERNET_DISCONNECTED"), opened(server)
+def test_disconnected_browser_delays_nobody_and_catches_up(server: PageServer, open_page: OpenPage) -> None:
+    away, here = open_page(server, expecting="ERR_INTERNET_DISCONNECTED"), open_page(server)
     expect(away.locator(".headline")).to_be_visible()
     server.run(FAR)
     expect(away.locator(".headline")).to_have_text("Running")

@@ -1,4 +1,4 @@
-"""Every page at every size, light and dark: nobody is shut out, and there are pictures for the guide."""
+"""Every page is accessible at every size, light and dark; screenshots are taken for the guide."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def office(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
 @pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])
 def test_pages(
     office: PageServer,
-    opened: OpenPage,
+    open_page: OpenPage,
     shoot: Shoot,
     screen: Screen,
 ) -> None:
     which, size, dark = screen
-    page = opened(office, size=size, dark=dark)
+    page = open_page(office, size=size, dark=dark)
 
     def look(name: str) -> None:
         page.evaluate("scrollTo(0, 0)")

@@ -1,4 +1,4 @@
-"""Past missions: the list with its search, in all tabs at once, and how a mission ended."""
+"""Past missions: a list with a search, which is live in all tabs, and the end of each mission."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ NO_ARM = """class NoArm:
 """
 
 
-def finish(server: PageServer, program: str) -> str:
-    """Run a program to its end; the name of its mission."""
+def run_to_end(server: PageServer, program: str) -> str:
+    """Run a program to its end; return the name of its mission."""
     server.run(program, despite_problems=True)
     ended = server.call("GET", "/api/robot?once=over").data
     assert ended["is_over"], ended
@@ -39,11 +39,11 @@ def server(tmp_path: Path) -> Iterator[PageServer]:
 
 
 @pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
-def test_a_mission_leads_with_why_it_ended_and_its_line(
-    server: PageServer, opened: OpenPage, shoot: Shoot, size: tuple[int, int]
+def test_mission_page_starts_with_the_reason_and_the_line_of_its_end(
+    server: PageServer, open_page: OpenPage, shoot: Shoot, size: tuple[int, int]
 ) -> None:
-    mission = finish(server, FAILS)
-    page = opened(server, f"missions/{mission}", size=size)
+    mission = run_to_end(server, FAILS)
+    page = open_page(server, f"missions/{mission}", size=size)
     ending = page.locator(".ending")
     expect(ending.locator(".state")).to_have_text("failed")
     expect(ending.locator(".reason")).to_have_text(re.compile(r"^line 3: .*unicorn"))
@@ -58,17 +58,17 @@ def test_a_mission_leads_with_why_it_ended_and_its_line(
     shoot(page, f"mission-failed-{size[0]}")
 
 
-def test_a_mission_without_a_line_has_no_mark(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server, f"missions/{finish(server, HELLO)}")
+def test_a_mission_without_a_line_has_no_mark(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server, f"missions/{run_to_end(server, HELLO)}")
     expect(page.locator(".ending .state")).to_have_text("done")
     expect(page.locator(".source")).to_contain_text("say('Hello')")
     expect(page.locator(".ending code, .source mark")).to_have_count(0)
 
 
-def test_the_page_of_a_mission_follows_it_to_its_end(server: PageServer, opened: OpenPage) -> None:
+def test_the_page_of_a_mission_follows_it_to_its_end(server: PageServer, open_page: OpenPage) -> None:
     server.run(FAR)
     mission = server.call("GET", "/api/robot").data["mission"]
-    page = opened(server, f"missions/{mission}")
+    page = open_page(server, f"missions/{mission}")
     expect(page.locator(".ending .state")).to_have_text("running")
     events = page.locator(".timeline li")
     known = events.count()
@@ -82,11 +82,11 @@ def test_the_page_of_a_mission_follows_it_to_its_end(server: PageServer, opened:
 
 @pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
 def test_the_list_shows_robot_and_reason_and_can_be_searched(
-    server: PageServer, opened: OpenPage, shoot: Shoot, size: tuple[int, int]
+    server: PageServer, open_page: OpenPage, shoot: Shoot, size: tuple[int, int]
 ) -> None:
-    finish(server, HELLO)
-    finish(server, FAILS)
-    page = opened(server, "missions", size=size)
+    run_to_end(server, HELLO)
+    run_to_end(server, FAILS)
+    page = open_page(server, "missions", size=size)
     rows = page.locator(".rows li")
     expect(rows).to_have_count(2)
     expect(rows.first.locator(".outcome")).to_have_text(re.compile("robot: simulated · line 3: .*unicorn"))
@@ -108,10 +108,10 @@ def test_the_list_shows_robot_and_reason_and_can_be_searched(
     expect(page).to_have_url(re.compile("/missions$"))
 
 
-def test_the_list_is_live_in_all_tabs(server: PageServer, opened: OpenPage) -> None:
-    first = opened(server, "missions")
+def test_the_list_is_live_in_all_tabs(server: PageServer, open_page: OpenPage) -> None:
+    first = open_page(server, "missions")
     stopped = f"{server.inside}/missions?text=stopped"
-    second = opened(server, beside=first, link=stopped)
+    second = open_page(server, beside=first, link=stopped)
     expect(first.get_by_text("No missions yet.")).to_be_visible()
     server.run(FAR)
     expect(first.locator(".rows li")).to_have_count(1)
@@ -121,21 +121,21 @@ def test_the_list_is_live_in_all_tabs(server: PageServer, opened: OpenPage) -> N
     expect(first.locator(".rows .state")).to_have_text("stopped")
     expect(first.locator(".rows .outcome")).to_have_text(re.compile("robot: simulated · .*stopped"))
     expect(second.locator(".rows li")).to_have_count(1)
-    finish(server, HELLO)
+    run_to_end(server, HELLO)
     expect(first.locator(".rows .state").first).to_have_text("done")
     expect(first.locator(".rows .state").last).to_have_text("stopped")
     expect(second.locator(".rows li")).to_have_count(1)
 
 
-# --- texts of earlier states
+# --- outdated messages
 
 WITHOUT_TIMEOUT = """const later = setTimeout;
 window.setTimeout = (call, wait, ...more) => (wait === 8000 ? 0 : later(call, wait, ...more));"""
-"""Without it, the result of STOP would vanish by itself after 8 seconds."""
+"""Keeps the result of STOP, which would otherwise vanish after 8 seconds."""
 
 
-def test_nothing_is_running_is_not_said_once_something_is(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server, script=WITHOUT_TIMEOUT)
+def test_message_nothing_is_running_ends_with_next_mission(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server, script=WITHOUT_TIMEOUT)
     expect(page.locator(".headline")).to_be_visible()
     page.locator("#stop").click()
     expect(page.locator("#stop-told")).to_have_text("Nothing is running.")
@@ -143,8 +143,8 @@ def test_nothing_is_running_is_not_said_once_something_is(server: PageServer, op
     expect(page.locator("#stop-told")).to_have_text("")
 
 
-def test_how_a_mission_ended_is_not_said_in_the_next_one(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server, script=WITHOUT_TIMEOUT)
+def test_message_robot_has_stopped_ends_with_next_mission(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server, script=WITHOUT_TIMEOUT)
     server.run(FAR)
     page.locator("#stop").click()
     expect(page.locator("#stop-told")).to_have_text("The robot has stopped.")
@@ -152,10 +152,10 @@ def test_how_a_mission_ended_is_not_said_in_the_next_one(server: PageServer, ope
     expect(page.locator("#stop-told")).to_have_text("")
 
 
-def test_what_the_robot_cannot_do_is_not_said_once_the_line_is_gone(tmp_path: Path, opened: OpenPage) -> None:
+def test_message_about_a_missing_skill_ends_with_its_line(tmp_path: Path, open_page: OpenPage) -> None:
     (tmp_path / "no_arm.py").write_text(NO_ARM)
     with PageServer(tmp_path, "--robot", "no_arm.py:NoArm") as server:
-        page = opened(server)
+        page = open_page(server)
         server.call("POST", "/api/missions", {"program": FAILS})
         cannot = page.get_by_text(re.compile("has no .pick. skill"))
         expect(cannot.first).to_be_visible()
@@ -167,6 +167,6 @@ def test_what_the_robot_cannot_do_is_not_said_once_the_line_is_gone(tmp_path: Pa
         expect(cannot.first).to_be_visible()
         page.context.close()
         server.rest()
-        mission = finish(server, FAILS)
+        mission = run_to_end(server, FAILS)
         events = server.call("GET", f"/api/missions/{mission}/events.jsonl").text
     assert "before the robot moves: line 3: this robot has no `pick`" in events

@@ -1,4 +1,4 @@
-"""On the page, a reply without a program is no dead end: it says why, and offers what helps."""
+"""After a reply without a program, the page says why and offers ways to go on."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PROGRAM = "Here it is.\n\n```python\ndef task_program():\n    go_to('kitchen')\n
 THOUGHTS = "<think>\nFirst to the kitchen.\n```python\ndef draft(): ...\n```\nThat will do.\n</think>\n"
 
 
-def serving(folder: Path, model: Server, *more: str) -> PageServer:
+def serve(folder: Path, model: Server, *more: str) -> PageServer:
     return PageServer(folder, "--speed", "0", "--model", "openai-chat:m", "--base-url", model.url, *more)
 
 
@@ -24,7 +24,7 @@ def ask(page: Page) -> None:
     page.locator("textarea").press("Control+Enter")
 
 
-def button(page: Page, name: str) -> None:
+def press(page: Page, name: str) -> None:
     page.get_by_role("button", name=name, exact=True).click()
 
 
@@ -37,15 +37,15 @@ WORDS = {
 
 
 def test_a_reply_without_a_program_says_why_and_can_be_asked_for_again(
-    tmp_path: Path, opened: OpenPage, shoot: Shoot
+    tmp_path: Path, open_page: OpenPage, shoot: Shoot
 ) -> None:
-    with Server(answer=lambda _: PROGRAM) as model, serving(tmp_path, model) as server:
+    with Server(answer=lambda _: PROGRAM) as model, serve(tmp_path, model) as server:
         model.faults.extend(WORDS)
-        page = opened(server)
+        page = open_page(server)
         ask(page)
         for asked, (fault, words) in enumerate(WORDS.items()):
             if asked:
-                button(page, "Ask again")
+                press(page, "Ask again")
             expect(page.locator(".programless")).to_have_text(words)
             expect(page.locator(".headline")).to_have_text("No program yet")
             expect(page.get_by_role("button", name="Run it on the robot")).to_be_hidden()
@@ -53,7 +53,7 @@ def test_a_reply_without_a_program_says_why_and_can_be_asked_for_again(
             expect(page.get_by_text("SyntaxError")).to_have_count(0)
             expect_no_grave_fault(page)
             shoot(page, f"no-program-{fault.name}")
-        button(page, "Ask for the program only")
+        press(page, "Ask for the program only")
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
         expect(page.locator(".programless")).to_be_hidden()
@@ -63,9 +63,9 @@ def test_a_reply_without_a_program_says_why_and_can_be_asked_for_again(
         page.context.close()
 
 
-def test_a_filtered_request_is_not_sent_with_advice(tmp_path: Path, opened: OpenPage) -> None:
-    with Server(fault=lambda _: Fault.FILTERED) as model, serving(tmp_path, model) as server:
-        page = opened(server)
+def test_a_filtered_request_is_not_sent_with_advice(tmp_path: Path, open_page: OpenPage) -> None:
+    with Server(fault=lambda _: Fault.FILTERED) as model, serve(tmp_path, model) as server:
+        page = open_page(server)
         ask(page)
         expect(page.locator(".programless")).to_contain_text("A content filter blocked")
         expect(page.get_by_text("The prompt triggered the content policy")).to_be_visible()
@@ -75,53 +75,53 @@ def test_a_filtered_request_is_not_sent_with_advice(tmp_path: Path, opened: Open
 
 
 def test_a_reply_that_was_cut_off_is_asked_for_with_a_higher_limit(
-    tmp_path: Path, opened: OpenPage, shoot: Shoot
+    tmp_path: Path, open_page: OpenPage, shoot: Shoot
 ) -> None:
     def answer(_: Request) -> str:
         return THOUGHTS + PROGRAM
 
     with (
         Server(answer=answer, limits=True) as model,
-        serving(tmp_path, model, "--max-tokens", "16") as server,
+        serve(tmp_path, model, "--max-tokens", "16") as server,
     ):
-        page = opened(server, size=PHONE)
+        page = open_page(server, size=PHONE)
         ask(page)
         expect(page.locator(".programless")).to_have_text("The reply was cut off at 16 tokens.")
         shoot(page, "no-program-cut-off-phone")
         page.set_viewport_size({"width": DESK[0], "height": DESK[1]})
         shoot(page, "no-program-cut-off")
-        button(page, "Raise the limit to 64 tokens")
+        press(page, "Raise the limit to 64 tokens")
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         assert [request.body["max_tokens"] for request in model.requests] == [16, 64]
         page.context.close()
 
 
 def test_a_program_stays_approvable_where_the_next_reply_holds_none(
-    tmp_path: Path, opened: OpenPage, shoot: Shoot
+    tmp_path: Path, open_page: OpenPage, shoot: Shoot
 ) -> None:
-    with Server(answer=lambda _: PROGRAM) as model, serving(tmp_path, model) as server:
+    with Server(answer=lambda _: PROGRAM) as model, serve(tmp_path, model) as server:
         model.faults.extend([None, Fault.REFUSAL])
-        page = opened(server)
+        page = open_page(server)
         ask(page)
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()
-        button(page, "Ask again")
+        press(page, "Ask again")
         expect(page.locator(".programless")).to_contain_text("The previous program is kept.")
         expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
         shoot(page, "no-program-but-one-before")
-        button(page, "Run it on the robot")
+        press(page, "Run it on the robot")
         expect(page.locator(".headline")).to_have_text("Done")
         expect(page.locator(".programless")).to_be_hidden()
         page.context.close()
 
 
 def test_a_reply_that_arrives_is_text_until_code_begins(
-    tmp_path: Path, opened: OpenPage, shoot: Shoot
+    tmp_path: Path, open_page: OpenPage, shoot: Shoot
 ) -> None:
     with (
         Server(answer=lambda _: THOUGHTS + PROGRAM, fault=lambda _: Fault.STALLED) as model,
-        serving(tmp_path, model) as server,
+        serve(tmp_path, model) as server,
     ):
-        page = opened(server)
+        page = open_page(server)
         ask(page)
         expect(page.locator(".reply .text").first).to_contain_text("First to the kitchen.")
         expect(page.locator(".headline")).to_have_text("Writing the program")
@@ -135,13 +135,13 @@ def test_a_reply_that_arrives_is_text_until_code_begins(
 
 
 def test_a_reply_that_arrives_is_code_from_where_code_begins(
-    tmp_path: Path, opened: OpenPage, shoot: Shoot
+    tmp_path: Path, open_page: OpenPage, shoot: Shoot
 ) -> None:
     with (
         Server(answer=lambda _: PROGRAM + " " * 60, fault=lambda _: Fault.STALLED) as model,
-        serving(tmp_path, model) as server,
+        serve(tmp_path, model) as server,
     ):
-        page = opened(server)
+        page = open_page(server)
         ask(page)
         expect(page.locator(".cm-content")).to_contain_text("def task_program")
         expect(page.locator(".reply .text").first).to_have_text("Here it is.")
@@ -152,9 +152,9 @@ def test_a_reply_that_arrives_is_code_from_where_code_begins(
         page.context.close()
 
 
-def test_a_program_that_cannot_run_is_not_ready(tmp_path: Path, opened: OpenPage) -> None:
+def test_a_program_that_cannot_run_is_not_ready(tmp_path: Path, open_page: OpenPage) -> None:
     with PageServer(tmp_path, "--speed", "0") as server:
-        page = opened(server)
+        page = open_page(server)
         expect(page.locator("[data-started] .cm-content")).to_be_visible()
         page.locator(".cm-content").click()
         page.keyboard.insert_text("def task_program(:\n    go_to('kitchen')\n")

@@ -1,4 +1,4 @@
-"""A person operates a robot from a browser, and never has to open a terminal."""
+"""A person can operate a robot from a browser, without a terminal."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ NUMBERS = itertools.count(1)
 
 
 def write(page: Page, program: str) -> None:
-    """Type a program in the place of what is there, once that is there."""
+    """Replace the program in the editor, once the editor has started."""
     expect(page.locator("[data-started] .cm-content")).to_be_visible()
     page.locator(".cm-content").click()
     page.keyboard.press("Control+a")
     page.keyboard.insert_text(program)
 
 
-def checked(page: Page, program: str) -> None:
-    """Type a program that no test before has typed."""
+def type_and_check(page: Page, program: str) -> None:
+    """Type a program that no earlier test has typed, and wait for its check."""
     mark = f"# {next(NUMBERS)}"
     write(page, f"{program}{mark}\n")
     until(
@@ -55,25 +55,25 @@ def checked(page: Page, program: str) -> None:
 
 
 def run(page: Page, program: str) -> None:
-    checked(page, program)
+    type_and_check(page, program)
     page.get_by_role("button", name="Run it on the robot").click()
     expect(page.locator(".headline")).to_have_text("Running")
 
 
 def text_of(page: Page) -> str:
-    """What the editor shows."""
+    """Return the text in the editor."""
     return "\n".join(page.locator(".cm-line").all_inner_texts())
 
 
 @pytest.fixture(autouse=True)
-def at_rest(server: PageServer) -> None:
-    """Every test begins with a robot that does nothing."""
+def stop_robot(server: PageServer) -> None:
+    """Start every test with a robot that does nothing."""
     server.rest()
 
 
-def test_from_an_instruction_to_the_end(tmp_path: Path, opened: OpenPage) -> None:
+def test_from_an_instruction_to_the_end(tmp_path: Path, open_page: OpenPage) -> None:
     with PageServer(tmp_path, "--speed", "40", world=OFFICE) as server:
-        page = opened(server)
+        page = open_page(server)
         page.locator(".picks .pick").first.click()
         page.get_by_role("button", name="Write the program").click()
         expect(page.get_by_text("A recorded program, not written by a language model.")).to_be_visible()
@@ -88,19 +88,19 @@ def test_from_an_instruction_to_the_end(tmp_path: Path, opened: OpenPage) -> Non
         page.context.close()
 
 
-def test_a_program_is_seen_while_it_is_written(tmp_path: Path, opened: OpenPage) -> None:
+def test_a_program_is_seen_while_it_is_written(tmp_path: Path, open_page: OpenPage) -> None:
     with (
         Server(fault=lambda _: Fault.DRIP) as model,
         PageServer(tmp_path, "--model", "completions:slow", "--base-url", model.url) as server,
     ):
-        page = opened(server)
+        page = open_page(server)
         page.locator("textarea").fill("Say hello")
         page.locator("textarea").press("Control+Enter")
         expect(page.get_by_role("button", name="Writing …")).to_be_disabled()
         expect(page.locator(".cm-line").first).not_to_be_empty()
         before = len(text_of(page))
         page.wait_for_function(f"document.querySelector('.cm-content').innerText.length > {before}")
-        other = opened(server)
+        other = open_page(server)
         expect(other.locator(".cm-line").first).not_to_be_empty()
         other.locator("#stop").click()
         expect(page.locator(".headline")).to_have_text("Stopped")
@@ -109,8 +109,8 @@ def test_a_program_is_seen_while_it_is_written(tmp_path: Path, opened: OpenPage)
         other.context.close()
 
 
-def test_what_is_said_and_asked_and_told_is_shown(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
+def test_page_shows_speech_questions_and_answers(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
     run(page, TEA)
     expect(page.locator(".doing")).to_have_text(re.compile("Drives to"))
     expect(page.get_by_text("line 3", exact=False)).to_be_visible()
@@ -121,10 +121,10 @@ def test_what_is_said_and_asked_and_told_is_shown(server: PageServer, opened: Op
     expect(page.locator(".floorplan .here")).to_have_count(1)
 
 
-def test_every_tab_and_every_reload_shows_the_same(server: PageServer, opened: OpenPage) -> None:
-    first = opened(server)
-    checked(first, TEA)
-    second, elsewhere = opened(server, beside=first), opened(server, size=PHONE)
+def test_every_tab_and_every_reload_shows_the_same(server: PageServer, open_page: OpenPage) -> None:
+    first = open_page(server)
+    type_and_check(first, TEA)
+    second, elsewhere = open_page(server, beside=first), open_page(server, size=PHONE)
     for page in (second, elsewhere):
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         expect(page.locator(".cm-content")).to_contain_text("Tea for ann, please")
@@ -140,9 +140,9 @@ def test_every_tab_and_every_reload_shows_the_same(server: PageServer, opened: O
         expect(page.locator(".headline")).to_have_text("Running")
 
 
-def test_an_edit_is_checked_and_problems_stand_at_their_lines(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
-    checked(page, TEA)
+def test_edit_is_checked_and_problems_stand_at_their_lines(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
+    type_and_check(page, TEA)
     write(page, BAD)
     page.wait_for_selector(".cm-line.problem-line")
     expect(page.locator(".cm-line.problem-line")).to_contain_text('there is no room "cellar"')
@@ -165,9 +165,9 @@ def test_an_edit_is_checked_and_problems_stand_at_their_lines(server: PageServer
     expect(page.locator(".problem-line")).to_have_count(0)
 
 
-def test_only_what_this_browser_shows_is_approved(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
-    checked(page, TEA)
+def test_only_what_this_browser_shows_is_approved(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
+    type_and_check(page, TEA)
     button = page.get_by_role("button", name="Run it on the robot")
     expect(button).to_be_enabled()
     button.evaluate("""(button) => {
@@ -184,8 +184,8 @@ def test_only_what_this_browser_shows_is_approved(server: PageServer, opened: Op
     expect(page.locator(".cm-content")).not_to_contain_text("something else")
 
 
-def test_checks_take_nothing_away_that_is_typed_meanwhile(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
+def test_checks_keep_text_that_is_typed_meanwhile(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
     write(page, TEA)
     page.keyboard.press("Control+End")
     typed = "# words with a pause in which a check begins, and words while it goes on, over and over"
@@ -199,7 +199,7 @@ def test_checks_take_nothing_away_that_is_typed_meanwhile(server: PageServer, op
     assert text_of(page).endswith(typed)
 
 
-def agree(server: PageServer, first: Page, second: Page) -> None:
+def wait_until_same(server: PageServer, first: Page, second: Page) -> None:
     """Wait until two pages show the program that the tool has."""
 
     def shown() -> set[str]:
@@ -212,9 +212,9 @@ def agree(server: PageServer, first: Page, second: Page) -> None:
         first.wait_for_timeout(50)
 
 
-def test_two_who_type_at_once_end_with_the_same_text(server: PageServer, opened: OpenPage) -> None:
-    first, second = opened(server), opened(server)
-    checked(first, TEA)
+def test_two_people_who_type_at_once_get_the_same_text(server: PageServer, open_page: OpenPage) -> None:
+    first, second = open_page(server), open_page(server)
+    type_and_check(first, TEA)
     expect(second.locator(".cm-content")).to_contain_text("Tea for ann")
     for page in (first, second):
         page.locator(".cm-content").click()
@@ -223,20 +223,20 @@ def test_two_who_type_at_once_end_with_the_same_text(server: PageServer, opened:
         first.keyboard.type(f"# first {number}\n")
         second.keyboard.type(f"# second {number}\n")
         first.wait_for_timeout(150 * (number % 4))
-    agree(server, first, second)
+    wait_until_same(server, first, second)
     first.keyboard.type("# the end of it\n")
     expect(second.locator(".cm-content")).to_contain_text("the end of it")
-    agree(server, first, second)
+    wait_until_same(server, first, second)
 
 
-def test_who_was_slower_at_the_same_moment_is_told(server: PageServer, opened: OpenPage) -> None:
-    first, second = opened(server), opened(server)
-    checked(first, TEA)
+def test_slower_of_two_edits_is_refused_with_a_message(server: PageServer, open_page: OpenPage) -> None:
+    first, second = open_page(server), open_page(server)
+    type_and_check(first, TEA)
     expect(second.locator(".cm-content")).to_contain_text("Tea for ann")
     for page in (first, second):
         page.locator(".cm-content").click()
         page.keyboard.press("Control+End")
-    second.evaluate("programEditor.show = () => {}")  # what the tool says comes too late
+    second.evaluate("programEditor.show = () => {}")  # The tool's message comes too late.
     first.keyboard.insert_text("# of the first\n")
     expect(first.get_by_text("Checked: no problems.")).to_be_visible()
     while "# of the first" not in server.call("GET", "/api/missions/current").data["program"]:
@@ -246,9 +246,9 @@ def test_who_was_slower_at_the_same_moment_is_told(server: PageServer, opened: O
     assert "# of the second" not in server.call("GET", "/api/missions/current").data["program"]
 
 
-def test_what_was_typed_just_before_a_click_is_checked_and_kept(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
-    checked(page, TEA)
+def test_text_typed_just_before_a_click_is_checked_and_kept(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
+    type_and_check(page, TEA)
     button = page.get_by_role("button", name="Run it on the robot")
     expect(button).to_be_enabled()
     page.locator(".cm-content").click()
@@ -264,9 +264,9 @@ def test_what_was_typed_just_before_a_click_is_checked_and_kept(server: PageServ
     expect(page.locator(".cm-content")).to_contain_text("# one more")
 
 
-def test_undoing_is_for_what_was_typed_here(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
-    checked(page, TEA)
+def test_undo_reverts_only_own_edits(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
+    type_and_check(page, TEA)
     page.keyboard.insert_text("# mine")
     expect(page.locator(".cm-content")).to_contain_text("# mine")
     server.call("PUT", "/api/missions/current/program", {"program": FAR})
@@ -276,9 +276,9 @@ def test_undoing_is_for_what_was_typed_here(server: PageServer, opened: OpenPage
     expect(page.locator(".cm-content")).to_contain_text("range(50)")
 
 
-def test_a_program_that_is_too_long_is_refused_in_a_sentence(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
-    checked(page, TEA)
+def test_a_program_that_is_too_long_is_refused_in_a_sentence(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
+    type_and_check(page, TEA)
     page.locator(".cm-content").click()
     page.keyboard.press("Control+a")
     page.keyboard.insert_text("# " + "x" * 200_000)
@@ -286,8 +286,8 @@ def test_a_program_that_is_too_long_is_refused_in_a_sentence(server: PageServer,
     expect(page.locator(".cm-content")).to_contain_text("Tea for ann, please")
 
 
-def test_a_despite_is_for_one_program_only(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
+def test_approval_despite_problems_is_for_one_program(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
     write(page, BAD)
     page.get_by_text("Run it despite the problems").click()
     write(page, BAD.replace("cellar", "attic"))
@@ -296,8 +296,8 @@ def test_a_despite_is_for_one_program_only(server: PageServer, opened: OpenPage)
 
 
 @pytest.mark.parametrize("how", ["click", "Escape"])
-def test_stop_ends_what_the_robot_does(server: PageServer, opened: OpenPage, how: str) -> None:
-    page = opened(server)
+def test_stop_ends_what_the_robot_does(server: PageServer, open_page: OpenPage, how: str) -> None:
+    page = open_page(server)
     run(page, FAR)
     if how == "click":
         page.locator("#stop").click()
@@ -308,17 +308,17 @@ def test_stop_ends_what_the_robot_does(server: PageServer, opened: OpenPage, how
     assert server.call("GET", "/api/robot").data["state"] == "stopped"
 
 
-def test_a_stop_before_the_robot_moves_discards_the_program(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
-    checked(page, TEA)
+def test_a_stop_before_the_robot_moves_discards_the_program(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
+    type_and_check(page, TEA)
     page.locator("#stop").click()
     expect(page.locator("#stop-told")).to_have_text("Discarded before it ran.")
     expect(page.locator(".reason")).to_have_text("stopped from the page before it ran")
 
 
-def test_recent_instructions_are_up_to_date(tmp_path: Path, opened: OpenPage) -> None:
+def test_recent_instructions_are_up_to_date(tmp_path: Path, open_page: OpenPage) -> None:
     with PageServer(tmp_path, world=OFFICE) as server:
-        page = opened(server)
+        page = open_page(server)
         page.locator(".pick").first.click()
         page.get_by_role("button", name="Write the program").click()
         page.get_by_role("button", name="Run it on the robot").click()
@@ -332,9 +332,9 @@ def test_recent_instructions_are_up_to_date(tmp_path: Path, opened: OpenPage) ->
         page.context.close()
 
 
-def test_an_unknown_instruction_leads_to_known_ones(tmp_path: Path, opened: OpenPage) -> None:
+def test_an_unknown_instruction_leads_to_known_ones(tmp_path: Path, open_page: OpenPage) -> None:
     with PageServer(tmp_path, world=OFFICE) as server:
-        page = opened(server)
+        page = open_page(server)
         page.locator("textarea").fill("Go to the lobby.")
         page.get_by_role("button", name="Write the program").click()
         expect(page.locator(".trouble")).to_contain_text("OPENAI_API_KEY")
@@ -347,33 +347,33 @@ def test_an_unknown_instruction_leads_to_known_ones(tmp_path: Path, opened: Open
         page.context.close()
 
 
-def test_an_empty_editor_says_that_programs_can_be_typed(tmp_path: Path, opened: OpenPage) -> None:
+def test_an_empty_editor_says_that_programs_can_be_typed(tmp_path: Path, open_page: OpenPage) -> None:
     with PageServer(tmp_path) as server:
-        page = opened(server)
+        page = open_page(server)
         expect(page.locator("[data-started]")).to_be_visible()
         shown = "getComputedStyle(document.querySelector('.cm-content'), '::before').content"
         assert "def task_program():" in page.evaluate(shown)
-        checked(page, TEA)
+        type_and_check(page, TEA)
         assert page.evaluate(shown) == "none"
         expect(page.get_by_text("Your own program, without an instruction.")).to_be_visible()
         page.context.close()
 
 
-def test_escape_leaves_a_program_alone_that_waits(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
-    checked(page, TEA)
+def test_escape_keeps_a_waiting_program(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
+    type_and_check(page, TEA)
     page.keyboard.press("Escape")
     page.wait_for_timeout(500)
     expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
 
 
-def test_stop_needs_nothing_of_the_rest_of_the_page(server: PageServer, opened: OpenPage) -> None:
-    """The page was just reloaded, and none of NiceGUI's scripts has come yet."""
-    page = opened(server)
+def test_stop_works_before_scripts_arrive(server: PageServer, open_page: OpenPage) -> None:
+    """The page is reloading, and none of NiceGUI's scripts has arrived."""
+    page = open_page(server)
     run(page, FAR)
     held: list[Route] = []
 
-    def hold(route: Route) -> None:  # Playwright wants a function of Python's own
+    def hold(route: Route) -> None:  # Playwright rejects built-in functions.
         held.append(route)
 
     page.context.route("**/_nicegui/**/*.js", hold)
@@ -384,8 +384,8 @@ def test_stop_needs_nothing_of_the_rest_of_the_page(server: PageServer, opened: 
     assert page.locator(".headline").count() == 0
 
 
-def test_a_stop_is_not_said_to_have_worked_before_it_has(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
+def test_stop_is_confirmed_only_after_it_worked(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
     run(page, FAR)
     answer = {"state": "stopping", "reason": "", "is_over": False}
     page.route("**/api/robot?once=over", lambda route: route.fulfill(body=json.dumps(answer)))
@@ -395,19 +395,19 @@ def test_a_stop_is_not_said_to_have_worked_before_it_has(server: PageServer, ope
     expect(page.locator("#stop-told")).to_have_text("Stop sent. Waiting for the robot to confirm …")
 
 
-def test_a_tool_that_cannot_be_reached_is_said(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
+def test_unreachable_tool_is_reported(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
     page.route("**/api/stop*", lambda route: route.fulfill(body="lost"))
     page.locator("#stop").click()
     expect(page.locator("#stop-told")).to_contain_text("emergency stop")
 
 
 def test_stop_is_always_in_the_same_place_and_nothing_is_wider_than_the_screen(
-    server: PageServer, opened: OpenPage
+    server: PageServer, open_page: OpenPage
 ) -> None:
     places = set()
-    page = opened(server)
-    checked(page, TEA + "    # " + "a long line " * 30 + "\n")
+    page = open_page(server)
+    type_and_check(page, TEA + "    # " + "a long line " * 30 + "\n")
     for path in ("/", "/missions", "/missions/" + server.call("GET", "/api/robot").data["mission"]):
         page.goto(f"{server.inside}{path}")
         expect(page.locator("h1, h2").first).to_be_visible()
@@ -423,17 +423,17 @@ def test_stop_is_always_in_the_same_place_and_nothing_is_wider_than_the_screen(
     assert len(places) == 3
 
 
-def test_a_robot_keeps_its_mission_when_the_page_closes(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
+def test_a_robot_keeps_its_mission_when_the_page_closes(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
     run(page, FAR)
     page.context.close()
     time.sleep(1)
     assert server.call("GET", "/api/robot").data["state"] == "running"
 
 
-def test_many_tabs_stay_in_step(server: PageServer, opened: OpenPage) -> None:
-    first = opened(server)
-    pages = [first, *(opened(server, beside=first) for _ in range(5))]
+def test_many_tabs_stay_in_step(server: PageServer, open_page: OpenPage) -> None:
+    first = open_page(server)
+    pages = [first, *(open_page(server, beside=first) for _ in range(5))]
     run(first, FAR)
     for page in pages:
         expect(page.locator(".headline")).to_have_text("Running")
@@ -442,9 +442,9 @@ def test_many_tabs_stay_in_step(server: PageServer, opened: OpenPage) -> None:
         expect(page.locator(".headline")).to_have_text("Stopped")
 
 
-def test_examples_are_seen_whole_and_taken_by_a_click(tmp_path: Path, opened: OpenPage) -> None:
+def test_examples_are_seen_whole_and_taken_by_a_click(tmp_path: Path, open_page: OpenPage) -> None:
     with PageServer(tmp_path, world=OFFICE) as server:
-        page = opened(server)
+        page = open_page(server)
         for pick in page.locator(".pick").all():
             words = pick.locator("span")
             assert words.evaluate("e => e.scrollHeight <= e.clientHeight"), words.inner_text()
@@ -458,7 +458,7 @@ def test_examples_are_seen_whole_and_taken_by_a_click(tmp_path: Path, opened: Op
 
 
 def is_in_sight(page: Page, name: str) -> bool:
-    """Whether a button can be pressed without scrolling, above the names of the pages."""
+    """Return whether a button can be pressed without scrolling, above the names of the pages."""
     box = page.get_by_role("button", name=name).bounding_box()
     pages = page.locator(".pages").bounding_box()
     assert box is not None
@@ -466,9 +466,9 @@ def is_in_sight(page: Page, name: str) -> bool:
     return box["y"] > 60 and box["y"] + box["height"] < pages["y"]
 
 
-def test_a_phone_shows_first_what_is_to_be_done(tmp_path: Path, opened: OpenPage) -> None:
+def test_phone_shows_the_next_step_first(tmp_path: Path, open_page: OpenPage) -> None:
     with PageServer(tmp_path, "--face", "--speed", "2", world=OFFICE) as server:
-        page = opened(server, size=PHONE)
+        page = open_page(server, size=PHONE)
         page.locator(".pick").last.scroll_into_view_if_needed()
         page.locator(".pick").last.click()
         page.wait_for_function("scrollY === 0")
@@ -497,27 +497,27 @@ def test_a_phone_shows_first_what_is_to_be_done(tmp_path: Path, opened: OpenPage
         page.context.close()
 
 
-def test_a_tool_that_is_gone_leaves_nothing_that_looks_alive(tmp_path: Path, opened: OpenPage) -> None:
+def test_page_of_a_killed_tool_is_disabled(tmp_path: Path, open_page: OpenPage) -> None:
     with PageServer(tmp_path) as server:
-        pages = [opened(server, size=size, expecting="ERR_CONNECTION_REFUSED") for size in (DESK, PHONE)]
+        pages = [open_page(server, size=size, expecting="ERR_CONNECTION_REFUSED") for size in (DESK, PHONE)]
         for page in pages:
             expect(page.locator(".headline")).to_be_visible()
             page.wait_for_load_state("networkidle")
         server.end(signal.SIGKILL)
         for page in pages:
             page.wait_for_selector("#popup[aria-hidden=false]")
-            told = page.locator("#popup").evaluate("e => getComputedStyle(e, '::before').content")
-            assert "use its emergency stop" in told
+            message = page.locator("#popup").evaluate("e => getComputedStyle(e, '::before').content")
+            assert "use its emergency stop" in message
             for pane in page.locator(".pane").all():
                 assert pane.evaluate("e => getComputedStyle(e.parentNode).filter") == "grayscale(1)"
                 assert pane.evaluate("e => getComputedStyle(e).pointerEvents") == "none"
-            page.locator("#stop").click()  # nothing lies over it
+            page.locator("#stop").click()  # Nothing covers the button.
             expect(page.locator("#stop-told")).to_contain_text("emergency stop")
             page.context.close()
 
 
-def test_past_missions_are_told_and_downloaded(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
+def test_past_missions_are_shown_and_downloaded(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
     run(page, TEA)
     expect(page.locator(".headline")).to_have_text("Done")
     page.get_by_role("link", name="Missions").click()
@@ -536,28 +536,28 @@ def test_past_missions_are_told_and_downloaded(server: PageServer, opened: OpenP
         assert Path(download.value.path()).read_bytes().startswith(begins)
 
 
-def test_what_became_of_a_mission_is_said_after_the_tool_died(tmp_path: Path, opened: OpenPage) -> None:
+def test_page_shows_how_a_mission_ended_after_the_tool_died(tmp_path: Path, open_page: OpenPage) -> None:
     with PageServer(tmp_path) as server:
-        page = opened(server)
+        page = open_page(server)
         run(page, FAR)
         expect(page.locator(".doing")).to_have_text(re.compile("Drives to"))
         page.context.close()
         server.end(signal.SIGKILL)
     with PageServer(tmp_path) as server:
-        page = opened(server)
+        page = open_page(server)
         expect(page.locator(".interrupted").first).to_contain_text("ended unexpectedly during go_to")
         page.get_by_role("button", name="Dismiss").click()
         expect(page.locator(".interrupted").first).to_be_hidden()
         page.context.close()
 
 
-def test_without_the_token_there_is_a_sentence(server: PageServer) -> None:
+def test_missing_token_is_explained(server: PageServer) -> None:
     answer = server.ask("GET", "/", accept="text/html")
     assert "open the printed link" in answer.text
 
 
-def test_a_program_that_replaces_another_needs_a_moment(server: PageServer, opened: OpenPage) -> None:
-    page = opened(server)
+def test_replacing_program_cannot_be_approved_at_once(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
     button = page.get_by_role("button", name="Run it on the robot")
     for program, is_first in ((TEA, True), (TEA.replace("tea", "milk").replace("Tea", "Milk"), False)):
         server.call("POST", "/api/missions", {"program": program})
@@ -573,10 +573,10 @@ def test_a_program_that_replaces_another_needs_a_moment(server: PageServer, open
     expect(page.locator(".headline")).to_have_text("Running")
 
 
-def test_a_new_mission_needs_a_moment_even_if_its_program_was_typed_here(
-    server: PageServer, opened: OpenPage
+def test_new_mission_cannot_be_approved_at_once_even_if_typed_here(
+    server: PageServer, open_page: OpenPage
 ) -> None:
-    page = opened(server)
+    page = open_page(server)
     button = page.get_by_role("button", name="Run it on the robot")
     write(page, TEA)
     expect(button).to_be_enabled()

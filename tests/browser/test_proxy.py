@@ -21,10 +21,10 @@ FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n 
 ASK = "def task_program():\n    say('Hello')\n    ask('ann', 'Tea?', ['yes', 'no'])\n"
 SOCKET, FILES = "/_nicegui_ws/", "/events."
 STATUSES = "(asked) => Promise.all(asked.map(async (each) => (await fetch(each)).status))"
-WAYS = {"root": ("", False), "kept": ("/robot", False), "stripped": ("/lab/robot", True)}
+PATHS = {"root": ("", False), "kept": ("/robot", False), "stripped": ("/lab/robot", True)}
 """The path of the page, and whether the proxy removes it."""
 BELOW_A_PATH = pytest.mark.parametrize("site", ["kept", "stripped"], indirect=True)
-"""At the root, what a page leads to is as without a proxy."""
+"""These tests skip the root, where a page has the same links without a proxy."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ class Site:
     proxy: TLSProxy
 
     def link(self, path: str = "") -> str:
-        """The link that opens a page through the proxy, as an operator."""
+        """Return the link that opens a page for an operator through the proxy."""
         return f"{self.proxy.address}/{path}?token={self.server.token}"
 
 
 @contextmanager
-def in_front(
+def serve_behind_proxy(
     folder: Path,
     *arguments: str,
     prefix: str = "",
@@ -48,30 +48,30 @@ def in_front(
     strips: bool = False,
     host: bool = True,
 ) -> Iterator[Site]:
-    """A page behind a proxy, which `--behind-proxy` may name."""
-    with ExitStack() as held:
+    """Serve a page behind a proxy; `named` passes the proxy to `--behind-proxy`."""
+    with ExitStack() as stack:
         servers: list[PageServer] = []
         proxy = TLSProxy(folder, lambda: servers[0].port, prefix, strips=strips, passes_host=host)
-        held.enter_context(proxy)
+        stack.enter_context(proxy)
         option = ("--behind-proxy", proxy.address) if named else ()
-        servers.append(held.enter_context(PageServer(folder, *arguments, *option)))
+        servers.append(stack.enter_context(PageServer(folder, *arguments, *option)))
         yield Site(servers[0], proxy)
 
 
-@pytest.fixture(scope="module", params=WAYS)
+@pytest.fixture(scope="module", params=PATHS)
 def site(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    prefix, strips = WAYS[request.param]
+    prefix, strips = PATHS[request.param]
     folder = tmp_path_factory.mktemp(request.param)
     (folder / "runs").mkdir()
     words = ("--model", "recorded:careful", "--num-completions", "1", "--no-report", "--tasks", "SayGoodDay")
     ended = forked("roboeval", "run", *words, "--out", str(folder / "runs" / "careful"))
     assert ended.status == 0, ended.err
-    with in_front(folder, "--speed", "2", "--face", prefix=prefix, strips=strips) as site:
+    with serve_behind_proxy(folder, "--speed", "2", "--face", prefix=prefix, strips=strips) as site:
         yield site
 
 
 def addresses(page: Page) -> list[str]:
-    """All that a page leads to or has loaded, as the browser resolves it."""
+    """Return the addresses that a page links to or has loaded, resolved by the browser."""
     script = """() => [
         ...[...document.querySelectorAll("a[href], link[href]")].map((e) => e.href),
         ...[...document.querySelectorAll("[src]")].map((e) => e.src),
@@ -88,10 +88,10 @@ def test_the_links_are_printed_with_their_tokens(site: Site) -> None:
     assert f"{site.proxy.address}/face?token={site.server.face_token}\n" in said
 
 
-def test_the_page_lives_and_stops_the_robot(site: Site, opened: OpenPage) -> None:
-    page = opened(site.server, link=site.link())
+def test_page_updates_and_stops_the_robot(site: Site, open_page: OpenPage) -> None:
+    page = open_page(site.server, link=site.link())
     site.server.run(FAR)
-    expect(page.locator(".headline")).to_have_text("Running")  # which the websocket brings
+    expect(page.locator(".headline")).to_have_text("Running")  # The websocket brings this text.
     with page.expect_response(re.compile("/api/stop")) as answer:
         page.locator("#stop").click()
     assert answer.value.status == 202
@@ -99,8 +99,8 @@ def test_the_page_lives_and_stops_the_robot(site: Site, opened: OpenPage) -> Non
     expect(page.locator(".headline")).to_have_text("Stopped")
 
 
-def test_no_address_leaves_the_path_of_the_page(site: Site, opened: OpenPage) -> None:
-    page = opened(site.server, link=site.link())
+def test_no_address_leaves_the_path_of_the_page(site: Site, open_page: OpenPage) -> None:
+    page = open_page(site.server, link=site.link())
     for path in ("", "missions", "runs", "runs/careful", "face"):
         page.goto(f"{site.proxy.address}{site.server.path}/{path}")
         page.wait_for_load_state("networkidle")
@@ -112,8 +112,8 @@ def test_no_address_leaves_the_path_of_the_page(site: Site, opened: OpenPage) ->
         assert dict(zip(asked, statuses, strict=True)) == dict.fromkeys(asked, 200), path
 
 
-def test_the_cookie_counts_below_the_path_alone_and_only_by_https(site: Site, opened: OpenPage) -> None:
-    page = opened(site.server, link=site.link("missions"))
+def test_the_cookie_counts_below_the_path_alone_and_only_by_https(site: Site, open_page: OpenPage) -> None:
+    page = open_page(site.server, link=site.link("missions"))
     assert urlsplit(page.url).query == ""
     (cookie,) = page.context.cookies()
     path = urlsplit(site.proxy.address).path + site.server.path
@@ -121,10 +121,10 @@ def test_the_cookie_counts_below_the_path_alone_and_only_by_https(site: Site, op
 
 
 @BELOW_A_PATH
-def test_a_past_mission_is_found_and_downloaded(site: Site, opened: OpenPage) -> None:
+def test_a_past_mission_is_found_and_downloaded(site: Site, open_page: OpenPage) -> None:
     site.server.rest()
     site.server.run(ASK)
-    page = opened(site.server, link=site.link())
+    page = open_page(site.server, link=site.link())
     page.get_by_role("link", name="Missions").click()
     page.locator(".rows a").first.click()
     expect(page.locator(".timeline")).to_contain_text("Hello")
@@ -134,9 +134,9 @@ def test_a_past_mission_is_found_and_downloaded(site: Site, opened: OpenPage) ->
 
 
 @BELOW_A_PATH
-def test_the_face_speaks_and_its_stop_works(site: Site, opened: OpenPage) -> None:
+def test_the_face_speaks_and_its_stop_works(site: Site, open_page: OpenPage) -> None:
     site.server.rest()
-    face = opened(site.server, link=f"{site.proxy.address}/face?token={site.server.face_token}")
+    face = open_page(site.server, link=f"{site.proxy.address}/face?token={site.server.face_token}")
     site.server.run(ASK)
     expect(face.locator("#said")).to_contain_text("Hello")
     face.locator("#options button").first.click()
@@ -147,8 +147,8 @@ def test_the_face_speaks_and_its_stop_works(site: Site, opened: OpenPage) -> Non
 
 
 @BELOW_A_PATH
-def test_the_run_of_a_benchmark_is_shown_to_its_last_page(site: Site, opened: OpenPage) -> None:
-    page = opened(site.server, link=site.link("runs"))
+def test_the_run_of_a_benchmark_is_shown_to_its_last_page(site: Site, open_page: OpenPage) -> None:
+    page = open_page(site.server, link=site.link("runs"))
     page.locator("table a").first.click()
     page.locator(".which a").first.click()
     expect(page.locator("h1")).to_contain_text("SayGoodDay")
@@ -157,8 +157,8 @@ def test_the_run_of_a_benchmark_is_shown_to_its_last_page(site: Site, opened: Op
 
 
 def test_without_the_option_stop_says_how_to_start(tmp_path: Path, browser: Browser) -> None:
-    """Without `opened`, since NiceGUI complains that its modules are refused."""
-    with in_front(tmp_path, named=False) as site, browser.new_context() as context:
+    """NiceGUI reports that its modules are refused, so `open_page` would fail the test."""
+    with serve_behind_proxy(tmp_path, named=False) as site, browser.new_context() as context:
         page = context.new_page()
         page.goto(site.link())
         page.wait_for_load_state("networkidle")

@@ -1,4 +1,4 @@
-"""The pages that say no: they can be read by everybody, too."""
+"""Pages that refuse a request are accessible, too."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from viewing import SCREENS, OpenPage, Screen, expect_no_grave_fault
 
 
 @pytest.mark.parametrize("screen", [SCREENS[0], SCREENS[-1]], ids=lambda screen: screen[0])
-def test_pages_that_refuse(server: PageServer, opened: OpenPage, screen: Screen) -> None:
+def test_pages_that_refuse(server: PageServer, open_page: OpenPage, screen: Screen) -> None:
     _, size, dark = screen
     address = f"http://localhost:{server.port}/"
-    page = opened(server, size=size, dark=dark, link=address, expecting="Failed to load resource")
+    page = open_page(server, size=size, dark=dark, link=address, expecting="Failed to load resource")
     expect(page.locator("p")).to_contain_text("open the printed link")
     expect_no_grave_fault(page)
     page.goto(f"{server.link}x")

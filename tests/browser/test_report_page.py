@@ -1,6 +1,6 @@
-"""The page in a real browser: tables are sorted, groups filtered, and without a script it still reads.
+"""The report in a real browser: tables sort, groups filter, and it is readable without scripts.
 
-Without a Chromium these tests are skipped and say so.
+Without Chromium, these tests are skipped and say so.
 """
 
 import base64
@@ -59,7 +59,7 @@ addEventListener("load", () => {
 
 
 @pytest.fixture(scope="module", name="chromium")
-def found_chromium() -> str:
+def find_chromium() -> str:
     found = chromium()
     if found is None:
         pytest.skip("there is no Chromium here")
@@ -73,7 +73,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     passes = {
         "strong": {"Visit": (9, 8), "CountMugs": (10, 3)},
         "weak": {"Visit": (0, 2), "CountMugs": (1, 0)},
-        HOSTILE: {"Visit": (4, 5)},  # and nothing else, so that some cells are empty
+        HOSTILE: {"Visit": (4, 5)},  # Other tasks are missing, so some cells are empty.
     }
     runs = [
         made_up(name, those, written=lambda _, index: {"program": program} if index > 6 else {})
@@ -83,8 +83,8 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "index.html"
 
 
-def opened(chromium: str, page: Path, folder: Path, *options: str) -> str:
-    """The page as it stands after its scripts have run."""
+def render(chromium: str, page: Path, folder: Path, *options: str) -> str:
+    """Return the page after its scripts have run."""
     ended = subprocess.run(
         [
             chromium,
@@ -106,7 +106,7 @@ def test_sorting_filtering_and_printing(chromium: str, page: Path, tmp_path: Pat
     text = text.replace("script-src ", f"script-src 'sha256-{digest}' ", 1)
     clicked = tmp_path / "clicked.html"
     clicked.write_text(text.replace("</body>", f"<script>{CLICKS}</script></body>"))
-    title = re.search(r"<title>(.*?)</title>", opened(chromium, clicked, tmp_path), re.DOTALL)
+    title = re.search(r"<title>(.*?)</title>", render(chromium, clicked, tmp_path), re.DOTALL)
     assert title is not None
     assert title[1].split(" | ") == [
         "down: stro,&lt;scr,weak",
@@ -127,23 +127,23 @@ A4 = 186 * 96 // 25  # pixels between margins of 12 mm
 
 
 def test_nothing_is_cut_off_on_paper(browser: Browser, page: Path) -> None:
-    opened = browser.new_page(viewport={"width": A4, "height": 1000})
-    opened.goto(page.as_uri())
-    opened.emulate_media(media="print")
-    opened.evaluate("dispatchEvent(new Event('beforeprint'))")
-    ends = opened.evaluate(
+    render = browser.new_page(viewport={"width": A4, "height": 1000})
+    render.goto(page.as_uri())
+    render.emulate_media(media="print")
+    render.evaluate("dispatchEvent(new Event('beforeprint'))")
+    ends = render.evaluate(
         "[...document.querySelectorAll('table, img, pre')].map((one) => one.getBoundingClientRect())"
         ".filter((box) => box.width > 0).map((box) => box.right)"
     )
-    opened.close()
+    render.close()
     assert len(ends) > 15
     assert max(ends) <= A4
 
 
-def test_without_a_script_it_reads_as_a_document(chromium: str, page: Path, tmp_path: Path) -> None:
+def test_report_is_readable_without_scripts(chromium: str, page: Path, tmp_path: Path) -> None:
     quiet = tmp_path / "quiet.html"
     quiet.write_text(page.read_text().replace(PAGE_SCRIPT.read_text(), ""))
-    text = opened(chromium, quiet, tmp_path)
+    text = render(chromium, quiet, tmp_path)
     assert "<button" not in text
     assert 'class="filters"' not in text
     assert text.count('<th scope="col"') > 20
@@ -153,4 +153,4 @@ def test_without_a_script_it_reads_as_a_document(chromium: str, page: Path, tmp_
 def test_no_other_script_runs(chromium: str, page: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.html"
     other.write_text(page.read_text().replace("</body>", "<script>document.title = 'ran'</script></body>"))
-    assert "<title>ran</title>" not in opened(chromium, other, tmp_path)
+    assert "<title>ran</title>" not in render(chromium, other, tmp_path)

@@ -1,4 +1,4 @@
-"""House rules on the page: what a person sees of them, and how one is switched off for one program."""
+"""The page shows house rules, and a person can switch one off for one program."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ SLY = """def task_program():
 """
 
 
-def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path, opened: OpenPage) -> None:
+def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path, open_page: OpenPage) -> None:
     (tmp_path / "rules.yaml").write_text(RULES)
     with PageServer(tmp_path, "--speed", "40", "--rules", "rules.yaml") as server:
-        page = opened(server)
+        page = open_page(server)
         expect(page.locator(".house-rules li")).to_have_text(
             ["Never go into the study.", "Carry no mug out of the kitchen."]
         )
@@ -63,16 +63,16 @@ def test_a_rule_is_shown_enforced_and_switched_off_with_a_reason(tmp_path: Path,
         expect(page.locator(".headline")).to_have_text("Done")
         expect(page.locator(".moment-log")).to_contain_text("Ann has asked for a visit")
 
-        write(page, VISIT + "\n")  # another mission, in which the rule counts again
+        write(page, VISIT + "\n")  # In this new mission the rule counts again.
         expect(page.locator(".problems")).to_contain_text('the rule "study" forbids going to "study"')
         expect(page.locator(".house-rules li.off")).to_have_count(0)
         page.context.close()
 
 
-def test_the_api_shows_rules_and_cannot_switch_them_off(tmp_path: Path, opened: OpenPage) -> None:
+def test_the_api_shows_rules_and_cannot_switch_them_off(tmp_path: Path, open_page: OpenPage) -> None:
     (tmp_path / "rules.yaml").write_text(RULES)
     with PageServer(tmp_path, "--speed", "0", "--rules", "rules.yaml") as server:
-        page = opened(server, size=PHONE)
+        page = open_page(server, size=PHONE)
         write(page, "def task_program():\n    say('hello')\n")
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         now = server.call("GET", "/api/missions/current").data

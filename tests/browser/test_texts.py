@@ -1,4 +1,4 @@
-"""Whatever a model, a world file, a robot or a person says is shown as text, and never obeyed."""
+"""Texts from models, world files, robots and people are shown as text and never interpreted."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from server import Server
 from viewing import PHONE, OpenPage
 
 LONGEST = 9_000
-"""A program may say no more at once."""
+"""Most characters that a program may say at once."""
 
 
-HIDDEN = r"""() => {
-    const odd = /[\p{Cc}\p{Cf}\p{Zl}\p{Zp}]/u;
+INVISIBLE_TEXTS = r"""() => {
+    const invisible = /[\p{Cc}\p{Cf}\p{Zl}\p{Zp}]/u;
     const found = [...document.querySelectorAll("textarea")].map((each) => each.value);
     const nodes = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
     while (nodes.nextNode()) {
-        // the editor shows what is really there, kept apart from the rest, with its name before it
+        // The editor shows each invisible character by name, in an element of its own.
         const { data, parentNode } = nodes.currentNode;
         if (!parentNode.closest(".escaped, script, style")) found.push(data);
     }
-    return found.filter((text) => odd.test(text.replace(/[\n\t]/g, "")));
+    return found.filter((text) => invisible.test(text.replace(/[\n\t]/g, "")));
 }"""
-"""Texts with characters that nobody sees."""
+"""Returns texts with invisible characters."""
 
 
 def world_of(text: str) -> str:
-    """A house in which everything has an evil name, as far as a world file can hold it."""
+    """Return a world in which everything has an evil name, as far as a world file allows."""
     name = json.dumps("".join(c for c in text if c.isprintable())[:300], ensure_ascii=False)
     plain = json.dumps("kitchen")
     quoted = name.replace("(", "").replace(")", "").replace("[", "").replace("*", "").replace("{", "")
@@ -57,20 +57,20 @@ def program_of(text: str) -> str:
 """
 
 
-def count(page: Page) -> int:
-    """How many elements there are that could do something."""
+def count_active(page: Page) -> int:
+    """Count the elements that could do something."""
     return page.locator(OWN_TAGS).count()
 
 
 def expect_unharmed(page: Page, before: int) -> None:
     assert page.evaluate("window.owned") is None
-    assert count(page) == before
-    assert page.evaluate("document.documentElement.scrollWidth") <= page.viewport_size["width"]  # type: ignore[index]  # it has one
+    assert count_active(page) == before
+    assert page.evaluate("document.documentElement.scrollWidth") <= page.viewport_size["width"]  # type: ignore[index]  # It has one.
 
 
 def expect_written_out(page: Page) -> None:
-    """Nothing on the page is hidden in its texts, or turns them round."""
-    assert page.evaluate(HIDDEN) == []
+    """Expect no characters that are invisible or reverse the text."""
+    assert page.evaluate(INVISIBLE_TEXTS) == []
 
 
 @pytest.fixture(params=range(len(EVIL)), ids=NAMES)
@@ -85,8 +85,8 @@ def model(evil: str) -> Iterator[Server]:
         yield model
 
 
-def test_no_text_becomes_more_than_text(tmp_path: Path, opened: OpenPage, model: Server, evil: str) -> None:
-    """An instruction, a model's name, a program, its problems, a world, an answer, an error, a reason."""
+def test_hostile_text_stays_text(tmp_path: Path, open_page: OpenPage, model: Server, evil: str) -> None:
+    """The text is in an instruction, a model's name, a program, a world, an answer, an error and a reason."""
     arguments = [
         "--model",
         f"completions:{evil[:80].splitlines()[0].replace(chr(0), '')}",
@@ -95,9 +95,9 @@ def test_no_text_becomes_more_than_text(tmp_path: Path, opened: OpenPage, model:
     ]
     arguments = [each.encode(errors="replace").decode() for each in arguments]
     with PageServer(tmp_path, *arguments, "--speed", "0", world=world_of(evil)) as server:
-        page = opened(server)
+        page = open_page(server)
         expect(page.locator(".headline")).to_be_visible()
-        before = count(page)
+        before = count_active(page)
         page.locator("textarea").fill(evil.encode(errors="replace").decode())
         page.get_by_role("button", name="Write the program").click()
         expect(page.locator(".verdict")).to_be_visible()
@@ -108,7 +108,7 @@ def test_no_text_becomes_more_than_text(tmp_path: Path, opened: OpenPage, model:
         page.get_by_role("button", name="Run it on the robot").click()
         expect(page.locator(".headline")).to_have_text("Failed")
         shown = page.locator(".moment-say .text").inner_text()
-        assert "".join(shown.split())[:10] == "".join(_visible(evil).split())[:10]
+        assert "".join(shown.split())[:10] == "".join(_escape_invisible(evil).split())[:10]
         expect_unharmed(page, before)
         page.reload()
         expect(page.locator(".headline")).to_have_text("Failed")
@@ -117,9 +117,9 @@ def test_no_text_becomes_more_than_text(tmp_path: Path, opened: OpenPage, model:
         expect_written_out(page)
         page.locator(".pick").last.click()
         expect_written_out(page)
-        phone = opened(server, "missions", size=PHONE)
+        phone = open_page(server, "missions", size=PHONE)
         expect(phone.locator(".rows li")).to_have_count(1)
-        expect_unharmed(phone, count(phone))
+        expect_unharmed(phone, count_active(phone))
         expect_written_out(phone)
         phone.locator(".rows a").first.click()
         expect(phone.locator(".timeline")).to_be_visible()
@@ -130,14 +130,14 @@ def test_no_text_becomes_more_than_text(tmp_path: Path, opened: OpenPage, model:
             each.context.close()
 
 
-def _visible(text: str) -> str:
+def _escape_invisible(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
-def test_a_huge_program_does_not_hold_the_page_up(tmp_path: Path, opened: OpenPage) -> None:
+def test_huge_program_does_not_block_the_page(tmp_path: Path, open_page: OpenPage) -> None:
     huge = "def task_program():\n" + "".join(f"    say('{n} xx')\n" for n in range(990))
     with PageServer(tmp_path, "--speed", "0") as server:
-        page = opened(server)
+        page = open_page(server)
         expect(page.locator(".headline")).to_be_visible()
         assert server.call("POST", "/api/missions", {"program": huge}).status == 201
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()

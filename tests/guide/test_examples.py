@@ -1,4 +1,4 @@
-"""Every example runs and prints what it is there to show."""
+"""Every example runs and prints its result."""
 
 import subprocess
 import sys
@@ -22,7 +22,7 @@ def test_every_example_is_listed() -> None:
 
 
 @pytest.mark.parametrize("name", SHOWS)
-def test_an_example_shows_what_it_should(name: str) -> None:
+def test_example_prints_its_result(name: str) -> None:
     command = [sys.executable, str(EXAMPLES / name)]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr

@@ -1,6 +1,6 @@
-"""The pages for users: every command and all code on them runs, in their order, as it stands there.
+"""Every command and all code on the pages for users runs unchanged, in the order of the page.
 
-What cannot run here is marked, `<!-- not run: WHY -->` or `<!-- run by TEST -->`, and listed below.
+Marks name the blocks that cannot run here, `<!-- not run: WHY -->` or `<!-- run by TEST -->`; lists follow.
 """
 
 import csv
@@ -52,15 +52,15 @@ NOT_RUN = {
     ],
     "tutorial.md": ["makes an environment of its own"],
 }
-"""Why blocks are not run, page by page: no other reason, and no further block."""
+"""Reasons of all blocks that are not run, page by page."""
 
 RUN_BY = {"library.md": "tests/test_library.py"}
-"""Pages that another test follows as a whole."""
+"""Pages that another test runs as a whole."""
 
-LESS = {
+SHORTER = {
     "README.md": [
         ("--num-completions 3", "--num-completions 1 --tasks LunchTime --no-report"),
-        ("roboeval serve ", "roboeval serve --help "),  # other pages serve
+        ("roboeval serve ", "roboeval serve --help "),  # Other pages serve.
         ("codebotler serve ", "codebotler serve --help "),
     ],
     "benchmark-pages.md": [("--num-completions 3", "--num-completions 1 --tasks LunchTime --no-report")],
@@ -76,12 +76,12 @@ LESS = {
     "roboeval-plus.md": [("--worlds 200", "--worlds 31"), ("--num-completions 3", "--num-completions 1")],
     "tutorial.md": [("--num-completions 2", "--num-completions 1 --tasks LunchTime --no-report")],
 }
-"""What a reader is told to do, and what is done here instead: the same with less."""
+"""Parts of commands on pages, and shorter replacements, which save time here."""
 
 JOURNEY = ("README.md", "index.md", "tutorial.md")
-"""Pages that one reader follows one after the other, in one folder; each other page has its own."""
+"""Pages that a reader follows in this order and in one folder; each other page has its own folder."""
 
-FOLLOWED = [page for page in PAGES if page not in RUN_BY]
+FOLLOWED_PAGES = [page for page in PAGES if page not in RUN_BY]
 CODE, DATA = {"sh", "python"}, {"yaml", "json", "text", "nginx", "caddy"}
 COMMAND = re.compile(r"^(?:\.venv/|codebotler |roboeval |python |pip |export |make |apt)", re.MULTILINE)
 MODEL = "http://localhost:8000/v1"
@@ -99,7 +99,7 @@ try:
     link = next(line.strip() for line in page.stderr if "http://" in line)
     link = re.sub(r"//[^/]*", "//localhost:" + port, link)
     browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
-    for again in range(5):  # on a busy machine a page may come too late; who sees that loads it again
+    for again in range(5):  # A busy machine may answer too late.
         try:
             browser.open(link, timeout=30)
             break
@@ -111,7 +111,7 @@ try:
 finally:
     page.kill()
 """
-"""In the place of a command: a page is served until somebody has opened it and pressed Ctrl-C."""
+"""Replaces a command: it serves a page, opens it like a browser and presses Ctrl-C."""
 
 PIP = """\
 #!{python}
@@ -123,7 +123,7 @@ os.execv(sys.executable, [sys.executable, "-m", "pip", *sys.argv[1:], *offline])
 
 @dataclass(frozen=True)
 class Block:
-    """What stands between fences on a page."""
+    """A fenced block of a page."""
 
     language: str
     text: str
@@ -140,15 +140,15 @@ def blocks(page: str) -> list[Block]:
     return [Block(f["language"], f["text"], f["why"] or "", f["test"] or "") for f in found]
 
 
-def followed_for(is_meant: Callable[[Block], bool]) -> list[object]:
-    """The pages that have such a block and are followed; those of a journey by the same reader."""
-    pages = [page for page in FOLLOWED if any(map(is_meant, blocks(page)))]
+def pages_with(is_meant: Callable[[Block], bool]) -> list[object]:
+    """Return the followed pages that have a block of a kind; `journey:` marks pages that share a reader."""
+    pages = [page for page in FOLLOWED_PAGES if any(map(is_meant, blocks(page)))]
     return [pytest.param(page, id=f"journey:{page}" if page in JOURNEY else page) for page in pages]
 
 
 @dataclass
 class Reader:
-    """Somebody who follows a page to the letter, in a folder of their own."""
+    """A reader who runs all blocks of a page, in a separate folder."""
 
     folder: Path
     url: str
@@ -157,11 +157,11 @@ class Reader:
     def __post_init__(self) -> None:
         if not (self.folder / "examples").exists():
             (self.folder / "examples").symlink_to(ROOT / "examples")
-        self.put("roboeval", SHIM.format(python=sys.executable, name="roboeval"))
-        self.put("codebotler", SHIM.format(python=sys.executable, name="codebotler"))
-        self.put("pip", PIP.format(python=sys.executable, site=str(self.folder / "site")))
+        self.install("roboeval", SHIM.format(python=sys.executable, name="roboeval"))
+        self.install("codebotler", SHIM.format(python=sys.executable, name="codebotler"))
+        self.install("pip", PIP.format(python=sys.executable, site=str(self.folder / "site")))
 
-    def put(self, name: str, script: str) -> None:
+    def install(self, name: str, script: str) -> None:
         path = self.folder / ".venv" / "bin" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(script)
@@ -172,9 +172,9 @@ class Reader:
             if block.language not in CODE or block.not_run or block.run_by or ">>> " in block.text:
                 continue
             text = block.text.replace(MODEL, self.url)
-            for told, less in LESS.get(page, []):
-                text = text.replace(told, less)
-            # ":" lets the shell stay until the last command has ended, which may ask what shell it is.
+            for long, short in SHORTER.get(page, []):
+                text = text.replace(long, short)
+            # ":" keeps the shell running during the last command, which may ask what shell started it.
             shell = ["bash", "-e", "-o", "pipefail", "-c", f"{text}:"]
             self.run(shell if block.language == "sh" else [sys.executable, "-c", text])
 
@@ -196,8 +196,8 @@ class Reader:
 
 
 @pytest.fixture(scope="session")
-def followed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Reader]]:
-    """Follows a page, once for all tests, with a model that answers quickly."""
+def follow(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Reader]]:
+    """Return a function that follows a page once for all tests, with a model that answers quickly."""
     readers: dict[str, Reader] = {}
     with Server(answer=lambda _: 'def task_program():\n    go_to("kitchen")\n    say("hello")\n') as server:
 
@@ -212,13 +212,13 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str
         yield follow
 
 
-@pytest.mark.parametrize("page", followed_for(lambda block: block.language == "sh"))
-def test_what_a_page_has_written_into_the_root_is_left_alone(
-    followed: Callable[[str], Reader], page: str, tmp_path: Path
+@pytest.mark.parametrize("page", pages_with(lambda block: block.language == "sh"))
+def test_git_ignores_files_that_a_page_writes_into_the_root(
+    follow: Callable[[str], Reader], page: str, tmp_path: Path
 ) -> None:
-    """By git, so that it is not packed either, and by the linters."""
+    """Packing and linters leave out the files that git ignores."""
     ours = {".venv", "examples", "site", "state"}
-    for path in followed(page).folder.iterdir():
+    for path in follow(page).folder.iterdir():
         if path.name not in ours:
             (shutil.copytree if path.is_dir() else shutil.copy)(path, tmp_path / path.name)
     shutil.copy(ROOT / ".gitignore", tmp_path)
@@ -228,37 +228,37 @@ def test_what_a_page_has_written_into_the_root_is_left_alone(
     assert seen.stdout == "?? .gitignore\n"
 
 
-MADE = re.compile(r"(?:--out|--mcap|(?<![<>=-])>|mkdir(?: -p)?|--new \S+ --suite) ?([\w./-]+)")
-"""What a command makes: a file or a folder."""
+OUTPUT = re.compile(r"(?:--out|--mcap|(?<![<>=-])>|mkdir(?: -p)?|--new \S+ --suite) ?([\w./-]+)")
+"""The file or folder that a command makes."""
 
 
-def made(text: str) -> Iterator[tuple[str, str]]:
-    """What the commands in a string make, and by which command, without a remark behind it."""
+def outputs_of(text: str) -> Iterator[tuple[str, str]]:
+    """Yield each file that commands in a string make, and its command without a trailing comment."""
     for line in text.replace("\\\n", " ").splitlines():
         command = " ".join(line.partition("   # ")[0].split())
         program = re.search(r"(?:codebotler|roboeval) .*|(?:cat|mkdir) .*", command)
         if program is not None:
-            files = MADE.findall(command)
+            files = OUTPUT.findall(command)
             if not files and (model := re.search(r"roboeval (?:run|generate) --model ([\w:-]+)", command)):
                 files = [f"runs/{model[1].replace(':', '-')}"]
             yield from ((file, program[0]) for file in files)
 
 
 def commands_of(page: str) -> Iterator[str]:
-    """What a page has in blocks for the shell, and in a sentence as a command."""
+    """Yield the commands of a page, from its shell blocks and its sentences."""
     yield from (block.text for block in blocks(page) if block.language == "sh")
     yield from re.findall(r"(?<!`)`(roboeval [^`]+)`", FENCE.sub("", PAGES[page].read_text()))
 
 
-def test_what_two_pages_make_has_two_names_but_where_they_make_it_by_the_same_command() -> None:
-    """So that whoever follows both in one folder meets no run that holds other completions."""
+def test_pages_make_files_of_the_same_name_only_by_the_same_command() -> None:
+    """A reader who follows both in one folder must not find a run with other completions."""
     makers: dict[str, dict[str, set[str]]] = {}
     demo = (ROOT / "Makefile").read_text().replace("$(BIN)", ".venv/bin").replace('"', "")
     for place, texts in [("Makefile", [demo]), *((page, commands_of(page)) for page in PAGES)]:
-        for file, command in (one for text in texts for one in made(text)):
+        for file, command in (one for text in texts for one in outputs_of(text)):
             alone = (
                 f" on {place}" if command.startswith("cat >") else ""
-            )  # what is written follows in other lines
+            )  # The text to write is not in the command.
             makers.setdefault(file, {}).setdefault(place, set()).add(command + alone)
     assert {"Makefile", "index.md"} <= makers["runs/hasty"].keys()
     assert {"runs/first-model", "runs/recorded-hasty", "first.py", "office"} <= makers.keys()
@@ -266,18 +266,18 @@ def test_what_two_pages_make_has_two_names_but_where_they_make_it_by_the_same_co
     assert {file: pages for file, pages in shared.items() if len(set.union(*pages.values())) > 1} == {}
 
 
-def is_printed(told: str, printed: str) -> bool:
-    """Whether a page tells what was printed, but for where lines break; `...` leaves something out."""
-    told, printed = (" ".join(text.split()) for text in (told, printed))
-    return re.search(re.escape(told).replace(r"\.\.\.", ".*?"), printed) is not None
+def is_printed(text: str, printed: str) -> bool:
+    """Return whether a command printed a text, except for line breaks; `...` stands for any text."""
+    text, printed = (" ".join(each.split()) for each in (text, printed))
+    return re.search(re.escape(text).replace(r"\.\.\.", ".*?"), printed) is not None
 
 
-@pytest.mark.parametrize("page", followed_for(lambda block: block.language in CODE))
-def test_every_block_of_a_page_runs(followed: Callable[[str], Reader], page: str) -> None:
-    followed(page)
+@pytest.mark.parametrize("page", pages_with(lambda block: block.language in CODE))
+def test_every_block_of_a_page_runs(follow: Callable[[str], Reader], page: str) -> None:
+    follow(page)
 
 
-def test_what_is_not_run_is_marked_and_listed() -> None:
+def test_blocks_that_are_not_run_are_marked_and_listed() -> None:
     marked = {page: [block.not_run for block in blocks(page) if block.not_run] for page in PAGES}
     assert {page: reasons for page, reasons in marked.items() if reasons} == NOT_RUN
     assert all(page in (ROOT / test).read_text() for page, test in RUN_BY.items())
@@ -304,26 +304,26 @@ def test_data_can_be_read() -> None:
                 assert read[block.language](block.text), (page, block)
 
 
-SHOWN_ELSEWHERE = {  # texts that no command of their page prints, and the tests that compare them
+SHOWN_ELSEWHERE = {  # No command of the page prints these texts.
     "architecture.md": ["roboeval\n  cli/"],
-    "check-before-you-run.md": ["Which did you mean?"],  # a terminal shows it, as in test_candidates.py
+    "check-before-you-run.md": ["Which did you mean?"],  # test_candidates.py shows it on a terminal.
     "index.md": ["abc argparse", "runs/hasty/"],
     "roboeval-plus.md": ["task   "],
     "ros.md": ["string location"],
 }
 
 
-@pytest.mark.parametrize("page", followed_for(lambda block: block.language == "text"))
-def test_what_a_page_says_is_printed_is_printed(followed: Callable[[str], Reader], page: str) -> None:
+@pytest.mark.parametrize("page", pages_with(lambda block: block.language == "text"))
+def test_commands_print_the_output_that_a_page_shows(follow: Callable[[str], Reader], page: str) -> None:
     elsewhere = tuple(SHOWN_ELSEWHERE.get(page, []))
-    told = [block.text for block in blocks(page) if block.language == "text"]
-    assert sum(text.startswith(elsewhere) for text in told) >= len(elsewhere)
-    for text in told:
+    texts = [block.text for block in blocks(page) if block.language == "text"]
+    assert sum(text.startswith(elsewhere) for text in texts) >= len(elsewhere)
+    for text in texts:
         if not (elsewhere and text.startswith(elsewhere)):
-            assert any(is_printed(text, printed) for printed in followed(page).printed), text
+            assert any(is_printed(text, printed) for printed in follow(page).printed), text
 
 
-def test_what_the_architecture_names_is_where_it_says() -> None:
+def test_architecture_names_existing_files_and_functions() -> None:
     page, _, _ = (ROOT / "docs" / "architecture.md").read_text().partition("## All modules")
     _, steps = page.split("## From a reply to a verdict")
     rows = [re.findall("`([^`]+)`", line) for line in steps.splitlines() if line.startswith("|")]
@@ -338,8 +338,8 @@ def test_what_the_architecture_names_is_where_it_says() -> None:
 
 
 @pytest.mark.parametrize("page", ["robots.md"])
-def test_every_command_about_robots_does_what_it_should(followed: Callable[[str], Reader], page: str) -> None:
-    reader = followed(page)
+def test_commands_about_robots_print_their_results(follow: Callable[[str], Reader], page: str) -> None:
+    reader = follow(page)
     kinds, tea, *_, shown, code = reader.printed
     assert re.search(r"^sim +works", kinds, re.MULTILINE)
     assert 'looks for "ann"\n            → found' in tea
@@ -349,8 +349,8 @@ def test_every_command_about_robots_does_what_it_should(followed: Callable[[str]
 
 
 @pytest.mark.parametrize("page", ["index.md"], ids=["journey:index.md"])
-def test_a_run_folder_holds_what_the_guide_lists(followed: Callable[[str], Reader], page: str) -> None:
-    folder = followed(page).folder / "runs" / "hasty"
+def test_guide_lists_the_files_of_a_run_folder(follow: Callable[[str], Reader], page: str) -> None:
+    folder = follow(page).folder / "runs" / "hasty"
     (listed,) = (b.text for b in blocks("index.md") if b.text.startswith("runs/hasty/"))
     names = set(re.findall(r"^  (\S+)", listed, re.MULTILINE))
     made = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
@@ -359,11 +359,11 @@ def test_a_run_folder_holds_what_the_guide_lists(followed: Callable[[str], Reade
 
 
 @pytest.mark.parametrize("page", ["write-a-task.md"])
-def test_a_task_that_is_written_by_the_guide_is_a_package_in_the_end(
-    followed: Callable[[str], Reader],
+def test_task_of_the_guide_becomes_a_package(
+    follow: Callable[[str], Reader],
     page: str,
 ) -> None:
-    reader = followed(page)
+    reader = follow(page)
     assert "an umbrella is in the lobby" in reader.printed[-1]
     assert not (reader.folder / "office").exists()
     judged = next(printed for printed in reader.printed if "FetchUmbrella/1/0" in printed)
@@ -386,8 +386,8 @@ def test_states_and_events_of_missions_are_documented() -> None:
 
 
 @pytest.mark.parametrize("page", ["report.md"])
-def test_every_number_of_a_report_is_explained(followed: Callable[[str], Reader], page: str) -> None:
-    report = followed(page).folder / "report"
+def test_every_number_of_a_report_is_explained(follow: Callable[[str], Reader], page: str) -> None:
+    report = follow(page).folder / "report"
     text = (DOCS / page).read_text()
     made = {path.stem for path in report.glob("*/*")}
     assert len(made) > 10
@@ -404,7 +404,7 @@ def test_pages_are_linked(page: str) -> None:
     assert f"](docs/{page})" in (ROOT / "README.md").read_text()
 
 
-def test_pictures_are_made_and_shown_and_quickly_loaded() -> None:
+def test_pictures_are_chosen_shown_and_small() -> None:
     chosen = runpy.run_path(str(ROOT / "tests" / "browser" / "pictures.py"))["CHOSEN"]
     pictures = {path.stem: path for path in (DOCS / "pictures").glob("*.png")}
     assert sorted(pictures) == sorted(chosen)
@@ -419,7 +419,7 @@ def test_pictures_are_made_and_shown_and_quickly_loaded() -> None:
 
 
 def test_this_project_is_installed_from_its_folder() -> None:
-    """By its name alone, pip would look for it among published packages."""
+    """Given only its name, pip would look for it among published packages."""
     readmes = {f"environments/{path.parent.name}": path for path in ROOT.glob("environments/*/README.md")}
     for page, path in {**PAGES, **readmes}.items():
         assert not re.findall(r"pip install [^`\n]*\bcodebotler\b(?!-\d)", path.read_text()), page

@@ -1,4 +1,4 @@
-"""Real action servers in which each goal says how it goes; what they hear is printed as JSON."""
+"""Real action servers, where the text of a goal selects its result; they print events as JSON."""
 
 import json
 import os
@@ -31,8 +31,8 @@ def tell(*what: str) -> None:
 SERVERS: dict[str, actionlib.ActionServer] = {}
 
 
-def know_late(seconds: float) -> None:
-    """Note who wants results so long after a status has come there, as a busy machine does."""
+def connect_late(seconds: float) -> None:
+    """Connect subscribers of results some seconds after they get a status, like a busy machine."""
     at_once = rospy.topics._PublisherImpl.add_connection
 
     def late(publisher: Any, connection: Any) -> Any:
@@ -43,7 +43,7 @@ def know_late(seconds: float) -> None:
         return True
 
     def note(server: Any, publisher: Any, connection: Any) -> None:
-        while not is_known_else(server):
+        while not has_other_connections(server):
             time.sleep(0.001)
         server.publish_status()
         time.sleep(seconds)
@@ -52,14 +52,14 @@ def know_late(seconds: float) -> None:
     rospy.topics._PublisherImpl.add_connection = late
 
 
-def is_known_else(server: Any) -> bool:
-    """Whether all that belongs to a goal but its result has somebody at the other end."""
+def has_other_connections(server: Any) -> bool:
+    """Return whether all topics of a goal except its result are connected."""
     ends = server.goal_sub, server.cancel_sub, server.status_pub, server.feedback_pub
     return all(end is not None and end.get_num_connections() for end in ends)
 
 
 class Deaf(actionlib.ActionServer):  # type: ignore[misc]  # it has no types
-    """Takes no notice of goals while the environment says so."""
+    """Ignores goals while the environment has DEAF."""
 
     def internal_goal_callback(self, goal: Any) -> None:
         if os.environ.get("DEAF"):
@@ -111,7 +111,7 @@ class Server:
 
 
 if "KNOWS_LATE" in os.environ:
-    know_late(float(os.environ["KNOWS_LATE"]))
+    connect_late(float(os.environ["KNOWS_LATE"]))
 rospy.init_node("servers", anonymous=True, disable_signals=True, log_level=rospy.FATAL)
 actions = json.loads(sys.argv[2])
 specs = action_types([{"type": kind, "definition": text} for kind, _, text in actions])

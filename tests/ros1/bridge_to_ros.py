@@ -1,7 +1,7 @@
-"""The ROS side of a double of rosbridge: its operations for topics and services, on a real graph.
+"""The ROS side of a rosbridge double, which performs operations on topics and services of a real graph.
 
-What is published right after it was advertised may be lost, as rosbridge itself loses it. Without a type, a
-topic can be subscribed to only if it is there.
+Like rosbridge, it may lose a message that is published right after its topic was advertised. Subscribing
+without a type works only if the topic exists.
 """
 
 import json
@@ -20,7 +20,7 @@ from channel import SetupError
 from message_types import action_types, as_data, import_type
 
 LOCK = threading.Lock()
-SUBSCRIBED: dict[str, Any] = {}
+SUBSCRIBERS: dict[str, Any] = {}
 
 
 def tell(**message: Any) -> None:
@@ -73,12 +73,12 @@ def obey(message: dict[str, Any], types: dict[str, Any], published: dict[str, An
         if kind is None:
             tell(op="status", level="error", msg=f"Cannot infer topic type for topic {topic}")
         elif (spec := type_of(kind, types)) is not None:
-            SUBSCRIBED[topic] = rospy.Subscriber(
-                topic, spec, lambda heard: tell(op="publish", topic=topic, msg=as_data(heard))
+            SUBSCRIBERS[topic] = rospy.Subscriber(
+                topic, spec, lambda data: tell(op="publish", topic=topic, msg=as_data(data))
             )
     elif operation == "unsubscribe":
-        if topic in SUBSCRIBED:
-            SUBSCRIBED.pop(topic).unregister()
+        if topic in SUBSCRIBERS:
+            SUBSCRIBERS.pop(topic).unregister()
     elif operation == "publish" and topic in published:
         made = published[topic].data_class()
         genpy.message.fill_message_args(made, [message["msg"]])

@@ -1,4 +1,4 @@
-"""A double of rosbridge for ROS 1, over a real graph, and a stand-in for its operations of ROS 2."""
+"""A rosbridge double for ROS 1 on a real graph, and a stand-in for rosbridge on ROS 2."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROS_SIDE = Path(__file__).parent / "bridge_to_ros.py"
 
 
 class Bridge:
-    """A websocket server; each connection is handled by one function.
+    """A websocket server that handles each connection with one function.
 
     Args:
         handle: talks on a connection until it is closed.
@@ -46,7 +46,7 @@ class Bridge:
         self.open.remove(connection)
 
     def cut(self) -> None:
-        """Lose all connections."""
+        """Break all connections."""
         for connection in list(self.open):
             connection.close_socket()
 
@@ -63,15 +63,15 @@ def bridge(handle: Callable[[ServerConnection], None]) -> Iterator[Bridge]:
     double.end()
 
 
-def over_ros(
+def ros_handler(
     master: str, skills: tuple[str, ...] = tuple(SKILLS), table: SkillTable = SKILLS
 ) -> Callable[[ServerConnection], None]:
-    """Handles connections by a node of their own on a real ROS graph.
+    """Return a function that handles each connection with a separate node on a real ROS graph.
 
     Args:
-        master: of the graph.
-        skills: whose messages it knows.
-        table: all of them.
+        master: URI of the graph's master.
+        skills: names of the skills whose messages the node knows.
+        table: all skills.
     """
     actions = [action for skill, action in calls_data(default_connection(table)).items() if skill in skills]
 
@@ -110,11 +110,11 @@ def over_ros(
     return handle
 
 
-def like_ros_2(heard: list[dict[str, Any]]) -> Callable[[ServerConnection], None]:
-    """Handles connections as a rosbridge of ROS 2 is documented to; a goal's first text says how it goes.
+def ros2_handler(requests: list[dict[str, Any]]) -> Callable[[ServerConnection], None]:
+    """Return a function that follows the documentation of rosbridge on ROS 2; goals select their results.
 
     Args:
-        heard: gets what was sent to it.
+        requests: collects all requests.
     """
 
     def handle(connection: ServerConnection) -> None:
@@ -123,7 +123,7 @@ def like_ros_2(heard: list[dict[str, Any]]) -> Callable[[ServerConnection], None
 
         for text in connection:
             message = json.loads(text)
-            heard.append(message)
+            requests.append(message)
             match message:
                 case {"op": "call_service", "id": called}:
                     values = {"version": 2, "distro": "jazzy"}

@@ -1,4 +1,4 @@
-"""A real camera's node: it publishes one picture, again and again, until its input ends."""
+"""A real camera node, which publishes one picture repeatedly until its input ends."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What tests on ROS 1 share; where there is no ROS, they are skipped, and say why."""
+"""Fixtures for tests on ROS 1; without ROS, they are skipped and say why."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A stand-in for a robot with move_base: `python3 move_base_robot.py [OPTIONS]`.
 
-Beside move_base, amcl and odometry, it offers the topic /speech and the service /door/open. It prints events
-as lists in JSON, one a line, and ends when its input does.
+In addition to move_base, amcl and odometry, it offers the topic /speech and the service /door/open. It
+prints events as JSON lists, one a line, and ends with its input.
 
 move_base and amcl of ROS 1, as documented:
 - /move_base is an action server for one goal at a time: a new goal preempts the older one, and the robot
@@ -9,7 +9,7 @@ move_base and amcl of ROS 1, as documented:
 - A cancelled goal is preempted in the next round of the controller, which then asks for the velocity 0; the
   robot still brakes.
 - A goal without a plan is aborted with a string after the recoveries, one with an invalid quaternion at once.
-- The result is empty, and the feedback is where the robot is.
+- The result is empty, and the feedback is the robot's position.
 - amcl publishes its pose, latched, after 0.2 m or 30 degrees, and the transform from map to odom.
 """
 
@@ -33,9 +33,9 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger, TriggerResponse
 from tf2_msgs.msg import TFMessage
 
-ROUND = 0.05  # seconds of a round of the controller
-MAP = 10.0  # metres from the middle of the map to its sides
-NEAR, TURNED = 0.2, math.pi / 6  # of amcl, and how near to its goal the robot stops, in metres
+ROUND = 0.05  # Seconds between rounds of the controller.
+MAP = 10.0  # Metres from the centre of the map to its sides.
+NEAR, TURNED = 0.2, math.pi / 6  # Metres and radians between poses of amcl; goals are reached within NEAR.
 
 
 def numbers(text: str) -> list[float]:
@@ -54,16 +54,16 @@ def options() -> argparse.Namespace:
     parser.add_argument("--never-stops", action="store_true", help="cancelled goals end, but it drives on")
     parser.add_argument("--door-jams", action="store_true")
     parser.add_argument("--door-breaks", action="store_true", help="its service fails")
-    parser.add_argument("--door-dies", action="store_true", help="so does the robot")
+    parser.add_argument("--door-dies", action="store_true", help="the robot dies with its service")
     return parser.parse_args()
 
 
 class Body:
-    """Where the robot is, and how it gets to where it shall be."""
+    """The robot's position, and its motion towards a goal."""
 
-    def __init__(self, said: argparse.Namespace) -> None:
-        self.said, self.start = said, said.start
-        self.x, self.y, self.yaw = said.start
+    def __init__(self, options: argparse.Namespace) -> None:
+        self.options, self.start = options, options.start
+        self.x, self.y, self.yaw = options.start
         self.speed = 0.0
         self.goal: tuple[float, float, float] | None = None
         self.published = (math.inf, 0.0, 0.0)
@@ -82,11 +82,11 @@ class Body:
             time.sleep(ROUND)
 
     def move(self) -> None:
-        goal, step = self.goal, self.said.acceleration * ROUND
+        goal, step = self.goal, self.options.acceleration * ROUND
         wanted = 0.0
         if goal is not None and not self.is_there():
             self.yaw = math.atan2(goal[1] - self.y, goal[0] - self.x)
-            wanted = self.said.speed
+            wanted = self.options.speed
         elif goal is not None:
             self.yaw, self.speed = goal[2], 0.0
         self.speed += max(-step, min(step, wanted - self.speed))
@@ -141,14 +141,14 @@ class MoveBase:
             goal = self.drive(goal.target_pose)
 
     def drive(self, target: Any) -> Any:
-        """Drive somewhere; the next goal, if that comes before."""
+        """Drive to a target; return the next goal if it arrives first."""
         x, y, turn = target.pose.position.x, target.pose.position.y, target.pose.orientation
         if abs(math.hypot(turn.x, turn.y, turn.z, turn.w) - 1) > 0.01:
             return self.server.set_aborted(text="the quaternion is invalid")
         yaw = 2 * math.atan2(turn.z, turn.w)
         tell("goal", round(x, 2), round(y, 2), round(yaw, 2), target.header.frame_id)
         if target.header.frame_id != "map" or max(abs(x), abs(y)) > MAP:
-            rospy.sleep(0.3)  # for recoveries
+            rospy.sleep(0.3)  # Recoveries take time.
             return self.server.set_aborted(text="there is no plan, nor after recoveries")
         self.body.goal = (x, y, yaw)
         while not self.body.is_there():
@@ -156,7 +156,7 @@ class MoveBase:
                 if self.server.is_new_goal_available():
                     return self.server.accept_new_goal()
                 tell("cancel")
-                if not self.body.said.never_stops:
+                if not self.body.options.never_stops:
                     self.body.goal = None
                 return self.server.set_preempted()
             feedback = MoveBaseFeedback()
@@ -167,18 +167,18 @@ class MoveBase:
 
 
 def main() -> None:
-    said = options()
+    parsed = options()
     rospy.init_node("move_base_robot", disable_signals=True, log_level=rospy.FATAL)
 
     def open_door(_: Any) -> TriggerResponse:
         tell("door")
-        if said.door_dies:
+        if parsed.door_dies:
             os._exit(1)
-        if said.door_breaks:
+        if parsed.door_breaks:
             raise RuntimeError("no current")
-        return TriggerResponse(not said.door_jams, "the door is jammed" if said.door_jams else "")
+        return TriggerResponse(not parsed.door_jams, "the door is jammed" if parsed.door_jams else "")
 
-    MoveBase(Body(said))
+    MoveBase(Body(parsed))
     rospy.Subscriber("/speech", String, lambda message: tell("heard", message.data))
     rospy.Service("/door/open", Trigger, open_door)
     tell("ready")

@@ -1,4 +1,4 @@
-"""A real ROS graph: a rosmaster on a free port, and action servers in processes of their own."""
+"""A real ROS graph: a rosmaster on a free port, and action servers in separate processes."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from codebotler.robots.ros.worker import WORKERS_FOLDER
 HERE = Path(__file__).parent
 MASTER = HERE / "ros_master.py"
 SERVER = HERE / "action_servers.py"
-LONG = 60.0  # seconds after which what is waited for has failed
+LONG = 60.0  # Seconds until a wait has failed.
 GO_TO, SAY = SKILLS["go_to"], SKILLS["say"]
 FEW = SkillTable((GO_TO, SAY))
-"""Enough for most tests: to make the messages of all skills takes a worker longer than all else."""
+"""Enough for most tests, because workers need long to make the messages of all skills."""
 
 
 def free_port() -> int:
@@ -38,7 +38,7 @@ def free_port() -> int:
 
 
 class Process:
-    """A script under a Python that has ROS; it ends with its input, and says JSON, line by line."""
+    """A script in a Python with ROS; it prints a JSON event per line, and ends with its input."""
 
     def __init__(
         self,
@@ -48,7 +48,7 @@ class Process:
         master: str = "",
         environment: Mapping[str, str] | None = None,
     ) -> None:
-        self.said: queue.Queue[list[Any]] = queue.Queue()
+        self.events: queue.Queue[list[Any]] = queue.Queue()
         self.process = subprocess.Popen(
             [str(python), str(script), *arguments],
             stdin=subprocess.PIPE,
@@ -63,11 +63,11 @@ class Process:
         assert self.process.stdout is not None
         for line in self.process.stdout:
             if line.startswith("["):
-                self.said.put(json.loads(line))
+                self.events.put(json.loads(line))
 
     def expect(self, *what: str) -> None:
-        """Wait until it says this next."""
-        assert self.said.get(timeout=LONG) == list(what)
+        """Wait for the next event, which must be this one."""
+        assert self.events.get(timeout=LONG) == list(what)
 
     def end(self) -> None:
         assert self.process.stdin is not None
@@ -87,7 +87,7 @@ class Process:
 
 
 class Graph:
-    """A ROS graph of its own."""
+    """A separate ROS graph."""
 
     def __init__(self) -> None:
         self.port = free_port()
@@ -101,7 +101,7 @@ class Graph:
         self.master.expect("ready")
 
     def serve(self, *skills: Skill, **environment: str) -> Process:
-        """An action server for each skill; what a goal says is how it goes."""
+        """Start an action server for each skill; the text of a goal selects its result."""
         actions = [[s.ros.type, s.ros.server, s.ros.definition] for s in skills if s.ros is not None]
         server = Process(
             SERVER, str(WORKERS_FOLDER), json.dumps(actions), environment=environment, master=self.uri
@@ -130,14 +130,14 @@ class Graph:
 
 
 @contextmanager
-def started(does: Callable[[], object]) -> Iterator[dict[str, object]]:
-    """Something that goes on in a thread; what it returned or raised is there at the end."""
+def run_in_thread(function: Callable[[], object]) -> Iterator[dict[str, object]]:
+    """Call a function in a thread; yield a dictionary that gets its value or its error at the end."""
     ended: dict[str, object] = {}
 
     def run() -> None:
         try:
-            ended["value"] = does()
-        except Exception as error:  # noqa: BLE001 - looked at by the test
+            ended["value"] = function()
+        except Exception as error:  # noqa: BLE001 - checked by the test
             ended["error"] = error
 
     thread = threading.Thread(target=run, daemon=True)
@@ -147,7 +147,7 @@ def started(does: Callable[[], object]) -> Iterator[dict[str, object]]:
     assert not thread.is_alive()
 
 
-INSTALLED = """
+ACTION_PACKAGE = """
 import sys
 sys.path.insert(0, {worker!r})
 from message_types import generate_action
@@ -159,11 +159,11 @@ for part in (action, *wholes, *parts):
 """
 
 
-def installed(folder: Path, name: str, definition: str) -> str:
-    """Install the robot's package with one action; what is then on the path."""
+def install_action(folder: Path, name: str, definition: str) -> str:
+    """Install the robot's package with one action; return the folder for the path."""
     package = folder / "robot_actions_pkg" / "msg"
     package.mkdir(parents=True)
     package.with_name("__init__.py").touch()
-    code = INSTALLED.format(worker=str(WORKERS_FOLDER), name=name, definition=definition)
+    code = ACTION_PACKAGE.format(worker=str(WORKERS_FOLDER), name=name, definition=definition)
     (package / "__init__.py").write_text(code)
     return str(folder)

@@ -1,4 +1,4 @@
-"""A real rosmaster that ends when its input does, so that none is ever left behind."""
+"""A real rosmaster that ends with its input, so that no test leaves it running."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""A robot with move_base as it is, connected by a file, on ROS 1 and behind a rosbridge."""
+"""A file connects an unchanged robot with move_base, on ROS 1 and behind a rosbridge."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from bridges import bridge, over_ros
+from bridges import bridge, ros_handler
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError, Options, RobotLostError
@@ -19,7 +19,7 @@ from codebotler.robots.ros import kinds
 from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.robot import RosRobot
-from ros_graph import HERE, LONG, Graph, Process, started
+from ros_graph import HERE, LONG, Graph, Process, run_in_thread
 
 CONNECTION = """\
 robot: ros1
@@ -53,7 +53,7 @@ BOTH = pytest.mark.parametrize("kind", ["ros1", "rosbridge"])
 
 
 class Robots:
-    """A robot with move_base, and those who are connected with it."""
+    """A robot with move_base, and the connections to it."""
 
     def __init__(self, graph: Graph, folder: Path, end: ExitStack) -> None:
         self.graph, self.folder, self._end = graph, folder, end
@@ -76,7 +76,7 @@ class Robots:
         if kind == "ros1":
             robot: RosRobot = kinds.ros1(Options(address=self.graph.uri, **options), WAITS)
         else:
-            double = self._end.enter_context(bridge(over_ros(self.graph.uri, ())))
+            double = self._end.enter_context(bridge(ros_handler(self.graph.uri, ())))
             robot = kinds.rosbridge(Options(address=double.address, **options), WAITS)
         self._end.callback(robot.disconnect)
         return robot
@@ -88,16 +88,16 @@ def robots(graph: Graph, tmp_path: Path) -> Iterator[Robots]:
         yield Robots(graph, tmp_path, end)
 
 
-def told(process: Process, what: str) -> list[object]:
-    """What the stand-in says about the next event of a kind."""
+def read_event(process: Process, what: str) -> list[object]:
+    """Return the details of the stand-in's next event of a kind."""
     while True:
-        kind, *about = process.said.get(timeout=LONG)
+        kind, *about = process.events.get(timeout=LONG)
         if kind == what:
             return about
 
 
 @BOTH
-def test_skills_are_what_the_file_maps(robots: Robots, kind: str) -> None:
+def test_skills_are_those_of_the_file(robots: Robots, kind: str) -> None:
     move_base = robots.move_base("--speed", "3", "--acceleration", "9")
     robot = robots.robot(kind)
     robot.connect()
@@ -107,19 +107,19 @@ def test_skills_are_what_the_file_maps(robots: Robots, kind: str) -> None:
     assert robot.perform("get_current_location", []) == "dock"
     reported: list[str | CameraPicture] = []
     robot.perform("go_to", ["Lab"], reported.append)
-    assert told(move_base, "goal") == [2.0, 0.0, 1.57, "map"]
+    assert read_event(move_base, "goal") == [2.0, 0.0, 1.57, "map"]
     assert any(str(one).startswith("at (1.") for one in reported)
     assert robot.perform("get_current_location", [], reported.append) == "lab"
     assert "lab, the nearest" in str(reported[-1])
     robot.perform("say", ["it is open"])
-    assert told(move_base, "heard") == ["Listen: it is open"]
+    assert read_event(move_base, "heard") == ["Listen: it is open"]
     robot.perform("open_door", [])
-    told(move_base, "door")
+    read_event(move_base, "door")
     assert robot.has_pose
 
 
 @BOTH
-def test_what_fails_is_a_robot_error_in_the_words_of_the_robot(robots: Robots, kind: str) -> None:
+def test_failure_is_a_robot_error_with_the_robots_message(robots: Robots, kind: str) -> None:
     robots.move_base("--door-jams")
     robot = robots.robot(kind)
     robot.connect()
@@ -138,16 +138,16 @@ def test_stop_ends_when_the_robot_stands_still(robots: Robots, kind: str) -> Non
     move_base = robots.move_base("--speed", "2", "--acceleration", "2")
     robot = robots.robot(kind)
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["moon"])) as ended:
-        told(move_base, "goal")
+    with run_in_thread(lambda: robot.perform("go_to", ["moon"])) as ended:
+        read_event(move_base, "goal")
         time.sleep(1.0)
         asked = time.monotonic()
         robot.cancel()
-        told(move_base, "cancel")
+        read_event(move_base, "cancel")
         assert time.monotonic() - asked < 1.0
     assert isinstance(ended["error"], CancelledError)
     assert robot.failed_stop == ""
-    assert 1.0 < time.monotonic() - asked < 4.0  # it brakes for a second
+    assert 1.0 < time.monotonic() - asked < 4.0  # It brakes for a second.
 
 
 @BOTH
@@ -155,8 +155,8 @@ def test_robot_that_goes_on_after_a_stop_is_lost(robots: Robots, kind: str) -> N
     move_base = robots.move_base("--never-stops")
     robot = robots.robot(kind)
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["moon"])) as ended:
-        told(move_base, "goal")
+    with run_in_thread(lambda: robot.perform("go_to", ["moon"])) as ended:
+        read_event(move_base, "goal")
         time.sleep(0.7)
         robot.cancel()
     assert isinstance(ended["error"], CancelledError)
@@ -206,7 +206,7 @@ def test_poses_that_cannot_be_used_are_refused(robots: Robots, kind: str) -> Non
         robot.disconnect()
 
 
-def test_what_is_missing_is_said(robots: Robots) -> None:
+def test_missing_offers_are_reported(robots: Robots) -> None:
     robots.move_base()
     text = CONNECTION.replace("/move_base,", "/drive,").replace("/door/open", "/gate")
     robot = robots.robot(text=text.replace("/speech", "/voice"))
@@ -237,10 +237,10 @@ def test_message_is_not_lost_right_after_the_connection(robots: Robots, kind: st
     robot.connect()
     assert robot.missing == {}
     robot.perform("say", ["hello"])
-    assert told(robot_itself, "heard") == ["hello"]
+    assert read_event(robot_itself, "heard") == ["hello"]
 
 
-def test_message_without_a_field_is_said(robots: Robots) -> None:
+def test_message_without_a_field_is_reported(robots: Robots) -> None:
     robots.move_base()
     robot = robots.robot(text=CONNECTION.replace("{data:", "{text:"))
     robot.connect()
@@ -249,7 +249,7 @@ def test_message_without_a_field_is_said(robots: Robots) -> None:
 
 
 @BOTH
-def test_types_are_written_as_on_ros_1_or_2(robots: Robots, kind: str) -> None:
+def test_types_may_be_written_like_ros_1_or_ros_2(robots: Robots, kind: str) -> None:
     move_base = robots.move_base("--speed", "5", "--acceleration", "9")
     for action, service, topic in (
         ("move_base_msgs/MoveBaseAction", "std_srvs/Trigger", "std_msgs/String"),
@@ -263,5 +263,5 @@ def test_types_are_written_as_on_ros_1_or_2(robots: Robots, kind: str) -> None:
         robot.perform("go_to", ["lab"])
         robot.perform("say", ["hello"])
         robot.perform("open_door", [])
-        told(move_base, "door")
+        read_event(move_base, "door")
         robot.disconnect()

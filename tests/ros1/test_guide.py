@@ -1,4 +1,4 @@
-"""The page on ROS says what is so."""
+"""The page on ROS 1 shows valid commands, code and errors."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from codebotler.robots.base import CancelledError
 from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.kinds import INSTALL_ROS1
 from error_tables import errors_on, unsaid
-from ros_graph import Graph, Process, free_port, installed, started
+from ros_graph import Graph, Process, free_port, install_action, run_in_thread
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE, ROS2 = ((DOCS / name).read_text() for name in ("ros1.md", "ros.md"))
 
 
-def test_the_packages_are_those_that_are_needed() -> None:
+def test_page_names_the_needed_packages() -> None:
     assert re.sub(r" \\\n +", " ", PAGE).count(INSTALL_ROS1) == 1
 
 
-def test_two_commands_are_the_whole_path(tmp_path: Path) -> None:
+def test_two_commands_run_a_program_on_a_robot(tmp_path: Path) -> None:
     office, program = (re.findall(rf"```{kind}\n(.*?)```", ROS2, re.DOTALL)[0] for kind in ("yaml", "python"))
     (tmp_path / "office.yaml").write_text(office)
     (tmp_path / "mug.py").write_text(program)
@@ -57,14 +57,14 @@ def test_two_commands_are_the_whole_path(tmp_path: Path) -> None:
     assert 'puts down "mug"' in done.stdout
 
 
-def test_the_server_in_twenty_lines_does_what_it_must(
+def test_short_server_of_the_page_works(
     graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     code = next(
         block for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL) if "actionlib" in block
     )
     assert len([line for line in code.splitlines() if line]) <= 22
-    monkeypatch.setenv("PYTHONPATH", installed(tmp_path, "GoTo", "string location\n---\n---\n"))
+    monkeypatch.setenv("PYTHONPATH", install_action(tmp_path, "GoTo", "string location\n---\n---\n"))
     script = tmp_path / "server.py"
     script.write_text(code.replace("server.start()\n", "server.start()\nprint('[\"ready\"]', flush=True)\n"))
     server = Process(script, master=graph.uri)
@@ -76,7 +76,7 @@ def test_the_server_in_twenty_lines_does_what_it_must(
     with pytest.raises(RobotError) as error:
         robot.perform("go_to", ["moon"])
     assert (error.value.kind, str(error.value)) == ("GoToInvalidLocation", 'I know no room "moon"')
-    with started(lambda: robot.perform("go_to", ["hallway"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["hallway"])) as ended:
         while robot._number != 3:
             pass
         robot.cancel()
@@ -98,6 +98,6 @@ VARIES = (
 )
 
 
-def test_every_error_on_the_page_is_one_that_is_raised() -> None:
+def test_code_raises_every_error_on_the_page() -> None:
     assert len(errors_on(PAGE)) >= 13
     assert unsaid(PAGE, VARIES) == []

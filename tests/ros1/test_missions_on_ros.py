@@ -1,4 +1,4 @@
-"""`codebotler run` on a real ROS graph: what it says before the robot moves, and how it is stopped."""
+"""`codebotler run` on a real ROS graph: its messages before the robot moves, and how it stops."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from bridges import bridge, over_ros
+from bridges import bridge, ros_handler
 from codebotler.core.skills.paper import SKILLS
 from ros_graph import GO_TO, Graph
 
@@ -44,7 +44,7 @@ STUBBORN = """def task_program():
 
 
 @contextmanager
-def begun(
+def run_tool(
     graph: Graph,
     folder: Path,
     program: str,
@@ -72,20 +72,20 @@ def begun(
             tool.kill()
 
 
-def test_skill_that_the_robot_lacks_is_said_before_it_moves(graph: Graph, tmp_path: Path) -> None:
+def test_missing_skill_is_reported_before_the_robot_moves(graph: Graph, tmp_path: Path) -> None:
     server = graph.serve(*(skill for skill in SKILLS.rows if skill.name != "pick"))
-    with begun(graph, tmp_path, FETCH) as tool:
+    with run_tool(graph, tmp_path, FETCH) as tool:
         out, err = tool.communicate()
 
     assert (tool.returncode, "running on" in out) == (1, False)
     assert re.search("line 4: this robot has no `pick` skill: .*/pick_server", err)
     assert "--despite-problems" in err
-    assert '"the hall"' not in str(list(server.said.queue))
+    assert '"the hall"' not in str(list(server.events.queue))
 
 
-def test_robot_that_does_not_say_its_rooms_can_be_used(graph: Graph, tmp_path: Path) -> None:
+def test_robot_without_a_list_of_rooms_works(graph: Graph, tmp_path: Path) -> None:
     server = graph.serve(GO_TO)
-    with begun(graph, tmp_path, 'def task_program():\n    go_to("the hall")\n') as tool:
+    with run_tool(graph, tmp_path, 'def task_program():\n    go_to("the hall")\n') as tool:
         _, err = tool.communicate()
     assert tool.returncode == 0, err
     server.expect("goal", "the hall")
@@ -96,19 +96,19 @@ def test_signal_cancels_the_goal_and_no_other_is_sent(
     graph: Graph, tmp_path: Path, number: int, status: int
 ) -> None:
     server = graph.serve(*SKILLS.rows)
-    with begun(graph, tmp_path, FAR, "--despite-problems") as tool:
+    with run_tool(graph, tmp_path, FAR, "--despite-problems") as tool:
         server.expect("goal", "")
         server.expect("goal", "")
         server.expect("goal", "never")
         tool.send_signal(number)
         out, err = tool.communicate()
     server.expect("cancel", "never")
-    assert (tool.returncode, server.said.empty()) == (status, True), err
+    assert (tool.returncode, server.events.empty()) == (status, True), err
     assert "stopped by" in out
 
 
-# The tool, in which a thread makes a call that lets no other thread run, not even for Ctrl-C.
-HELD = 6  # seconds
+# In this tool, a thread makes a call during which no other thread can run, not even for Ctrl-C.
+FROZEN_SECONDS = 6
 FROZEN = f"""
 import ctypes, sys, threading, time
 from pathlib import Path
@@ -117,7 +117,7 @@ def freeze():
     while not Path("freeze").exists():
         time.sleep(0.01)
     ctypes.PyDLL(None).creat(b"frozen", 0o600)
-    ctypes.PyDLL(None).sleep({HELD})
+    ctypes.PyDLL(None).sleep({FROZEN_SECONDS})
 
 threading.Thread(target=freeze, daemon=True).start()
 sys.argv[0] = "codebotler"
@@ -127,12 +127,12 @@ main()
 
 
 @pytest.mark.parametrize("robot", ["ros1", "rosbridge"])
-def test_robot_is_stopped_while_the_tool_hears_nothing(graph: Graph, tmp_path: Path, robot: str) -> None:
+def test_robot_is_stopped_while_the_tool_is_frozen(graph: Graph, tmp_path: Path, robot: str) -> None:
     server = graph.serve(*SKILLS.rows)
-    with bridge(over_ros(graph.uri)) as double:
+    with bridge(ros_handler(graph.uri)) as double:
         address = ("--address", double.address) if robot == "rosbridge" else ()
         options = ("--despite-problems", *address)
-        with begun(graph, tmp_path, FAR, *options, robot=robot, command=("-c", FROZEN)) as tool:
+        with run_tool(graph, tmp_path, FAR, *options, robot=robot, command=("-c", FROZEN)) as tool:
             for goal in ("", "", "never"):
                 server.expect("goal", goal)
             (tmp_path / "freeze").touch()
@@ -141,15 +141,15 @@ def test_robot_is_stopped_while_the_tool_hears_nothing(graph: Graph, tmp_path: P
             frozen = time.monotonic()
             tool.send_signal(signal.SIGINT)
             server.expect("cancel", "never")
-            assert time.monotonic() - frozen < HELD / 2
+            assert time.monotonic() - frozen < FROZEN_SECONDS / 2
             _, err = tool.communicate()
     assert tool.returncode in {1, 130}, err
-    assert server.said.empty()
+    assert server.events.empty()
 
 
-def test_suspended_tool_stops_the_robot_and_says_so(graph: Graph, tmp_path: Path) -> None:
+def test_suspended_tool_stops_the_robot_and_reports_it(graph: Graph, tmp_path: Path) -> None:
     server = graph.serve(*SKILLS.rows)
-    with begun(graph, tmp_path, FAR, "--despite-problems") as tool:
+    with run_tool(graph, tmp_path, FAR, "--despite-problems") as tool:
         for goal in ("", "", "never"):
             server.expect("goal", goal)
         tool.send_signal(signal.SIGSTOP)
@@ -158,20 +158,20 @@ def test_suspended_tool_stops_the_robot_and_says_so(graph: Graph, tmp_path: Path
         finally:
             tool.send_signal(signal.SIGCONT)
         out, err = tool.communicate()
-    assert (tool.returncode, server.said.empty()) == (1, True), err
+    assert (tool.returncode, server.events.empty()) == (1, True), err
     assert "no sign of life" in out + err
 
 
 @pytest.mark.parametrize("robot", ["ros1", "rosbridge"])
-def test_what_a_house_rule_forbids_is_never_sent(graph: Graph, tmp_path: Path, robot: str) -> None:
+def test_goal_that_breaks_a_house_rule_is_never_sent(graph: Graph, tmp_path: Path, robot: str) -> None:
     server = graph.serve(*SKILLS.rows)
     (tmp_path / "house.yaml").write_text(RULES)
     options = ("--rules", "house.yaml", "--despite-problems")
-    with bridge(over_ros(graph.uri)) as double:
+    with bridge(ros_handler(graph.uri)) as double:
         address = ("--address", double.address) if robot == "rosbridge" else ()
-        with begun(graph, tmp_path, STUBBORN, *options, *address, robot=robot) as tool:
+        with run_tool(graph, tmp_path, STUBBORN, *options, *address, robot=robot) as tool:
             out, err = tool.communicate()
     assert "stopped by rule vault" in out, err
-    for goal in ("", "", "the hall"):  # it was asked for its rooms and where it is
+    for goal in ("", "", "the hall"):  # The first goals ask for its rooms and its location.
         server.expect("goal", goal)
-    assert server.said.empty()
+    assert server.events.empty()

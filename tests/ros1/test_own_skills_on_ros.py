@@ -1,4 +1,4 @@
-"""Skills of one's own over a real ROS graph: values of every type, and errors, go there and back."""
+"""Own skills over a real ROS graph: values of every type, and errors, go there and back."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from bridges import bridge, over_ros
+from bridges import bridge, ros_handler
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.table import SkillTable
@@ -64,7 +64,7 @@ def robot_(request: pytest.FixtureRequest, graph: Graph, table: SkillTable) -> I
     if request.param == "ros1":
         yield graph.robot(waits, skills=table)
     else:
-        with bridge(over_ros(graph.uri, tuple(table), table)) as double:
+        with bridge(ros_handler(graph.uri, tuple(table), table)) as double:
             behind = kinds.rosbridge(Options(address=double.address, skills=table), waits)
             yield behind
             behind.disconnect()

@@ -19,7 +19,7 @@ from xmlrpc.client import ServerProxy
 import pytest
 from mcap.reader import make_reader
 
-from bridges import bridge, over_ros
+from bridges import bridge, ros_handler
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
@@ -31,7 +31,7 @@ from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from halves import encoded, has_frame, rows, sees
-from ros_graph import HERE, LONG, Graph, Process, started
+from ros_graph import HERE, LONG, Graph, Process, run_in_thread
 from server import Fault, Server
 
 SRC = HERE.parents[1] / "src"
@@ -62,7 +62,7 @@ def model(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
 
 
 class Eyes:
-    """A robot whose only skill is to look at a camera."""
+    """A robot whose only skill looks through a camera."""
 
     def __init__(self, graph: Graph, folder: Path, end: ExitStack) -> None:
         self.graph, self.folder, self._end = graph, folder, end
@@ -74,7 +74,7 @@ class Eyes:
         if kind == "ros1":
             robot = kinds.ros1(Options(address=self.graph.uri, connection=connection), WAITS)
         else:
-            double = self._end.enter_context(bridge(over_ros(self.graph.uri, ())))
+            double = self._end.enter_context(bridge(ros_handler(self.graph.uri, ())))
             robot = kinds.rosbridge(Options(address=double.address, connection=connection), WAITS)
         self._end.callback(robot.disconnect)
         robot.connect()
@@ -87,16 +87,16 @@ def eyes(graph: Graph, tmp_path: Path) -> Iterator[Eyes]:
         yield Eyes(graph, tmp_path, end)
 
 
-def camera(graph: Graph, kind: str, fields: dict[str, Any], topic: str = TOPIC) -> Process:
-    """A camera that publishes until it is ended."""
+def start_camera(graph: Graph, kind: str, fields: dict[str, Any], topic: str = TOPIC) -> Process:
+    """Start a camera that publishes until its end."""
     process = Process(HERE / "camera.py", topic, kind, json.dumps(fields), master=graph.uri)
     graph.processes.append(process)
     process.expect("ready")
     return process
 
 
-def listened_to(graph: Graph) -> list[str]:
-    """The topics to which anybody listens."""
+def subscribed_topics(graph: Graph) -> list[str]:
+    """Return the topics that have subscribers."""
     with ServerProxy(graph.uri) as master:
         answer: Any = master.getSystemState("/test")
     return [topic for topic, _ in answer[2][1]]
@@ -107,32 +107,32 @@ def listened_to(graph: Graph) -> list[str]:
     [
         ("ros1", "Image", RAW),
         ("ros1", "CompressedImage", JPEG),
-        ("rosbridge", "Image", PADDED),  # all of them are read by the same code, once they have come
+        ("rosbridge", "Image", PADDED),  # The same code reads messages from both.
         ("rosbridge", "CompressedImage", PNG),
     ],
 )
 def test_camera_becomes_an_answer_and_a_picture(
     eyes: Eyes, model: Server, kind: str, message: str, fields: dict[str, Any]
 ) -> None:
-    camera(eyes.graph, message, fields)
+    start_camera(eyes.graph, message, fields)
     robot = eyes.robot(kind)
     assert [*robot.skills] == ["is_in_room"]
-    told: list[str | CameraPicture] = []
-    assert robot.perform("is_in_room", ["mug"], told.append) is True
-    (picture,) = told
+    pictures: list[str | CameraPicture] = []
+    assert robot.perform("is_in_room", ["mug"], pictures.append) is True
+    (picture,) = pictures
     assert isinstance(picture, CameraPicture)
     assert has_frame(picture.data)
     assert robot.perform("is_in_room", ["cat"]) is False
     assert len(model.requests) == 2
     until = time.monotonic() + LONG
-    while TOPIC in listened_to(eyes.graph):
-        assert time.monotonic() < until, "pictures go on to arrive"
+    while TOPIC in subscribed_topics(eyes.graph):
+        assert time.monotonic() < until, "the robot still subscribes to the camera"
         time.sleep(0.05)
 
 
 @pytest.mark.usefixtures("model")
 def test_mission_keeps_what_the_robot_saw(graph: Graph, tmp_path: Path) -> None:
-    camera(graph, "Image", RAW)
+    start_camera(graph, "Image", RAW)
     others = graph.serve(*(skill for name, skill in SKILLS.items() if name != "is_in_room"))
     (tmp_path / "look.py").write_text(PROGRAM)
     ((file, command),) = re.findall(r"```yaml\n(.*?)```.*?```sh\ncodebotler (.*?)\n```", PAGE, re.DOTALL)
@@ -176,26 +176,26 @@ def test_mission_keeps_what_the_robot_saw(graph: Graph, tmp_path: Path) -> None:
 
 @BOTH
 @pytest.mark.usefixtures("model")
-def test_no_picture_yet_and_no_picture_any_more_are_said(eyes: Eyes, kind: str) -> None:
+def test_missing_and_old_pictures_are_reported(eyes: Eyes, kind: str) -> None:
     robot = eyes.robot(kind)
     with pytest.raises(RobotError, match=TOPIC):
         robot.perform("is_in_room", ["mug"])
-    filming = camera(eyes.graph, "Image", RAW)
+    filming = start_camera(eyes.graph, "Image", RAW)
     assert robot.perform("is_in_room", ["mug"])
     filming.end()
     with pytest.raises(RobotError, match=rf"no picture arrived on {TOPIC}|{TOPIC} came \d s ago") as error:
         robot.perform("is_in_room", ["mug"])
     assert error.value.kind == "IsInRoomFailed"
-    camera(eyes.graph, "Image", RAW)
+    start_camera(eyes.graph, "Image", RAW)
     assert robot.perform("is_in_room", ["mug"])
 
 
 @BOTH
 @pytest.mark.usefixtures("model")
-def test_what_is_no_picture_is_said(eyes: Eyes, kind: str) -> None:
-    camera(eyes.graph, "String", {}, topic="/words")
-    camera(eyes.graph, "Image", {**RAW, "encoding": "16UC1"}, topic="/depth")
-    camera(eyes.graph, "CompressedImage", {"format": "jpeg", "data": "00ff"}, topic="/noise")
+def test_messages_without_a_picture_are_reported(eyes: Eyes, kind: str) -> None:
+    start_camera(eyes.graph, "String", {}, topic="/words")
+    start_camera(eyes.graph, "Image", {**RAW, "encoding": "16UC1"}, topic="/depth")
+    start_camera(eyes.graph, "CompressedImage", {"format": "jpeg", "data": "00ff"}, topic="/noise")
     for topic, sentence in (
         ("/words", "/words is not an image message"),
         ("/depth", '/depth .*"16UC1"; use one of rgb8'),
@@ -208,8 +208,8 @@ def test_what_is_no_picture_is_said(eyes: Eyes, kind: str) -> None:
         robot.disconnect()
 
 
-def test_model_that_is_down_is_said_and_may_come_back(eyes: Eyes, model: Server) -> None:
-    camera(eyes.graph, "Image", RAW)
+def test_failing_model_is_reported_and_may_recover(eyes: Eyes, model: Server) -> None:
+    start_camera(eyes.graph, "Image", RAW)
     robot = eyes.robot()
     model.fault = lambda _: Fault.NOT_FOUND
     with pytest.raises(RobotError) as error:
@@ -223,10 +223,10 @@ def test_model_that_is_down_is_said_and_may_come_back(eyes: Eyes, model: Server)
 
 
 def test_look_that_is_cancelled_ends_at_once(eyes: Eyes, model: Server) -> None:
-    camera(eyes.graph, "Image", RAW)
+    start_camera(eyes.graph, "Image", RAW)
     model.pause = 2.0
     robot = eyes.robot()
-    with started(lambda: robot.perform("is_in_room", ["mug"])) as ended:
+    with run_in_thread(lambda: robot.perform("is_in_room", ["mug"])) as ended:
         while not model.open:
             time.sleep(0.01)
         began = time.monotonic()
@@ -237,7 +237,7 @@ def test_look_that_is_cancelled_ends_at_once(eyes: Eyes, model: Server) -> None:
     assert robot.perform("is_in_room", ["mug"])
 
 
-# --- what a robot shows
+# --- pictures that a server shows
 
 
 SHOWS = """
@@ -272,7 +272,7 @@ os._exit(0)
 """
 
 
-def test_any_server_may_show_what_it_sees(graph: Graph, tmp_path: Path) -> None:
+def test_any_server_may_show_pictures(graph: Graph, tmp_path: Path) -> None:
     action = SKILLS["is_in_room"].ros
     assert action is not None
     script = tmp_path / "eyes.py"
@@ -283,13 +283,13 @@ def test_any_server_may_show_what_it_sees(graph: Graph, tmp_path: Path) -> None:
     robot = graph.robot(skills=SkillTable((SKILLS["is_in_room"],)))
     robot.connect()
 
-    def told(label: str) -> list[str | CameraPicture]:
-        heard: list[str | CameraPicture] = []
-        assert robot.perform("is_in_room", [label], heard.append) is False
-        return heard
+    def look(label: str) -> list[str | CameraPicture]:
+        found: list[str | CameraPicture] = []
+        assert robot.perform("is_in_room", [label], found.append) is False
+        return found
 
-    assert told("late") == [CameraPicture(b"no picture at all")]
-    assert told("three") == [CameraPicture(b"no picture at all")] * 3
+    assert look("late") == [CameraPicture(b"no picture at all")]
+    assert look("three") == [CameraPicture(b"no picture at all")] * 3
     began = time.monotonic()
-    assert told("nothing") == []
+    assert look("nothing") == []
     assert time.monotonic() - began < 1.0

@@ -31,7 +31,7 @@ from codebotler.robots.open import open_robot
 from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
-from ros_graph import FEW, GO_TO, LONG, SAY, Graph, free_port, installed, started
+from ros_graph import FEW, GO_TO, LONG, SAY, Graph, free_port, install_action, run_in_thread
 
 
 def test_goal_is_executed_and_the_result_comes_back(graph: Graph) -> None:
@@ -63,10 +63,10 @@ def test_rejected_or_aborted_goal_is_a_robot_error(graph: Graph) -> None:
         robot.perform("go_to", ["the hall"])
     with pytest.raises(RobotError) as error:
         robot.perform("pick", ["abort"])
-    assert error.value.kind == "PickFailed"  # a skill that fails in several ways names itself
+    assert error.value.kind == "PickFailed"  # A skill with several failures names itself.
 
 
-def test_no_master_is_said_at_once() -> None:
+def test_missing_master_is_reported_at_once() -> None:
     uri = f"http://localhost:{free_port()}"
     with pytest.raises(NotReadyError, match=f"no ROS master .*{uri}"):
         open_robot("ros1", Options(address=uri)).connect()
@@ -78,7 +78,7 @@ def test_address_that_is_no_uri_is_refused(uri: str) -> None:
         open_robot("ros1", Options(address=uri))
 
 
-def test_no_rospy_is_said_with_the_mend(graph: Graph) -> None:
+def test_missing_rospy_is_reported_with_a_fix(graph: Graph) -> None:
     with pytest.raises(NotReadyError, match="No module named"):
         graph.robot(ros_python=Path(sys.executable)).connect()
     with pytest.raises(NotReadyError, match="--ros-python"):
@@ -103,7 +103,7 @@ def test_missing_server_is_known_before_motion_and_looked_for_again(graph: Graph
     server.expect("goal", "hello")
 
 
-def test_no_result_is_lost_of_a_server_that_knows_late_who_wants_it(graph: Graph) -> None:
+def test_no_result_is_lost_when_a_server_connects_late(graph: Graph) -> None:
     graph.serve(GO_TO)
     robot = graph.robot()
     robot.connect()
@@ -111,7 +111,7 @@ def test_no_result_is_lost_of_a_server_that_knows_late_who_wants_it(graph: Graph
     robot.perform("say", ["hello"])
 
 
-def test_server_with_another_definition_is_told_from_a_missing_one(graph: Graph) -> None:
+def test_server_with_another_definition_is_reported(graph: Graph) -> None:
     assert GO_TO.ros is not None
     graph.serve(SAY, replace(GO_TO, ros=replace(GO_TO.ros, goal=("string place",))))
     robot = graph.robot()
@@ -122,7 +122,7 @@ def test_server_with_another_definition_is_told_from_a_missing_one(graph: Graph)
         robot.perform("go_to", ["the hall"])
 
 
-def test_server_that_died_long_ago_is_said_to_have_died(graph: Graph) -> None:
+def test_server_that_died_long_ago_is_reported(graph: Graph) -> None:
     graph.serve(SAY)
     graph.serve(GO_TO).kill()
     robot = graph.robot()
@@ -160,7 +160,7 @@ def test_goal_that_does_not_end_is_cancelled(graph: Graph, goal: str, named: str
         server.expect("cancel", goal)
 
 
-def test_goal_of_which_the_server_takes_no_notice(graph: Graph) -> None:
+def test_goal_that_the_server_ignores_is_reported(graph: Graph) -> None:
     graph.serve(GO_TO, DEAF="1")
     robot = graph.robot()
     robot.connect()
@@ -168,7 +168,7 @@ def test_goal_of_which_the_server_takes_no_notice(graph: Graph) -> None:
         robot.perform("go_to", ["the hall"])
 
 
-def test_goal_that_somebody_else_cancels_is_cancelled(graph: Graph) -> None:
+def test_goal_that_another_node_cancels_is_cancelled(graph: Graph) -> None:
     graph.serve(GO_TO)
     robot = graph.robot()
     robot.connect()
@@ -180,7 +180,7 @@ def test_cancel_reaches_the_server_and_nothing_is_performed_before_the_next_conn
     server = graph.serve(GO_TO, SAY)
     robot = graph.robot()
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
         robot.cancel()
         server.expect("cancel", "never")
@@ -199,7 +199,7 @@ def test_cancel_right_after_a_goal_always_ends_it(graph: Graph) -> None:
     robot = graph.robot()
     robot.connect()
     for _ in range(20):
-        with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
             while robot._number == 0:
                 time.sleep(0)
             robot.cancel()
@@ -207,26 +207,26 @@ def test_cancel_right_after_a_goal_always_ends_it(graph: Graph) -> None:
         robot._stopped, robot._number = False, 0
     robot._stopped = False
     robot.perform("go_to", ["the end"])
-    while server.said.get(timeout=LONG) != ["goal", "the end"]:
+    while server.events.get(timeout=LONG) != ["goal", "the end"]:
         pass
 
 
-def test_cancel_while_a_server_is_waited_for(graph: Graph) -> None:
+def test_cancel_ends_the_wait_for_a_server(graph: Graph) -> None:
     graph.serve(GO_TO)
     robot = graph.robot(waits=Timeouts(patience=2.0))
     robot.connect()
-    with started(lambda: robot.perform("say", ["hello"])) as ended:
+    with run_in_thread(lambda: robot.perform("say", ["hello"])) as ended:
         while robot._number == 0:
             time.sleep(0.01)
         robot.cancel()
     assert isinstance(ended["error"], CancelledError)
 
 
-def test_robot_that_answers_after_a_stop_answers_in_vain(graph: Graph) -> None:
+def test_result_after_a_stop_is_ignored(graph: Graph) -> None:
     server = graph.serve(GO_TO)
     robot = graph.robot()
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["late"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["late"])) as ended:
         server.expect("goal", "late")
         robot.cancel()
     assert isinstance(ended["error"], CancelledError)
@@ -235,11 +235,11 @@ def test_robot_that_answers_after_a_stop_answers_in_vain(graph: Graph) -> None:
         robot.perform("go_to", ["abort"])
 
 
-def test_robot_that_does_not_stop_is_said_not_to(graph: Graph) -> None:
+def test_robot_that_does_not_stop_is_reported(graph: Graph) -> None:
     server = graph.serve(GO_TO)
     robot = graph.robot()
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never, whatever you say"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never, whatever you say"])) as ended:
         server.expect("goal", "never, whatever you say")
         robot.cancel()
     assert isinstance(ended["error"], RobotLostError)
@@ -250,7 +250,7 @@ def test_killed_worker_is_replaced_by_one_that_cancels_all(graph: Graph) -> None
     server = graph.serve(GO_TO)
     robot = graph.robot()
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
         assert robot._worker is not None
         os.kill(robot._worker._process.pid, signal.SIGKILL)
@@ -263,9 +263,9 @@ def test_killed_worker_is_replaced_by_one_that_cancels_all(graph: Graph) -> None
 
 def test_stop_works_where_the_worker_hangs(graph: Graph) -> None:
     server = graph.serve(GO_TO)
-    robot = graph.robot(waits=Timeouts(patience=LONG))  # too long for its silence to be noticed
+    robot = graph.robot(waits=Timeouts(patience=LONG))  # Its silence is not noticed.
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
         assert robot._worker is not None
         os.kill(robot._worker._process.pid, signal.SIGSTOP)
@@ -281,7 +281,7 @@ def test_stop_works_where_the_worker_hangs_before_it_took_the_goal(graph: Graph)
     assert robot._worker is not None
     os.kill(robot._worker._process.pid, signal.SIGSTOP)
     more_than_a_pipe_holds = ("x" * 10_000,) * 20
-    with started(lambda: robot.perform("ask", ["ann", "tea?", more_than_a_pipe_holds])) as ended:
+    with run_in_thread(lambda: robot.perform("ask", ["ann", "tea?", more_than_a_pipe_holds])) as ended:
         while robot._number == 0:
             time.sleep(0.01)
         robot.cancel()
@@ -292,7 +292,7 @@ def test_hanging_worker_is_noticed_without_a_stop(graph: Graph) -> None:
     server = graph.serve(GO_TO)
     robot = graph.robot()
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
         assert robot._worker is not None
         os.kill(robot._worker._process.pid, signal.SIGSTOP)
@@ -333,9 +333,9 @@ def test_goals_of_a_worker_that_was_killed_with_its_tool_are_cancelled_by_the_ne
     server = graph.serve(GO_TO, SAY)
     first = graph.robot()
     first.connect()
-    with started(lambda: first.perform("go_to", ["never"])):
+    with run_in_thread(lambda: first.perform("go_to", ["never"])):
         server.expect("goal", "never")
-        worker, first._worker = first._worker, None  # as if nobody were there to notice
+        worker, first._worker = first._worker, None  # The tool must not notice.
         assert worker is not None
         worker.kill()
         graph.robot().connect()
@@ -355,16 +355,16 @@ def test_robot_that_was_left_in_doubt_is_cleared_at_the_next_connection(graph: G
         "ros1", graph.uri, "ros1_worker.py", Options(skills=FEW), environment, node="somebody_else"
     )
     other.connect()
-    with started(lambda: other.perform("say", ["never"])) as ended:  # stands for what nobody looks after
+    with run_in_thread(lambda: other.perform("say", ["never"])) as ended:  # An abandoned goal.
         server.expect("goal", "never")
         robot.connect()
         server.expect("cancel", "never")
     assert isinstance(ended["error"], CancelledError)
-    with started(lambda: other.perform("say", ["never"])):
+    with run_in_thread(lambda: other.perform("say", ["never"])):
         server.expect("goal", "never")
         robot.connect()
         robot.perform("go_to", ["the hall"])
-        server.expect("goal", "the hall")  # nothing is in doubt any more
+        server.expect("goal", "the hall")  # No goal is in doubt now.
         other.disconnect()
 
 
@@ -411,7 +411,7 @@ def test_goal_is_cancelled_when_another_node_takes_the_name(graph: Graph) -> Non
     server = graph.serve(GO_TO)
     robot = graph.robot()
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
         code = "import rospy, sys; rospy.init_node('codebotler', disable_signals=True); sys.stdin.read()"
         with subprocess.Popen(
@@ -445,7 +445,7 @@ serve(Late)
 """
 
 
-def test_tool_whose_name_is_taken_while_it_connects_says_so(graph: Graph, tmp_path: Path) -> None:
+def test_tool_whose_name_is_taken_while_it_connects_is_refused(graph: Graph, tmp_path: Path) -> None:
     graph.serve(GO_TO)
     script = tmp_path / "late.py"
     script.write_text(LATE)
@@ -456,10 +456,10 @@ def test_tool_whose_name_is_taken_while_it_connects_says_so(graph: Graph, tmp_pa
     began = time.monotonic()
     with pytest.raises(NotReadyError, match="node called /codebotler"):
         robot.connect()
-    assert time.monotonic() - began < LONG / 2, "no server is waited for any more"
+    assert time.monotonic() - began < LONG / 2, "the tool still waits for servers"
 
 
-def test_text_that_no_message_can_hold_is_said(graph: Graph) -> None:
+def test_text_that_no_message_can_hold_is_reported(graph: Graph) -> None:
     server = graph.serve(SAY)
     robot = graph.robot()
     robot.connect()
@@ -469,7 +469,7 @@ def test_text_that_no_message_can_hold_is_said(graph: Graph) -> None:
     server.expect("goal", "hello")
 
 
-def test_master_that_was_started_anew_between_missions(graph: Graph) -> None:
+def test_restart_of_the_master_between_missions_is_noticed(graph: Graph) -> None:
     graph.serve(GO_TO)
     robot = graph.robot()
     robot.connect()
@@ -495,7 +495,7 @@ def test_two_hundred_goals_in_a_row_and_none_is_lost(graph: Graph) -> None:
     robot.connect()
     for number in range(200):
         robot.perform("say", [str(number)])
-    heard = [server.said.get(timeout=LONG) for _ in range(200)]
+    heard = [server.events.get(timeout=LONG) for _ in range(200)]
     assert heard == [["goal", str(number)] for number in range(200)]
 
 
@@ -514,17 +514,17 @@ def test_ninth_skill_is_performed(graph: Graph) -> None:
     server.expect("goal", "ann")
 
 
-def test_installed_messages_are_preferred_and_their_feedback_is_told(
+def test_installed_messages_are_preferred_and_give_feedback(
     graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     definition = "string location\n---\n---\nstring near\n"
-    monkeypatch.setenv("PYTHONPATH", installed(tmp_path, "GoTo", definition))
+    monkeypatch.setenv("PYTHONPATH", install_action(tmp_path, "GoTo", definition))
     graph.serve(GO_TO, SAY)
     robot = graph.robot()
     robot.connect()
-    told: list[str | CameraPicture] = []
-    robot.perform("go_to", ["feedback"], told.append)
-    assert told == ["near: the hall"]
+    feedback: list[str | CameraPicture] = []
+    robot.perform("go_to", ["feedback"], feedback.append)
+    assert feedback == ["near: the hall"]
     robot.perform("say", ["hello"])
 
 
@@ -544,7 +544,7 @@ STATUS = "d388f9b87b3c471f784434d671988d4a"
 
 
 def test_messages_made_in_memory_are_those_of_the_code_generator() -> None:
-    from hashlib import md5  # noqa: PLC0415 - the way in which ROS tells messages apart
+    from hashlib import md5  # noqa: PLC0415 - ROS identifies messages by it
 
     def digest(*lines: str) -> str:
         return md5("\n".join(lines).encode(), usedforsecurity=False).hexdigest()

@@ -1,6 +1,6 @@
-"""The robot behind a rosbridge: on a real ROS graph through a double of rosbridge.
+"""The robot behind a rosbridge double on a real ROS graph.
 
-What concerns ROS 2 is tested against a stand-in for the protocol only: no rosbridge of ROS 2 was at hand.
+ROS 2 is tested only against a stand-in for the protocol, because no rosbridge for ROS 2 was available.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 from websockets.sync.server import ServerConnection
 
-from bridges import Bridge, bridge, like_ros_2, over_ros
+from bridges import Bridge, bridge, ros2_handler, ros_handler
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
@@ -29,38 +29,38 @@ from codebotler.robots.ros import kinds
 from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.robot import RosRobot
 from processes import are_gone, children_of
-from ros_graph import FEW, GO_TO, SAY, Graph, free_port, started
+from ros_graph import FEW, GO_TO, SAY, Graph, free_port, run_in_thread
 
 WAITS = Timeouts(patience=5.0, silence=1.5, longest=20.0)
 
 
-def behind(address: str, waits: Timeouts | None = None, skills: SkillTable = FEW) -> RosRobot:
+def robot_at(address: str, waits: Timeouts | None = None, skills: SkillTable = FEW) -> RosRobot:
     return kinds.rosbridge(Options(address=address, skills=skills), waits)
 
 
 @pytest.fixture
 def double(graph: Graph) -> Iterator[Bridge]:
-    with bridge(over_ros(graph.uri, tuple(FEW))) as double:
+    with bridge(ros_handler(graph.uri, tuple(FEW))) as double:
         yield double
 
 
 @pytest.fixture
 def whole_double(graph: Graph) -> Iterator[Bridge]:
-    """One that knows the messages of all skills."""
-    with bridge(over_ros(graph.uri)) as double:
+    """Start a double that knows the messages of all skills."""
+    with bridge(ros_handler(graph.uri)) as double:
         yield double
 
 
 @pytest.fixture
 def robot(double: Bridge) -> Iterator[RosRobot]:
-    robot = behind(double.address, WAITS)
+    robot = robot_at(double.address, WAITS)
     yield robot
     robot.disconnect()
 
 
 def test_goal_is_executed_and_the_result_comes_back(graph: Graph, whole_double: Bridge) -> None:
     server = graph.serve(*SKILLS.rows)
-    robot = behind(whole_double.address, WAITS, SKILLS)
+    robot = robot_at(whole_double.address, WAITS, SKILLS)
     robot.connect()
     assert robot.perform("go_to", ["the hall"]) is None
     server.expect("goal", "the hall")
@@ -72,7 +72,7 @@ def test_goal_is_executed_and_the_result_comes_back(graph: Graph, whole_double: 
     robot.disconnect()
 
 
-def test_no_result_is_lost_of_a_server_that_knows_late_who_wants_it(graph: Graph, robot: RosRobot) -> None:
+def test_no_result_is_lost_when_a_server_connects_late(graph: Graph, robot: RosRobot) -> None:
     graph.serve(SAY, KNOWS_LATE="1.0")
     robot.connect()
     robot.perform("say", ["hello"])
@@ -96,7 +96,7 @@ def test_cancel_reaches_the_server_and_nothing_is_performed_before_the_next_conn
 ) -> None:
     server = graph.serve(GO_TO, SAY)
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
         robot.cancel()
         server.expect("cancel", "never")
@@ -111,7 +111,7 @@ def test_cancel_reaches_the_server_and_nothing_is_performed_before_the_next_conn
 def test_cancel_right_after_the_first_goal_ends_it(graph: Graph, robot: RosRobot) -> None:
     graph.serve(GO_TO)
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
         while robot._number == 0:
             time.sleep(0)
         robot.cancel()
@@ -127,35 +127,35 @@ def test_server_that_dies_in_a_goal_is_noticed(graph: Graph, robot: RosRobot) ->
 
 def test_server_that_sends_no_result_is_noticed(graph: Graph, double: Bridge) -> None:
     graph.serve(GO_TO)
-    robot = behind(double.address, Timeouts(patience=4.0))
+    robot = robot_at(double.address, Timeouts(patience=4.0))
     robot.connect()
     with pytest.raises(RobotLostError, match=r"/go_to_server .*no result .*4 s"):
         robot.perform("go_to", ["no result"])
     robot.disconnect()
 
 
-def test_missing_server_is_said(graph: Graph, robot: RosRobot) -> None:
+def test_missing_server_is_reported(graph: Graph, robot: RosRobot) -> None:
     graph.serve(GO_TO)
     robot.connect()
     with pytest.raises(RobotLostError, match=r"no action server .*/say_server"):
         robot.perform("say", ["hello"])
 
 
-def test_messages_that_the_robot_does_not_know_are_said(graph: Graph) -> None:
+def test_messages_that_the_robot_does_not_know_are_reported(graph: Graph) -> None:
     graph.serve(GO_TO)
-    with bridge(over_ros(graph.uri, ("say",))) as double:
-        robot = behind(double.address, WAITS, SKILLS)
+    with bridge(ros_handler(graph.uri, ("say",))) as double:
+        robot = robot_at(double.address, WAITS, SKILLS)
         robot.connect()
         with pytest.raises(RobotLostError, match="Unable to import robot_actions_pkg/"):
             robot.perform("ask", ["ann", "tea?", ()])
         robot.disconnect()
 
 
-def test_robot_that_does_not_stop_is_said_not_to(graph: Graph, double: Bridge) -> None:
+def test_robot_that_does_not_stop_is_reported(graph: Graph, double: Bridge) -> None:
     server = graph.serve(GO_TO)
-    robot = behind(double.address, Timeouts(patience=2.0))
+    robot = robot_at(double.address, Timeouts(patience=2.0))
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never, whatever you say"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never, whatever you say"])) as ended:
         server.expect("goal", "never, whatever you say")
         robot.cancel()
     assert isinstance(ended["error"], RobotLostError)
@@ -168,7 +168,7 @@ def test_goal_is_cancelled_over_another_connection_when_one_is_lost(
 ) -> None:
     server = graph.serve(GO_TO)
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
         double.cut()
         server.expect("cancel", "never")
@@ -213,53 +213,53 @@ def test_worker_of_a_tool_that_leaves_cancels_nothing(graph: Graph, robot: RosRo
     workers = children_of(os.getpid())
     robot.disconnect()
     server.expect("goal", "the hall")
-    assert server.said.empty()
+    assert server.events.empty()
     assert len(children_of(os.getpid())) < len(workers)
 
 
-def test_no_rosbridge_is_said_with_the_mend() -> None:
+def test_missing_rosbridge_is_reported() -> None:
     address = f"ws://127.0.0.1:{free_port()}"
     with pytest.raises(NotReadyError, match=f"no rosbridge .*{address}"):
-        behind(address).connect()
+        robot_at(address).connect()
     with pytest.raises(NotReadyError, match=r"no rosbridge .*nonsense"):
-        behind("nonsense").connect()
+        robot_at("nonsense").connect()
 
 
 # --- ROS 2, against a stand-in
 
 
 @pytest.mark.parametrize("other", ["ws://127.0.0.1:{}/", "WS://LocalHost:{}", "ws://[::1]:{}"])
-def test_two_tools_are_kept_from_one_robot_whatever_their_homes_and_words(tmp_path: Path, other: str) -> None:
-    with bridge(like_ros_2([])) as double:
+def test_two_tools_cannot_share_a_robot_despite_other_homes_or_spellings(tmp_path: Path, other: str) -> None:
+    with bridge(ros2_handler([])) as double:
         port = double.address.rpartition(":")[2]
         with (
-            Reservation(behind(double.address), tmp_path / "one"),
+            Reservation(robot_at(double.address), tmp_path / "one"),
             pytest.raises(NotReadyError, match=f"another tool .process {os.getpid()}, since"),
         ):
-            Reservation(behind(other.format(port)), tmp_path / "two").__enter__()
-        with Reservation(behind(f"ws://localhost:{port}/"), tmp_path / "two"):
+            Reservation(robot_at(other.format(port)), tmp_path / "two").__enter__()
+        with Reservation(robot_at(f"ws://localhost:{port}/"), tmp_path / "two"):
             pass
 
 
 @pytest.fixture
-def heard() -> list[dict[str, Any]]:
+def requests() -> list[dict[str, Any]]:
     return []
 
 
 @pytest.fixture
-def second(heard: list[dict[str, Any]]) -> Iterator[RosRobot]:
-    with bridge(like_ros_2(heard)) as double:
-        robot = behind(double.address, Timeouts(patience=1.0, longest=2.0), SKILLS)
+def ros2_robot(requests: list[dict[str, Any]]) -> Iterator[RosRobot]:
+    with bridge(ros2_handler(requests)) as double:
+        robot = robot_at(double.address, Timeouts(patience=1.0, longest=2.0), SKILLS)
         robot.connect()
         yield robot
         robot.disconnect()
 
 
-def test_stand_in_for_ros_2_executes_goals(second: RosRobot, heard: list[dict[str, Any]]) -> None:
-    told: list[str | CameraPicture] = []
-    assert second.perform("ask", ["ann", "tea?", ("yes", "no")], told.append) == "yes"
-    assert told == ["near: the hall"]
-    sent = heard[-1]
+def test_stand_in_for_ros_2_executes_goals(ros2_robot: RosRobot, requests: list[dict[str, Any]]) -> None:
+    feedback: list[str | CameraPicture] = []
+    assert ros2_robot.perform("ask", ["ann", "tea?", ("yes", "no")], feedback.append) == "yes"
+    assert feedback == ["near: the hall"]
+    sent = requests[-1]
     assert sent.pop("id")
     assert sent == {
         "op": "send_action_goal",
@@ -270,21 +270,21 @@ def test_stand_in_for_ros_2_executes_goals(second: RosRobot, heard: list[dict[st
     }
 
 
-def test_stand_in_for_ros_2_aborts_and_refuses(second: RosRobot) -> None:
+def test_stand_in_for_ros_2_aborts_and_refuses(ros2_robot: RosRobot) -> None:
     with pytest.raises(RobotError) as error:
-        second.perform("go_to", ["abort"])
+        ros2_robot.perform("go_to", ["abort"])
     assert error.value.kind == "GoToInvalidLocation"
     with pytest.raises(RobotLostError, match="no such action"):
-        second.perform("go_to", ["unknown"])
+        ros2_robot.perform("go_to", ["unknown"])
 
 
 @pytest.mark.parametrize(
-    "said", ["{nonsense", '{"op": "action_result", "id": 1, "status": []}', '{"op": [' + "[" * 5_000]
+    "reply", ["{nonsense", '{"op": "action_result", "id": 1, "status": []}', '{"op": [' + "[" * 5_000]
 )
-def test_stand_in_for_ros_2_that_talks_nonsense_is_not_lost(second: RosRobot, said: str) -> None:
+def test_stand_in_for_ros_2_survives_its_nonsense(ros2_robot: RosRobot, reply: str) -> None:
     with pytest.raises(RobotLostError, match=r"not finish .*2 s"):
-        second.perform("go_to", [said])
-    assert second.perform("ask", ["ann", "tea?", ("yes", "no")]) == "yes"
+        ros2_robot.perform("go_to", [reply])
+    assert ros2_robot.perform("ask", ["ann", "tea?", ("yes", "no")]) == "yes"
 
 
 @pytest.mark.parametrize(
@@ -295,7 +295,7 @@ def test_stand_in_for_ros_2_that_talks_nonsense_is_not_lost(second: RosRobot, sa
         {"op": "status", "level": "error", "msg": "bad"},
     ],
 )
-def test_message_that_is_none_is_survived_and_shown(
+def test_invalid_message_is_survived_and_shown(
     message: dict[str, Any],
 ) -> None:
     def handle(connection: ServerConnection) -> None:
@@ -303,7 +303,7 @@ def test_message_that_is_none_is_survived_and_shown(
             connection.send(json.dumps(message))
 
     with bridge(handle) as double:
-        robot = behind(double.address, Timeouts(patience=1.0))
+        robot = robot_at(double.address, Timeouts(patience=1.0))
         robot.connect()
         with pytest.raises(RobotLostError, match=r"no action server .*/say_server") as error:
             robot.perform("say", ["hello"])
@@ -338,28 +338,28 @@ def test_stand_in_for_ros_2_may_end_a_stopped_goal_in_any_way(
                 connection.send(json.dumps({"op": "action_result", "id": message["id"], **end}))
 
     with bridge(handle) as double:
-        robot = behind(double.address)
+        robot = robot_at(double.address)
         robot.connect()
-        with started(lambda: robot.perform("go_to", ["the hall"])) as ended:
+        with run_in_thread(lambda: robot.perform("go_to", ["the hall"])) as ended:
             assert sent.wait(30)
             robot.cancel()
         assert type(ended["error"]) is error
         robot.disconnect()
 
 
-def test_stand_in_for_ros_2_hears_of_a_stop_and_of_what_takes_too_long(
-    second: RosRobot, heard: list[dict[str, Any]]
+def test_stand_in_for_ros_2_receives_cancels_after_stops_and_timeouts(
+    ros2_robot: RosRobot, requests: list[dict[str, Any]]
 ) -> None:
     with pytest.raises(RobotLostError, match=r"not finish .*2 s.*cancelled"):
-        second.perform("go_to", ["never"])
-    while len(heard) < 3:
+        ros2_robot.perform("go_to", ["never"])
+    while len(requests) < 3:
         time.sleep(0.01)
-    assert heard[-1]["op"] == "cancel_action_goal"
-    with started(lambda: second.perform("go_to", ["never"])) as ended:
-        while len(heard) < 4:
+    assert requests[-1]["op"] == "cancel_action_goal"
+    with run_in_thread(lambda: ros2_robot.perform("go_to", ["never"])) as ended:
+        while len(requests) < 4:
             time.sleep(0.01)
-        second.cancel()
-        while len(heard) < 5:
+        ros2_robot.cancel()
+        while len(requests) < 5:
             time.sleep(0.01)
     assert isinstance(ended["error"], CancelledError)
-    assert heard[-1]["id"] == heard[-2]["id"]
+    assert requests[-1]["id"] == requests[-2]["id"]

@@ -1,4 +1,4 @@
-"""The virtual robot: the whole path over a real ROS graph, from an instruction to the end of its program."""
+"""The virtual robot performs whole programs on a real ROS graph, and its command ends cleanly."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from codebotler.robots.simulated import SIMULATION, Simulated
 from codebotler.simulator.engine import run
 from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite
-from ros_graph import Graph, free_port, started
+from ros_graph import Graph, free_port, run_in_thread
 
 WORLD = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
-SPEED = 200.0  # of the virtual robot's clock, so that it drives at 100 m/s
+SPEED = 200.0  # The virtual robot's clock is faster: it drives at 100 m/s.
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def virtual(graph: Graph) -> Iterator[VirtualRobot]:
 
 
 @pytest.mark.usefixtures("virtual")
-def test_it_does_on_the_graph_what_the_simulated_robot_does(graph: Graph) -> None:
+def test_it_acts_on_the_graph_like_the_simulated_robot(graph: Graph) -> None:
     robot = graph.robot(skills=SKILLS)
     robot.connect()
     assert robot.missing == {}
@@ -63,7 +63,7 @@ def test_it_stops_and_goes_on_where_it_was(graph: Graph) -> None:
     virtual.start()
     robot = graph.robot(skills=SKILLS)
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["kitchen"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["kitchen"])) as ended:
         while not virtual._current:
             time.sleep(0.01)
         robot.cancel()
@@ -82,9 +82,7 @@ def test_goals_wait_for_each_other_and_one_that_waits_can_be_cancelled(virtual: 
     assert not virtual._body.clock.wait(0)
 
 
-def test_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
-    paper: Suite, graph: Graph
-) -> None:
+def test_reference_programs_act_on_a_ros_graph_like_in_the_simulator(paper: Suite, graph: Graph) -> None:
     model = open_recorded("recorded:careful")
     tasks = [(task.name, task.prompts[0], task.scenarios[0].world) for task in [*paper.tasks.values()][::2]]
     programs = [model.solution(instruction, 0).program for _, instruction, _ in tasks]
@@ -110,7 +108,7 @@ def test_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
         virtual.stop()
 
 
-def test_taken_port_and_distant_master_are_said() -> None:
+def test_taken_port_and_distant_master_are_reported() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
@@ -131,7 +129,7 @@ def test_second_virtual_robot_is_refused(graph: Graph, virtual: VirtualRobot) ->
     assert virtual._worker.receive(0) is None
 
 
-def test_killed_worker_is_said(virtual: VirtualRobot) -> None:
+def test_killed_worker_is_reported(virtual: VirtualRobot) -> None:
     assert virtual._worker is not None
     os.kill(virtual._worker._process.pid, signal.SIGKILL)
     with pytest.raises(RobotLostError, match=r"virtual robot's worker has died \(signal 9\)"):

@@ -1,4 +1,4 @@
-"""What tests on ROS 2 share; where there is no rclpy, they are skipped, and say why."""
+"""Fixtures for tests on ROS 2; without rclpy, they are skipped and say why."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from codebotler.robots.ros.worker import find_missing
 from ros2_scene import PROFILE, ROS2_PYTHON, Scene, installed
 
 HERE = Path(__file__).parent
-DOMAINS = range(41, 100)  # each test process has a graph of its own
+DOMAINS = range(41, 100)  # Each test process has a separate graph.
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -33,7 +33,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session", autouse=True)
 def ros2_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch, ExitStack() as locks:
-        patch.setenv("ROS_DOMAIN_ID", str(free_domain(locks)))
+        patch.setenv("ROS_DOMAIN_ID", str(lock_free_domain(locks)))
         # The profile keeps all traffic on loopback; LOCALHOST would add sockets on other addresses to it.
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SYSTEM_DEFAULT")
         patch.setenv("ROS_LOG_DIR", str(tmp_path_factory.mktemp("ros2")))
@@ -43,8 +43,8 @@ def ros2_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
         yield
 
 
-def free_domain(locks: ExitStack) -> int:
-    """A domain that no other tests use; it is locked for as long as they may."""
+def lock_free_domain(locks: ExitStack) -> int:
+    """Return a domain that no other tests use, and lock it."""
     for domain in DOMAINS:
         lock = locks.enter_context((Path(gettempdir()) / f"codebotler-tests-{domain}.lock").open("w"))
         with suppress(BlockingIOError):
@@ -61,5 +61,5 @@ def scene() -> Iterator[Scene]:
     finally:
         scene.end()
         ours = robot_file("ros2", os.environ["ROS_DOMAIN_ID"], "goal")
-        for sign in ours.parent.glob(f"{ours.stem}.*.goal"):  # of goals that ended with their servers
+        for sign in ours.parent.glob(f"{ours.stem}.*.goal"):  # These goals ended with their servers.
             sign.unlink()

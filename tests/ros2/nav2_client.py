@@ -1,4 +1,4 @@
-"""A client of Nav2 in plain rclpy, which obeys lists in JSON on its input, and prints lists as events."""
+"""A client of Nav2 in plain rclpy, which reads commands and prints events, both as JSON lists."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Client:
         self.door = node.create_client(Trigger, "/door/open")
         node.create_subscription(PoseWithCovarianceStamped, "/amcl_pose", self.hear_pose, LATCHED)
         node.create_subscription(Odometry, "/odom", self.hear_odometry, 10)
-        node.create_subscription(TYPES[FRAMES], "/tf", lambda told: self.frames.append(told.transforms), 100)
+        node.create_subscription(TYPES[FRAMES], "/tf", lambda data: self.frames.append(data.transforms), 100)
 
     def hear_pose(self, pose: Any) -> None:
         self.poses.append((pose.pose.pose.position.x, pose.pose.pose.position.y))
@@ -71,16 +71,16 @@ class Client:
         goal.pose.header.frame_id = frame
         goal.pose.pose.position.x, goal.pose.pose.position.y = float(x), float(y)
         goal.pose.pose.orientation.z, goal.pose.pose.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
-        sent = self.navigate.send_goal_async(goal, lambda told: self.feedback.append(told.feedback))
-        sent.add_done_callback(lambda done: self.sent(name, done.result()))
+        sent = self.navigate.send_goal_async(goal, lambda data: self.feedback.append(data.feedback))
+        sent.add_done_callback(lambda done: self.on_sent(name, done.result()))
 
-    def sent(self, name: str, handle: Any) -> None:
+    def on_sent(self, name: str, handle: Any) -> None:
         tell("accepted" if handle.accepted else "rejected", name)
         self.handles[name] = handle
         if handle.accepted:
-            handle.get_result_async().add_done_callback(lambda done: self.ended(name, done.result()))
+            handle.get_result_async().add_done_callback(lambda done: self.on_ended(name, done.result()))
 
-    def ended(self, name: str, answer: Any) -> None:
+    def on_ended(self, name: str, answer: Any) -> None:
         result = answer.result
         speed = self.speeds[-1][1] if self.speeds else 0.0
         tell("result", name, answer.status, result.error_code, result.error_msg, speed, time.monotonic())
@@ -113,7 +113,7 @@ class Client:
         )
 
     def look(self) -> None:
-        """Tell all that was heard since the last look."""
+        """Print all messages since the last look."""
         feedback = [as_data(each) for each in self.feedback]
         frames = [as_data(each) for each in self.frames[-1]] if self.frames else []
         tell("seen", {"feedback": feedback, "speeds": self.speeds, "poses": self.poses, "frames": frames})

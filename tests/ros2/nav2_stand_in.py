@@ -1,21 +1,20 @@
 """A stand-in for a robot with Nav2, written from Nav2's documentation: `python nav2_stand_in.py WORKERS`.
 
-It offers /navigate_to_pose, and apart from Nav2 the topic /speech and the service /door/open. The robot takes
-a straight way where there is one, else a way around obstacles and keepout zones, at a limited speed and
-acceleration.
+It offers /navigate_to_pose and, in addition to Nav2, the topic /speech and the service /door/open. The robot
+drives straight where it can, else around obstacles and keepout zones, at a limited speed and acceleration.
 
-It prints events as lists in JSON, one a line. Lines on standard input change the robot: activate, deactivate,
-block (it does not move, however it is driven), unblock, die. It ends when its input does.
+It prints events as JSON lists, one a line. Lines on standard input change the robot: activate, deactivate,
+block (it cannot move), unblock, die. It ends with its input.
 
 Nav2 of ROS 2 Kilted, as documented:
-- A goal that comes while another goes on preempts it: the older one is aborted with an empty result, and the
-  robot goes on without a stop. A preempting goal that asks for another behavior tree is aborted instead.
+- A goal that arrives during another preempts it: the older one is aborted with an empty result, and the
+  robot does not stop. A preempting goal that asks for another behavior tree is aborted instead.
 - The loop of the behavior tree takes 10 ms; each round looks for cancels, and publishes feedback.
 - A cancelled goal ends at the next round, while the robot still brakes: controllers may cancel gracefully.
-- While the server is inactive, goals are rejected, and the one that goes on is aborted.
+- While the server is inactive, goals are rejected, and the current one is aborted.
 - The result has the lowest error code, of the controller (1xx) or planner (2xx), and its message. Recoveries
   are tried only where they may help: if no way was found, or if the robot makes no progress.
-- The goal checker is content 0.25 m and 0.25 rad from the goal.
+- The goal checker accepts 0.25 m and 0.25 rad from the goal.
 - AMCL publishes its pose, transient local, after 0.25 m or 0.2 rad.
 - Keepout filter: /costmap_filter_info names the topic of a mask; base + multiplier * value of 100 or more is
   forbidden.
@@ -54,13 +53,13 @@ from std_srvs.srv import Trigger
 
 from ros2_types import message_types
 
-LOOP = 0.01  # seconds of a round of the behavior tree
-REPLANS = 1.0  # seconds between two plans while the robot drives
-PROGRESS = 0.5  # metres that the robot must move within --patience
-TOLERANCE = 0.25  # metres and radians from the goal
-CELL = 0.2  # metres, of the planner's grid
-LETHAL = 100.0  # of a filter's mask
-TURNS = 1.5  # radians a second
+LOOP = 0.01  # Seconds between rounds of the behavior tree.
+REPLANS = 1.0  # Seconds between two plans of a drive.
+PROGRESS = 0.5  # Metres that the robot must move within --patience.
+TOLERANCE = 0.25  # Metres and radians from the goal.
+CELL = 0.2  # Metres between cells of the planner's grid.
+LETHAL = 100.0  # This value of a filter's mask forbids a cell.
+TURNS = 1.5  # Radians a second.
 GOAL_OUTSIDE_MAP, START_OCCUPIED, GOAL_OCCUPIED, NO_VALID_PATH = 204, 205, 206, 208
 FAILED_TO_MAKE_PROGRESS = 105
 FAILED_TO_LOAD_BEHAVIOR_TREE, TF_ERROR = 9001, 9002
@@ -111,7 +110,7 @@ class NavigationError(Exception):
 
 @dataclass
 class Floor:
-    """Where the robot may be."""
+    """The space that the robot may use."""
 
     bounds: tuple[float, ...]
     obstacles: list[tuple[float, ...]]
@@ -141,7 +140,7 @@ class Floor:
         return all(self.is_free(_between(start, end, step / steps)) for step in range(1, steps + 1))
 
     def plan(self, start: Point, goal: Point) -> list[Point]:
-        """Corners of a way; raise what the planner server reports if there is none."""
+        """Return the corners of a way; raise the planner server's error if there is none."""
         if not self.is_inside(goal):
             raise NavigationError(GOAL_OUTSIDE_MAP, f"goal {goal} is outside of the map")
         if not self.is_free(goal):
@@ -152,14 +151,14 @@ class Floor:
             return [goal]
         way = [start, *reversed(self._search(goal, start)), goal]
         corners = []
-        while len(way) > 1:  # leave out each corner that can be cut
+        while len(way) > 1:  # Cut corners where the way is clear.
             ahead = next(n for n in range(len(way) - 1, 0, -1) if n == 1 or self.is_clear(way[0], way[n]))
             way = way[ahead:]
             corners.append(way[0])
         return corners
 
     def _search(self, start: Point, goal: Point) -> list[Point]:
-        """A* on the grid."""
+        """Search the grid with A*."""
         first, last = _cell(start), _cell(goal)
         came: dict[tuple[int, int], tuple[int, int]] = {first: first}
         cost = {first: 0.0}
@@ -196,13 +195,13 @@ def _centre(cell: tuple[int, int]) -> Point:
     return cell[0] * CELL, cell[1] * CELL
 
 
-def _turned(angle: float) -> float:
+def _normalize(angle: float) -> float:
     return math.remainder(angle, math.tau)
 
 
 @dataclass
 class Body:
-    """The robot's body, which follows corners, in any direction, and then turns; without any, it brakes."""
+    """The robot's body: it follows corners in any direction and then turns; without corners it brakes."""
 
     x: float
     y: float
@@ -249,9 +248,9 @@ class Body:
         self.y += self.speed * seconds * math.sin(self.heading)
 
     def _turn_to(self, yaw: float, seconds: float) -> None:
-        rest = _turned(yaw - self.yaw)
+        rest = _normalize(yaw - self.yaw)
         self.turning = math.copysign(min(TURNS, abs(rest) / seconds), rest)
-        self.yaw = _turned(self.yaw + self.turning * seconds)
+        self.yaw = _normalize(self.yaw + self.turning * seconds)
 
 
 OPTIONS = options()
@@ -263,7 +262,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Drive:
-    """What the behavior tree does for one goal."""
+    """The state of the behavior tree for one goal."""
 
     def __init__(self, handle: Any) -> None:
         pose = handle.request.pose.pose
@@ -300,7 +299,7 @@ class Robot:
         self.odometry = node.create_publisher(Odometry, "/odom", 10)
         self.frames = node.create_publisher(TYPES[FRAMES], "/tf", 100)
         node.create_subscription(TYPES[FILTER], "/costmap_filter_info", self.take_filter, LATCHED)
-        node.create_subscription(String, "/speech", lambda said: tell("heard", said.data), 10)
+        node.create_subscription(String, "/speech", lambda speech: tell("heard", speech.data), 10)
         node.create_service(Trigger, "/door/open", self.open_door)
         node.create_timer(LOOP, self.tick)
         node.create_timer(0.05, self.publish)
@@ -341,7 +340,7 @@ class Robot:
         return TYPES[NAVIGATE].Result(error_code=code, error_msg=text)
 
     def tick(self) -> None:
-        """One round of the behavior tree, and of the body."""
+        """Run one round of the behavior tree and of the body."""
         now = time.monotonic()
         if self.pending is not None:
             drive, self.pending = self.pending, None
@@ -398,7 +397,7 @@ class Robot:
             return
         body = self.body
         near = math.dist(body.at(), drive.goal) < TOLERANCE
-        if near and abs(_turned(drive.yaw - body.yaw)) < TOLERANCE:
+        if near and abs(_normalize(drive.yaw - body.yaw)) < TOLERANCE:
             self.finish("succeed")
             return
         if near and not body.corners:
@@ -422,11 +421,11 @@ class Robot:
             number_of_recoveries=drive.recoveries,
             distance_remaining=left,
         )
-        feedback.current_pose.header = self.stamped(PoseStamped(), "map").header
+        feedback.current_pose.header = self.stamp(PoseStamped(), "map").header
         self.put(feedback.current_pose.pose, self.body.x, self.body.y, self.body.yaw)
         drive.handle.publish_feedback(feedback)
 
-    def stamped(self, message: Any, frame: str) -> Any:
+    def stamp(self, message: Any, frame: str) -> Any:
         message.header.frame_id, message.header.stamp = frame, self.node.get_clock().now().to_msg()
         return message
 
@@ -435,12 +434,12 @@ class Robot:
         pose.orientation.z, pose.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
 
     def publish(self) -> None:
-        """Publish odometry, which starts at zero, frames, and where it has moved enough, the pose."""
+        """Publish odometry, which starts at zero, and frames; also the pose after enough motion."""
         x, y, yaw = self.start
         dx, dy, body = self.body.x - x, self.body.y - y, self.body
         dx, dy = dx * math.cos(yaw) + dy * math.sin(yaw), dy * math.cos(yaw) - dx * math.sin(yaw)
-        odometry = self.stamped(Odometry(child_frame_id="base_link"), "odom")
-        self.put(odometry.pose.pose, dx, dy, _turned(body.yaw - yaw))
+        odometry = self.stamp(Odometry(child_frame_id="base_link"), "odom")
+        self.put(odometry.pose.pose, dx, dy, _normalize(body.yaw - yaw))
         twist, ahead = odometry.twist.twist, body.heading - body.yaw
         twist.linear.x, twist.linear.y = body.speed * math.cos(ahead), body.speed * math.sin(ahead)
         twist.angular.z = body.turning
@@ -451,14 +450,14 @@ class Robot:
         ]
         self.frames.publish(TYPES[FRAMES](transforms=frames))
         last = self.localized
-        if last is None or math.dist(body.at(), last[:2]) > 0.25 or abs(_turned(body.yaw - last[2])) > 0.2:
+        if last is None or math.dist(body.at(), last[:2]) > 0.25 or abs(_normalize(body.yaw - last[2])) > 0.2:
             self.localized = body.x, body.y, body.yaw
-            pose = self.stamped(PoseWithCovarianceStamped(), "map")
+            pose = self.stamp(PoseWithCovarianceStamped(), "map")
             self.put(pose.pose.pose, *self.localized)
             self.poses.publish(pose)
 
     def frame(self, parent: str, child: str, x: float, y: float, yaw: float) -> Any:
-        frame = self.stamped(TransformStamped(child_frame_id=child), parent)
+        frame = self.stamp(TransformStamped(child_frame_id=child), parent)
         frame.transform.translation.x, frame.transform.translation.y = x, y
         frame.transform.rotation.z, frame.transform.rotation.w = math.sin(yaw / 2), math.cos(yaw / 2)
         return frame

@@ -1,4 +1,4 @@
-"""Real action servers on ROS 2 in which each goal says how it goes; what they hear is printed as JSON."""
+"""Real action servers on ROS 2, where the text of a goal selects its result; they print events as JSON."""
 
 import json
 import os
@@ -73,7 +73,7 @@ class Server:
         return self.spec.Result()
 
     def end_for(self, handle: Any) -> Any:
-        """The future of a goal, which may be cancelled before it is executed."""
+        """Return the future of a goal, which may be cancelled before its execution."""
         return self.ends.setdefault(bytes(handle.goal_id.uuid), Future(executor=executor))
 
     async def end_of(self, handle: Any, text: str) -> None:

@@ -1,4 +1,4 @@
-"""A camera's node in rclpy: it publishes one message, again and again, until its input ends."""
+"""A camera node in rclpy, which publishes one message repeatedly until its input ends."""
 
 import importlib
 import json

@@ -1,4 +1,4 @@
-"""An action server of rclpy for `is_in_room` that shows pictures, as the label of its goal says."""
+"""An action server of rclpy for `is_in_room`; the label of a goal selects the pictures to show."""
 
 import json
 import os

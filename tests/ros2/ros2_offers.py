@@ -1,4 +1,4 @@
-"""A robot's topics and services on ROS 2, which do nothing; it says when they are there."""
+"""Topics and services of a robot on ROS 2 that do nothing; prints "ready" when they exist."""
 
 import os
 import sys

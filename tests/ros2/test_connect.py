@@ -1,4 +1,4 @@
-"""A robot with Nav2 as it is, connected by a file: what is sent to it, what comes back, and how it stops."""
+"""A file connects an unchanged robot with Nav2: goals, results, errors and stops."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros2_scene import ROS2_PYTHON, SHORT, Scene
-from ros_graph import LONG, Process, started
+from ros_graph import LONG, Process, run_in_thread
 
 STAND_IN = Path(__file__).with_name("nav2_stand_in.py")
 PACKAGE = Path(__file__).with_name("nav2_msgs")
@@ -58,7 +58,7 @@ def open_door(sim: Simulation) -> None:
 
 
 class Robots:
-    """A robot with Nav2, and those who are connected with it."""
+    """A robot with Nav2, and the connections to it."""
 
     def __init__(self, scene: Scene, folder: Path) -> None:
         self.scene, self.folder = scene, folder
@@ -77,10 +77,10 @@ class Robots:
         return self.scene.robot(waits, skills=table, connection=read)
 
 
-def told(process: Process, what: str) -> list[object]:
-    """What the stand-in says about the next event of a kind."""
+def read_event(process: Process, what: str) -> list[object]:
+    """Return the details of the stand-in's next event of a kind."""
     while True:
-        kind, *about = process.said.get(timeout=LONG)
+        kind, *about = process.events.get(timeout=LONG)
         if kind == what:
             return about
 
@@ -90,7 +90,7 @@ def robots(scene: Scene, tmp_path: Path) -> Robots:
     return Robots(scene, tmp_path)
 
 
-def test_skills_are_what_the_file_maps(robots: Robots) -> None:
+def test_skills_are_those_of_the_file(robots: Robots) -> None:
     nav2 = robots.nav2("--speed", "5", "--acceleration", "9")
     robot = robots.robot()
     robot.connect()
@@ -100,20 +100,18 @@ def test_skills_are_what_the_file_maps(robots: Robots) -> None:
     assert robot.perform("get_current_location", []) == "dock"
     reported: list[str | CameraPicture] = []
     robot.perform("go_to", ["Lab"], reported.append)
-    assert told(nav2, "goal") == [2.0, 0.0, 1.57]
+    assert read_event(nav2, "goal") == [2.0, 0.0, 1.57]
     assert any(str(one).startswith("at (1.") for one in reported)
-    assert (
-        robot.perform("get_current_location", [], reported.append) == "lab"
-    )  # the nearest, since none holds it
+    assert robot.perform("get_current_location", [], reported.append) == "lab"  # No room contains it.
     assert "lab, the nearest" in str(reported[-1])
     robot.perform("say", ["it is open"])
-    assert told(nav2, "heard") == ["Listen: it is open"]
+    assert read_event(nav2, "heard") == ["Listen: it is open"]
     robot.perform("open_door", [])
-    told(nav2, "door")
+    read_event(nav2, "door")
     assert robot.has_pose
 
 
-def test_what_fails_is_a_robot_error_in_the_words_of_the_robot(robots: Robots) -> None:
+def test_failure_is_a_robot_error_with_the_robots_message(robots: Robots) -> None:
     robots.nav2("--obstacle", "4,4,6,6", "--door-jams", "--recoveries", "1")
     robot = robots.robot()
     robot.connect()
@@ -133,24 +131,24 @@ def test_stop_ends_when_the_robot_stands_still(robots: Robots) -> None:
     nav2 = robots.nav2("--speed", "2", "--acceleration", "2")
     robot = robots.robot()
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["moon"])) as ended:
-        told(nav2, "goal")
+    with run_in_thread(lambda: robot.perform("go_to", ["moon"])) as ended:
+        read_event(nav2, "goal")
         time.sleep(1.0)
         asked = time.monotonic()
         robot.cancel()
-        told(nav2, "cancel")
+        read_event(nav2, "cancel")
         assert time.monotonic() - asked < 1.0
     assert isinstance(ended["error"], CancelledError)
     assert robot.failed_stop == ""
-    assert 1.0 < time.monotonic() - asked < 4.0  # it brakes for a second
+    assert 1.0 < time.monotonic() - asked < 4.0  # It brakes for a second.
 
 
 def test_robot_that_goes_on_after_a_stop_is_lost(robots: Robots) -> None:
     nav2 = robots.nav2("--never-stops")
     robot = robots.robot()
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["moon"])) as ended:
-        told(nav2, "goal")
+    with run_in_thread(lambda: robot.perform("go_to", ["moon"])) as ended:
+        read_event(nav2, "goal")
         time.sleep(0.7)
         robot.cancel()
     assert isinstance(ended["error"], CancelledError)
@@ -181,14 +179,14 @@ skills:
 """
 
 
-def test_service_that_goes_on_after_a_stop_is_told(robots: Robots, tmp_path: Path) -> None:
+def test_service_that_goes_on_after_a_stop_is_reported(robots: Robots, tmp_path: Path) -> None:
     (tmp_path / "slow_door.py").write_text(SLOW_DOOR)
     door = Process(tmp_path / "slow_door.py", python=ROS2_PYTHON)
     robots.scene.processes.append(door)
     door.expect("ready")
     robot = robots.robot(DOOR)
     robot.connect()
-    with started(lambda: robot.perform("open_door", [])) as ended:
+    with run_in_thread(lambda: robot.perform("open_door", [])) as ended:
         door.expect("opening")
         robot.cancel()
     assert isinstance(ended["error"], RobotLostError)
@@ -202,7 +200,7 @@ def test_poses_in_another_frame_are_refused(robots: Robots) -> None:
         robot.connect()
 
 
-def test_topic_without_a_publisher_and_message_without_a_field_are_told(robots: Robots) -> None:
+def test_topic_without_a_publisher_and_message_without_a_field_are_reported(robots: Robots) -> None:
     robots.nav2()
     robot = robots.robot(CONNECTION.replace("/amcl_pose", "/nothing"))
     with pytest.raises(NotReadyError, match="/nothing"):
@@ -239,7 +237,7 @@ def test_planner_keeps_out_of_rooms_that_rules_forbid(robots: Robots) -> None:
     (robots.folder / "rules.yaml").write_text(RULE)
     robot.connect()
     robot.keep_out(read_rules(robots.folder / "rules.yaml"))
-    width, height, cells = told(nav2, "mask")
+    width, height, cells = read_event(nav2, "mask")
     assert [width, height, cells] == [40, 60, 40 * 60]  # 2 m by 3 m
     reported: list[str | CameraPicture] = []
     robot.perform("go_to", ["hall"], reported.append)
@@ -247,16 +245,16 @@ def test_planner_keeps_out_of_rooms_that_rules_forbid(robots: Robots) -> None:
     assert len(way) > 5
     assert not [(x, y) for x, y in way if 3 < x < 5 and -1.5 < y < 1.5]
     robot.keep_out(())
-    assert told(nav2, "mask") == [1, 1, 0]
+    assert read_event(nav2, "mask") == [1, 1, 0]
 
 
 def test_mission_ends_where_the_robot_enters_a_forbidden_room(robots: Robots) -> None:
     nav2 = robots.nav2("--speed", "2", "--acceleration", "9")
-    status, said = mission(robots, "    go_to('hall')\n    say('there')\n")
-    assert status == 1, said
-    assert "not-the-cellar" in said
-    told(nav2, "goal")
-    told(nav2, "cancel")
+    status, output = run_mission(robots, "    go_to('hall')\n    say('there')\n")
+    assert status == 1, output
+    assert "not-the-cellar" in output
+    read_event(nav2, "goal")
+    read_event(nav2, "cancel")
 
 
 LATCHED = """\
@@ -277,8 +275,8 @@ time.sleep(60)
 """
 
 
-def mission(robots: Robots, program: str, connection: str = CONNECTION) -> tuple[int, str]:
-    """Run a program under the rule; the exit status, and what is said."""
+def run_mission(robots: Robots, program: str, connection: str = CONNECTION) -> tuple[int, str]:
+    """Run a program under the rule; return the exit status and the output."""
     robots.robot(connection)
     (robots.folder / "rules.yaml").write_text(RULE)
     (robots.folder / "drive.py").write_text(f"def task_program():\n{program}")
@@ -310,8 +308,8 @@ def test_robot_that_drives_on_without_a_pose_is_stopped(robots: Robots, tmp_path
     robots.scene.processes.append(localization)
     localization.expect("ready")
     connection = CONNECTION.replace("/amcl_pose", "/once")
-    status, said = mission(robots, "    go_to('hall')\n    say('there')\n", connection)
+    status, output = run_mission(robots, "    go_to('hall')\n    say('there')\n", connection)
     assert status == 1
-    assert "stopped reporting its position" in said
-    told(nav2, "goal")
-    told(nav2, "cancel")
+    assert "stopped reporting its position" in output
+    read_event(nav2, "goal")
+    read_event(nav2, "cancel")

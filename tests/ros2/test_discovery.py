@@ -1,4 +1,4 @@
-"""What is on a real ROS 2 graph becomes a first file for `--connect`."""
+"""Discovery on a real ROS 2 graph writes a first file for `--connect`."""
 
 from __future__ import annotations
 

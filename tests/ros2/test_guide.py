@@ -1,4 +1,4 @@
-"""The pages on ROS 2 and Nav2 say what is so: their files and servers run as they are, on a real graph."""
+"""The files and servers on the pages about ROS 2 and Nav2 run unchanged on a real graph."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ from codebotler.robots.ros.keepout import keepout_messages as keepout_mask
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from error_tables import errors_on, unsaid
 from ros2_scene import ROS2_PYTHON, Scene, installed
-from ros_graph import GO_TO, Process, started
+from ros_graph import GO_TO, Process, run_in_thread
 
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 ROS2, NAV2 = ((ROOT / "docs" / name).read_text() for name in ("ros.md", "nav2.md"))
 ROOMS = (Room("cellar", footprint=((0, 0), (1, 0), (1, 1))),)
-LINES = 25  # of a file that connects a robot, at most
+LINES = 25  # Most lines of a file that connects a robot.
 
 
 def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", page, re.DOTALL)
 
 
-def test_the_table_of_servers_is_that_of_the_skills() -> None:
-    told = {}
+def test_table_of_servers_matches_the_skills() -> None:
+    listed = {}
     for row in (line.split("|")[1:5] for line in ROS2.splitlines() if "_server`, " in line):
         skill, server, goal, result = row
         name, kind = re.findall(r"`(.*)`, (\w+)", server)[0]
         returned = re.findall("`(.*?) result`", result)
-        told[skill.strip(" `")] = (name, kind, tuple(re.findall("`(.*?)`", goal)), "".join(returned))
-    assert told == {
+        listed[skill.strip(" `")] = (name, kind, tuple(re.findall("`(.*?)`", goal)), "".join(returned))
+    assert listed == {
         skill.name: (skill.ros.server, skill.ros.type, skill.ros.goal, skill.ros.result or "")
         for skill in SKILLS.rows
         if skill.ros is not None
@@ -52,9 +52,7 @@ def test_the_table_of_servers_is_that_of_the_skills() -> None:
     assert f"```text\n{GO_TO.ros.definition}```" in ROS2
 
 
-def test_the_server_of_the_page_does_what_it_must(
-    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_server_of_the_page_works(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert GO_TO.ros is not None
     monkeypatch.setenv("PYTHONPATH", installed("robot_actions_pkg", {"GoTo": GO_TO.ros.definition}))
     code = next(block for block in blocks(ROS2, "python") if "rclpy" in block)
@@ -77,7 +75,7 @@ def test_the_server_of_the_page_does_what_it_must(
         with pytest.raises(RobotError) as error:
             robot.perform("go_to", ["moon"])
         assert error.value.kind == "GoToInvalidLocation"
-        with started(lambda: robot.perform("go_to", ["hallway"])) as ended:
+        with run_in_thread(lambda: robot.perform("go_to", ["hallway"])) as ended:
             server.expect("drives")
             robot.cancel()
             server.expect("stops")
@@ -113,8 +111,8 @@ def test_robot_of_the_page_is_connected_by_its_file(scene: Scene, tmp_path: Path
     )
     assert done.returncode == 0, done.stderr
     heard = []
-    while not nav2.said.empty():
-        heard.append(nav2.said.get())
+    while not nav2.events.empty():
+        heard.append(nav2.events.get())
     if option == "--door-jams":
         assert heard == [["door"], ["heard", "The door does not open."]]
     else:
@@ -149,6 +147,6 @@ VARIES = (
 
 
 @pytest.mark.parametrize(("page", "least"), [(ROS2, 15), (NAV2, 9)], ids=["ros.md", "nav2.md"])
-def test_every_error_on_the_page_is_one_that_is_raised(page: str, least: int) -> None:
+def test_code_raises_every_error_on_the_page(page: str, least: int) -> None:
     assert len(errors_on(page)) >= least
     assert unsaid(page, VARIES) == []

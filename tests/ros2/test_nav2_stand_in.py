@@ -1,4 +1,4 @@
-"""The stand-in for Nav2 does what Nav2's documentation says, seen by a client in plain rclpy."""
+"""The stand-in for Nav2 follows Nav2's documentation, as a client in plain rclpy sees."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ QUICK = ("--speed", "3", "--acceleration", "8", "--recoveries", "2", "--patience
 
 
 class Nav2:
-    """The stand-in, and its client."""
+    """The stand-in and its client."""
 
     def __init__(self, *options: str) -> None:
         arguments = (str(WORKERS_FOLDER), *QUICK, *options)
@@ -31,8 +31,8 @@ class Nav2:
         write(self.client, json.dumps(what))
 
     def result(self, name: str) -> list[Any]:
-        """Status, code, message, speed at that time, and the time."""
-        return until(self.client, "result", name)
+        """Return the status, code, message, speed and time of a goal's end."""
+        return wait_for(self.client, "result", name)
 
     def go(self, x: float, y: float, *more: object) -> list[Any]:
         self.do("send", "goal", x, y, *more)
@@ -40,10 +40,10 @@ class Nav2:
 
     def look(self) -> dict[str, Any]:
         self.do("look")
-        seen: dict[str, Any] = until(self.client, "seen")[0]
+        seen: dict[str, Any] = wait_for(self.client, "seen")[0]
         return seen
 
-    def stands_still(self) -> bool:
+    def is_still(self) -> bool:
         self.look()
         time.sleep(0.3)
         seen = self.look()
@@ -51,7 +51,7 @@ class Nav2:
 
     def end(self) -> None:
         self.client.end()
-        with suppress(BrokenPipeError):  # it may have died
+        with suppress(BrokenPipeError):  # It may have died.
             self.robot.end()
 
 
@@ -61,10 +61,10 @@ def write(process: Process, line: str) -> None:
     process.process.stdin.flush()
 
 
-def until(process: Process, *what: object) -> list[Any]:
-    """The rest of the next event that begins so."""
+def wait_for(process: Process, *what: object) -> list[Any]:
+    """Wait for the next event that begins with these values; return its rest."""
     while True:
-        line = process.said.get(timeout=10)
+        line = process.events.get(timeout=10)
         if line[: len(what)] == list(what):
             return line[len(what) :]
 
@@ -75,7 +75,7 @@ def nav2() -> Iterator[Callable[..., Nav2]]:
 
     def make(*options: str) -> Nav2:
         made.append(Nav2(*options))
-        until(made[-1].client, "ready")
+        wait_for(made[-1].client, "ready")
         return made[-1]
 
     yield make
@@ -86,29 +86,29 @@ def nav2() -> Iterator[Callable[..., Nav2]]:
 def test_drive_is_seen_in_feedback_odometry_poses_and_frames(nav2: Callable[..., Nav2]) -> None:
     robot = nav2("--start=1,0,1.57")
     assert robot.go(1, 3, 1.57) == [SUCCEEDED, 0, ""]
-    time.sleep(0.4)  # it may still roll
-    assert robot.stands_still()
+    time.sleep(0.4)  # It may still roll.
+    assert robot.is_still()
     robot.go(1, 0, 0)
     time.sleep(0.4)
     seen = robot.look()
     left = [each["distance_remaining"] for each in seen["feedback"]]
     drives = seen["feedback"][-1]["navigation_time"]
     assert left == sorted(left, reverse=True)
-    assert len(left) > 20 * (drives["sec"] + drives["nanosec"] / 1e9)  # 100 a second, were the machine idle
+    assert len(left) > 20 * (drives["sec"] + drives["nanosec"] / 1e9)  # An idle machine sends 100 a second.
     assert any(each["estimated_time_remaining"]["nanosec"] for each in seen["feedback"])
     assert 1.5 < max(speed for _, speed in seen["speeds"]) < 3.01
     assert all(abs(b[1] - a[1]) <= 8 * (b[0] - a[0] + 0.2) for a, b in pairwise(seen["speeds"]))
-    assert 5 < len(seen["poses"]) < 30  # one each 0.25 m or 0.2 rad
+    assert 5 < len(seen["poses"]) < 30  # One pose for 0.25 m or 0.2 rad.
     assert seen["feedback"][0]["current_pose"]["header"]["frame_id"] == "map"
     outer, inner = (each["transform"] for each in seen["frames"])
     assert (outer["translation"]["x"], outer["translation"]["y"]) == (1, 0)
-    assert abs(inner["translation"]["x"]) < 0.4  # in the frame of odometry, which begins where the robot did
+    assert abs(inner["translation"]["x"]) < 0.4  # Odometry starts at the robot's start.
 
 
-def test_new_goal_preempts_the_old_one_which_is_aborted_without_a_word(nav2: Callable[..., Nav2]) -> None:
+def test_new_goal_preempts_the_old_one_which_is_aborted_without_a_message(nav2: Callable[..., Nav2]) -> None:
     robot = nav2()
     robot.do("send", "first", 8, 0)
-    until(robot.client, "accepted", "first")
+    wait_for(robot.client, "accepted", "first")
     time.sleep(0.4)
     robot.do("send", "second", 3, 1)
     status, code, text, speed, _ = robot.result("first")
@@ -122,16 +122,16 @@ def test_new_goal_preempts_the_old_one_which_is_aborted_without_a_word(nav2: Cal
 def test_cancelled_goal_ends_at_once_while_the_robot_brakes(nav2: Callable[..., Nav2]) -> None:
     robot = nav2()
     robot.do("send", "goal", 8, 0)
-    until(robot.client, "accepted", "goal")
+    wait_for(robot.client, "accepted", "goal")
     time.sleep(0.4)
     robot.do("cancel", "goal")
-    goals, asked = until(robot.client, "cancelling")
+    goals, asked = wait_for(robot.client, "cancelling")
     status, _, _, speed, ended = robot.result("goal")
     assert (status, goals) == (CANCELED, 1)
     assert ended - asked < 0.5
     assert speed > 1
     time.sleep(0.5)
-    assert robot.stands_still()
+    assert robot.is_still()
 
 
 def test_planner_says_why_it_fails(nav2: Callable[..., Nav2]) -> None:
@@ -142,7 +142,7 @@ def test_planner_says_why_it_fails(nav2: Callable[..., Nav2]) -> None:
     assert (status, code, bool(text)) == (ABORTED, 206, True)
     assert robot.look()["feedback"][-1:] == []
     assert robot.go(3.5, 3.5)[:2] == [ABORTED, 208]
-    until(robot.robot, "recovery", 2)
+    wait_for(robot.robot, "recovery", 2)
     assert robot.look()["feedback"][-1]["number_of_recoveries"] == 2
     assert robot.go(1, 0, 0, "kitchen")[:2] == [ABORTED, 9002]
     assert robot.go(1, 0, 0, "map", "own.xml")[:2] == [ABORTED, 9001]
@@ -154,12 +154,12 @@ def test_planner_says_why_it_fails(nav2: Callable[..., Nav2]) -> None:
 def test_robot_that_makes_no_progress_recovers_and_then_fails(nav2: Callable[..., Nav2]) -> None:
     robot = nav2()
     write(robot.robot, "block")
-    until(robot.robot, "block")
+    wait_for(robot.robot, "block")
     status, code, text = robot.go(3, 0)
     assert (status, code, bool(text)) == (ABORTED, 105, True)
     assert robot.look()["feedback"][-1]["number_of_recoveries"] == 2
     robot.do("send", "again", 3, 0)
-    until(robot.robot, "recovery", 1)
+    wait_for(robot.robot, "recovery", 1)
     write(robot.robot, "unblock")
     assert robot.result("again")[0] == SUCCEEDED
 
@@ -167,19 +167,19 @@ def test_robot_that_makes_no_progress_recovers_and_then_fails(nav2: Callable[...
 def test_inactive_server_rejects_goals_and_aborts_the_one_that_goes_on(nav2: Callable[..., Nav2]) -> None:
     robot = nav2("--inactive")
     robot.do("send", "early", 1, 0)
-    until(robot.client, "rejected", "early")
+    wait_for(robot.client, "rejected", "early")
     write(robot.robot, "activate")
-    until(robot.robot, "activate")
+    wait_for(robot.robot, "activate")
     robot.do("send", "goal", 8, 0)
-    until(robot.client, "accepted", "goal")
+    wait_for(robot.client, "accepted", "goal")
     write(robot.robot, "deactivate")
     assert robot.result("goal")[:3] == [ABORTED, 0, ""]
 
 
-def test_keepout_zone_is_driven_around_and_no_place_for_a_goal(nav2: Callable[..., Nav2]) -> None:
+def test_robot_drives_around_keepout_zones_and_refuses_goals_in_them(nav2: Callable[..., Nav2]) -> None:
     robot = nav2()
     robot.do("mask", 1, -1, 2, 1)
-    until(robot.robot, "mask", 100, 100)
+    wait_for(robot.robot, "mask", 100, 100)
     robot.look()
     assert robot.go(3, 0) == [SUCCEEDED, 0, ""]
     poses = [each["current_pose"]["pose"]["position"] for each in robot.look()["feedback"]]
@@ -192,24 +192,24 @@ def test_keepout_zone_is_driven_around_and_no_place_for_a_goal(nav2: Callable[..
 def test_faults_of_a_stop(nav2: Callable[..., Nav2], fault: str) -> None:
     robot = nav2(fault)
     robot.do("send", "goal", 5 if "refuse" in fault else 9, 0)
-    until(robot.client, "accepted", "goal")
+    wait_for(robot.client, "accepted", "goal")
     time.sleep(0.4)
     robot.do("cancel", "goal")
-    goals, asked = until(robot.client, "cancelling")
+    goals, asked = wait_for(robot.client, "cancelling")
     status, *_, ended = robot.result("goal")
     refuses, waits, drives = "refuse" in fault, "slow" in fault, "never" in fault
     assert (goals, status) == ((0, SUCCEEDED) if refuses else (1, CANCELED))
     assert (ended - asked > 0.7) == (refuses or waits)
     time.sleep(0.5)
-    assert robot.stands_still() != drives
+    assert robot.is_still() != drives
 
 
 def test_it_hears_speech_opens_its_door_and_dies(nav2: Callable[..., Nav2]) -> None:
     robot = nav2("--door-jams")
     robot.do("say", "„Tea”, for ann?")
-    assert until(robot.robot, "heard") == ["„Tea”, for ann?"]
+    assert wait_for(robot.robot, "heard") == ["„Tea”, for ann?"]
     robot.do("open")
-    success, message = until(robot.client, "door")
+    success, message = wait_for(robot.client, "door")
     assert (success, bool(message)) == (False, True)
     write(robot.robot, "die")
     assert robot.robot.process.wait(10) == -9

@@ -1,4 +1,4 @@
-"""Pictures on a real ROS 2 graph: those that a server shows, and those of a camera."""
+"""Pictures on a real ROS 2 graph, from a server and from a camera."""
 
 from __future__ import annotations
 
@@ -55,19 +55,19 @@ def eyes(scene: Scene) -> Process:
 
 
 @pytest.mark.usefixtures("eyes")
-def test_any_server_may_show_what_it_sees(scene: Scene) -> None:
+def test_any_server_may_show_pictures(scene: Scene) -> None:
     robot = scene.robot(skills=SkillTable((LOOK,)))
     robot.connect()
 
-    def told(label: str) -> list[str | CameraPicture]:
-        heard: list[str | CameraPicture] = []
-        assert robot.perform("is_in_room", [label], heard.append) is False
-        return heard
+    def look(label: str) -> list[str | CameraPicture]:
+        found: list[str | CameraPicture] = []
+        assert robot.perform("is_in_room", [label], found.append) is False
+        return found
 
-    assert told("late") == [CameraPicture(bytes(8))]
-    assert told("three") == [CameraPicture(bytes(8))] * 3
+    assert look("late") == [CameraPicture(bytes(8))]
+    assert look("three") == [CameraPicture(bytes(8))] * 3
     began = time.monotonic()
-    assert told("nothing") == []
+    assert look("nothing") == []
     assert time.monotonic() - began < 1.0
 
 
@@ -111,10 +111,10 @@ def test_connected_camera_becomes_an_answer_and_a_picture(
 
 
 @pytest.mark.parametrize(("topic", "why"), [("/words", "is empty"), (TOPIC, "no picture")])
-def test_what_is_no_picture_is_said(
+def test_messages_without_a_picture_are_reported(
     scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, topic: str, why: str
 ) -> None:
-    monkeypatch.setenv("OPENAI_BASE_URL", "http://localhost:1/v1")  # which is not asked
+    monkeypatch.setenv("OPENAI_BASE_URL", "http://localhost:1/v1")  # The model is not asked.
     process(scene, HERE / "ros2_camera.py", "/words", "String", "{}").expect("ready")
     path = tmp_path / "robot.yaml"
     path.write_text(f'skills: {{is_in_room: {{detector: "openai-chat:eyes", image: {topic}}}}}')

@@ -22,7 +22,7 @@ from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros2_scene import ROS2_PYTHON, Scene, installed
-from ros_graph import GO_TO, SAY, started
+from ros_graph import GO_TO, SAY, run_in_thread
 
 
 @pytest.mark.smoke
@@ -57,7 +57,7 @@ def test_cancel_reaches_the_server_and_nothing_is_performed_before_the_next_conn
     server = scene.serve(GO_TO)
     robot = scene.robot()
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
         robot.cancel()
         server.expect("cancel", "never")
@@ -73,7 +73,7 @@ def test_cancel_before_the_server_has_accepted_the_goal(scene: Scene) -> None:
     server = scene.serve(GO_TO)
     robot = scene.robot()
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["slow"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["slow"])) as ended:
         server.expect("taking")
         robot.cancel()
         server.expect("goal", "slow")
@@ -86,17 +86,17 @@ def test_stop_at_any_moment_leaves_no_goal_running(scene: Scene) -> None:
     robot = scene.robot()
     robot.connect()
     for moment in range(30):
-        with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
             time.sleep(moment / 1000)
             robot.cancel()
         assert isinstance(ended["error"], CancelledError)
         time.sleep(0.05)
-        heard = {server.said.get()[0] for _ in range(server.said.qsize())}
-        assert heard in (set(), {"goal", "cancel"}), moment  # in any order, and cancelled more than once
-        robot._stopped = False  # connected as it is
+        heard = {server.events.get()[0] for _ in range(server.events.qsize())}
+        assert heard in (set(), {"goal", "cancel"}), moment  # In any order, and perhaps repeated.
+        robot._stopped = False  # It stays connected.
 
 
-def test_goal_that_somebody_else_cancels_is_cancelled(scene: Scene) -> None:
+def test_goal_that_another_node_cancels_is_cancelled(scene: Scene) -> None:
     scene.serve(GO_TO)
     robot = scene.robot()
     robot.connect()
@@ -104,21 +104,21 @@ def test_goal_that_somebody_else_cancels_is_cancelled(scene: Scene) -> None:
         robot.perform("go_to", ["by somebody else"])
 
 
-def test_robot_that_answers_after_a_stop_answers_in_vain(scene: Scene) -> None:
+def test_result_after_a_stop_is_ignored(scene: Scene) -> None:
     server = scene.serve(GO_TO)
     robot = scene.robot()
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["late"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["late"])) as ended:
         server.expect("goal", "late")
         robot.cancel()
     assert isinstance(ended["error"], CancelledError)
 
 
-def test_robot_that_does_not_stop_is_said_not_to(scene: Scene) -> None:
+def test_robot_that_does_not_stop_is_reported(scene: Scene) -> None:
     server = scene.serve(GO_TO)
     robot = scene.robot(Timeouts(patience=1.0, silence=0.5, longest=20.0))
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never, whatever you say"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never, whatever you say"])) as ended:
         server.expect("goal", "never, whatever you say")
         robot.cancel()
     assert isinstance(ended["error"], RobotLostError)
@@ -135,7 +135,7 @@ def test_goal_that_does_not_end_is_cancelled(scene: Scene) -> None:
     server.expect("cancel", "never")
 
 
-def test_goal_of_which_the_server_takes_no_notice(scene: Scene) -> None:
+def test_goal_that_the_server_ignores_is_reported(scene: Scene) -> None:
     scene.serve(SAY)
     robot = scene.robot(Timeouts(patience=1.0, silence=0.5, longest=20.0))
     robot.connect()
@@ -184,7 +184,7 @@ def test_killed_worker_is_replaced_by_one_that_cancels_all(scene: Scene) -> None
     server = scene.serve(GO_TO)
     robot = scene.robot()
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
         assert robot._worker is not None
         os.kill(robot._worker._process.pid, signal.SIGKILL)
@@ -206,7 +206,7 @@ robot.perform("go_to", ["never"])
 """
 
 
-def begun_tool() -> subprocess.Popen[bytes]:
+def start_tool() -> subprocess.Popen[bytes]:
     source = str(Path(__file__).parents[2] / "src")
     return subprocess.Popen(
         [sys.executable, "-c", TOOL, str(ROS2_PYTHON)], env={**os.environ, "PYTHONPATH": source}
@@ -215,7 +215,7 @@ def begun_tool() -> subprocess.Popen[bytes]:
 
 def test_killed_tool_leaves_no_moving_robot(scene: Scene) -> None:
     server = scene.serve(GO_TO)
-    with begun_tool() as tool:
+    with start_tool() as tool:
         server.expect("goal", "never")
         tool.kill()
         killed = time.monotonic()
@@ -225,24 +225,24 @@ def test_killed_tool_leaves_no_moving_robot(scene: Scene) -> None:
 
 def test_goals_of_a_worker_that_was_killed_with_its_tool_are_cancelled_by_the_next(scene: Scene) -> None:
     server = scene.serve(GO_TO)
-    with begun_tool() as tool:
+    with start_tool() as tool:
         server.expect("goal", "never")
         (worker,) = children(tool.pid)
-        os.kill(worker, signal.SIGSTOP)  # so that it does not notice that it is alone
+        os.kill(worker, signal.SIGSTOP)  # The worker must not notice that its tool is gone.
         tool.kill()
         os.kill(worker, signal.SIGKILL)
-    time.sleep(4)  # the worker has left the graph, and its lock is free
+    time.sleep(4)  # The worker has left the graph, and its lock is free.
     with pytest.raises(NotReadyError, match="/go_to_server"):
-        scene.robot(skills=SkillTable((SAY,))).connect()  # which could not cancel it
+        scene.robot(skills=SkillTable((SAY,))).connect()  # It cannot cancel the goal.
     robot = scene.robot()
     robot.connect()
     server.expect("cancel", "never")
     robot.disconnect()
-    with started(lambda: perform_as_somebody_else(scene)) as ended:
+    with run_in_thread(lambda: perform_as_other_node(scene)) as ended:
         server.expect("goal", "never")
         robot.connect()
         robot.perform("go_to", ["the hall"])
-        server.expect("goal", "the hall")  # nothing is left behind any more
+        server.expect("goal", "the hall")  # No goal is left behind.
         scene.robots[-1].cancel()
     assert isinstance(ended["error"], CancelledError)
 
@@ -251,7 +251,7 @@ def children(process: int) -> list[int]:
     return [int(pid) for pid in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
 
 
-def perform_as_somebody_else(scene: Scene) -> None:
+def perform_as_other_node(scene: Scene) -> None:
     environment = {"ROS_DOMAIN_ID": os.environ["ROS_DOMAIN_ID"]}
     skills = SkillTable((GO_TO,))
     options = Options(ros_python=ROS2_PYTHON, skills=skills)
@@ -265,14 +265,14 @@ def perform_as_somebody_else(scene: Scene) -> None:
 
 def test_suspended_tool_stops_the_robot(scene: Scene) -> None:
     server = scene.serve(GO_TO)
-    with begun_tool() as tool:
+    with start_tool() as tool:
         server.expect("goal", "never")
         tool.send_signal(signal.SIGSTOP)
         server.expect("cancel", "never")
         tool.kill()
 
 
-def test_installed_package_is_preferred_and_its_feedback_is_told(
+def test_installed_package_is_preferred_and_gives_feedback(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert GO_TO.ros is not None
@@ -281,12 +281,12 @@ def test_installed_package_is_preferred_and_its_feedback_is_told(
     scene.serve_as([["robot_actions_pkg/action/GoTo", "/go_to_server", definition]])
     robot = scene.robot(skills=SkillTable((GO_TO,)))
     robot.connect()
-    told: list[str | CameraPicture] = []
-    robot.perform("go_to", ["feedback"], told.append)
-    assert told == ["near: the hall"]
+    feedback: list[str | CameraPicture] = []
+    robot.perform("go_to", ["feedback"], feedback.append)
+    assert feedback == ["near: the hall"]
 
 
-def test_text_that_no_message_can_hold_is_said(scene: Scene) -> None:
+def test_text_that_no_message_can_hold_is_reported(scene: Scene) -> None:
     server = scene.serve(SAY)
     robot = scene.robot()
     robot.connect()

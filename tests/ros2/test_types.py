@@ -43,8 +43,8 @@ POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 GRID = "nav_msgs/msg/OccupancyGrid"
 
 
-def filled(names: list[str], *fillings: tuple[str, str, dict[str, Any]], folders: list[Path]) -> list[Any]:
-    """What messages hold, or why they cannot, after they went over the wire."""
+def fill(names: list[str], *fillings: tuple[str, str, dict[str, Any]], folders: list[Path]) -> list[Any]:
+    """Return the data of messages after they went over the wire, or the errors of filling them."""
     asked = json.dumps([names, [str(folder) for folder in folders], fillings])
     command = [str(ROS2_PYTHON), "-c", SCRIPT, str(WORKERS_FOLDER), asked]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -55,7 +55,7 @@ def filled(names: list[str], *fillings: tuple[str, str, dict[str, Any]], folders
 
 
 def test_messages_go_there_and_back() -> None:
-    goal, info, frames, trigger, pose, grid = filled(
+    goal, info, frames, trigger, pose, grid = fill(
         [NAVIGATE, FILTER, FRAMES, TRIGGER, POSE, GRID],
         (
             NAVIGATE,
@@ -91,9 +91,9 @@ def test_value_that_does_not_fit_is_named_by_its_path() -> None:
         (number, {"data": 300}, "data"),
         (text, {"data": 3}, "data"),
     ]
-    told = filled([POSE, poses, number, text], *((name, "", values) for name, values, _ in wrong), folders=[])
-    for said, (_, _, path) in zip(told, wrong, strict=True):
-        assert f" {path} " in re.sub("[,;]", " ", said)
+    errors = fill([POSE, poses, number, text], *((name, "", values) for name, values, _ in wrong), folders=[])
+    for sentence, (_, _, path) in zip(errors, wrong, strict=True):
+        assert f" {path} " in re.sub("[,;]", " ", sentence)
 
 
 def test_messages_of_the_package_itself_are_built_with_it(tmp_path: Path) -> None:
@@ -109,19 +109,19 @@ def test_messages_of_the_package_itself_are_built_with_it(tmp_path: Path) -> Non
         (tmp_path / "lab_msgs" / name).write_text(text)
     serve = "lab_msgs/srv/Serve"
     values = {"tray": {"cups": [{"name": "tea"}], "spares": []}}
-    assert filled([serve], (serve, "Request", values), folders=[tmp_path / "lab_msgs"]) == [values]
-    for name, said in (
+    assert fill([serve], (serve, "Request", values), folders=[tmp_path / "lab_msgs"]) == [values]
+    for name, sentence in (
         ("Missing", r"lab_msgs .*unknown_msgs"),
         ("Broken", "lab_msgs/msg/Broken"),
         ("None", r"lab_msgs/msg/None\.msg"),
     ):
-        with pytest.raises(AssertionError, match=said) as error:
-            filled([f"lab_msgs/msg/{name}"], folders=[tmp_path / "lab_msgs"])
+        with pytest.raises(AssertionError, match=sentence) as error:
+            fill([f"lab_msgs/msg/{name}"], folders=[tmp_path / "lab_msgs"])
         assert "Traceback" not in str(error.value)
 
 
 @pytest.mark.parametrize("name", ["lab_msgs/msg/Cup", "std_msgs/msg/Cup"])
 def test_type_that_is_missing_is_named(name: str) -> None:
     with pytest.raises(AssertionError, match=r"(lab|std)_msgs") as error:
-        filled([name], folders=[])
+        fill([name], folders=[])
     assert "Traceback" not in str(error.value)

@@ -1,4 +1,4 @@
-"""The virtual robot on a real ROS 2 graph, also with skills of one's own, and as commands."""
+"""The virtual robot on a real ROS 2 graph, also with own skills and as a command."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.robots.base import CancelledError, NotReadyError
 from codebotler.robots.ros.virtual import VirtualRobot
 from ros2_scene import ROS2_PYTHON, Scene
-from ros_graph import started
+from ros_graph import run_in_thread
 
 WORLD = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
 OWN = """
@@ -58,7 +58,7 @@ def virtual(request: pytest.FixtureRequest) -> Iterator[VirtualRobot]:
 
 
 @pytest.mark.usefixtures("virtual")
-def test_it_does_on_the_graph_what_the_simulated_robot_does(scene: Scene) -> None:
+def test_it_acts_on_the_graph_like_the_simulated_robot(scene: Scene) -> None:
     robot = scene.robot(skills=SKILLS)
     robot.connect()
     assert robot.missing == {}
@@ -78,7 +78,7 @@ def test_it_stops_where_it_is(scene: Scene) -> None:
     virtual.start()
     robot = scene.robot(skills=SKILLS)
     robot.connect()
-    with started(lambda: robot.perform("go_to", ["kitchen"])) as ended:
+    with run_in_thread(lambda: robot.perform("go_to", ["kitchen"])) as ended:
         while not virtual._current:
             time.sleep(0.01)
         robot.cancel()
@@ -112,7 +112,7 @@ def test_own_values_of_every_type_go_there_and_back(scene: Scene, tmp_path: Path
 
 
 def commands_on(page: str) -> list[list[str]]:
-    """The options of the commands of a block for ROS 2, each without a remark behind it."""
+    """Return the options of each command in a block for ROS 2, without a trailing comment."""
     (block,) = re.findall(
         rf"<!-- run by tests/ros2/{Path(__file__).name} -->\n```sh\n(.*?)```", page, re.DOTALL
     )
