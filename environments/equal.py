@@ -22,13 +22,13 @@ from roboeval.training.missions import TrainingMission, load_missions
 from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Rollout, judge
 
-TASKS, EACH, MISSIONS_EACH = 100, 5, 2  # to make a task takes longer than to judge five programs
+TASKS, EACH, MISSIONS_EACH = 100, 5, 2  # Making a task takes longer than judging five programs.
 
 Call: TypeAlias = tuple[str, dict[str, Any]]
 
 
 def examples() -> list[tuple[dict[str, Any], str]]:
-    """Rows of prompts, each with EACH completions: right, wrong and invalid programs."""
+    """Return rows of prompts, each with EACH completions: right, wrong and invalid programs."""
     found = []
     for number, row in enumerate(load_prompts("validation", count=TASKS)):
         task = trained_task(row["family"], row["seed"])
@@ -40,7 +40,7 @@ def examples() -> list[tuple[dict[str, Any], str]]:
 
 
 def missions() -> list[tuple[dict[str, Any], list[Call]]]:
-    """Rows of missions, each with MISSIONS_EACH lists of calls: of right and wrong programs, and mistakes."""
+    """Return missions, each with MISSIONS_EACH lists of calls: of right and wrong programs, and mistakes."""
     found = []
     for number, row in enumerate(load_missions("validation", count=TASKS)):
         task = trained_task(row["family"], row["seed"])
@@ -70,7 +70,7 @@ def calls_of(task: TrainedTask, world: int, program: str) -> list[Call]:
     return calls
 
 
-def by_core() -> list[float]:
+def judge_with_core() -> list[float]:
     """Compute the rewards with the library itself, first of the programs and then of the missions."""
     rollouts = [
         Rollout(row["family"], row["seed"], row["prompt_index"], program_in(text)) for row, text in examples()
@@ -85,7 +85,7 @@ def by_core() -> list[float]:
     return rewards
 
 
-def by_trl() -> list[float]:
+def judge_with_trl() -> list[float]:
     """Compute the rewards that a trainer of TRL receives."""
     from codebotler_trl import MissionEnvironment, reward  # noqa: PLC0415 - installed in one environment only
 
@@ -101,7 +101,7 @@ def by_trl() -> list[float]:
     return rewards
 
 
-def by_verifiers() -> list[float]:
+def judge_with_verifiers() -> list[float]:
     """Compute the rewards in traces of verifiers."""
     import codebotler_verifiers as environment  # noqa: PLC0415 - installed in one environment only
     import verifiers.v1 as vf  # noqa: PLC0415 - installed in one environment only
@@ -111,7 +111,7 @@ def by_verifiers() -> list[float]:
         options = {"id": "codebotler-verifiers", "split": "validation", "mode": mode, "count": count}
         return environment.TrainingTaskset(environment.TrainingConfig(**options)).load()
 
-    async def scored(task: Any, text: str, calls: list[Call]) -> float:  # noqa: ANN401 - as above
+    async def score(task: Any, text: str, calls: list[Call]) -> float:  # noqa: ANN401 - verifiers is not installed where mypy runs
         trace = vf.Trace[environment.TrainingData](
             task=vf.TraceTask[environment.TrainingData](type=type(task).__name__, data=task.data),
             agent=vf.AgentInfo(config=vf.AgentConfig(runtime=vf.SubprocessConfig())),
@@ -125,20 +125,20 @@ def by_verifiers() -> list[float]:
         await task.score(trace)
         return trace.reward
 
-    async def all_scored() -> list[float]:
+    async def score_all() -> list[float]:
         prompts = [task for task in tasks("program", TASKS) for _ in range(EACH)]
         programs = zip(prompts, examples(), strict=True)
         begun = [task for task in tasks("agent", TASKS) for _ in range(MISSIONS_EACH)]
         acted = zip(begun, missions(), strict=True)
         return [
-            *[await scored(task, text, []) for task, (_, text) in programs],
-            *[await scored(task, "Done.", calls) for task, (_, calls) in acted],
+            *[await score(task, text, []) for task, (_, text) in programs],
+            *[await score(task, "Done.", calls) for task, (_, calls) in acted],
         ]
 
-    return asyncio.run(all_scored())
+    return asyncio.run(score_all())
 
 
-def by_openenv() -> list[float]:
+def judge_with_openenv() -> list[float]:
     """Compute the rewards of a session of OpenEnv."""
     from codebotler_openenv import CodebotlerAction  # noqa: PLC0415 - installed in one environment only
     from codebotler_openenv.environment import CodebotlerEnvironment  # noqa: PLC0415 - installed in one environment only
@@ -158,9 +158,9 @@ def by_openenv() -> list[float]:
 
 
 REWARDS: dict[str, Callable[[], list[float]]] = {
-    "trl": by_trl,
-    "verifiers": by_verifiers,
-    "openenv": by_openenv,
+    "trl": judge_with_trl,
+    "verifiers": judge_with_verifiers,
+    "openenv": judge_with_openenv,
 }
 
 
@@ -169,7 +169,7 @@ def main() -> int:
     if sys.argv[1:2] == ["--as"]:
         print(json.dumps(REWARDS[sys.argv[2]]()))
         return 0
-    expected, status = by_core(), 0
+    expected, status = judge_with_core(), 0
     right = sum(reward == 1 for reward in expected)
     print(f"core: {len(expected)} rewards, of which {right} are 1, and {expected.count(0)} are 0")
     for given in sys.argv[1:]:

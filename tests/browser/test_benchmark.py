@@ -22,7 +22,7 @@ from evil import EVIL, NAMES, OWN_TAGS
 from pageserver import PageServer
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.task import plain_check
-from runs_server import serving
+from runs_server import serve_runs
 from seals import unseal
 from viewing import DESK, PHONE, SCREENS, OpenPage, Screen, Shoot, expect_no_grave_fault
 
@@ -63,7 +63,7 @@ def real_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def real_server(real_runs: Path) -> Iterator[PageServer]:
-    with serving(real_runs) as server:
+    with serve_runs(real_runs) as server:
         yield server
 
 
@@ -175,7 +175,7 @@ def test_reply_without_a_program_is_explained_and_its_texts_are_folded(
             row["verdicts"][0]["satisfied"] = False
     run.rows("paper").write_bytes(b"".join(map(to_line, judged)))
     unseal(run.path)
-    with serving(small_copy) as server:
+    with serve_runs(small_copy) as server:
         page = open_page(server, f"runs/hasty/{name}")
         expect(page.locator(".facts .state")).to_have_text("no program: cut-off")
         expect(page.locator(".worlds-of .trouble")).to_have_text(NO_PROGRAM_SENTENCES["cut-off"])
@@ -228,7 +228,7 @@ def test_everything_works_with_the_keyboard(real_server: PageServer, open_page: 
 
 def test_a_long_list_has_few_rows_in_the_page(hasty_copy: Path, open_page: OpenPage) -> None:
     repeat_completions(RunFolder(hasty_copy / "hasty"), 17)
-    with serving(hasty_copy) as server:
+    with serve_runs(hasty_copy) as server:
         page = open_page(server, "runs/hasty")
         expect(page.locator("#count")).to_have_text("4,080 completions")
         for share, wanted in ((1.0, 4081), (0.5, None), (0.0, 2)):
@@ -258,7 +258,7 @@ def test_a_run_is_followed_while_it_is_made(hasty_copy: Path, open_page: OpenPag
 
     run.path.mkdir()
     shutil.copy(whole.about, run.about)
-    with serving(hasty_copy) as server:
+    with serve_runs(hasty_copy) as server:
         with run.writing():
             write("completions.jsonl", 0, 60)
             everything, page = open_page(server), open_page(server, "runs/growing")
@@ -290,7 +290,7 @@ def test_a_run_is_followed_while_it_is_made(hasty_copy: Path, open_page: OpenPag
 def test_a_real_run_appears_as_it_is_made(tmp_path: Path, open_page: OpenPage) -> None:
     folder = tmp_path / "runs"
     folder.mkdir()
-    with serving(folder) as server:
+    with serve_runs(folder) as server:
         page = open_page(server)
         expect(page.get_by_text("There are no runs yet.")).to_be_visible()
         command = [
@@ -320,7 +320,7 @@ def test_a_real_run_appears_as_it_is_made(tmp_path: Path, open_page: OpenPage) -
 
 
 def test_open_page_reports_that_its_run_was_deleted(small_copy: Path, open_page: OpenPage) -> None:
-    with serving(small_copy) as server:
+    with serve_runs(small_copy) as server:
         page = open_page(server, "runs/hasty", expecting="404")
         expect(page.locator("#count")).to_have_text("15 completions")
         shutil.rmtree(small_copy / "hasty")
@@ -337,7 +337,7 @@ def test_damaged_row_is_reported(small_copy: Path, open_page: OpenPage) -> None:
     rows = RunFolder(small_copy / "hasty").rows("paper")
     lines = rows.read_bytes().splitlines(keepends=True)
     rows.write_bytes(b"".join([*lines[:10], b"{broken\n", *lines[11:]]))
-    with serving(small_copy) as server:
+    with serve_runs(small_copy) as server:
         page = open_page(server, "runs/hasty")
         expect(page.get_by_role("alert")).to_contain_text("paper.jsonl, line 11: this line is not an eval")
         page.context.close()
@@ -409,7 +409,7 @@ def test_hostile_text_stays_text(small_run: Path, tmp_path: Path, open_page: Ope
     head = json.loads(run.manifest("paper").read_text())
     shutil.copy(run.rows("paper"), run.rows(name))
     shutil.copy(run.manifest("paper"), run.manifest(name))
-    with serving(run.path.parent) as server:
+    with serve_runs(run.path.parent) as server:
         for size in (DESK, PHONE) if len(evil) > LONGEST else (PHONE,):
             page = open_page(server, size=size)
             expect(page.locator(".runs tbody tr")).to_have_count(1)
@@ -465,7 +465,7 @@ def test_three_runs_are_compared_pair_by_pair(small_run: Path, tmp_path: Path, o
     for name in ("a", "b"):
         shutil.copytree(small_run, folder / name)
     make_run(folder, "careful", "--tasks", "SayGoodDay", count=1)
-    with serving(folder) as server:
+    with serve_runs(folder) as server:
         page = open_page(server)
         page.goto(f"{server.inside}/side-by-side?run=a&run=b&run=careful")
         expect(page.locator(".pairs li")).to_have_count(3)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
-from made_up_runs import HOSTILE, made_up
+from made_up_runs import HOSTILE, new_run
 from roboeval.report.page import PAGE_SCRIPT
 from roboeval.report.writing import sections, write_report
 from viewing import chromium
@@ -76,7 +76,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         HOSTILE: {"Visit": (4, 5)},  # Other tasks are missing, so some cells are empty.
     }
     runs = [
-        made_up(name, those, written=lambda _, index: {"program": program} if index > 6 else {})
+        new_run(name, those, written=lambda _, index: {"program": program} if index > 6 else {})
         for name, those in passes.items()
     ]
     list(write_report("t", ["about it"], sections(runs, command="c"), folder))

@@ -1,4 +1,4 @@
-"""A server on loopback whose model calls tools as a script says, and which counts what it was asked."""
+"""A server on loopback whose scripted model calls tools, and which counts its requests."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ Call: TypeAlias = tuple[str, object]
 """The name of a tool and its arguments, or a text in place of them."""
 
 Turn: TypeAlias = Sequence[Call] | str
-"""What the model replies: calls, or a text."""
+"""A reply of the model: calls, or a text."""
 
 INPUT_TOKENS, OUTPUT_TOKENS, REASONING_TOKENS = 100, 10, 3
 
 
 @dataclass
 class Agent:
-    """Replies with the turns of a script, which depends on the request."""
+    """Reply with the turns of a script, which depends on the request."""
 
     script: Callable[[Request], Sequence[Turn]]
-    answered: Counter[str] = field(default_factory=Counter)  # how often each turn was requested
+    answered: Counter[str] = field(default_factory=Counter)  # It counts the requests of each turn.
 
-    def sends(self, request: Request) -> tuple[int, dict[str, str], bytes]:
+    def respond(self, request: Request) -> tuple[int, dict[str, str], bytes]:
         """Answer a request with the turn that follows those in its conversation."""
         number = turns_before(request)
         turns = self.script(request)
@@ -35,7 +35,7 @@ class Agent:
 
 
 def turns_before(request: Request) -> int:
-    """The number of turns that the model has made in this conversation; 1 if it is to write a rest."""
+    """Count the model's turns in this conversation; a request to write the rest of a program is turn 1."""
     if "tools" not in request.body:
         return int("ended early" in request.body["messages"][-1]["content"])
     return sum(message["role"] == "assistant" for message in request.body["messages"])
@@ -46,12 +46,12 @@ def instruction_of(request: Request) -> str:
 
 
 def results_in(request: Request) -> list[str]:
-    """What the model was told about its calls."""
+    """Return the results of the calls that the model received."""
     return [str(one["content"]) for one in request.body["messages"] if one["role"] == "tool"]
 
 
 def stream(turn: Turn, number: int) -> bytes:
-    """A reply as OpenAI streams it."""
+    """Encode a reply as a stream of OpenAI's format."""
     if isinstance(turn, str):
         delta: dict[str, Any] = {"role": "assistant", "content": turn}
     else:
@@ -96,6 +96,6 @@ def _chunk(choices: list[dict[str, Any]], usage: dict[str, Any] | None = None) -
 
 
 def serve(script: Callable[[Request], Sequence[Turn]]) -> tuple[Agent, Server]:
-    """An agent and its server, which is still to be started."""
+    """Make an agent and its server, which the caller starts."""
     agent = Agent(script)
-    return agent, Server(sends=agent.sends)
+    return agent, Server(sends=agent.respond)

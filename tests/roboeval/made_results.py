@@ -1,4 +1,4 @@
-"""Results of rows that are written in a test."""
+"""Results made of rows that a test writes."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ VERDICT = {
 
 
 def judged_rows(rows: Iterable[Mapping[str, Any]], programs: Mapping[CompletionKey, str] = {}) -> list[Row]:
-    """Rows as they are read; what a test leaves out is filled in."""
-    return [decode_row(to_line(_whole(row, programs.get(key_of(row), "")))) for row in rows]
+    """Decode rows, with defaults for the fields that a test omits."""
+    return [decode_row(to_line(_complete(row, programs.get(key_of(row), "")))) for row in rows]
 
 
 def row_of(completion: Completion, judgement: bytes) -> Row:
-    """The row of an evaluation, as it is read."""
+    """Return the row of an evaluation as it is read."""
     row: Row = json.loads(row_line(completion, judgement))
     return row
 
 
-def _whole(row: Mapping[str, Any], program: str) -> dict[str, Any]:
+def _complete(row: Mapping[str, Any], program: str) -> dict[str, Any]:
     failure = row.get("failure")
     least = 1 if failure is None else failure["world"] + 1
     verdicts = [{**VERDICT, **verdict} for verdict in row.get("verdicts", ())]
@@ -56,8 +56,8 @@ def _whole(row: Mapping[str, Any], program: str) -> dict[str, Any]:
     return {"program_sha256": made, **row, "failure": failure, "verdicts": verdicts}
 
 
-def as_driven(world: World, *events: Event) -> Trace:
-    """Events with the places where they happen, as the drives among them lead."""
+def with_places(world: World, *events: Event) -> Trace:
+    """Return events with the places where they happen, as the drives among them determine."""
     robot, driven = SimulatedRobot(world), []
     for event in events:
         if event.kind == "goto":
@@ -70,7 +70,7 @@ def as_driven(world: World, *events: Event) -> Trace:
 
 
 def table_of(rows: Iterable[Mapping[str, Any]]) -> pl.DataFrame:
-    """The table of some rows."""
+    """Build the table of some rows."""
     builder = TableBuilder()
     for row in judged_rows(rows):
         builder.add(row)
@@ -78,7 +78,7 @@ def table_of(rows: Iterable[Mapping[str, Any]]) -> pl.DataFrame:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class MadeResults(Results):
+class InMemoryResults(Results):
     """Results without a file."""
 
     rows: Mapping[CompletionKey, Row]
@@ -96,15 +96,15 @@ def results_of(
     ablated: bool = False,
     head: Mapping[str, Any] = {},
 ) -> Results:
-    """What was judged, as if it had been read from a run.
+    """Return the results of rows as if they had been read from a run.
 
     Args:
-        rows: of the evaluation.
-        suite: by which they were judged.
-        programs: what was judged; the program of any other completion is empty.
-        completions: the same with all there is to say of them.
-        ablated: whether common sense only was required.
-        head: what KEY.json says.
+        rows: the rows of the evaluation.
+        suite: the suite that judged them.
+        programs: the judged programs; that of any other completion is empty.
+        completions: the judged completions, if they need more fields.
+        ablated: whether only common sense was required.
+        head: the content of KEY.json.
     """
     written = {one.key: one for one in completions}
     for (task, prompt, index), program in programs.items():
@@ -118,7 +118,7 @@ def results_of(
     builder = TableBuilder()
     for row in judged:
         builder.add(row, written[key_of(row)])
-    return MadeResults(
+    return InMemoryResults(
         run=RunFolder(Path("nowhere")),
         key=f"paper{'-ablation' * ablated}",
         suite=suite,

@@ -1,4 +1,4 @@
-"""Runs that nobody generated, for tests of reports: how many completions of each prompt pass, and why not."""
+"""Invented runs for tests of reports: how many completions of each prompt pass, and why others fail."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ FAILURES = (
     ("TaskCompletionError", "InitialTerminal"),
     ("TaskCompletionError", "EventOrdering"),
 )
-WITHOUT = (("NoProgram", "cut-off"), ("NoProgram", "tool-call"), *FAILURES)
+NO_PROGRAM = (("NoProgram", "cut-off"), ("NoProgram", "tool-call"), *FAILURES)
 PROGRAM = 'def task_program():\n    say("hello")\n'
 UNCHECKED = pl.lit(None)
 RUNS = pl.col("passed") | (pl.col("failure_class") == "TaskCompletionError")
 
 
-def made_up(
+def new_run(
     name: str,
     passes: Mapping[str, tuple[int, ...]],
     *,
@@ -56,17 +56,17 @@ def made_up(
     written: Callable[[int, int], Mapping[str, Any]] = lambda *_: {},
     **about: Any,  # noqa: ANN401 - `folder`, and any field of results
 ) -> JudgedRun:
-    """A run of which so many completions pass, by task and prompt; the others fail by all kinds in turn.
+    """Invent a run with given numbers of passing completions; the others fail by all kinds in turn.
 
     Args:
-        name: of its model, and of its folder, if no other is given.
+        name: the name of its model and, by default, of its folder.
         passes: how many completions of each prompt pass, by task.
         of: how many completions each prompt has.
         failures: classes and kinds.
-        suite: by which they were judged.
-        ablated: the tasks that were judged by common sense only as well.
-        accepted: what the check says; null where it was not asked.
-        written: what else the row of a completion says, by prompt and index.
+        suite: the suite that judged them.
+        ablated: the tasks that were also judged by common sense only.
+        accepted: whether the check accepts a completion; null if there was no check.
+        written: further fields of a completion, by prompt and index.
         about: the name of the `folder`, and fields of the results.
     """
     rows = [
@@ -75,10 +75,10 @@ def made_up(
         for prompt, passed in enumerate(prompts)
         for index in range(of)
     ]
-    return judged(name, rows, suite=suite, ablated=ablated, accepted=accepted, written=written, **about)
+    return run_of_rows(name, rows, suite=suite, ablated=ablated, accepted=accepted, written=written, **about)
 
 
-def judged(
+def run_of_rows(
     name: str,
     rows: list[dict[str, Any]],
     *,
@@ -88,9 +88,9 @@ def judged(
     written: Callable[[int, int], Mapping[str, Any]] = lambda *_: {},
     folder: str = "",
     model: str | None = "",
-    **fields: Any,  # noqa: ANN401 - of results
+    **fields: Any,  # noqa: ANN401 - fields of results
 ) -> JudgedRun:
-    """A run of such rows; see `made_up`."""
+    """Invent a run of some rows; see `new_run`."""
     model = name if model == "" else model
     completions = [
         Completion.of(
@@ -137,23 +137,23 @@ def _row(
 
 
 def usual() -> list[JudgedRun]:
-    """Three models of different strength, one of them judged under ablation too."""
+    """Invent three models of different strength, one of them also judged under ablation."""
     strong = {"Visit": (10, 10, 9), "WaitForAlice": (10, 4, 10), "CountMugs": (8, 7, 9), "BringTea": (10,)}
     middle = {"Visit": (8, 5, 9), "WaitForAlice": (1, 0, 3), "CountMugs": (4, 4, 4), "BringTea": (2,)}
     weak = {"Visit": (3, 0, 1), "WaitForAlice": (0, 0, 0), "FindBook": (0, 1)}
     return [
-        made_up("strong", strong, ablated=("Visit", "CountMugs")),
-        made_up("middle", middle),
-        made_up("weak", weak),
+        new_run("strong", strong, ablated=("Visit", "CountMugs")),
+        new_run("middle", middle),
+        new_run("weak", weak),
     ]
 
 
 @cache
 def cases() -> dict[str, list[JudgedRun]]:
-    """What has broken figures elsewhere."""
-    one = made_up("one", {"Visit": (4,)})
+    """Invent runs that have broken figures before."""
+    one = new_run("one", {"Visit": (4,)})
     many = [
-        made_up(
+        new_run(
             f"model {n}", {task: ((n + i) % 11, n % 7) for i, task in enumerate(NAMES)}, ablated=("Visit",)
         )
         for n in range(40)
@@ -161,21 +161,21 @@ def cases() -> dict[str, list[JudgedRun]]:
     return {
         "usual": usual(),
         "one prompt": [one],
-        "one completion": [made_up("one", {"Visit": (0,)}, of=1)],
-        "no failures": [made_up("perfect", {"Visit": (10, 10), "CountMugs": (10,)})],
-        "all failures": [made_up("hopeless", {"Visit": (0, 0), "CountMugs": (0,)}, accepted=UNCHECKED)],
+        "one completion": [new_run("one", {"Visit": (0,)}, of=1)],
+        "no failures": [new_run("perfect", {"Visit": (10, 10), "CountMugs": (10,)})],
+        "all failures": [new_run("hopeless", {"Visit": (0, 0), "CountMugs": (0,)}, accepted=UNCHECKED)],
         "unfinished": [unfinished(one, 500), *usual()[:1]],
-        "without programs": [made_up("cut off", {"Visit": (2, 4), "CountMugs": (3,)}, failures=WITHOUT)],
+        "without programs": [new_run("cut off", {"Visit": (2, 4), "CountMugs": (3,)}, failures=NO_PROGRAM)],
         "40 models": many,
         "long names": [
-            made_up(f"openai-chat:somebody/model-34b-hf-{n}", {"Visit": (n, 5)}) for n in range(7)
+            new_run(f"openai-chat:somebody/model-34b-hf-{n}", {"Visit": (n, 5)}) for n in range(7)
         ],
-        "hostile": [made_up(HOSTILE, {"Visit": (4, 5)})],
+        "hostile": [new_run(HOSTILE, {"Visit": (4, 5)})],
     }
 
 
 def unfinished(run: JudgedRun, total: int) -> JudgedRun:
-    """The same run where there are so many completions to judge."""
+    """Return the same run with this total of completions to judge."""
     (task, prompt, _), last = list(run.results.completions.items())[-1]
     more = {(task, prompt, index): replace(last, index=index) for index in range(1_000, total + 990)}
     completions = {**run.results.completions, **more}

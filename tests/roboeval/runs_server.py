@@ -1,4 +1,4 @@
-"""`roboeval serve` as a user starts it."""
+"""Start `roboeval serve` for tests."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from pathlib import Path
 from pageserver import PageServer
 
 
-def serving(runs: Path, *arguments: str | Path) -> PageServer:
-    """The pages of a folder of runs, in a process of their own.
+def serve_runs(runs: Path, *arguments: str | Path) -> PageServer:
+    """Serve the pages of a folder of runs in a process of their own.
 
     Args:
         runs: the folder.
-        arguments: further ones.
+        arguments: further arguments of the command.
     """
     home = runs.with_name(f"{runs.name}-served")
     home.mkdir()

@@ -1,4 +1,4 @@
-"""A model for tests of what happens around one: it takes its time, fails where told, and keeps a log."""
+"""A model for tests of its callers: it takes its time, fails on demand, and keeps a log."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Scripted:
 
     Args:
         seconds: how long a reply takes on average.
-        fails: whether the request with this number, counted from 0 over all, fails, and how.
+        fails: returns the error of a request by its number from 0, or none.
         log: a file that gets a line as each request comes in and as each reply leaves.
         text: the program, with `{number}` for the sample's number.
     """

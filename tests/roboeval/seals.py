@@ -1,4 +1,4 @@
-"""What tests do to evaluations that their readers would otherwise call damaged."""
+"""Remove the seals of evaluations, so that tests may change their rows."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from roboeval.evaluation.runs.folder import RunFolder
 
 
 def unseal(run: Path, key: str = "paper") -> None:
-    """Let an evaluation be one that was not finished, whose rows may be any."""
+    """Mark an evaluation as unfinished, so that its rows may change."""
     path = RunFolder(run).manifest(key)
     head = json.loads(path.read_text())
     path.write_bytes(to_text({name: value for name, value in head.items() if name not in {"rows", "sha256"}}))

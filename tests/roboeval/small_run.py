@@ -1,4 +1,4 @@
-"""A small evaluation, and how it looks on a terminal: what tests of tables and summaries share."""
+"""A small evaluation, and its output on a terminal, for tests of tables and summaries."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ ROWS = [
 ]
 
 
-def printed(renderable: RenderableType, width: int = 80, *, colour: bool = False) -> str:
+def text_of(renderable: RenderableType, width: int = 80, *, colour: bool = False) -> str:
     console = Console(width=width, force_terminal=colour, color_system="standard" if colour else None)
     with console.capture() as captured:
         console.print(renderable)

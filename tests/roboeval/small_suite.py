@@ -1,4 +1,4 @@
-"""A suite of one task, written into a folder."""
+"""Write a suite of one task into a folder."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ worlds:
 """
 
 
-def a_suite(folder: Path, task: str = TASK, suite: str = SUITE, name: str = "T.yaml") -> str:
+def write_suite(folder: Path, task: str = TASK, suite: str = SUITE, name: str = "T.yaml") -> str:
     (folder / "tasks").mkdir()
     (folder / "suite.yaml").write_text(suite)
     (folder / "tasks" / name).write_text(task)

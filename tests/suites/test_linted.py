@@ -1,4 +1,4 @@
-"""What the linter says of the suites that ship: nothing that their task files do not accept."""
+"""The linter finds nothing in the shipped suite of the paper that its task files do not accept."""
 
 import re
 from dataclasses import replace
@@ -14,19 +14,19 @@ from roboeval.suites.load import Suite, load_suite
 
 
 @pytest.fixture(scope="module")
-def of_paper() -> list[Finding]:
+def paper_findings() -> list[Finding]:
     suite = load_suite("paper")
     return [
         one for task in suite.tasks.values() for one in lint(task, judge_solutions(task, suite, workers=2))
     ]
 
 
-def test_the_papers_suite_has_no_open_finding(of_paper: list[Finding]) -> None:
-    assert [one.name for one in of_paper if one.accepted is None] == []
-    assert re.search(rf"^{len(of_paper)} accepted findings .*--accepted", render(of_paper))
+def test_the_papers_suite_has_no_open_finding(paper_findings: list[Finding]) -> None:
+    assert [one.name for one in paper_findings if one.accepted is None] == []
+    assert re.search(rf"^{len(paper_findings)} accepted findings .*--accepted", render(paper_findings))
 
 
-def test_a_finding_of_the_papers_suite_comes_back(paper: Suite) -> None:
+def test_a_finding_appears_if_it_is_not_accepted(paper: Suite) -> None:
     task = paper.task("HalloweenShopping")
     findings = lint(replace(task, accepted=()), [])
     assert [one.name for one in findings if one.kind != "untripped"] == ["same-worlds: 4 and 5"]
@@ -43,21 +43,21 @@ IMPLIED = {
     ("LunchBreak", 'asks_to_lunch("bob")'),
     ("CountSavory", 'not questions_after_looking("alice")'),
     ("CountSavory", 'not questions_after_looking("david")'),
-    # Beyond those that mutated traces had shown:
+    # Mutated traces had not shown the following ones.
     ("SayGoodDay", "looks_into_every_lab"),
     ("MovieMessenger", "tells_mark_something"),
     ("StaplerDelivery", "takes_none_from_first_printer_room"),
 }
 
 
-def test_what_follows_in_the_papers_suite(of_paper: list[Finding]) -> None:
-    implied = {(one.path.stem, one.subject) for one in of_paper if one.kind == "implied"}
+def test_implied_requirements_of_the_papers_suite(paper_findings: list[Finding]) -> None:
+    implied = {(one.path.stem, one.subject) for one in paper_findings if one.kind == "implied"}
     assert {one for one in implied if not one[1].startswith("visits_")} == IMPLIED
 
 
-def test_the_order_of_mail_delivery_does_not_follow(of_paper: list[Finding], paper: Suite) -> None:
-    """520,000 mutated traces had not shown it, but it can be the only one to fail."""
-    assert "implied: visits_all_offices_before_returning" not in {one.name for one in of_paper}
+def test_the_order_of_mail_delivery_is_not_implied(paper_findings: list[Finding], paper: Suite) -> None:
+    """The requirement can be the only one to fail, though 520,000 mutated traces did not show it."""
+    assert "implied: visits_all_offices_before_returning" not in {one.name for one in paper_findings}
     back_at_once = [Event("goto", "mail room"), Event("pick", "bin"), Event("goto", "mail room")]
     says = [Event("place", "bin"), Event("say", "alice, bob, charlie")]
     asks = [

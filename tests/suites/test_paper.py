@@ -1,4 +1,4 @@
-"""The 16 tasks: five phrasings each that say what the requirements rest on, and recorded programs for all."""
+"""The 16 tasks: five phrasings each, all facts for the requirements, and recorded programs."""
 
 import ast
 import re
@@ -39,7 +39,7 @@ def test_five_phrasings_differ(task: Task) -> None:
 
 
 @each_task
-def test_every_prompt_says_what_the_requirements_rest_on(task: Task) -> None:
+def test_every_prompt_has_the_facts_of_the_requirements(task: Task) -> None:
     assert task.facts
     for fact in task.facts:
         for prompt in task.prompts:
@@ -60,7 +60,7 @@ def test_tasks_of_common_sense_list_it(paper: Suite) -> None:
 
 
 def shape(program: str) -> str:
-    """A program without its names and literals: what is left is how it was thought out."""
+    """Return the structure of a program, without its names and literals."""
     try:
         tree = ast.parse(program)
     except SyntaxError:
@@ -76,7 +76,7 @@ def shape(program: str) -> str:
 
 @each_task
 @each_model
-def test_programs_were_thought_out_differently(task: Task, model: str) -> None:
+def test_programs_for_different_prompts_have_different_structures(task: Task, model: str) -> None:
     replies = open_recorded(f"recorded:{model}").replies
     shapes = [frozenset(shape(reply.program) for reply in replies[prompt]) for prompt in task.prompts]
     differing = max(
@@ -99,14 +99,14 @@ def test_every_prompt_has_recorded_programs(paper: Suite, model: str) -> None:
 
 @pytest.fixture(scope="session")
 def verdicts(paper: Suite) -> dict[str, list[tuple[Completion, Solution, dict[str, Any]]]]:
-    def judged(model: str) -> Iterator[tuple[Completion, Solution, dict[str, Any]]]:
+    def judge_recorded(model: str) -> Iterator[tuple[Completion, Solution, dict[str, Any]]]:
         completions = list(recorded_completions(f"recorded:{model}", paper))
         replies = open_recorded(f"recorded:{model}")
         for completion, row in zip(completions, evaluate(completions, paper, workers=2), strict=True):
             assert completion.instruction is not None
             yield completion, replies.solution(completion.instruction, completion.index), {**row}
 
-    return {model: list(judged(model)) for model in MODELS}
+    return {model: list(judge_recorded(model)) for model in MODELS}
 
 
 Verdicts = dict[str, list[tuple[Completion, Solution, dict[str, Any]]]]
@@ -135,9 +135,7 @@ def test_careful_passes_most_and_hasty_fails_in_every_way(verdicts: Verdicts) ->
 
 
 @each_task
-def test_a_task_has_four_programs_that_are_wrong_for_different_reasons(
-    verdicts: Verdicts, task: Task
-) -> None:
+def test_a_task_has_programs_that_fail_for_four_reasons(verdicts: Verdicts, task: Task) -> None:
     reasons: Counter[tuple[str, str | None]] = Counter()
     for rows in verdicts.values():
         for completion, _, row in rows:

@@ -1,4 +1,4 @@
-"""The suite `plus`: its tasks judge as their instructions ask, and what is beside that changes nothing."""
+"""The suite `plus`: its tasks judge as their instructions ask, and unrelated actions change nothing."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -37,8 +37,8 @@ def plus_of_another_seed() -> Suite:
     return plus().with_worlds(40, 77)
 
 
-def verdicts(programs: list[str], task: Task, worlds: list[World] | None = None) -> list[list[Verdict]]:
-    """How each program does in all worlds of a task, or in changed ones with the same requirements."""
+def judge_programs(programs: list[str], task: Task, worlds: list[World] | None = None) -> list[list[Verdict]]:
+    """Run and judge each program in all worlds of a task, or in other worlds with the same requirements."""
     scenarios = task.scenarios
     shown = worlds or [scenario.world for scenario in scenarios]
     pairs = [(program, world) for program in programs for world in shown]
@@ -47,18 +47,18 @@ def verdicts(programs: list[str], task: Task, worlds: list[World] | None = None)
 
 
 def passes(several: Verdicts, prompt: int | None = None) -> bool:
-    """Whether a program does what a prompt asks for, or any prompt."""
+    """Whether a program does what a prompt or, without a prompt, any prompt asks for."""
     prompts = range(5) if prompt is None else [prompt]
     return any(all(verdict.on(number).satisfied for verdict in several) for number in prompts)
 
 
 @cache
-def verdicts_on_solutions(name: str) -> Sequence[Verdicts]:
-    """How the reference solutions of a task do."""
+def solution_verdicts(name: str) -> Sequence[Verdicts]:
+    """Return the verdicts on the reference solutions of a task."""
     return judge_solutions(plus().tasks[name], plus(), workers=2)
 
 
-def test_the_suite_of_the_paper_is_what_it_was() -> None:
+def test_the_papers_suite_is_unchanged_and_plus_has_its_prompts() -> None:
     assert load_suite("paper").digest == "ea395de1c023ae42bcf293f8da46567226ecc850722a2ec3a081fb90c44b5ffb"
     assert sorted(plus().tasks) == TASKS
     for name, task in plus().tasks.items():
@@ -66,9 +66,9 @@ def test_the_suite_of_the_paper_is_what_it_was() -> None:
 
 
 @each_task
-def test_what_other_checks_misjudge_is_judged_right(name: str) -> None:
+def test_programs_that_other_checks_misjudge_are_judged_right(name: str) -> None:
     of_task = [known for known in KNOWN if known["task"] == name]
-    judged = verdicts([known["program"] for known in of_task], plus().tasks[name])
+    judged = judge_programs([known["program"] for known in of_task], plus().tasks[name])
     wrong = [
         (
             known["key"],
@@ -81,11 +81,11 @@ def test_what_other_checks_misjudge_is_judged_right(name: str) -> None:
     assert wrong == []
 
 
-# Where solutions are judged otherwise than by the paper, and who is right.
+# Here verdicts differ from those of the paper's suite; the value says whether the solution is right.
 OTHERWISE = {
     "FindBackpack": {
         "puts it down under another name than it was picked up": True,
-        # Rooms by numbers that nobody told.
+        # No instruction numbers the rooms.
         "numbers the rooms itself": False,
     },
     "GetDrink": {
@@ -98,7 +98,7 @@ OTHERWISE = {
         "one question with the ingredients as options": False,
     },
     "CountSavory": {
-        # Asks only the owner of an office.
+        # It asks only the owner of an office.
         "knows the four offices by heart": False,
     },
     "HalloweenShopping": {
@@ -106,7 +106,7 @@ OTHERWISE = {
     },
     "HalloweenList": {
         "uses a Counter and looks for the owner by name": False,
-        # No word where nobody is in.
+        # It says nothing where nobody is in.
         "plain loop over the rooms": False,
     },
     "LunchBreak": {
@@ -132,22 +132,22 @@ OTHERWISE = {
     "StaplerDelivery": {
         "puts down something it did not pick under that name": True,
         "makes sure that there are staplers in the supply room before it starts looking": True,
-        # Rooms by numbers that nobody told.
+        # No instruction numbers the rooms.
         "the rooms by their numbers, delivered at once": False,
     },
     "StaplerSupply": {
-        # One sentence for all rooms, where each phrasing asks for one a room.
+        # It says one sentence for all rooms, but each phrasing asks for one per room.
         "looks into every printer room and lists those without one": False,
         "a comprehension with a function that looks": False,
         "separate lists, of which only the one asked for is reported": False,
         "plain and right": False,
         "right, builds the sentence while it drives": False,
         "right, with a generator": False,
-        # Rooms by numbers that nobody told.
+        # No instruction numbers the rooms.
         "numbers the printer rooms and lists the numbers": False,
     },
     "WeatherPoll": {
-        # Waits in calls of itself, of which Python allows no thousand.
+        # It waits in recursive calls, and Python's limit on recursion ends it.
         "right, calls itself for the next person": False,
     },
 }
@@ -158,14 +158,14 @@ def is_right(solution: Solution, name: str) -> bool:
 
 
 @each_task
-def test_solutions_are_judged_as_they_are_meant(name: str) -> None:
+def test_solutions_are_judged_as_declared(name: str) -> None:
     task = plus().tasks[name]
     wrong = [
         (
             one.about,
             [(v.world, v.outcome.error, [r.text for r in v.failed]) for v in several if not v.satisfied][:2],
         )
-        for one, several in zip(solutions(task), verdicts_on_solutions(name), strict=True)
+        for one, several in zip(solutions(task), solution_verdicts(name), strict=True)
         if passes(several) != is_right(one, name)
         or OTHERWISE.get(name, {}).get(one.about) == (one.fails is None)
     ]
@@ -174,7 +174,7 @@ def test_solutions_are_judged_as_they_are_meant(name: str) -> None:
 
 @each_task
 def test_the_linter_finds_nothing(name: str) -> None:
-    assert lint(plus().tasks[name], verdicts_on_solutions(name)) == []
+    assert lint(plus().tasks[name], solution_verdicts(name)) == []
 
 
 HARMLESS = """
@@ -187,7 +187,7 @@ def go_to(room):
 
 
 WORLDS = 3
-"""Each third world shows it."""
+"""The distance between worlds with harmless additions."""
 AROUND = [
     "say('I am on my way.'); _task(); say('All done!')",
     "_task(); say('That was no problem at all.')",
@@ -200,11 +200,11 @@ AROUND = [
 
 
 @each_task
-def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: str) -> None:
+def test_harmless_looks_pauses_and_sentences_change_nothing(name: str) -> None:
     task = plus().tasks[name]
     several = [
         (one, judged[::WORLDS])
-        for one, judged in [*zip(solutions(task), verdicts_on_solutions(name), strict=True)][::4]
+        for one, judged in [*zip(solutions(task), solution_verdicts(name), strict=True)][::4]
     ]
     task = replace(task, scenarios=task.scenarios[::WORLDS])
     changed = [
@@ -213,7 +213,7 @@ def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: 
     ]
     otherwise = [
         (program, [(v.world, [r.text for r in v.failed]) for v in after if not v.satisfied])
-        for program, (_, before), after in zip(changed, several, verdicts(changed, task), strict=True)
+        for program, (_, before), after in zip(changed, several, judge_programs(changed, task), strict=True)
         if passes(before) != passes(after)
     ]
     assert otherwise == []
@@ -228,14 +228,14 @@ def test_the_order_of_rooms_changes_no_verdict_on_a_right_program(name: str) -> 
         replace(s.world, rooms=tuple(random.sample(s.world.rooms, len(s.world.rooms))))
         for s in task.scenarios
     ]
-    assert all(map(passes, verdicts(right, task, worlds)))
+    assert all(map(passes, judge_programs(right, task, worlds)))
 
 
 @each_task
-def test_worlds_of_another_seed_are_others_and_judge_alike(name: str) -> None:
+def test_worlds_of_another_seed_differ_and_give_the_same_verdicts(name: str) -> None:
     task = plus_of_another_seed().tasks[name]
     assert {s.world for s in task.scenarios} != {s.world for s in plus().tasks[name].scenarios}
     chosen = solutions(task)[::9]
-    judged = verdicts([one.program for one in chosen], task)
+    judged = judge_programs([one.program for one in chosen], task)
     for one, several in zip(chosen, judged, strict=True):
         assert passes(several) == is_right(one, name), one.about

@@ -1,4 +1,4 @@
-"""Starts the server as it is, and talks to it with the client of the package."""
+"""Test the real server with the package's own client."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ PACKAGE = Path(__file__).parents[1]
 SERVER = "from codebotler_openenv.server import main\nmain()\n"
 WITHOUT_ENGINE = (
     "import os\n"
-    "os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"  # for one worker, which is stopped
+    "os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"  # One processor means one worker to stop.
     "from codebotler.simulator.pool import shared_pool\n"
     "shared_pool().submit(lambda: shared_pool().here().stop()).result()\n"
 )
@@ -46,8 +46,8 @@ FOR_EVER = "def task_program():\n    while True:\n        pass\n"
 
 
 @contextmanager
-def serving(before: str = "", *options: str) -> Iterator[str]:
-    """The address of a server process of its own."""
+def start_server(before: str = "", *options: str) -> Iterator[str]:
+    """Start a server in a process of its own and yield its address."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -55,14 +55,14 @@ def serving(before: str = "", *options: str) -> Iterator[str]:
         [sys.executable, "-c", before + SERVER, "--port", str(port), *options], stderr=subprocess.DEVNULL
     )
     try:
-        wait_for(f"http://127.0.0.1:{port}", server)
+        wait_until_healthy(f"http://127.0.0.1:{port}", server)
         yield f"http://127.0.0.1:{port}"
     finally:
         server.terminate()
         server.wait(20)
 
 
-def wait_for(url: str, server: subprocess.Popen[bytes]) -> None:
+def wait_until_healthy(url: str, server: subprocess.Popen[bytes]) -> None:
     until = time.monotonic() + 60
     while time.monotonic() < until and server.poll() is None:
         try:
@@ -76,7 +76,7 @@ def wait_for(url: str, server: subprocess.Popen[bytes]) -> None:
 
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
-    with serving() as url:
+    with start_server() as url:
         yield url
 
 
@@ -110,7 +110,7 @@ def test_a_reset_gives_the_prompt_of_load_prompts(session: Session, split: str) 
     assert (state.prompt_index, state.step_count) == (row["prompt_index"], 0)
 
 
-def test_a_family_and_an_episode_are_as_asked_for_and_the_task_is_drawn(session: Session) -> None:
+def test_a_reset_takes_a_family_and_an_episode_and_draws_a_random_task(session: Session) -> None:
     seeds = set()
     for _ in range(3):
         session.reset(family="BringThing", episode_id="mine")
@@ -144,7 +144,7 @@ def assert_passes(result: Result) -> None:
 @pytest.mark.parametrize(
     "action", [{"program": ""}, {"completion": ""}, {"program": IDLE}, {"completion": "No."}]
 )
-def test_what_does_nothing_earns_0(session: Session, action: dict[str, Any]) -> None:
+def test_an_action_that_does_nothing_earns_0(session: Session, action: dict[str, Any]) -> None:
     session.reset(seed=3)
     result = session.step(CodebotlerAction(**action))
     assert (result.reward, result.done) == (0.0, True)
@@ -216,7 +216,7 @@ def test_a_mission_may_end_with_a_call(session: Session) -> None:
         session.step(actions[1])
 
 
-def test_an_action_of_the_other_mode_says_why_and_the_mission_goes_on(session: Session) -> None:
+def test_an_action_of_the_other_mode_is_refused_and_the_mission_continues(session: Session) -> None:
     begin_mission(session)
     for wrong in (CodebotlerAction(program=""), CodebotlerAction(tool="say", answer="")):
         with pytest.raises(RuntimeError, match="either a tool or an answer"):
@@ -238,7 +238,7 @@ def test_a_wrong_reset_leaves_no_mission(session: Session) -> None:
 # --- sessions
 
 
-def test_sessions_at_the_same_time_keep_their_own_tasks(url: str) -> None:
+def test_concurrent_sessions_keep_their_own_tasks(url: str) -> None:
     async def rewards() -> list[float]:
         clients = [CodebotlerEnv(url) for _ in range(6)]
         try:
@@ -286,8 +286,8 @@ def test_the_server_answers_while_it_judges(session: Session, url: str) -> None:
     assert max(delays) < max(1.0, took / 2)
 
 
-def test_no_more_sessions_than_allowed() -> None:
-    with serving("", "--sessions", "1") as url, CodebotlerEnv(url).sync() as first:
+def test_more_sessions_than_allowed_are_refused() -> None:
+    with start_server("", "--sessions", "1") as url, CodebotlerEnv(url).sync() as first:
         first.reset(seed=1)
         with pytest.raises(RuntimeError, match="CAPACITY_REACHED"), CodebotlerEnv(url).sync() as second:
             second.reset(seed=1)
@@ -301,7 +301,7 @@ def test_no_more_sessions_than_allowed() -> None:
     ("options", "sentence"),
     [
         ({"family": "NoSuchFamily"}, 'there is no family "NoSuchFamily"'),
-        ({"family": str(family_file("BringThing"))}, "there is no family"),  # no file is read for a client
+        ({"family": str(family_file("BringThing"))}, "there is no family"),  # No file is read for a client.
         ({"split": "plus"}, 'unknown split "plus"'),
         ({"seed": -1}, "the seed is -1"),
         ({"seed": SEEDS}, "from 0 to 999,999,999"),
@@ -310,7 +310,7 @@ def test_no_more_sessions_than_allowed() -> None:
         ({"famly": "BringThing"}, "but not famly"),
     ],
 )
-def test_a_wrong_reset_says_why_and_leaves_no_task(
+def test_a_wrong_reset_is_refused_and_leaves_no_task(
     session: Session, options: dict[str, Any], sentence: str
 ) -> None:
     session.reset(seed=1)
@@ -320,7 +320,7 @@ def test_a_wrong_reset_says_why_and_leaves_no_task(
         session.step(CodebotlerAction(program=""))
 
 
-def test_steps_that_cannot_be_judged_say_why(session: Session) -> None:
+def test_steps_that_cannot_be_judged_are_refused(session: Session) -> None:
     with pytest.raises(RuntimeError, match="there is no task yet"):
         session.step(CodebotlerAction(program=""))
     session.reset(seed=1)
@@ -334,7 +334,7 @@ def test_steps_that_cannot_be_judged_say_why(session: Session) -> None:
     assert session.step(CodebotlerAction(program=solution(session))).reward == 1
 
 
-def test_a_field_of_the_wrong_kind_is_an_error_and_the_session_goes_on(session: Session) -> None:
+def test_a_field_of_the_wrong_type_is_an_error_and_the_session_continues(session: Session) -> None:
     session.reset(seed=1)
     wrong = CodebotlerAction.model_construct(program=7)
     with (
@@ -353,23 +353,23 @@ def test_plain_http_says_why_it_cannot_judge(url: str) -> None:
 
 
 def test_a_failure_of_the_engine_is_an_error_and_no_reward() -> None:
-    with serving(WITHOUT_ENGINE) as url, CodebotlerEnv(url).sync() as session:
+    with start_server(WITHOUT_ENGINE) as url, CodebotlerEnv(url).sync() as session:
         session.reset(seed=1)
-        for _ in range(2):  # the episode goes on
+        for _ in range(2):  # The episode continues.
             with pytest.raises(RuntimeError, match=r"EngineError: .*no reward"):
                 session.step(CodebotlerAction(program=solution(session)))
         assert session.state().step_count == 0
 
 
-def test_only_this_machine_is_listened_to(url: str) -> None:
+def test_the_server_listens_only_on_this_machine(url: str) -> None:
     with pytest.raises(httpx.ConnectError):
         httpx.get(url.replace("127.0.0.1", "127.0.0.2") + "/health")
 
 
-# --- what openenv demands
+# --- checks of openenv
 
 
-def openenv(*arguments: str) -> dict[str, Any]:
+def validate_with_openenv(*arguments: str) -> dict[str, Any]:
     command = [str(Path(sys.executable).parent / "openenv"), "validate", *arguments, "--json"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -379,17 +379,17 @@ def openenv(*arguments: str) -> dict[str, Any]:
 
 
 def test_openenv_validates_the_package() -> None:
-    assert openenv(str(PACKAGE), "--level", "static")["verdict"] == "pass"
+    assert validate_with_openenv(str(PACKAGE), "--level", "static")["verdict"] == "pass"
 
 
 def test_openenv_validates_the_running_server(url: str) -> None:
-    report = openenv("--url", url)
+    report = validate_with_openenv("--url", url)
     assert report["passed"]
     assert report["mode"] == "simulation"
 
 
-def test_an_episode_holds_what_the_manifest_declares(url: str) -> None:
-    """What `openenv validate --level runtime` does in a container."""
+def test_an_episode_fits_the_manifest(url: str) -> None:
+    """Repeat the checks that `openenv validate --level runtime` makes in a container."""
     manifest = OpenEnvYamlParser().parse(PACKAGE)
     assert isinstance(manifest, NormalizedManifestV2)
     plan = load_runtime_plan(PACKAGE, manifest.execution)

@@ -1,4 +1,4 @@
-"""Trains a tiny model with TRL, made on the spot, and compares rewards with those of the library."""
+"""Train a tiny model with TRL and compare its rewards with those of the library."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from roboeval.suites.families.tasks import trained_task
 from roboeval.training.missions import TrainingMission, mission_tools
 from roboeval.training.prompts import PolicyReply
 
-FAMILY, AGENT_FAMILY = "BringThing", "AnnounceInOrder"  # the latter's solutions have no branches
+FAMILY, AGENT_FAMILY = "BringThing", "AnnounceInOrder"  # Solutions of the latter have no branches.
 END = "<end>"
 IDENTITY = ("family", "seed", "prompt_index", "world")
 
@@ -56,10 +56,10 @@ def test_rewards_of_right_and_idle_programs_as_chats_and_as_texts() -> None:
 
 
 def test_a_failure_of_the_engine_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> object:
+    def raise_error(*_: object) -> object:
         raise EngineError("no process can be started")
 
-    monkeypatch.setattr(rewards, "judge_batch", broken)
+    monkeypatch.setattr(rewards, "judge_batch", raise_error)
     rows = load_prompts("train", count=1, seed=77, only=[FAMILY])
     with pytest.raises(EngineError, match="no process"):
         reward(["    say('a')\n"], **columns(rows))
@@ -75,7 +75,7 @@ def right_calls(row: dict[str, Any]) -> list[tuple[str, dict[str, str]]]:
     return [call for calls in each for call in calls]
 
 
-def environment_after(row: dict[str, Any], calls: list[tuple[str, dict[str, Any]]]) -> MissionEnvironment:
+def act_in_environment(row: dict[str, Any], calls: list[tuple[str, dict[str, Any]]]) -> MissionEnvironment:
     environment = MissionEnvironment()
     environment.reset(**row)
     for name, arguments in calls:
@@ -105,7 +105,7 @@ def test_a_mission_is_judged_by_its_calls_and_by_how_the_conversation_ends() -> 
     some: list[tuple[list[Any], PolicyReply]] = [
         (calls, answer), (calls[:2], answer), ([], answer), (calls, cut), (calls, answer[:1])
     ]  # fmt: skip
-    environments = [environment_after(row, made) for made, _ in some]
+    environments = [act_in_environment(row, made) for made, _ in some]
     completions = [completion for _, completion in some]
     rewards = reward(completions, environments=environments, **columns(load_prompts("train", count=5)))
     part = TrainingMission.begin(row)
@@ -119,9 +119,9 @@ def test_a_mission_is_judged_by_its_calls_and_by_how_the_conversation_ends() -> 
 # --- real training runs
 
 
-def model_and_tokenizer(lines: list[str], end: str = END, text: str = "") -> tuple[Any, Any]:
-    """A model so small that it has a token for each line, one for each byte, and those of a text."""
-    torch.set_num_threads(1)  # several threads spend far more time on so small a model
+def make_model_and_tokenizer(lines: list[str], end: str = END, text: str = "") -> tuple[Any, Any]:
+    """Make a small model with a token for each line, one for each byte, and those of a text."""
+    torch.set_num_threads(1)  # Several threads are far slower on a small model.
     made = tokenizers.Tokenizer(tokenizers.models.BPE())
     made.pre_tokenizer = tokenizers.pre_tokenizers.ByteLevel(add_prefix_space=False)
     made.decoder = tokenizers.decoders.ByteLevel()
@@ -138,7 +138,7 @@ def model_and_tokenizer(lines: list[str], end: str = END, text: str = "") -> tup
         eos_token_id=tokenizer.eos_token_id, pad_token_id=tokenizer.pad_token_id,
     )  # fmt: skip
     model = transformers.LlamaForCausalLM(config)
-    with torch.no_grad():  # it babbles in lines, not in bytes
+    with torch.no_grad():  # The bias makes it write lines instead of bytes.
         head = torch.full((len(tokenizer), 1), -1.0)
         head[[tokenizer.eos_token_id, *tokenizer.convert_tokens_to_ids(lines)]] = 0.0
         model.lm_head = torch.nn.Linear(64, len(tokenizer), bias=True)
@@ -146,15 +146,15 @@ def model_and_tokenizer(lines: list[str], end: str = END, text: str = "") -> tup
     return model, tokenizer
 
 
-@pytest.mark.filterwarnings("ignore")  # libraries' own
+@pytest.mark.filterwarnings("ignore")  # The warnings are the libraries' own.
 def test_the_reward_of_a_tiny_model_rises(tmp_path: Path) -> None:
     rows = load_prompts("train", count=1, only=["AnnounceInOrder"], form="text")
     opening, solution = rows[0]["opening"], trained_task("AnnounceInOrder", rows[0]["seed"]).solution
     message, *rooms = sorted(re.findall(r'"(.*?)"', solution), key=len, reverse=True)
-    model, tokenizer = model_and_tokenizer(
+    model, tokenizer = make_model_and_tokenizer(
         [*(f'    go_to("{room}")\n' for room in rooms), f'    say("{message}")\n']
     )
-    asked = rows.map(lambda _: {"prompt": opening})  # all that fits into so small a head
+    asked = rows.map(lambda _: {"prompt": opening})  # Longer prompts do not fit a small model.
     config = trl.GRPOConfig(
         output_dir=str(tmp_path), max_steps=80, per_device_train_batch_size=32, num_generations=32,
         max_completion_length=8, learning_rate=1e-3, lr_scheduler_type="constant", logging_steps=1,
@@ -166,13 +166,13 @@ def test_the_reward_of_a_tiny_model_rises(tmp_path: Path) -> None:
         processing_class=tokenizer,
     )  # fmt: skip
     trainer.train()
-    told = [log["rewards/reward/mean"] for log in trainer.state.log_history if "rewards/reward/mean" in log]
-    assert fmean(told[:5]) < 0.4
-    assert fmean(told[-5:]) > 0.8
+    means = [log["rewards/reward/mean"] for log in trainer.state.log_history if "rewards/reward/mean" in log]
+    assert fmean(means[:5]) < 0.4
+    assert fmean(means[-5:]) > 0.8
 
 
 def replayed(completions: list[list[dict[str, Any]]], **columns: list[Any]) -> list[float]:
-    """The rewards of missions that repeat the calls of conversations."""
+    """Compute the rewards of missions that repeat the calls of conversations."""
     rewards = []
     for number, completion in enumerate(completions):
         mission = TrainingMission.begin({name: columns[name][number] for name in IDENTITY})
@@ -185,13 +185,13 @@ def replayed(completions: list[list[dict[str, Any]]], **columns: list[Any]) -> l
     return rewards
 
 
-@pytest.mark.filterwarnings("ignore")  # libraries' own
-def test_a_tiny_model_acts_for_some_steps(tmp_path: Path) -> None:
+@pytest.mark.filterwarnings("ignore")  # The warnings are the libraries' own.
+def test_a_tiny_model_calls_tools_in_training(tmp_path: Path) -> None:
     rows = load_missions("train", count=1, only=[AGENT_FAMILY])
     calls = [json.dumps({"name": name, "arguments": given}) for name, given in right_calls(rows[0])]
     texts = [f"<tool_call>\n{call}\n</tool_call>" for call in dict.fromkeys(calls)]
     text = json.dumps([rows[0]["prompt"], mission_tools()], indent=1)
-    model, tokenizer = model_and_tokenizer(texts, "<|im_end|>", text)
+    model, tokenizer = make_model_and_tokenizer(texts, "<|im_end|>", text)
     tokenizer.chat_template = chat_template_utils.qwen3_chat_template
     config = trl.GRPOConfig(
         output_dir=str(tmp_path), max_steps=4, per_device_train_batch_size=8, num_generations=8,

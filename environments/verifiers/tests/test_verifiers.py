@@ -1,4 +1,4 @@
-"""Runs verifiers as it is, with a scripted server in place of a model."""
+"""Run verifiers itself with a scripted server in place of a model."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from roboeval.training.missions import TrainingMission, load_missions, mission_t
 from roboeval.training.prompts import load_prompts
 
 NAME, FAMILY = "codebotler-verifiers", "BringThing"
-AGENT_FAMILY = "AnnounceInOrder"  # its solutions have no branches
+AGENT_FAMILY = "AnnounceInOrder"  # Its solutions have no branches.
 SCRIPTS = Path(sys.executable).parent
 Call: TypeAlias = tuple[str, dict[str, Any]]
 PARTS = {"passed", "requirements", "without_errors", "parses", "rules_kept"}
@@ -79,7 +79,7 @@ def task() -> TrainingTask:
 def test_tasks_are_those_of_load_prompts() -> None:
     some = list(taskset(split="test", count=3, seed=2, worlds=11))
     for task, row in zip(some, load_prompts("test", count=3, seed=2), strict=True):
-        sent = task.data.model_dump(mode="json")  # as traces and servers have it
+        sent = task.data.model_dump(mode="json")  # Traces and servers use this format.
         asked = [{"role": one["role"], "content": one["content"]} for one in sent["prompt"]]
         assert [{"role": "system", "content": sent["system_prompt"]}, *asked] == row["prompt"]
         assert {name: sent[name] for name in ("family", "seed", "prompt_index")}.items() <= row.items()
@@ -89,7 +89,7 @@ def test_tasks_are_those_of_load_prompts() -> None:
     assert len({task.key for task in some}) == 3
 
 
-def test_tasks_never_end_unless_counted() -> None:
+def test_tasks_are_unlimited_without_a_count() -> None:
     endless = taskset()
     assert not endless.bounded
     assert endless.take(2).bounded
@@ -131,7 +131,7 @@ def test_a_program_that_does_nothing_earns_0(task: TrainingTask, reply: str) -> 
     trace = trace_of(task, reply)
     asyncio.run(task.score(trace))
     assert trace.reward == trace.metrics["passed"] == 0
-    assert trace.metrics["requirements"]  # some hold before anything is done
+    assert trace.metrics["requirements"]  # Some hold before the robot acts.
     assert set(trace.metrics) == PARTS
 
 
@@ -158,17 +158,17 @@ def test_each_task_is_valid() -> None:
 
 
 @contextmanager
-def broken_engine() -> Iterator[None]:
+def break_engine() -> Iterator[None]:
     shared_pool().submit(lambda: shared_pool().here().stop()).result()
     try:
         yield
     finally:
-        SHARED_POOL.end()  # the next call starts another
+        SHARED_POOL.end()  # The next call starts another pool.
 
 
 def test_a_failure_of_the_engine_is_no_reward(task: TrainingTask) -> None:
     trace = trace_of(task, "```python\ndef task_program():\n    say('not judged before')\n```")
-    with broken_engine(), pytest.raises(vf.TaskError, match="EngineError") as found:
+    with break_engine(), pytest.raises(vf.TaskError, match="EngineError") as found:
         asyncio.run(task.score(trace))
     assert isinstance(found.value.__cause__, EngineError)
     assert trace.rewards == {"reward": None}
@@ -195,13 +195,13 @@ def test_missions_are_those_of_load_missions() -> None:
             task.data.model_dump(include={"family", "seed", "prompt_index", "world"}).items() <= row.items()
         )
         assert task.data.system_prompt == row["prompt"][0]["content"]
-        assert asked(task) == row["prompt"][-1]["content"]
+        assert instruction_of(task) == row["prompt"][-1]["content"]
     assert len({task.key for task in some}) == 3
     assert [MissionToolset] == [type(one) for one in TrainingTaskset.toolsets(TrainingConfig(mode="agent"))]
     assert TrainingTaskset.toolsets(TrainingConfig()) == []
 
 
-def test_the_server_offers_the_tools_and_hands_arguments_on_unchanged(
+def test_the_server_offers_the_tools_and_passes_arguments_unchanged(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     sent: list[Call] = [("say", {"message": "[1, 2]"}), ("wait", {"seconds": "soon"})]
@@ -269,11 +269,11 @@ def test_the_eval_command_lets_agents_act(tmp_path: Path) -> None:
     replies: dict[str, list[dict[str, Any]]] = {}
     for number, task in enumerate(tasks):
         calls = right_calls(task) if number % 2 else []
-        replies[asked(task)] = [*({"tool": call} for call in calls), {"content": "Done."}]
-    with scripted_model(replies) as url:
+        replies[instruction_of(task)] = [*({"tool": call} for call in calls), {"content": "Done."}]
+    with serve_replies(replies) as url:
         options = eval_options(url, tmp_path, 4, AGENT_FAMILY)
         run(SCRIPTS / "vf-eval", *options, "--env.taskset.mode", "agent")
-    traces = [trace for one in written(tmp_path / "run" / "traces.jsonl") for trace in one["traces"]]
+    traces = [trace for one in read_lines(tmp_path / "run" / "traces.jsonl") for trace in one["traces"]]
     assert all(trace["ok"] for trace in traces)
     scores = {trace["task"]["key"]: trace["rewards"]["reward"]["score"] for trace in traces}
     assert scores == {task.key: float(number % 2) for number, task in enumerate(tasks)}
@@ -287,14 +287,15 @@ def test_the_eval_command_lets_agents_act(tmp_path: Path) -> None:
 # --- the commands of verifiers
 
 
-def test_the_eval_command(tmp_path: Path) -> None:
+def test_the_eval_command_judges_programs(tmp_path: Path) -> None:
     tasks = list(taskset(count=4, families=[FAMILY]))
     replies = {
-        asked(task): [{"content": solution(task) if number % 2 else ""}] for number, task in enumerate(tasks)
+        instruction_of(task): [{"content": solution(task) if number % 2 else ""}]
+        for number, task in enumerate(tasks)
     }
-    with scripted_model(replies) as url:
+    with serve_replies(replies) as url:
         run(SCRIPTS / "vf-eval", *eval_options(url, tmp_path, 4))
-    episodes = written(tmp_path / "run" / "traces.jsonl")
+    episodes = read_lines(tmp_path / "run" / "traces.jsonl")
     traces = [trace for episode in episodes for trace in episode["traces"]]
     assert all(trace["ok"] for trace in traces)
     scores = {trace["task"]["key"]: trace["rewards"]["reward"]["score"] for trace in traces}
@@ -303,7 +304,7 @@ def test_the_eval_command(tmp_path: Path) -> None:
     assert all(set(trace["metrics"]) >= PARTS for trace in traces)
 
 
-def test_the_eval_command_sees_a_failure_of_the_engine(tmp_path: Path) -> None:
+def test_the_eval_command_records_a_failure_of_the_engine(tmp_path: Path) -> None:
     (task,) = taskset(count=1, families=[FAMILY])
     program = (
         "from codebotler.simulator.pool import shared_pool\n"
@@ -311,9 +312,9 @@ def test_the_eval_command_sees_a_failure_of_the_engine(tmp_path: Path) -> None:
         "shared_pool().submit(lambda: shared_pool().here().stop()).result()\n"
         "main()\n"
     )
-    with scripted_model({asked(task): [{"content": solution(task)}]}) as url:
+    with serve_replies({instruction_of(task): [{"content": solution(task)}]}) as url:
         run(sys.executable, "-c", program, *eval_options(url, tmp_path, 1))
-    (episode,) = written(tmp_path / "run" / "traces.jsonl")
+    (episode,) = read_lines(tmp_path / "run" / "traces.jsonl")
     (trace,) = episode["traces"]
     assert not episode["ok"]
     assert not trace["ok"]
@@ -322,15 +323,15 @@ def test_the_eval_command_sees_a_failure_of_the_engine(tmp_path: Path) -> None:
     assert not any(trace["rewards"].values())
 
 
-def test_the_validate_command(tmp_path: Path) -> None:
+def test_the_validate_command_accepts_all_tasks(tmp_path: Path) -> None:
     options = ("-n", "3", "-c", "2", "--runtime.type", "subprocess", "-o", tmp_path, "--run.name", "run")
     run(SCRIPTS / "vf-validate", NAME, "--no-rich", *options)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["outcomes"]["valid"] == summary["total"] == 3
 
 
-def asked(task: TrainingTask) -> str:
-    """The instruction at the end of a prompt."""
+def instruction_of(task: TrainingTask) -> str:
+    """Return the instruction at the end of a prompt."""
     return str(task.data.model_dump()["prompt"][-1]["content"])
 
 
@@ -341,20 +342,20 @@ def eval_options(url: str, folder: Path, count: int, family: str = FAMILY) -> li
 
 
 def run(*command: str | Path) -> None:
-    path = f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"  # where uv may lie, which the null harness asks for
+    path = f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"  # The null harness needs uv, which may be there.
     done = subprocess.run(
         command, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=240, check=False
     )
     assert done.returncode == 0, done.stdout[-3_000:] + done.stderr[-3_000:]
 
 
-def written(path: Path) -> list[dict[str, Any]]:
+def read_lines(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text().splitlines()]
 
 
 @contextmanager
-def scripted_model(replies: dict[str, list[dict[str, Any]]]) -> Iterator[str]:
-    """The address of a server that answers each instruction with its replies, one after each result."""
+def serve_replies(replies: dict[str, list[dict[str, Any]]]) -> Iterator[str]:
+    """Serve each instruction's replies, one after each result, and yield the address."""
 
     class Handler(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
@@ -362,7 +363,7 @@ def scripted_model(replies: dict[str, list[dict[str, Any]]]) -> Iterator[str]:
             stream, sent = bool(body.get("stream")), body["messages"]
             instruction = [one["content"] for one in sent if one["role"] == "user"][-1]
             results = sum(one["role"] == "tool" for one in sent)
-            answer = answered(replies[instruction][results], number=results, stream=stream)
+            answer = encode_completion(replies[instruction][results], number=results, stream=stream)
             self.send_response(200)
             self.send_header("Content-Type", "text/event-stream" if stream else "application/json")
             self.send_header("Content-Length", str(len(answer)))
@@ -380,8 +381,8 @@ def scripted_model(replies: dict[str, list[dict[str, Any]]]) -> Iterator[str]:
             server.shutdown()
 
 
-def answered(reply: dict[str, Any], *, number: int, stream: bool) -> bytes:
-    """A chat completion, whole or as the one event of a stream."""
+def encode_completion(reply: dict[str, Any], *, number: int, stream: bool) -> bytes:
+    """Encode a chat completion, whole or as the only event of a stream."""
     message = {"role": "assistant", "content": reply.get("content", "")}
     if "tool" in reply:
         name, arguments = reply["tool"]

@@ -1,4 +1,4 @@
-"""Runs in which a real chat client lets a scripted server act as an agent."""
+"""Test runs in which the real chat client connects a scripted agent."""
 
 import json
 import os
@@ -35,7 +35,7 @@ from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.evaluation.runs.rows import Row
 from roboeval.suites.load import Suite, load_suite
 from server import Request, Server
-from small_suite import a_suite
+from small_suite import write_suite
 
 LIMITS = TurnLimits(20)
 WORLDS = """\
@@ -56,22 +56,22 @@ STOP: Turn = [("give_up", {"reason": "I cannot."})]
 @pytest.fixture
 def suite(tmp_path: Path) -> Suite:
     """A suite of two prompts and two worlds."""
-    return load_suite(a_suite(_new(tmp_path / "suite"), WORLDS))
+    return load_suite(write_suite(_make_folder(tmp_path / "suite"), WORLDS))
 
 
 @pytest.fixture
 def small(tmp_path: Path) -> Suite:
     """A suite of one prompt and one world."""
-    return load_suite(a_suite(_new(tmp_path / "small")))
+    return load_suite(write_suite(_make_folder(tmp_path / "small")))
 
 
-def _new(folder: Path) -> Path:
+def _make_folder(folder: Path) -> Path:
     folder.mkdir()
     return folder
 
 
 @pytest.fixture(autouse=True)
-def key(monkeypatch: pytest.MonkeyPatch) -> None:
+def set_key(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "a key")
 
 
@@ -93,7 +93,7 @@ def rows_of(run: RunFolder, suite: Suite) -> list[Row]:
     return [*evaluate_run(run, suite, ablated=False, tasks=None, redo=False)]
 
 
-def ran(
+def run_agent(
     tmp_path: Path, suite: Suite, turns: Sequence[Turn], limits: TurnLimits = LIMITS
 ) -> tuple[list[Completion], list[Row], Agent, list[Request]]:
     run = RunFolder(tmp_path / "run")
@@ -103,10 +103,8 @@ def ran(
     return [*run.read(suite)], rows_of(run, suite), agent, server.requests
 
 
-def test_each_world_of_each_prompt_is_a_mission_whose_row_says_what_it_took(
-    tmp_path: Path, suite: Suite
-) -> None:
-    completions, rows, agent, _ = ran(tmp_path, suite, [GO, LOOK, "Done."])
+def test_each_world_of_each_prompt_is_a_mission_with_its_costs(tmp_path: Path, suite: Suite) -> None:
+    completions, rows, agent, _ = run_agent(tmp_path, suite, [GO, LOOK, "Done."])
     prompts = len(suite.tasks["T"].prompts)
     assert {(one.prompt, one.more["world"]) for one in completions} == {
         (prompt, world) for prompt in range(prompts) for world in range(2)
@@ -146,7 +144,7 @@ def test_a_mistake_ends_a_mission_with_its_class(
     tmp_path: Path, small: Suite, monkeypatch: pytest.MonkeyPatch, turns: list[Turn], failure: tuple[str, str]
 ) -> None:
     monkeypatch.setattr("roboeval.evaluation.agents.mission.MAX_REPEATS", 6)
-    completions, (row,), agent, _ = ran(tmp_path, small, turns)
+    completions, (row,), agent, _ = run_agent(tmp_path, small, turns)
     assert row["failure"] is not None
     assert (row["failure"]["class"], row["failure"]["kind"]) == failure
     assert sum(agent.answered.values()) == sum(one.more["turns"] for one in completions)
@@ -154,17 +152,17 @@ def test_a_mistake_ends_a_mission_with_its_class(
 
 def test_a_limit_of_tokens_ends_a_mission(tmp_path: Path, small: Suite) -> None:
     each = INPUT_TOKENS + OUTPUT_TOKENS
-    completions, _, _, _ = ran(tmp_path, small, [GO, LOOK] * 10, TurnLimits(20, tokens=4 * each))
+    completions, _, _, _ = run_agent(tmp_path, small, [GO, LOOK] * 10, TurnLimits(20, tokens=4 * each))
     assert {(one.more["ending"], one.more["turns"]) for one in completions} == {("TokenLimit", 4)}
 
 
 def test_the_model_sees_each_result_and_its_own_calls(tmp_path: Path, small: Suite) -> None:
-    _, _, _, requests = ran(tmp_path, small, [[("fly", {})], GO, LOOK, "Done."])
+    _, _, _, requests = run_agent(tmp_path, small, [[("fly", {})], GO, LOOK, "Done."])
     last = max(requests, key=turns_before)
-    told = results_in(last)
-    assert told[0].startswith("UnknownTool")
-    assert told[1] == "done"
-    assert told[2] in {"true", "false"}
+    sent = results_in(last)
+    assert sent[0].startswith("UnknownTool")
+    assert sent[1] == "done"
+    assert sent[2] in {"true", "false"}
     calls = [one["tool_calls"][0] for one in last.body["messages"] if one["role"] == "assistant"]
     assert [call["function"]["name"] for call in calls] == ["fly", "go_to", "is_in_room"]
     assert {tool["function"]["name"] for tool in last.body["tools"]} == {
@@ -174,17 +172,17 @@ def test_the_model_sees_each_result_and_its_own_calls(tmp_path: Path, small: Sui
     }
 
 
-def test_a_failed_request_is_made_again_where_the_mission_was(tmp_path: Path, suite: Suite) -> None:
+def test_a_failed_request_is_repeated_in_the_same_mission(tmp_path: Path, suite: Suite) -> None:
     run = RunFolder(tmp_path / "run")
     agent, server = serve(lambda _: [GO, LOOK, "Done."])
     agent_sends, broken = server.sends, True
 
-    def sends(request: Request) -> tuple[int, dict[str, str], bytes] | None:
+    def respond(request: Request) -> tuple[int, dict[str, str], bytes] | None:
         if broken and turns_before(request) == 2:
             return 401, {"Content-Type": "application/json"}, b'{"error": {"message": "No."}}'
         return agent_sends(request)
 
-    server.sends = sends
+    server.sends = respond
     with server:
         assert act(run, suite, server).missing is not None
         broken = False
@@ -194,42 +192,42 @@ def test_a_failed_request_is_made_again_where_the_mission_was(tmp_path: Path, su
 
 
 def test_a_reasoning_models_thoughts_are_kept(tmp_path: Path, small: Suite) -> None:
-    completions, _, _, _ = ran(tmp_path, small, [GO, "<think>She is away.</think>Done."])
+    completions, _, _, _ = run_agent(tmp_path, small, [GO, "<think>She is away.</think>Done."])
     assert {one.more["reasoning"] for one in completions} == {"She is away."}
 
 
-def rejecting(turns: int) -> Server:
+def rejecting_server(turns: int) -> Server:
     """A server that rejects conversations with this number of turns."""
     _, server = serve(lambda _: [GO, LOOK, "Done."])
     answers = server.sends
 
-    def sends(request: Request) -> tuple[int, dict[str, str], bytes] | None:
+    def respond(request: Request) -> tuple[int, dict[str, str], bytes] | None:
         if turns_before(request) == turns:
             return 400, {"Content-Type": "application/json"}, b'{"error": {"message": "Too long."}}'
         return answers(request)
 
-    server.sends = sends
+    server.sends = respond
     return server
 
 
-def test_a_server_that_takes_no_results_stops_the_command(tmp_path: Path, suite: Suite) -> None:
+def test_a_server_that_rejects_results_stops_the_command(tmp_path: Path, suite: Suite) -> None:
     run = RunFolder(tmp_path / "run")
-    with rejecting(1) as server:
+    with rejecting_server(1) as server:
         assert "Too long" in str(act(run, suite, server, count=9).missing)
-    assert not run.completions.read_bytes()  # so that the same command can go on once the server is mended
+    assert not run.completions.read_bytes()  # An empty file lets the same command continue later.
 
 
 @pytest.mark.slow
 def test_many_rejected_missions_in_a_row_stop_the_command(tmp_path: Path, suite: Suite) -> None:
     run = RunFolder(tmp_path / "run")
-    with rejecting(2) as server:
+    with rejecting_server(2) as server:
         assert "Too long" in str(act(run, suite, server, count=9).missing)
     assert Pace().concurrency <= len([*run.read(suite)]) < 2 * Pace().concurrency
 
 
-def test_a_server_may_reject_what_has_become_too_long(tmp_path: Path, suite: Suite) -> None:
+def test_rejecting_a_long_conversation_ends_its_mission(tmp_path: Path, suite: Suite) -> None:
     run = RunFolder(tmp_path / "run")
-    with rejecting(2) as server:
+    with rejecting_server(2) as server:
         assert act(run, suite, server).missing is None
     completions = [*run.read(suite)]
     assert {(one.more["ending"], one.turns) for one in completions} == {("Rejected", 2)}
@@ -263,16 +261,16 @@ def test_after_a_failure_the_model_writes_the_rest(tmp_path: Path, suite: Suite)
         assert one.more["tool_errors"] == {"GoToInvalidLocation": 1}
     for row in rows:
         spoken = [event[1] for event in row["verdicts"][0]["trace"] if event[0] == "say"]
-        assert spoken == ["hello", "sorry"]  # the suite lower-cases texts; the first is not said again
+        assert spoken == ["hello", "sorry"]  # Texts are lower-cased, and none is repeated.
     second = max(server.requests, key=turns_before)
-    told = second.body["messages"][-1]["content"]
-    assert 'failed to go to "the moon"' in told  # rather than that the robot went there
+    sent = second.body["messages"][-1]["content"]
+    assert 'failed to go to "the moon"' in sent  # The prompt must not say that the robot went there.
 
 
-def test_rooms_and_waits_are_no_steps(tmp_path: Path, small: Suite) -> None:
+def test_looking_at_rooms_and_waiting_are_no_steps(tmp_path: Path, small: Suite) -> None:
     _, _, server = replan(tmp_path, small, ["get_all_rooms(); time.sleep(1); int('x')", "say('hello')"])
     sent = max(server.requests, key=turns_before).body["messages"][-1]["content"]
-    assert "- no step was finished" in sent  # rather than that nothing was seen
+    assert "- no step was finished" in sent  # Looking at rooms and waiting are no steps.
 
 
 @pytest.mark.parametrize(
@@ -282,7 +280,7 @@ def test_rooms_and_waits_are_no_steps(tmp_path: Path, small: Suite) -> None:
         ("say(undefined)", "PythonError", "NameError"),
         ("say('x'", "PythonError", "SyntaxError"),
         ("import time\n    while True: time.sleep(1)", "PythonError", "TimeoutError"),
-        ("'x'.encode().decode('utf-16')", "PythonError", "UnicodeDecodeError"),  # takes more than a text
+        ("'x'.encode().decode('utf-16')", "PythonError", "UnicodeDecodeError"),  # It takes five arguments.
         ("1 / 0", "PythonError", "ZeroDivisionError"),
         ("raise Exception('no path')", "PythonError", "Exception"),
     ],
@@ -304,7 +302,7 @@ def test_the_text_of_the_last_failure_is_not_quoted_again(tmp_path: Path, small:
 
 
 LOOKS = "[is_in_room('jill') for _ in range(600)]"
-SLEEP = "time.sleep(1900)"  # of 3600 seconds
+SLEEP = "time.sleep(1900)"  # Two sleeps exceed the limit of 3600 seconds.
 
 
 @pytest.mark.parametrize("use", [LOOKS, f"import time; {SLEEP}"])
@@ -318,13 +316,13 @@ LATE = "try: pick('moon')\n    except Exception as error: time.sleep(100); raise
 
 
 @pytest.mark.parametrize("fails", ["time.sleep(100); int('x')", f"0\n    {LATE}"])
-def test_time_goes_on_from_one_program_to_the_next(tmp_path: Path, small: Suite, fails: str) -> None:
+def test_the_clock_continues_in_the_next_program(tmp_path: Path, small: Suite, fails: str) -> None:
     says = "time.sleep(50); say(str(time.monotonic()))"
     _, rows, _ = replan(tmp_path, small, [f"import time; {fails}", f"import time; {says}"])
     assert {event[1] for row in rows for event in row["verdicts"][0]["trace"]} == {"150.0"}
 
 
-def test_a_program_may_look_as_often_as_it_likes(tmp_path: Path, suite: Suite) -> None:
+def test_calls_of_a_program_do_not_count_as_turns(tmp_path: Path, suite: Suite) -> None:
     body = "[is_in_room('jill') for _ in range(150)]; say('hello')"
     completions, rows, _ = replan(tmp_path, suite, [body])
     assert {one.more["ending"] for one in completions} == {"answer"}
@@ -366,7 +364,7 @@ generate_run(RunFolder(pathlib.Path({run!r})), plan, model, Pace(concurrency=3))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
-def test_an_interrupted_run_goes_on_after_the_last_turn_that_came(
+def test_an_interrupted_run_continues_after_its_last_turn(
     tmp_path: Path, suite: Suite, end: signal.Signals
 ) -> None:
     run = RunFolder(tmp_path / "run")
@@ -374,11 +372,11 @@ def test_an_interrupted_run_goes_on_after_the_last_turn_that_came(
     server.pause = 0.02
     answers = server.sends
 
-    def slowly(request: Request) -> tuple[int, dict[str, str], bytes] | None:
-        time.sleep(0.01)  # so that a signal finds requests under way
+    def respond_slowly(request: Request) -> tuple[int, dict[str, str], bytes] | None:
+        time.sleep(0.01)  # The pause lets a signal find open requests.
         return answers(request)
 
-    server.sends = slowly
+    server.sends = respond_slowly
     environment = {**os.environ, "OPENAI_API_KEY": "a key"}
     with server:
         for asked in (20, 90):
@@ -407,7 +405,7 @@ def test_an_interrupted_run_goes_on_after_the_last_turn_that_came(
 
 
 def test_the_log_of_turns_has_every_reply(tmp_path: Path, suite: Suite) -> None:
-    completions, _, _, _ = ran(tmp_path, suite, [GO, LOOK, "Done."])
+    completions, _, _, _ = run_agent(tmp_path, suite, [GO, LOOK, "Done."])
     lines = map(json.loads, (tmp_path / "run" / "turns.jsonl").read_text().splitlines())
     turns = Counter((row["task"], row["prompt"], row["index"]) for row in lines)
     assert turns == {one.key: 3 for one in completions}

@@ -1,4 +1,4 @@
-"""An agent behind Anthropic's protocol, whose thoughts are signed and must be sent back."""
+"""Test an agent with Anthropic's protocol, which requires its signed thoughts back."""
 
 import json
 from pathlib import Path
@@ -14,13 +14,13 @@ from roboeval.evaluation.generating.generate import Pace, generate_run
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.load import load_suite
 from server import Request, Server
-from small_suite import a_suite
+from small_suite import write_suite
 
 THOUGHT = {"type": "thinking", "thinking": "The kitchen is near.", "signature": "c2lnbmVk"}
 CALL = {"type": "tool_use", "id": "call-1", "name": "go_to", "input": {}}
 
 
-def sends(request: Request) -> tuple[int, dict[str, str], bytes]:
+def respond(request: Request) -> tuple[int, dict[str, str], bytes]:
     """Call go_to first, and answer in text after its result."""
     is_first = all(message["role"] == "user" for message in request.body["messages"])
     usage = {"input_tokens": 50, "output_tokens": 1}
@@ -51,14 +51,12 @@ def sends(request: Request) -> tuple[int, dict[str, str], bytes]:
     return 200, {}, "".join(lines).encode()
 
 
-@pytest.mark.slow  # the library takes seconds to load
-def test_thoughts_and_calls_are_sent_back_as_they_came(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.slow  # Importing the library takes seconds.
+def test_thoughts_and_calls_are_sent_back_unchanged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ANTHROPIC_API_KEY", "a key")
     (tmp_path / "suite").mkdir()
-    suite, run = load_suite(a_suite(tmp_path / "suite")), RunFolder(tmp_path / "run")
-    with Server(sends=sends) as server:
+    suite, run = load_suite(write_suite(tmp_path / "suite")), RunFolder(tmp_path / "run")
+    with Server(sends=respond) as server:
         settings = SamplingSettings(base_url=server.url, reasoning_effort="low")
         model = open_model("anthropic:claude-sonnet-4-5", settings)
         plan = AgentPlan(suite, None, 1, mode="agent", limits=TurnLimits(5))

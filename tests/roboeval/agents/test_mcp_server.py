@@ -1,4 +1,4 @@
-"""Missions that a client of the Model Context Protocol carries out."""
+"""Test missions that a client of the Model Context Protocol carries out."""
 
 import asyncio
 import json
@@ -16,9 +16,9 @@ from mcp_types import TextContent
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.load import Suite, load_suite
-from small_suite import a_suite
+from small_suite import write_suite
 
-SOON = 60
+TIMEOUT_S = 60
 WORLDS = """\
 name: T
 summary: s
@@ -36,7 +36,7 @@ worlds:
 def suite(tmp_path: Path) -> Suite:
     folder = tmp_path / "suite"
     folder.mkdir()
-    return load_suite(a_suite(folder, WORLDS))
+    return load_suite(write_suite(folder, WORLDS))
 
 
 def command(run: Path, suite: Suite) -> list[str]:
@@ -45,7 +45,7 @@ def command(run: Path, suite: Suite) -> list[str]:
 
 
 def client(run: Path, suite: Suite) -> Client:
-    """A client that starts the command, as a coding agent does."""
+    """Return a client that starts the command, as a coding agent does."""
     return Client(StdioServerParameters(command=sys.executable, args=command(run, suite), env={**os.environ}))
 
 
@@ -56,35 +56,35 @@ async def call(to: Client, name: str, **arguments: Any) -> str:  # noqa: ANN401 
 
 
 @pytest.mark.slow
-def test_a_client_carries_out_missions_and_goes_on_later(tmp_path: Path, suite: Suite) -> None:
+def test_a_client_continues_missions_after_a_restart(tmp_path: Path, suite: Suite) -> None:
     run = tmp_path / "run"
 
-    async def first() -> None:
-        async with asyncio.timeout(SOON), client(run, suite) as agent:
+    async def carry_out_first() -> None:
+        async with asyncio.timeout(TIMEOUT_S), client(run, suite) as agent:
             names = {tool.name for tool in (await agent.list_tools()).tools}
             assert names == {"next_mission", "finish_mission", "wait", "give_up", *suite.skills}
-            assert "next_mission" in await call(agent, "say", message="hello")  # there is no mission yet
+            assert "next_mission" in await call(agent, "say", message="hello")  # There is no mission yet.
             assert "Say hello." in await call(agent, "next_mission")
             assert "not over" in await call(agent, "next_mission")
             assert (await call(agent, "say", message="hello")) == "done"
             assert "over" in await call(agent, "finish_mission", answer="I said it.")
             await call(agent, "next_mission")
-            await call(agent, "say", message="hello")  # and the client ends in the middle of the second
+            await call(agent, "say", message="hello")  # The client disconnects during a mission.
 
-    async def second() -> None:
-        async with asyncio.timeout(SOON), client(run, suite) as agent:
+    async def carry_out_second() -> None:
+        async with asyncio.timeout(TIMEOUT_S), client(run, suite) as agent:
             await call(agent, "next_mission")
-            told = [await call(agent, "is_in_room", entity="Ann") for _ in range(4)]
-            assert ["over" in one for one in told] == [False, False, False, True]
+            replies = [await call(agent, "is_in_room", entity="Ann") for _ in range(4)]
+            assert ["over" in one for one in replies] == [False, False, False, True]
             assert "All missions are done" in await call(agent, "next_mission")
 
-    asyncio.run(first())
+    asyncio.run(carry_out_first())
     assert [one.more["world"] for one in RunFolder(run).read(suite)] == [0, 1]
-    asyncio.run(second())
+    asyncio.run(carry_out_second())
     completions = [*RunFolder(run).read(suite)]
     assert [(one.model, one.more["ending"], one.turns) for one in completions] == [
         ("mcp:coder", "answer", 2),
-        ("mcp:coder", "GaveUp", 2),  # and not to be tried again
+        ("mcp:coder", "GaveUp", 2),  # It is not repeated.
         ("mcp:coder", "TurnLimit", 4),
     ]
     rows = [*evaluate_run(RunFolder(run), suite, ablated=False, tasks=None, redo=False)]
@@ -93,7 +93,7 @@ def test_a_client_carries_out_missions_and_goes_on_later(tmp_path: Path, suite: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_ends_the_mission_as_the_end_of_input_does(
+def test_a_signal_ends_the_mission_like_the_end_of_input(
     tmp_path: Path, suite: Suite, number: signal.Signals
 ) -> None:
     about = {"protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": {"name": "c", "version": "1"}}
@@ -112,5 +112,5 @@ def test_a_signal_ends_the_mission_as_the_end_of_input_does(
             process.stdin.flush()
             process.stdout.readline()
         process.send_signal(number)
-        assert process.wait(SOON) == -number
+        assert process.wait(TIMEOUT_S) == -number
     assert [one.more["ending"] for one in RunFolder(tmp_path / "run").read(suite)] == ["GaveUp"]

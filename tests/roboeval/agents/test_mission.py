@@ -1,4 +1,4 @@
-"""Missions of agents in the simulator, and the programs that they become."""
+"""Test missions of agents in the simulator, and the programs made from them."""
 
 import json
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ def mission(paper: Suite) -> AgentMission:
     return AgentMission(paper, paper.task(TASK).scenarios[WORLD].asked_by(0))
 
 
-def judged(mission: AgentMission, suite: Suite, *, index: int = 0) -> Row:
+def judge_mission(mission: AgentMission, suite: Suite, *, index: int = 0) -> Row:
     assert mission.ending is not None
     more = {"world": WORLD, "ending": mission.ending, "no_program": None}
     completion = Completion(task=TASK, prompt=0, index=index, program=mission.program, more=more)
@@ -39,7 +39,7 @@ def judged(mission: AgentMission, suite: Suite, *, index: int = 0) -> Row:
     return row
 
 
-def test_calls_tell_what_skills_return(mission: AgentMission) -> None:
+def test_calls_return_the_results_of_skills(mission: AgentMission) -> None:
     rooms = json.loads(mission.call("get_all_rooms", ""))
     assert mission.call("get_current_location", {}) in {json.dumps(room) for room in rooms}
     assert mission.call("is_in_room", '{"entity": "unicorn"}') == "false"
@@ -48,20 +48,20 @@ def test_calls_tell_what_skills_return(mission: AgentMission) -> None:
     assert mission.ending is None
 
 
-def test_an_answer_is_the_option_that_a_person_chose(mission: AgentMission) -> None:
+def test_ask_returns_the_option_that_a_person_chose(mission: AgentMission) -> None:
     mission.call("go_to", {"location": "jill's office"})
     options = ["yes", "no"]
-    told = mission.call("ask", {"person": "Jill", "question": "Lunch?", "options": options})
-    assert json.loads(told) in options
-    assert mission.outcome.trace[-1].answer == json.loads(told)
+    chosen = mission.call("ask", {"person": "Jill", "question": "Lunch?", "options": options})
+    assert json.loads(chosen) in options
+    assert mission.outcome.trace[-1].answer == json.loads(chosen)
 
 
-def test_texts_are_lower_cased_as_the_suite_does_those_of_programs(mission: AgentMission) -> None:
+def test_texts_are_lower_cased_like_those_of_programs(mission: AgentMission) -> None:
     mission.call("say", {"message": "Lunch at NOON"})
     assert mission.outcome.trace[-1].text == "lunch at noon"
 
 
-def test_time_passes_while_it_waits(mission: AgentMission) -> None:
+def test_time_passes_while_an_agent_waits(mission: AgentMission) -> None:
     before, after = (mission.call("wait", {"seconds": seconds}) for seconds in (0, 90))
     assert before != after
     assert "time.sleep(90.0)" in mission.program
@@ -80,7 +80,7 @@ def test_time_passes_while_it_waits(mission: AgentMission) -> None:
         ("wait", {"seconds": float("nan")}, "WrongArguments"),
     ],
 )
-def test_a_mistake_moves_nothing_and_the_third_in_a_row_ends_it(
+def test_a_mistake_has_no_effect_and_the_third_in_a_row_ends_the_mission(
     mission: AgentMission, paper: Suite, name: str, arguments: str, kind: str
 ) -> None:
     for number in range(MAX_MISTAKES):
@@ -91,14 +91,14 @@ def test_a_mistake_moves_nothing_and_the_third_in_a_row_ends_it(
     assert not mission.outcome.trace
     with pytest.raises(UserError):
         mission.call("get_all_rooms", {})
-    row = judged(mission, paper)
+    row = judge_mission(mission, paper)
     assert row["failure"] is not None
     assert row["failure"]["class"] == "AgentError"
     assert row["failure"]["kind"] == kind
     assert row["verdicts"][0]["status"] == "agent-error"
 
 
-def test_a_right_call_between_mistakes_lets_it_go_on(mission: AgentMission) -> None:
+def test_a_right_call_between_mistakes_lets_the_mission_continue(mission: AgentMission) -> None:
     for _ in range(MAX_MISTAKES + 1):
         mission.call("fly", {})
         mission.call("get_all_rooms", {})
@@ -106,13 +106,13 @@ def test_a_right_call_between_mistakes_lets_it_go_on(mission: AgentMission) -> N
     assert mission.mistakes["UnknownTool"] == MAX_MISTAKES + 1
 
 
-def test_several_calls_at_once_are_not_made(mission: AgentMission) -> None:
+def test_several_calls_at_once_are_a_mistake(mission: AgentMission) -> None:
     for _ in range(MAX_MISTAKES):
         mission.refuse_several(["go_to", "say"])
     assert mission.ending == "SeveralCalls"
 
 
-def test_equal_calls_without_end_are_a_limit(mission: AgentMission, paper: Suite) -> None:
+def test_too_many_equal_calls_end_a_mission(mission: AgentMission, paper: Suite) -> None:
     while mission.ending is None:
         mission.call("is_in_room", {"entity": "jill"})
         if mission.ending is None:
@@ -120,15 +120,15 @@ def test_equal_calls_without_end_are_a_limit(mission: AgentMission, paper: Suite
     assert mission.ending == "RepeatedCalls"
     assert sum(event.kind == "check" for event in mission.outcome.trace) == MAX_REPEATS
     assert mission.outcome.status is Status.TIMEOUT
-    assert judged(mission, paper)["failure"] == {
+    assert judge_mission(mission, paper)["failure"] == {
         "class": "AgentError", "kind": "RepeatedCalls", "world": 0, "check": None
     }  # fmt: skip
 
 
-def test_to_give_up_fails_with_the_error_that_was_the_cause(mission: AgentMission, paper: Suite) -> None:
+def test_giving_up_after_an_error_fails_with_that_error(mission: AgentMission, paper: Suite) -> None:
     mission.call("go_to", {"location": "the moon"})
     mission.call("give_up", {"reason": "no such room"})
-    failure = judged(mission, paper)["failure"]
+    failure = judge_mission(mission, paper)["failure"]
     assert failure is not None
     assert (failure["class"], failure["kind"]) == ("RobotExecutionError", "GoToInvalidLocation")
 
@@ -138,36 +138,36 @@ def test_a_mistake_after_the_error_does_not_hide_the_cause(mission: AgentMission
     mission.call("go_to", {"location": "the moon"})
     mission.call("fly", {})
     mission.call("give_up", {"reason": "no such room"})
-    row = judged(mission, paper)
+    row = judge_mission(mission, paper)
     assert row["failure"] is not None
     assert row["failure"]["kind"] == "GoToInvalidLocation"
     assert [event[0] for event in row["verdicts"][0]["trace"]] == ["say", "goto"]
 
 
-def test_to_give_up_without_an_error_is_the_agents_own_failure(mission: AgentMission, paper: Suite) -> None:
+def test_giving_up_without_an_error_is_the_agents_failure(mission: AgentMission, paper: Suite) -> None:
     mission.call("get_all_rooms", {})
     mission.call("give_up", {"reason": "I do not know"})
-    failure = judged(mission, paper)["failure"]
+    failure = judge_mission(mission, paper)["failure"]
     assert failure is not None
     assert (failure["class"], failure["kind"]) == ("AgentError", "GaveUp")
 
 
-def test_an_answer_without_a_call_is_named_as_such_if_it_fails(mission: AgentMission, paper: Suite) -> None:
+def test_an_answer_without_any_call_fails_as_no_call(mission: AgentMission, paper: Suite) -> None:
     mission.answer("I would go there and ask her.")
-    failure = judged(mission, paper)["failure"]
+    failure = judge_mission(mission, paper)["failure"]
     assert failure is not None
     assert (failure["class"], failure["kind"]) == ("AgentError", "NoCall")
 
 
-def test_a_claim_to_be_done_is_judged_by_what_was_done(mission: AgentMission, paper: Suite) -> None:
+def test_a_claim_of_success_is_judged_by_the_calls(mission: AgentMission, paper: Suite) -> None:
     mission.call("go_to", {"location": "jill's office"})
     mission.answer("Done! Jill comes at noon.")
-    failure = judged(mission, paper)["failure"]
+    failure = judge_mission(mission, paper)["failure"]
     assert failure is not None
     assert failure["class"] == "TaskCompletionError"
 
 
-def test_a_house_rule_ends_a_mission_as_it_ends_a_program(tmp_path: Path, paper: Suite) -> None:
+def test_a_house_rule_ends_a_mission(tmp_path: Path, paper: Suite) -> None:
     file = tmp_path / "quiet.yaml"
     file.write_text("rules:\n- {name: away, says: Leave her., always: 'not tr.Exists(goto(\"jill\"))'}\n")
     suite = paper.with_house_rules(HouseRules.read(file))
@@ -177,19 +177,19 @@ def test_a_house_rule_ends_a_mission_as_it_ends_a_program(tmp_path: Path, paper:
     assert mission.mistakes == {VIOLATION: 1}
     assert mission.outcome.error is not None
     assert mission.outcome.error.kind == VIOLATION
-    failure = judged(mission, suite)["failure"]
+    failure = judge_mission(mission, suite)["failure"]
     assert failure is not None
     assert failure["kind"] == VIOLATION
 
 
-def test_a_contract_ends_a_mission_before_the_call_that_it_does_not_allow(paper: Suite) -> None:
+def test_a_contract_ends_a_mission_before_a_forbidden_call(paper: Suite) -> None:
     allowed = contract_from({"get_all_rooms": {}, "say": {"message": ["hello"]}}, paper.skills)
     mission = AgentMission(paper, paper.task(TASK).scenarios[WORLD].asked_by(0), [allowed])
     mission.call("say", {"message": "hello"})
     mission.call("say", {"message": "goodbye"})
     assert mission.ending == "OutsideContract"
     assert [event.text for event in mission.outcome.trace] == ["hello"]
-    row = judged(mission, paper)
+    row = judge_mission(mission, paper)
     assert len(row["verdicts"][0]["trace"]) == 1
     assert row["failure"] is not None
     assert (row["failure"]["class"], row["failure"]["kind"]) == ("AgentError", "OutsideContract")
@@ -211,7 +211,7 @@ def test_a_missing_world_is_named(paper: Suite) -> None:
 @pytest.mark.parametrize(
     "more", [{"world": 0}, {"world": -1, "ending": "answer"}, {"world": 0, "ending": "?"}]
 )
-def test_a_row_with_half_an_ending_is_refused(more: dict[str, object]) -> None:
+def test_a_row_with_an_incomplete_ending_is_refused(more: dict[str, object]) -> None:
     with pytest.raises(UserError):
         Completion(task=TASK, prompt=0, index=0, program="", more=more)
 
@@ -251,7 +251,7 @@ def test_a_mission_and_its_program_do_the_same(
     if mission.ending is None:
         mission.answer("done") if ends else mission.end("TurnLimit")
     verdict = judge(mission.outcome, mission.scenario)
-    row = judged(mission, paper)
+    row = judge_mission(mission, paper)
     (of_program,) = row["verdicts"]
     assert (of_program["satisfied"], of_program["status"]) == (verdict.satisfied, mission.outcome.status)
     assert of_program["failed_checks"] == [one.text for one in verdict.failed]
@@ -259,7 +259,7 @@ def test_a_mission_and_its_program_do_the_same(
 
 
 @pytest.mark.slow
-def test_an_agent_can_do_each_task_within_the_usual_limit_of_turns() -> None:
+def test_an_agent_can_do_each_task_within_the_default_turns() -> None:
     suite = load_suite("plus")
     with closing(Worker()) as worker:
         for one in recorded_completions("recorded:careful", suite):
@@ -269,7 +269,7 @@ def test_an_agent_can_do_each_task_within_the_usual_limit_of_turns() -> None:
 
 
 def turns_to_pass(worker: Worker, suite: Suite, one: Completion, scenario: Scenario) -> int:
-    """The number of a program's calls until its world's requirements hold; 0 if they never do."""
+    """Count a program's calls until its world's requirements hold; 0 if they never do."""
     robot, asked = RecordingRobot(scenario.world, suite), scenario.asked_by(one.prompt)
     if not judge(worker.run_alone(one.program, lambda: robot), asked).satisfied:
         return 0

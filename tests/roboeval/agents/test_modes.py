@@ -1,4 +1,4 @@
-"""Programs and agents, compared mission by mission."""
+"""Compare programs and agents mission by mission."""
 
 import csv
 import json
@@ -19,7 +19,7 @@ from roboeval.evaluation.runs.results import load_results
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sections.modes import ending_sheet, mode_sheet
 from small_run import SUITE
-from small_suite import a_suite
+from small_suite import write_suite
 
 WORLDS = """\
 name: T
@@ -31,12 +31,12 @@ worlds:
 - {about: one, robot: lobby, rooms: [kitchen, lobby], require: [says("hello")]}
 - {about: two, robot: lobby, rooms: [lobby], require: [says("hello")]}
 """
-GO = 'def task_program():\n    go_to("kitchen")\n    say("hello")\n'  # fails in the second world
+GO = 'def task_program():\n    go_to("kitchen")\n    say("hello")\n'  # The second world has no kitchen.
 SAY = 'def task_program():\n    say("hello")\n'
 USAGE = {"input_tokens": 90, "output_tokens": 10, "reasoning_tokens": None}
 
 
-def a_run(folder: Path, suite: str, rows: list[dict[str, object]], mode: str = "program") -> Path:
+def make_run(folder: Path, suite: str, rows: list[dict[str, object]], mode: str = "program") -> Path:
     folder.mkdir()
     identity = {"task": "T", "prompt": 0, "instruction": "Say hello in the kitchen.", "usage": USAGE}
     lines = [to_line({**identity, "index": index, "model": "m", **row}) for index, row in enumerate(rows)]
@@ -53,18 +53,18 @@ def mission(world: int, program: str, ending: str = "answer", **more: object) ->
 
 @pytest.fixture
 def runs(tmp_path: Path) -> tuple[Path, Path, str]:
-    """A program that succeeds in one of two worlds, and an agent that succeeds in both, once of twice."""
+    """A program that succeeds in one of two worlds, and an agent that succeeds in three of four missions."""
     folder = tmp_path / "suite"
     folder.mkdir()
-    suite = a_suite(folder, WORLDS)
-    programs = a_run(tmp_path / "programs", suite, [{"program": GO}])
+    suite = write_suite(folder, WORLDS)
+    programs = make_run(tmp_path / "programs", suite, [{"program": GO}])
     missions = [
         mission(0, GO),
         mission(1, SAY, tool_errors={"GoToInvalidLocation": 2}),
         mission(0, SAY),
         mission(1, "def task_program():\n    pass\n", "TurnLimit"),
     ]
-    agents = a_run(tmp_path / "agents", suite, missions, "agent")
+    agents = make_run(tmp_path / "agents", suite, missions, "agent")
     return programs, agents, suite
 
 
@@ -72,13 +72,13 @@ def tables(runs: tuple[Path, Path, str]) -> list[pl.DataFrame]:
     return [load_results(run, suite=runs[2]) for run in runs[:2]]
 
 
-def test_both_are_counted_by_missions(runs: tuple[Path, Path, str]) -> None:
+def test_a_program_and_an_agent_are_compared_by_missions(runs: tuple[Path, Path, str]) -> None:
     programs, agents = tables(runs)
     assert (has_missions(programs), has_missions(agents)) == (False, True)
     found = compare_tables(programs, agents)
     assert (found.first, found.second) == (0.5, 0.75)
     assert found.counts_missions
-    assert not sample_size_sentences(found)  # which would be about completions
+    assert not sample_size_sentences(found)  # These sentences are about completions.
     assert found.sample_sizes == SampleSizes(None, None)
 
 
@@ -94,7 +94,7 @@ def costs(*tables: pl.DataFrame) -> list[list[Any]]:
     return [[*row] for row in mode_sheet([JudgedRun(results, table, name="m") for table in tables]).rows]
 
 
-def test_costs_are_those_of_a_mission(runs: tuple[Path, Path, str]) -> None:
+def test_costs_are_counted_by_mission(runs: tuple[Path, Path, str]) -> None:
     (one, other) = costs(*tables(runs))
     assert one[:4] == ["m", "program", 2, 0.5]
     assert one[6:] == [0, 1, None, 100, 200]
@@ -102,19 +102,19 @@ def test_costs_are_those_of_a_mission(runs: tuple[Path, Path, str]) -> None:
     assert other[6:] == [0, 3, 0.5, 100, pytest.approx(100 / 0.75)]
 
 
-def test_what_a_contract_or_a_rule_ended_is_forbidden(runs: tuple[Path, Path, str], tmp_path: Path) -> None:
+def test_missions_that_a_contract_ended_are_forbidden(runs: tuple[Path, Path, str], tmp_path: Path) -> None:
     missions = [mission(0, SAY), mission(1, SAY), mission(0, SAY, "OutsideContract"), mission(1, SAY)]
-    run = a_run(tmp_path / "bounded", runs[2], missions, "agent")
+    run = make_run(tmp_path / "bounded", runs[2], missions, "agent")
     (row,) = costs(load_results(run, suite=runs[2]))
     assert row[6] == 0.25
 
 
-def test_the_command_compares_them_and_says_how(runs: tuple[Path, Path, str]) -> None:
+def test_compare_counts_missions_of_agents(runs: tuple[Path, Path, str]) -> None:
     programs, agents, suite = runs
     paths = [str(programs), str(agents)]
     data = json.loads(roboeval("compare", *paths, "--suite", suite, "--json").out)
     assert (data["first"]["pass@1"], data["second"]["pass@1"]) == (0.5, 0.75)
-    assert data["first"]["failures"]["RobotExecutionError"] == 0.5  # of missions
+    assert data["first"]["failures"]["RobotExecutionError"] == 0.5  # It is a share of missions.
     assert any("mission" in warning for warning in data["warnings"])
     shown = roboeval("compare", *paths, "--suite", suite).out
     assert "pass@1" not in shown
@@ -174,19 +174,19 @@ def test_the_nearest_passing_mission_is_from_the_same_world(
     runs: tuple[Path, Path, str], tmp_path: Path
 ) -> None:
     twice = f'{SAY}    say("hello")\n'
-    run = a_run(tmp_path / "run", runs[2], [mission(0, SAY), mission(1, twice), mission(1, GO)], "agent")
+    run = make_run(tmp_path / "run", runs[2], [mission(0, SAY), mission(1, twice), mission(1, GO)], "agent")
     (group,) = json.loads(roboeval("find", str(run), "--suite", runs[2], "--json").out)["groups"]
     assert group["fix"]["program"] == "T/0/1"
 
 
 @pytest.mark.parametrize("name", ["recover", "resample", "clarify"])
-def test_what_needs_programs_refuses_missions(runs: tuple[Path, Path, str], name: str) -> None:
+def test_commands_about_programs_refuse_missions(runs: tuple[Path, Path, str], name: str) -> None:
     _, agents, suite = runs
     assert "of an agent" in refused(name, str(agents), "--suite", suite).sentence
 
 
 @pytest.mark.parametrize("mode", ["agent", "replan"])
-def test_recorded_models_drive_no_missions(mode: str) -> None:
+def test_recorded_models_cannot_be_agents(mode: str) -> None:
     refused("run", "--model", "recorded:careful", "--mode", mode)
 
 

@@ -1,4 +1,4 @@
-"""Groups of failures: who is together, in which order, and what is said of them."""
+"""Groups of failures: their members, their order and their descriptions."""
 
 import json
 from typing import Any, cast
@@ -9,7 +9,7 @@ from roboeval.analysis.failure_groups import describe_groups, group_data, group_
 from roboeval.cli.views.groups import failure_group_view
 from roboeval.evaluation.runs.completions import CompletionKey
 from roboeval.evaluation.runs.rows import Failure, Row, WorldVerdict, key_of
-from small_run import HOSTILE, SHOWN, SUITE, printed, row
+from small_run import HOSTILE, SHOWN, SUITE, row, text_of
 
 GOES = """\
 def task_program():
@@ -23,7 +23,7 @@ def task_program():
 RIGHT = GOES.format("hall").replace("you", "me")
 
 
-def failed(prompt: int, index: int, *, task: str = "Visit", check: str = "visits()") -> Row:
+def failure(prompt: int, index: int, *, task: str = "Visit", check: str = "visits()") -> Row:
     verdict: WorldVerdict = {
         "world": "w",
         "satisfied": False,
@@ -47,8 +47,8 @@ def failed(prompt: int, index: int, *, task: str = "Visit", check: str = "visits
     return cast("Row", made)
 
 
-def test_same_task_same_check_similar_program() -> None:
-    rows = [failed(0, 0), failed(0, 1), failed(1, 0), failed(0, 2), failed(0, 3, check="other()")]
+def test_similar_programs_that_fail_the_same_check_are_one_group() -> None:
+    rows = [failure(0, 0), failure(0, 1), failure(1, 0), failure(0, 2), failure(0, 3, check="other()")]
     programs: dict[CompletionKey, str] = {
         ("Visit", 0, 0): GOES.format("lab"),
         ("Visit", 0, 1): GOES.format("lab").replace("here", "there"),
@@ -56,7 +56,7 @@ def test_same_task_same_check_similar_program() -> None:
         ("Visit", 0, 2): "def task_program():\n    pass\n",
         ("Visit", 0, 3): GOES.format("lab"),
     }
-    rows.append(failed(0, 0, task="FindBook"))
+    rows.append(failure(0, 0, task="FindBook"))
     programs["FindBook", 0, 0] = GOES.format("lab")
     found = [
         [(row["task"], row["prompt"], row["index"]) for row in those]
@@ -84,21 +84,21 @@ def test_replies_without_a_program_are_one_group_without_a_fix() -> None:
     refused, empty = describe_groups(group_failures(cast("list[Row]", rows[:3]), programs), results)
     assert [len(one.members) for one in (refused, empty)] == [2, 1]
     assert (refused.fix, refused.why) == (None, NO_PROGRAM_SENTENCES["refusal"])
-    text = printed(failure_group_view(refused))
+    text = text_of(failure_group_view(refused))
     assert NO_PROGRAM_SENTENCES["refusal"] in text
     assert 'in "' not in text, "no robot was in a world"
 
 
 def test_large_groups_come_first() -> None:
-    rows = [failed(n, 0, task=task, check=f"{n}()") for task in ("Visit", "FindBook") for n in range(3)]
-    rows += [failed(9, n, check="nine()") for n in range(2)]
+    rows = [failure(n, 0, task=task, check=f"{n}()") for task in ("Visit", "FindBook") for n in range(3)]
+    rows += [failure(9, n, check="nine()") for n in range(2)]
     programs = {key_of(row): "" for row in rows}
     found = [(those[0]["task"], those[0]["prompt"]) for those in group_failures(rows, programs)]
     assert found == [("Visit", 9), *((task, n) for task in ("FindBook", "Visit") for n in range(3))]
 
 
-def told(program: str = GOES.format("lab")) -> Any:  # noqa: ANN401 - one group
-    rows = [failed(0, n) for n in range(3)]
+def describe_group(program: str = GOES.format("lab")) -> Any:  # noqa: ANN401 - one group
+    rows = [failure(0, n) for n in range(3)]
     programs = {("Visit", 0, 0): "pass", ("Visit", 0, 1): program, ("Visit", 0, 2): program}
     programs["Visit", 4, 0] = RIGHT
     results = results_of([*rows, {**row(4, 0), "passed": True}], SUITE, programs)
@@ -106,8 +106,8 @@ def told(program: str = GOES.format("lab")) -> Any:  # noqa: ANN401 - one group
     return one
 
 
-def test_the_representative_is_of_the_most_frequent_program() -> None:
-    one = told()
+def test_the_most_frequent_program_represents_its_group() -> None:
+    one = describe_group()
     assert one.representative == ("Visit", 0, 1)
     assert len(one.members) == 3
     assert one.prompts == [0]
@@ -115,14 +115,14 @@ def test_the_representative_is_of_the_most_frequent_program() -> None:
     assert one.fix.changed == 4
 
 
-def test_a_group_for_machines() -> None:
-    data = json.loads(json.dumps(group_data(told())))
+def test_a_group_as_json() -> None:
+    data = json.loads(json.dumps(group_data(describe_group())))
     assert (data["size"], data["representative"], data["world"]) == (3, "Visit/0/1", "w")
     assert '+    say("me")' in data["fix"]["difference"]
 
 
-def test_a_group_for_people_shows_what_models_write_as_it_is() -> None:
-    shown = printed(failure_group_view(told(f"say({HOSTILE}")), width=200)
+def test_hostile_text_in_a_group_stays_text() -> None:
+    shown = text_of(failure_group_view(describe_group(f"say({HOSTILE}")), width=200)
     assert SHOWN.removesuffix("\\n") in shown
     assert "\x1b" not in shown
     assert shown.startswith("3 completions of Visit, failed check: Location")

@@ -106,7 +106,7 @@ def test_t_quantile_against_tables(p: float, df: int, expected: float) -> None:
     assert t_quantile(p, df) == pytest.approx(expected, abs=1e-8)
 
 
-def test_t_quantile_of_the_brief() -> None:
+def test_t_quantile_of_1_4_and_79_degrees_of_freedom() -> None:
     assert round(t_quantile(0.975, 1), 4) == 12.7062
     assert round(t_quantile(0.975, 4), 5) == 2.77645
     assert round(t_quantile(0.975, 79), 5) == 1.99045
@@ -123,7 +123,7 @@ def test_interval_by_hand() -> None:
     assert [found.mean, found.low, found.high] == pytest.approx([0.5, 0.5 - margin, 0.5 + margin])
 
 
-def test_interval_of_one_prompt_is_everything() -> None:
+def test_interval_of_one_prompt_is_the_whole_range() -> None:
     assert over_prompts([0.3]) == Estimate(0.3, 0, 1)
 
 

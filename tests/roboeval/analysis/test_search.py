@@ -1,4 +1,4 @@
-"""Looking through all traces of a run by a formula."""
+"""Search all traces of a run with a formula."""
 
 import json
 from pathlib import Path
@@ -30,7 +30,7 @@ ROWS = [
 ]
 
 
-def found(question: TraceQuery, rows: list[dict[str, Any]] | None = None) -> list[TraceMatch]:
+def matches(question: TraceQuery, rows: list[dict[str, Any]] | None = None) -> list[TraceMatch]:
     return [one for one in search(ROWS if rows is None else rows, question) if one.worlds]
 
 
@@ -42,31 +42,31 @@ HALL = parse('tr.Exists(goto("hall"))')
 
 
 def test_a_formula_is_tried_in_every_world() -> None:
-    assert [(one.key[2], [n for n, _ in one.worlds]) for one in found(TraceQuery(HALL))] == [
+    assert [(one.key[2], [n for n, _ in one.worlds]) for one in matches(TraceQuery(HALL))] == [
         (0, [1]),
         (1, [2]),
         (3, [1, 2]),
     ]
-    negated = found(TraceQuery(HALL, negated=True))
+    negated = matches(TraceQuery(HALL, negated=True))
     assert [(one.key[2], [n for n, _ in one.worlds]) for one in negated] == [(0, [2]), (1, [1]), (2, [1, 2])]
 
 
-def test_narrowed_to_a_task_or_a_world() -> None:
-    assert [one.key[2] for one in found(TraceQuery(HALL, task="Wait"))] == [3]
-    assert [one.key[2] for one in found(TraceQuery(HALL, world="2"))] == [1, 3]
-    assert [one.key[2] for one in found(TraceQuery(HALL, world="world 1"))] == [0, 3]
-    assert len(found(TraceQuery())) == 4
+def test_a_search_can_be_limited_to_a_task_or_a_world() -> None:
+    assert [one.key[2] for one in matches(TraceQuery(HALL, task="Wait"))] == [3]
+    assert [one.key[2] for one in matches(TraceQuery(HALL, world="2"))] == [1, 3]
+    assert [one.key[2] for one in matches(TraceQuery(HALL, world="world 1"))] == [0, 3]
+    assert len(matches(TraceQuery())) == 4
 
 
-def test_what_cannot_be_judged_does_not_match() -> None:
+def test_an_undecided_formula_matches_only_if_negated() -> None:
     asks = row(0, [["ask", "tea?", [{"no text": "1"}], None]])
     formula = parse('tr.Exists(ask("tea", "yes"))')
-    assert found(TraceQuery(formula), [asks]) == []
-    assert len(found(TraceQuery(formula, negated=True), [asks])) == 1
+    assert matches(TraceQuery(formula), [asks]) == []
+    assert len(matches(TraceQuery(formula, negated=True), [asks])) == 1
 
 
 @pytest.mark.slow
-def test_places_are_those_of_the_row_and_not_of_requests() -> None:
+def test_places_come_from_the_row_and_not_from_requests() -> None:
     formula = parse('tr.Exists(at("hall", say("x")))')
     old = row(0, [["goto", "hall"], ["say", "x"]])
     new = {**old, "verdicts": [{**old["verdicts"][0], "places": [[1, "hall"], [2, "the hall"], [3, "lab"]]}]}
@@ -87,7 +87,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "run"
 
 
-def test_the_command(runs: Path) -> None:
+def test_find_prints_matches_and_groups(runs: Path) -> None:
     made = roboeval("find", runs, 'tr.Exists(goto("lab"))', "--task", "SayGoodDay")
     assert made.status == 0, made
     assert made.out.startswith("found ")
@@ -113,7 +113,7 @@ def test_the_command(runs: Path) -> None:
     assert "--groups" in few
 
 
-def test_what_is_refused(runs: Path) -> None:
+def test_find_refuses_wrong_formulas_and_options(runs: Path) -> None:
     said = refused("find", runs, 'tr.Exist(goto("lab"))').sentence
     for name in ("column 4", "Exist;", "Exists?"):
         assert name in said
@@ -124,7 +124,7 @@ def test_what_is_refused(runs: Path) -> None:
     assert '"99"' in said
 
 
-def test_rows_about_other_programs_are_refused(runs: Path) -> None:
+def test_find_refuses_rows_about_other_programs(runs: Path) -> None:
     file = runs / "completions.jsonl"
     kept = file.read_text()
     file.write_text(kept.replace("def task_program", "def  task_program"))

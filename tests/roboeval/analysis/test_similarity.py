@@ -1,4 +1,4 @@
-"""Shapes of programs, what two share, and the shortest way from one to another."""
+"""Shapes of programs, their similarity, and the shortest fix."""
 
 import ast
 from collections import Counter
@@ -33,7 +33,7 @@ def task_program():
 """
 
 
-def test_names_comments_and_layout_are_no_shape() -> None:
+def test_names_comments_and_layout_do_not_change_the_shape() -> None:
     assert normalised_lines(ONE) == normalised_lines(OTHER)
     assert "    name1 = get_current_location()" in normalised_lines(ONE)
     assert normalised_lines(ONE) != normalised_lines(ONE.replace("range(3)", "range(4)"))
@@ -52,7 +52,7 @@ def test_different_names_stay_different() -> None:
     assert normalised_lines("a = 1\nb = 2\nsay(a)\n") != normalised_lines("a = 1\nb = 2\nsay(b)\n")
 
 
-def test_functions_and_their_arguments_have_chosen_names() -> None:
+def test_names_of_functions_and_arguments_do_not_change_the_shape() -> None:
     program = "def {0}({1}):\n    try:\n        go_to({1})\n    except Exception as {2}:\n        say({2})\n"
     assert normalised_lines(program.format("visit", "room", "error")) == normalised_lines(
         program.format("f", "x", "e")
@@ -92,7 +92,7 @@ def test_the_shortest_fix() -> None:
     assert shortest_fix(wrong, {}) is None
 
 
-def test_of_equally_near_programs_the_first() -> None:
+def test_the_first_of_equally_near_programs_is_the_fix() -> None:
     fix = shortest_fix("a\nb\n", passing_programs([("one", "a\nc\n"), ("two", "a\nd\n")]))
     assert fix is not None
     assert fix.name == "one"
@@ -104,7 +104,7 @@ def test_lines_that_only_move_are_changes() -> None:
     assert fix.changed == 2
 
 
-def test_what_is_left_out_of_a_difference_is_marked() -> None:
+def test_omitted_lines_of_a_difference_are_marked() -> None:
     lines = [f"line {n}" for n in range(30)]
     fix = shortest_fix("\n".join(lines), passing_programs([("p", "\n".join([*lines[:29], "other"]))]))
     assert fix is not None

@@ -1,4 +1,4 @@
-"""Intervals and tests against cases computed by hand, and how often they hold what is true."""
+"""Intervals and tests: cases computed by hand, and how often intervals cover the true value."""
 
 import math
 import random
@@ -39,12 +39,12 @@ def test_one_cluster_says_nothing_about_others() -> None:
         assert method([[0.5]], within=DIFFERENCE) == Estimate(0.5, -1.0, 1.0)
 
 
-def test_where_all_clusters_agree_nothing_is_open() -> None:
+def test_equal_clusters_have_an_interval_without_width() -> None:
     for method in (by_formula, by_bootstrap):
         assert method([[1.0, 0.0]] * 6) == Estimate(0.5, 0.5, 0.5)
 
 
-def test_the_bootstrap_repeats_itself() -> None:
+def test_the_same_seed_repeats_the_bootstrap() -> None:
     clusters = [[n / 10, n / 20] for n in range(8)]
     assert by_bootstrap(clusters, seed=3) == by_bootstrap(clusters, seed=3)
     assert by_bootstrap(clusters, seed=3) != by_bootstrap(clusters, seed=4)
@@ -72,7 +72,7 @@ METHODS: dict[str, Callable[[Clusters, int], Estimate]] = {
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("tasks", [6, 16])
-def test_intervals_hold_the_truth_about_as_often_as_they_say(method: str, tasks: int) -> None:
+def test_intervals_cover_the_true_value_about_as_often_as_stated(method: str, tasks: int) -> None:
     chance = random.Random(7)
     times = 400
     held = 0
@@ -87,7 +87,7 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say(method: str, tasks:
     assert 0.92 <= held / times <= 0.985
 
 
-def test_taking_prompts_for_independent_would_hold_it_less_often() -> None:
+def test_treating_prompts_as_independent_covers_it_less_often() -> None:
     chance = random.Random(8)
     held = 0
     for _ in range(300):
@@ -110,7 +110,7 @@ def test_signs_by_hand() -> None:
     assert p_by_signs([[0.0], [0.0]]) == 1.0
 
 
-def test_exact_signs_are_all_signs() -> None:
+def test_exact_p_values_try_all_signs() -> None:
     chance = random.Random(3)
     sums = [chance.uniform(-1, 1.5) for _ in range(9)]
     seen = abs(sum(sums))
@@ -121,16 +121,16 @@ def test_exact_signs_are_all_signs() -> None:
     assert p_by_signs([[one] for one in sums]) == pytest.approx(sum(as_far) / 2**9)
 
 
-def test_drawn_signs_come_close_to_exact_ones() -> None:
+def test_p_values_of_random_signs_are_close_to_exact_ones() -> None:
     chance = random.Random(5)
     sums = [chance.gauss(0.25, 1) for _ in range(20)]
     exact = p_by_signs([[one] for one in sums])
-    drawn = p_by_signs([[one] for one in [*sums, 0.0]])  # 21 clusters are drawn; a 0 changes no sum
+    drawn = p_by_signs([[one] for one in [*sums, 0.0]])  # 21 clusters get random signs; a 0 changes no sum.
     assert drawn == pytest.approx(exact, abs=0.006)
     assert p_by_signs([[1.0]] * 40) == 1 / 100_001
 
 
-def test_where_neither_is_better_p_is_small_as_rarely_as_it_should_be() -> None:
+def test_p_is_rarely_small_without_a_difference() -> None:
     chance = random.Random(2)
     small = 0
     for _ in range(500):
@@ -139,10 +139,10 @@ def test_where_neither_is_better_p_is_small_as_rarely_as_it_should_be() -> None:
     assert 0.02 <= small / 500 <= 0.08
 
 
-# --- how much it takes
+# --- sample sizes
 
 
-def test_how_many_completions_by_hand() -> None:
+def test_sample_sizes_by_hand() -> None:
     # One prompt each way: a (1 - a) + b (1 - b) = 0.25 + 0.24; (1.96 + 0.8416)**2 = 7.849 over 0.01.
     found = sample_sizes([(0.5, 0.6), (0.5, 0.6)])
     assert found.completions == math.ceil(7.849 / 0.01 * 0.49 / 2)
@@ -151,22 +151,22 @@ def test_how_many_completions_by_hand() -> None:
     assert sample_sizes([(0.0, 0.0), (0.0, 0.4)]).prompts == math.ceil(7.849 / 0.04 * 0.08)
 
 
-def test_what_does_not_differ_is_never_told() -> None:
+def test_no_sample_size_detects_equal_scores() -> None:
     assert sample_sizes([(0.5, 0.6), (0.6, 0.5)]) == SampleSizes(None, None)
     assert sample_sizes([(0.0, 1.0)]) == SampleSizes(1, None)
 
 
-def test_so_many_completions_do_tell_four_times_in_five() -> None:
+def test_the_sample_size_detects_a_difference_four_times_in_five() -> None:
     chance = random.Random(9)
     true = [(0.3, 0.45), (0.6, 0.7), (0.5, 0.55), (0.2, 0.4)]
     n = sample_sizes(true).completions
     assert n is not None
-    told = 0
+    detected = 0
     for _ in range(300):
         total = variance = 0.0
         for a, b in true:
             one, two = (sum(chance.random() < p for _ in range(n)) / n for p in (a, b))
             total += two - one
             variance += (one * (1 - one) + two * (1 - two)) / n
-        told += total > 1.96 * math.sqrt(variance)
-    assert told / 300 == pytest.approx(0.8, abs=0.07)
+        detected += total > 1.96 * math.sqrt(variance)
+    assert detected / 300 == pytest.approx(0.8, abs=0.07)

@@ -21,7 +21,7 @@ from roboeval.evaluation.judging.failures import FAILURE_CLASSES
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.scope import JudgingScope
 from roboeval.suites.load import Suite
-from small_run import ROWS, SUITE, TASK, printed, row
+from small_run import ROWS, SUITE, TASK, row, text_of
 
 
 def summary(
@@ -75,12 +75,12 @@ def test_each_prompt_counts_the_same_however_many_completions_it_has() -> None:
     assert summary(rows, SUITE).overall[0].mean == (1 + 0.25) / 2
 
 
-def test_tasks_stand_in_the_order_of_the_suite() -> None:
+def test_tasks_are_in_the_order_of_the_suite() -> None:
     rows = [row(0, 0, task="Wait"), row(0, 0)]
     assert [task.task for task in summary(rows, SUITE).tasks] == ["Visit", "Wait"]
 
 
-def test_nothing_to_count_is_said() -> None:
+def test_a_summary_of_nothing_is_refused() -> None:
     with pytest.raises(UserError, match=r"^0 of 0 completions "):
         summary([], SUITE)
 
@@ -92,14 +92,14 @@ def test_a_k_that_cannot_be_estimated_is_refused(k: int) -> None:
 
 
 @pytest.mark.parametrize("width", [80, 120])
-def test_the_tables_fit_and_break_no_number(width: int) -> None:
+def test_tables_fit_the_width_without_breaking_numbers(width: int) -> None:
     rows = [
         row(p, i, ("PythonError", "NameError"), task=task)
         for task in ("Visit", "Wait")
         for p in range(2)
         for i in range(1000)
     ]
-    text = printed(summary_view(summary(rows, SUITE, k=(1, 2)), title="runs/one"), width)
+    text = text_of(summary_view(summary(rows, SUITE, k=(1, 2)), title="runs/one"), width)
     assert max(map(len, text.splitlines())) <= width
     assert "runs/one" in text
     assert "Visit" in text
@@ -107,28 +107,28 @@ def test_the_tables_fit_and_break_no_number(width: int) -> None:
     unknown = "pass@2 over all prompts: 0.000 (95% interval over tasks unknown: no variation between tasks)"
     assert unknown in " ".join(text.split())
     assert "\n4,000 of 4,000 completions, 4 prompts of 2 tasks\n" in text
-    assert "without a program" not in text, "it did not happen"
+    assert "without a program" not in text, "every reply has a program"
     assert re.search(r"\n  NameError +4,000  100\.0%", text)
     assert re.search(r"failed checks +0 +0.0%", text)
     assert "ExhaustiveSearch" not in text
 
 
-def test_of_a_single_program_only_what_happened_is_told() -> None:
+def test_a_single_program_shows_only_its_own_failure() -> None:
     tasks = {name: replace(TASK, name=name) for name in ("Visit", "A", "B", "C", "D")}
     counts = summary([row(0, 0, ("PythonError", "NameError"))], replace(SUITE, tasks=tasks))
-    text = printed(summary_view(counts, title="mine"), 100)
+    text = text_of(summary_view(counts, title="mine"), 100)
     assert text.rstrip().endswith("Python errors  1  100.0%\n  NameError    1  100.0%")
     assert "\nno completions for 4 tasks\n" in text
 
 
-def test_tasks_without_a_score_are_told_apart() -> None:
+def test_tasks_without_a_score_are_counted_by_reason() -> None:
     suite = replace(SUITE, tasks={name: replace(TASK, name=name) for name in ("Visit", "A", "B", "C")})
     scope = JudgingScope({"Visit": 9, "B": 2, "C": 5}, frozenset({"Visit", "A", "B"}))
     counted = summary(ROWS, suite, scope=scope)
     data = summary_data(counted)
     assert data["missing"] == {"no_completions": ["A"], "not_judged": ["B"], "not_selected": ["C"]}
     assert (data["judged"], data["to_judge"]) == (4, 11)
-    text = printed(summary_view(counted, title="x"))
+    text = text_of(summary_view(counted, title="x"))
     assert "\n4 of 11 completions (7 not judged), 2 prompts of 1 task\n" in text
     assert re.search(r"\nVisit +4 of 9 ", text)
     assert re.search(r"no completions .*1 task\nnot judged.* 1 task\nnot selected.* 1 task\n", text)
@@ -136,21 +136,21 @@ def test_tasks_without_a_score_are_told_apart() -> None:
         summary([], suite, scope=scope)
 
 
-def test_requested_completions_that_are_missing_are_counted() -> None:
+def test_missing_completions_are_counted() -> None:
     about = {"batches": [{"tasks": ["Visit"], "num_completions": 3}], "settings": {"max_tokens": 512}}
     there = [completion(n // 2, n % 2, finish_reason="length" if n else "stop") for n in range(4)]
     counted = summary(ROWS[:3], SUITE, scope=JudgingScope.of(there, frozenset({"Visit"}), about, SUITE))
     data = summary_data(counted)
     assert (data["judged"], data["to_judge"], data["requested"]) == (3, 4, 6)
     assert (data["cut_off"], data["max_tokens"], data["tasks"][0]["requested"]) == (3, 512, 6)
-    text = printed(summary_view(counted, title="x"), 200)
+    text = text_of(summary_view(counted, title="x"), 200)
     assert "\n3 of 6 completions (2 missing, 1 not judged)," in text
     assert re.search(r"\nVisit +3 of 6 ", text)
     assert re.search(r"\n3 of 4 replies \(75\.0%\) .*512 tokens; .*--max-tokens\n", text)
 
 
 @pytest.mark.parametrize(("cut_off", "is_said"), [(2, False), (3, True)])
-def test_more_than_one_in_fifty_cut_off_is_said(cut_off: int, *, is_said: bool) -> None:
+def test_more_than_one_cut_off_reply_in_fifty_causes_a_warning(cut_off: int, *, is_said: bool) -> None:
     warning = JudgingScope({"Visit": 100}, cut_off=cut_off).cut_off_warning
     assert (warning is not None) == is_said
     if warning is not None:
@@ -161,31 +161,31 @@ def test_more_than_one_in_fifty_cut_off_is_said(cut_off: int, *, is_said: bool) 
 def test_replies_without_a_program_are_a_class_with_kinds() -> None:
     rows = [row(0, 0), row(0, 1, ("NoProgram", "cut-off")), row(1, 0, ("NoProgram", "refusal"))]
     counted = summary(rows, SUITE)
-    text = printed(summary_view(counted, title="x"))
+    text = text_of(summary_view(counted, title="x"))
     assert re.search(r"\nwithout a program +2 +66\.7%", text)
     assert re.search(r"\n  cut-off +1 +33\.3%", text)
 
 
-def test_one_is_one() -> None:
+def test_one_completion_is_written_in_the_singular() -> None:
     one = row(0, 0, ("PythonError", "NameError"))
-    assert "1 of 1 completion failed" in printed(summary_view(summary([one], SUITE), title="x"))
+    assert "1 of 1 completion failed" in text_of(summary_view(summary([one], SUITE), title="x"))
     with pytest.raises(UserError, match=r"^0 of 1 completion "):
         summary([], SUITE, scope=JudgingScope({"Visit": 1}))
 
 
-def test_one_prompt_has_no_interval_and_no_failure_no_tables() -> None:
-    text = printed(summary_view(summary([row(0, 0)], SUITE), title="x"))
+def test_one_passing_prompt_has_no_interval_and_no_failures() -> None:
+    text = text_of(summary_view(summary([row(0, 0)], SUITE), title="x"))
     assert "interval" not in text
     assert "SyntaxError" not in text
 
 
-def test_an_ablation_is_named_and_misses_no_task() -> None:
-    text = printed(summary_view(summary(ROWS, SUITE, ablated=True), title="x"))
+def test_an_ablation_is_named_and_reports_no_missing_task() -> None:
+    text = text_of(summary_view(summary(ROWS, SUITE, ablated=True), title="x"))
     assert "x (ablation" in text
     assert "Wait" not in text
 
 
-def test_causes_are_shares_of_classes_and_of_their_kinds() -> None:
+def test_causes_are_shares_by_class_and_by_kind() -> None:
     rows = [
         row(0, 0),
         *(row(0, n, ("PythonError", kind)) for n, kind in enumerate(("X", "NameError", "X"), 1)),

@@ -1,4 +1,4 @@
-"""A part of a run as tables, and that nothing a model wrote reaches the terminal as more than text."""
+"""Tables of a part of a run, in which everything that a model wrote stays text."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from roboeval.evaluation.judging.explanation import INSTRUCTION_NOT_RECORDED, OF
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.scope import JudgingScope
-from small_run import HOSTILE, ROWS, SHOWN, SUITE, printed, row
+from small_run import HOSTILE, ROWS, SHOWN, SUITE, row, text_of
 
 
 def results(*completions: Completion, rows: Sequence[Mapping[str, Any]] = ROWS) -> Results:
@@ -44,34 +44,34 @@ def test_a_task_is_shown_prompt_by_prompt() -> None:
         "pass@1": 0.5,
         "failures": [failure],
     }
-    text = printed(task_view(task_data(results(*completions), "Visit")))
+    text = text_of(task_view(task_data(results(*completions), "Visit")))
     assert "Visit/0  1 of 2 passed (pass@1 0.50)\nVisit her.\n" in text
     assert "  1  Python error: NameError  such as Visit/0/1\n" in text
 
 
-def test_requested_completions_of_a_prompt_are_shown_where_some_are_missing() -> None:
+def test_a_prompt_with_missing_completions_shows_the_requested_number() -> None:
     about = {"batches": [{"tasks": None, "num_completions": 5}]}
     data = task_data(replace(results(), about=about), "Visit")
     assert [prompt["requested"] for prompt in data["prompts"]] == [5, 5]
-    assert "Visit/0  1 of 2 passed (pass@1 0.50); 5 were requested\n" in printed(task_view(data))
+    assert "Visit/0  1 of 2 passed (pass@1 0.50); 5 were requested\n" in text_of(task_view(data))
 
 
-def test_replies_without_a_program_are_said_in_words() -> None:
+def test_replies_without_a_program_are_explained() -> None:
     found = results(rows=[row(0, 0, ("NoProgram", "cut-off"))])
-    text = printed(prompt_view(prompt_data(found, "Visit", 0)))
+    text = text_of(prompt_view(prompt_data(found, "Visit", 0)))
     assert "no program: cut-off" in text
     assert NO_PROGRAM_SENTENCES["cut-off"] in text
 
 
-def test_text_of_the_suite_is_marked_where_the_instruction_was_not_recorded() -> None:
+def test_the_suites_instruction_is_marked_if_none_was_recorded() -> None:
     completions = [Completion(task="Visit", prompt=prompt, index=0, program="") for prompt in range(2)]
-    text = printed(task_view(task_data(results(*completions), "Visit")))
+    text = text_of(task_view(task_data(results(*completions), "Visit")))
     for instruction in SUITE.tasks["Visit"].prompts:
         assert f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}\n{instruction}\n" in text
 
 
 @pytest.mark.parametrize("colour", [False, True])
-def test_what_a_model_wrote_is_text(*, colour: bool) -> None:
+def test_hostile_text_of_a_model_stays_text(*, colour: bool) -> None:
     rows = [row(0, 0, ("PythonError", HOSTILE))]
     completions = [Completion(task="Visit", prompt=0, index=0, program="", instruction=HOSTILE)]
     views = [
@@ -79,12 +79,12 @@ def test_what_a_model_wrote_is_text(*, colour: bool) -> None:
         task_view(task_data(results(*completions, rows=rows), "Visit")),
     ]
     for view in views:
-        text = printed(view, colour=colour)
+        text = text_of(view, colour=colour)
         assert text.count(SHOWN) == 2
         assert "\x1b[2J" not in text
         text.encode()
 
 
-def test_visible_keeps_what_can_be_seen() -> None:
+def test_visible_escapes_only_invisible_characters() -> None:
     assert visible("naïve 日本 → [x]") == "naïve 日本 → [x]"
     assert visible("a\tb\u200b\x9b") == r"a\tb\u200b\x9b"

@@ -1,4 +1,4 @@
-"""What another suite changes: by hand, and as a person meets it."""
+"""Verdicts that another suite changes: counted by hand, and in the commands."""
 
 import json
 import re
@@ -25,7 +25,7 @@ from roboeval.analysis.comparisons.verdict_changes import (
 from roboeval.cli.views.comparison import changes_view
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import key_of
-from small_run import HOSTILE, SHOWN, SUITE, printed, row
+from small_run import HOSTILE, SHOWN, SUITE, row, text_of
 
 STRICT = replace(SUITE, name="strict")
 PROGRAM = 'def task_program():\n    say("hello")\n'
@@ -41,10 +41,10 @@ FAILURES = (
 Passes = Mapping[str, tuple[int, ...]]
 
 
-def judged(passes: Passes, *, strictly: bool = False) -> Results:
-    """Ten completions a prompt, of which so many pass; the others fail by all kinds in turn."""
+def results_by(passes: Passes, *, strictly: bool = False) -> Results:
+    """Return ten completions of each prompt: the first ones pass, the others fail by all kinds in turn."""
     rows = [
-        one(task, prompt, index, passed=index < passed)
+        row_of(task, prompt, index, passed=index < passed)
         for task, prompts in passes.items()
         for prompt, passed in enumerate(prompts)
         for index in range(10)
@@ -52,7 +52,7 @@ def judged(passes: Passes, *, strictly: bool = False) -> Results:
     return results_of(rows, STRICT if strictly else SUITE, {key_of(row): PROGRAM for row in rows})
 
 
-def one(task: str, prompt: int, index: int, *, passed: bool) -> dict[str, Any]:
+def row_of(task: str, prompt: int, index: int, *, passed: bool) -> dict[str, Any]:
     name, kind = FAILURES[(index + 3 * prompt) % len(FAILURES)]
     check = f"{kind.lower()}()" if name == "TaskCompletionError" else None
     error = None if check else {"kind": kind, "message": f"{kind} it is"}
@@ -65,12 +65,12 @@ def one(task: str, prompt: int, index: int, *, passed: bool) -> dict[str, Any]:
     return {**row(prompt, index, task=task), "passed": passed, "failure": why, "verdicts": [verdict]}
 
 
-def changed(first: Passes, second: Passes, *, name: str = "a") -> VerdictChanges:
-    return verdict_changes(name, judged(first), judged(second, strictly=True))
+def changes_between(first: Passes, second: Passes, *, name: str = "a") -> VerdictChanges:
+    return verdict_changes(name, results_by(first), results_by(second, strictly=True))
 
 
-def test_counted_by_hand() -> None:
-    found = changed({"Visit": (10, 4), "FindBook": (0,)}, {"Visit": (7, 4), "FindBook": (2,)})
+def test_changed_verdicts_by_hand() -> None:
+    found = changes_between({"Visit": (10, 4), "FindBook": (0,)}, {"Visit": (7, 4), "FindBook": (2,)})
     assert found.suites == ("small", "strict")
     assert [(t.task, t.both, t.first_only, t.second_only, t.neither) for t in found.tasks] == [
         ("Visit", 11, 3, 0, 6),
@@ -89,68 +89,68 @@ def test_counted_by_hand() -> None:
     ]
     assert {one.failure["class"] for one in found.second_only} == {
         "PythonError"
-    }  # what the first has against
+    }  # The first suite names the failure.
     assert found.programs == 2
     assert re.search(
         r"^a: strict .*\b3 of the 14 .*\bsmall .*\b2 .*small .*\(2 distinct programs\)", describe_run(found)
     )
 
 
-def test_nothing_changes() -> None:
-    found = changed({"Visit": (3,)}, {"Visit": (3,)})
+def test_suites_that_agree_have_no_changes() -> None:
+    found = changes_between({"Visit": (3,)}, {"Visit": (3,)})
     assert (found.first_only, found.second_only) == ((), ())
     assert re.search(r"\bsmall and strict agree .*\b10\b", describe_run(found))
-    assert "only, and what" not in printed(changes_view([found], most=3))
+    assert "only, and what" not in text_of(changes_view([found], most=3))
 
 
-def test_what_one_suite_has_not_judged_is_left_out() -> None:
-    found = changed({"Visit": (3,), "FindBook": (1,)}, {"Visit": (2,), "BringTea": (9, 9)})
+def test_completions_judged_by_one_suite_only_are_left_out() -> None:
+    found = changes_between({"Visit": (3,), "FindBook": (1,)}, {"Visit": (2,), "BringTea": (9, 9)})
     assert (found.completions, found.left_out) == (10, 30)
     assert [task.task for task in found.tasks] == ["Visit"]
     with pytest.raises(UserError, match="both suites") as error:
-        changed({"Visit": (3,)}, {"FindBook": (3,)})
+        changes_between({"Visit": (3,)}, {"FindBook": (3,)})
     assert error.value.file == "a"
 
 
 def runs(**scores: tuple[int, int]) -> list[VerdictChanges]:
-    return [changed({"Visit": (a,)}, {"Visit": (b,)}, name=name) for name, (a, b) in scores.items()]
+    return [changes_between({"Visit": (a,)}, {"Visit": (b,)}, name=name) for name, (a, b) in scores.items()]
 
 
-def test_places_are_shared_by_those_that_pass_equally_often() -> None:
+def test_runs_with_equal_scores_share_a_rank() -> None:
     small, strict = ranks(runs(a=(5, 5), b=(9, 5), c=(5, 2), d=(1, 2)))
     assert small == {"a": 2, "b": 1, "c": 2, "d": 4}
     assert strict == {"a": 1, "b": 1, "c": 3, "d": 3}
 
 
-def test_who_changes_places() -> None:
+def test_changed_ranks_are_listed() -> None:
     (sentence,) = describe_ranking(runs(a=(9, 3), b=(5, 5), c=(9, 2), d=(1, 1)))
     assert "under small: 1 a, 1 c, 3 b, 4 d; under strict: 1 b, 2 a, 3 c, 4 d" in sentence
 
 
-def test_the_order_stays() -> None:
+def test_an_unchanged_order_is_reported() -> None:
     (sentence,) = describe_ranking(runs(a=(5, 3), b=(2, 1)))
     assert re.search(r"\b2 runs is the same under strict\b.* small", sentence)
     assert describe_ranking(runs(a=(5, 3))) == []
 
 
-def test_runs_about_different_prompts_are_warned_of() -> None:
+def test_runs_with_different_prompts_cause_a_warning() -> None:
     one, other = runs(a=(5, 3), b=(2, 1))
-    more = changed({"Visit": (1, 1)}, {"Visit": (1, 1)}, name="c")
+    more = changes_between({"Visit": (1, 1)}, {"Visit": (1, 1)}, name="c")
     assert warn_of_prompts([one, other]) == []
     (warning,) = warn_of_prompts([one, more])
     assert "different prompts" in warning
 
 
-def test_what_a_model_wrote_and_is_called_does_no_harm() -> None:
-    found = replace(changed({"Visit": (3,)}, {"Visit": (1,)}), name=HOSTILE)
-    assert "".join(SHOWN.split()) in "".join(printed(changes_view([found, found], most=1), 300).split())
-    assert "\x1b[2J" not in printed(changes_view([found], most=1))
+def test_hostile_names_stay_text() -> None:
+    found = replace(changes_between({"Visit": (3,)}, {"Visit": (1,)}), name=HOSTILE)
+    assert "".join(SHOWN.split()) in "".join(text_of(changes_view([found, found], most=1), 300).split())
+    assert "\x1b[2J" not in text_of(changes_view([found], most=1))
 
 
 def test_the_largest_groups_are_shown() -> None:
-    found = changed({"Visit": (10,)}, {"Visit": (0,)})
-    assert re.search(r"\b6 more groups\b.* --groups\b", printed(changes_view([found], most=1)))
-    assert "more groups" not in printed(changes_view([found], most=7))
+    found = changes_between({"Visit": (10,)}, {"Visit": (0,)})
+    assert re.search(r"\b6 more groups\b.* --groups\b", text_of(changes_view([found], most=1)))
+    assert "more groups" not in text_of(changes_view([found], most=7))
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +165,7 @@ def judged_twice(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_the_command(judged_twice: Path) -> None:
+def test_compare_lists_verdicts_that_differ_by_suite(judged_twice: Path) -> None:
     made = roboeval("compare", "hasty", "careful", "--suites", "paper,plus", cwd=judged_twice)
     assert made.status == 0, made
     assert made.err == ""
@@ -189,7 +189,7 @@ def verdicts_of(run: Path, suite: str) -> dict[str, bool]:
 
 
 @pytest.mark.slow
-def test_the_other_way_round(judged_twice: Path) -> None:
+def test_swapping_suites_mirrors_the_changes(judged_twice: Path) -> None:
     def data(suites: str) -> dict[str, Any]:
         ended = roboeval("compare", "hasty", "careful", "--suites", suites, "--json", cwd=judged_twice)
         return dict(json.loads(ended.out))
@@ -200,7 +200,7 @@ def test_the_other_way_round(judged_twice: Path) -> None:
 
 
 @pytest.mark.slow
-def test_other_worlds_than_the_suites_own(judged_twice: Path, tmp_path: Path) -> None:
+def test_verdicts_in_other_worlds_can_be_compared(judged_twice: Path, tmp_path: Path) -> None:
     shutil.copytree(judged_twice / "hasty", tmp_path / "hasty")
     few = ("--suite", "plus", "--tasks", "GetDrink,GrilledCheese", "--worlds", "12", "--seed", "5", "--redo")
     assert roboeval("evaluate", "hasty", *few, cwd=tmp_path).status == 0
@@ -211,7 +211,7 @@ def test_other_worlds_than_the_suites_own(judged_twice: Path, tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_the_report(judged_twice: Path, tmp_path: Path) -> None:
+def test_a_report_can_show_verdicts_of_another_suite(judged_twice: Path, tmp_path: Path) -> None:
     out = tmp_path / "report"
     options = ("--beside", "plus", "--no-check")
     made = roboeval("report", "hasty", "careful", "--out", str(out), *options, cwd=judged_twice)
@@ -225,18 +225,18 @@ def test_the_report(judged_twice: Path, tmp_path: Path) -> None:
     assert not (out / "tables" / "reversals.csv").exists()
 
 
-def test_what_is_refused(tmp_path: Path) -> None:
-    def told(*words: str) -> Ended:
+def test_wrong_suites_and_unjudged_runs_are_refused(tmp_path: Path) -> None:
+    def run_here(*words: str) -> Ended:
         return roboeval(*words, cwd=tmp_path)
 
-    assert told("evaluate", "recorded:hasty", "--tasks", "LunchTime", "--out", "hasty").status == 0
+    assert run_here("evaluate", "recorded:hasty", "--tasks", "LunchTime", "--out", "hasty").status == 0
     assert "two runs, not 1" in refused("compare", "hasty", cwd=tmp_path).sentence
     assert 'not "paper"' in refused("compare", "hasty", "--suites", "paper", cwd=tmp_path).sentence
     assert "comma" in refused("compare", "hasty", "--suites", "plus,plus", cwd=tmp_path).sentence
-    assert "twice" in told("compare", "hasty", "./hasty", "--suites", "paper,plus").err
-    twice = told("report", "hasty", "--out", "r", "--beside", "paper")
+    assert "twice" in run_here("compare", "hasty", "./hasty", "--suites", "paper,plus").err
+    twice = run_here("report", "hasty", "--out", "r", "--beside", "paper")
     assert (twice.status, '"paper"' in twice.err) == (2, True)
-    unjudged = told("compare", "hasty", "--suites", "paper,rules")
+    unjudged = run_here("compare", "hasty", "--suites", "paper,rules")
     assert (unjudged.status, '"rules"' in unjudged.err) == (2, True)
 
 

@@ -1,4 +1,4 @@
-"""Requests in a file for a batch endpoint, and its answers: rows as of `generate`, and nothing lost."""
+"""Batch files of requests and answers: the same rows as from `generate`, and none lost."""
 
 import json
 import urllib.request
@@ -14,37 +14,37 @@ from server import Fault, Server
 
 TASKS = ("--tasks", "LunchTime", "--num-completions", "2")
 MODEL = "openai-chat:some/model"
-URL = "http://127.0.0.1:1/v1"  # where nobody listens
+URL = "http://127.0.0.1:1/v1"  # Nothing listens there.
 COUNT = 10
 
 Row = dict[str, Any]
 
 
 @pytest.fixture(autouse=True)
-def without_key(monkeypatch: pytest.MonkeyPatch) -> None:
+def remove_key(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("OPENAI_API_KEY", raising=False)
 
 
-def lines(path: Path) -> list[Row]:
+def read_lines(path: Path) -> list[Row]:
     return [json.loads(line) for line in path.read_text().splitlines()]
 
 
-def written(path: Path, rows: Sequence[Row]) -> Path:
+def write_lines(path: Path, rows: Sequence[Row]) -> Path:
     path.write_text("".join(json.dumps(row) + "\n" for row in rows))
     return path
 
 
 def begin(folder: Path, *more: str, model: str = MODEL, url: str | None = URL) -> list[Row]:
-    """The requests of a run that begins with them."""
+    """Begin a run by writing its requests, and return them."""
     own = () if url is None else ("--base-url", url)
     words = ("--model", model, *own, *TASKS, "--out", "run", "--requests", "requests.jsonl")
     ended = roboeval("generate", *words, *more, cwd=folder)
     assert ended.status == 0, ended
-    return lines(folder / "requests.jsonl")
+    return read_lines(folder / "requests.jsonl")
 
 
 def answers(server: Server, requests: Sequence[Row]) -> Iterator[Row]:
-    """What a batch endpoint says of requests, each of which a real server answers, the last one first."""
+    """Yield the answers of a batch endpoint, which a real server gives, in reverse order."""
     for number, request in enumerate(reversed(requests)):
         sent = urllib.request.Request(
             server.url.removesuffix("/v1") + request["url"],
@@ -61,7 +61,7 @@ def answers(server: Server, requests: Sequence[Row]) -> Iterator[Row]:
 
 
 def answer(request: Row, status: int = 200, **message: object) -> Row:
-    """One answer, as vLLM writes it."""
+    """Return an answer in vLLM's format."""
     choice = {"index": 0, "message": {"role": "assistant", **message}, "finish_reason": "stop"}
     body = {"id": "c", "object": "chat.completion", "created": 1, "model": "m", "choices": [choice]}
     return {
@@ -72,12 +72,12 @@ def answer(request: Row, status: int = 200, **message: object) -> Row:
     }
 
 
-def without(rows: Sequence[Row], *names: str) -> list[Row]:
+def without_fields(rows: Sequence[Row], *names: str) -> list[Row]:
     kept = [{name: value for name, value in row.items() if name not in names} for row in rows]
     return sorted(kept, key=lambda row: (row["task"], row["prompt"], row["index"]))
 
 
-def take(folder: Path, *names: str) -> Ended:
+def import_answers(folder: Path, *names: str) -> Ended:
     ended = Ended(0, "", "")
     for name in names:
         ended = roboeval("import", name, "--out", "run", cwd=folder)
@@ -88,7 +88,7 @@ def take(folder: Path, *names: str) -> Ended:
 
 
 @pytest.mark.slow
-def test_requests_hold_what_is_set_and_need_no_key(tmp_path: Path) -> None:
+def test_requests_contain_the_settings_and_need_no_key(tmp_path: Path) -> None:
     rows = begin(tmp_path, "--seed", "3", "--max-tokens", "99", "--no-top-p", url=None)
     assert len(rows) == len({row["custom_id"] for row in rows}) == COUNT
     assert {(row["method"], row["url"]) for row in rows} == {("POST", "/v1/chat/completions")}
@@ -132,7 +132,7 @@ def test_the_same_command_writes_the_same_bytes_and_no_other_file(tmp_path: Path
 
 
 @pytest.mark.parametrize("model", ["recorded:careful", "anthropic:claude-x", "openai:gpt-5.1", "hf:x"])
-def test_other_models_take_no_batch_file(tmp_path: Path, model: str) -> None:
+def test_other_models_refuse_a_batch_file(tmp_path: Path, model: str) -> None:
     refusal = refused("generate", "--model", model, "--requests", "requests.jsonl", cwd=tmp_path)
     assert "openai-chat:NAME" in refusal.sentence
     assert list(tmp_path.iterdir()) == []
@@ -146,12 +146,12 @@ def test_rows_are_those_of_generate(tmp_path: Path, model: str) -> None:
     with Server() as server:
         server.fault = lambda request: Fault.TOO_LONG if request.body["seed"] == 2 else None
         requests = begin(tmp_path, "--seed", "1", model=model, url=server.url)
-        written(tmp_path / "answers.jsonl", [*answers(server, requests)])
+        write_lines(tmp_path / "answers.jsonl", [*answers(server, requests)])
         words = ("generate", "--model", model, "--base-url", server.url, *TASKS, "--seed", "1")
         assert roboeval(*words, "--out", "online", cwd=tmp_path).status == 0
-    assert take(tmp_path, "answers.jsonl").status == 0
-    found, expected = (lines(tmp_path / name / "completions.jsonl") for name in ("run", "online"))
-    assert without(found, "latency_s", "usage") == without(expected, "latency_s", "usage")
+    assert import_answers(tmp_path, "answers.jsonl").status == 0
+    found, expected = (read_lines(tmp_path / name / "completions.jsonl") for name in ("run", "online"))
+    assert without_fields(found, "latency_s", "usage") == without_fields(expected, "latency_s", "usage")
     refusals = [row["index"] for row in found if row["no_program"] == "refusal"]
     assert (len(found), refusals) == (COUNT, [1] * 5)
     used = [row["usage"]["output_tokens"] for row in found if row["index"] == 0]
@@ -196,44 +196,44 @@ def test_rows_are_those_of_generate(tmp_path: Path, model: str) -> None:
 )
 def test_replies_of_each_kind(tmp_path: Path, message: Row, kept: Row) -> None:
     first, *_ = begin(tmp_path)
-    written(tmp_path / "answers.jsonl", [answer(first, **message)])
-    assert take(tmp_path, "answers.jsonl").status == 1
-    (row,) = lines(tmp_path / "run" / "completions.jsonl")
+    write_lines(tmp_path / "answers.jsonl", [answer(first, **message)])
+    assert import_answers(tmp_path, "answers.jsonl").status == 1
+    (row,) = read_lines(tmp_path / "run" / "completions.jsonl")
     assert row.items() >= kept.items()
     assert row["latency_s"] is None
 
 
-def test_a_file_twice_changes_nothing_and_several_add_up(tmp_path: Path) -> None:
+def test_importing_a_file_twice_changes_nothing_and_several_files_add_up(tmp_path: Path) -> None:
     requests = begin(tmp_path)
     whole = [answer(request, content="def task_program():\n    pass") for request in requests]
-    written(tmp_path / "a.jsonl", whole[:4])
-    written(tmp_path / "b.jsonl", whole[2:])
+    write_lines(tmp_path / "a.jsonl", whole[:4])
+    write_lines(tmp_path / "b.jsonl", whole[2:])
     run = tmp_path / "run"
-    assert take(tmp_path, "a.jsonl").status == 1
+    assert import_answers(tmp_path, "a.jsonl").status == 1
     before = {name: (run / name).read_bytes() for name in ("completions.jsonl", "run.json")}
-    assert take(tmp_path, "a.jsonl").status == 1
+    assert import_answers(tmp_path, "a.jsonl").status == 1
     assert {name: (run / name).read_bytes() for name in before} == before
     assert len(begin(tmp_path)) == COUNT - 4
-    ended = take(tmp_path, "b.jsonl")
+    ended = import_answers(tmp_path, "b.jsonl")
     assert (ended.status, ended.err.count("\n")) == (0, 1)
-    rows = lines(run / "completions.jsonl")
+    rows = read_lines(run / "completions.jsonl")
     assert len({(row["prompt"], row["index"]) for row in rows}) == len(rows) == COUNT
     after = {name: (run / name).stat().st_mtime_ns for name in before}
-    assert take(tmp_path, "a.jsonl", "b.jsonl").status == 0
+    assert import_answers(tmp_path, "a.jsonl", "b.jsonl").status == 0
     assert {name: (run / name).stat().st_mtime_ns for name in before} == after
 
 
 def test_the_order_of_answers_makes_no_difference(tmp_path: Path) -> None:
     requests = begin(tmp_path)
     whole = [answer(request, content=str(number)) for number, request in enumerate(requests)]
-    written(tmp_path / "answers.jsonl", whole[::-1])
-    assert take(tmp_path, "answers.jsonl").status == 0
-    assert [row["raw_reply"] for row in lines(tmp_path / "run" / "completions.jsonl")] == [
+    write_lines(tmp_path / "answers.jsonl", whole[::-1])
+    assert import_answers(tmp_path, "answers.jsonl").status == 0
+    assert [row["raw_reply"] for row in read_lines(tmp_path / "run" / "completions.jsonl")] == [
         str(number) for number in range(COUNT)
     ]
 
 
-def test_failed_and_missing_answers_are_named_and_asked_for_again(tmp_path: Path) -> None:
+def test_failed_and_missing_answers_are_named_and_requested_again(tmp_path: Path) -> None:
     one, two, three, four, *others = begin(tmp_path)
     expired = {"code": "batch_expired", "message": "This request expired."}
     vllm = {"error": {"message": "The prompt is too long.", "type": "BadRequestError", "code": 400}}
@@ -243,12 +243,12 @@ def test_failed_and_missing_answers_are_named_and_asked_for_again(tmp_path: Path
         answer(three) | {"response": {"status_code": 400, "body": None}, "error": vllm},
         *(answer(request, content="pass") for request in others),
     ]
-    written(tmp_path / "answers.jsonl", rows)
-    ended = take(tmp_path, "answers.jsonl")
+    write_lines(tmp_path / "answers.jsonl", rows)
+    ended = import_answers(tmp_path, "answers.jsonl")
     assert ended.status == 1
     assert "3 completions missing: " in ended.err
     assert "This request expired" in ended.err
-    kept = {row["raw_reply"]: row["no_program"] for row in lines(tmp_path / "run" / "completions.jsonl")}
+    kept = {row["raw_reply"]: row["no_program"] for row in read_lines(tmp_path / "run" / "completions.jsonl")}
     assert len(kept) == 2
     assert [why for text, why in kept.items() if "The prompt is too long" in text] == ["refusal"]
     again = begin(tmp_path)
@@ -258,31 +258,31 @@ def test_failed_and_missing_answers_are_named_and_asked_for_again(tmp_path: Path
 def test_refusals_of_all_requests_are_failures(tmp_path: Path) -> None:
     requests = begin(tmp_path)
     refusal = {"status_code": 400, "body": {"error": {"message": "There is no such field."}}}
-    written(tmp_path / "answers.jsonl", [answer(one) | {"response": refusal} for one in requests])
-    ended = take(tmp_path, "answers.jsonl")
+    write_lines(tmp_path / "answers.jsonl", [answer(one) | {"response": refusal} for one in requests])
+    ended = import_answers(tmp_path, "answers.jsonl")
     assert ended.status == 1
     assert "10 completions missing: " in ended.err
     assert (tmp_path / "run" / "completions.jsonl").read_bytes() == b""
 
 
-def changed(row: Row, **values: object) -> Row:
+def change(row: Row, **values: object) -> Row:
     return {**row, **values}
 
 
 @pytest.mark.parametrize(
     ("spoilt", "named"),
     [
-        (lambda row: changed(row, custom_id="LunchTime/0/0/00000000"), "another run"),
-        (lambda row: changed(row, custom_id="mine"), "'mine'"),
+        (lambda row: change(row, custom_id="LunchTime/0/0/00000000"), "another run"),
+        (lambda row: change(row, custom_id="mine"), "'mine'"),
         (lambda row: {"custom_id": row["custom_id"], "method": "POST"}, "not an answer"),
         (lambda row: {"custom_id": row["custom_id"]}, "not an answer"),
     ],
 )
-def test_a_line_that_is_no_answer_of_the_run_adds_nothing(
+def test_a_line_that_is_not_an_answer_of_the_run_adds_nothing(
     tmp_path: Path, spoilt: Callable[[Row], Row], named: str
 ) -> None:
     first, second, *_ = begin(tmp_path)
-    written(tmp_path / "answers.jsonl", [answer(first, content="a"), spoilt(answer(second, content="b"))])
+    write_lines(tmp_path / "answers.jsonl", [answer(first, content="a"), spoilt(answer(second, content="b"))])
     refusal = refused("import", "answers.jsonl", "--out", "run", cwd=tmp_path)
     assert refusal.at == ("answers.jsonl", 2)
     assert named in refusal.sentence
@@ -293,13 +293,13 @@ def test_answers_to_other_settings_are_refused(tmp_path: Path) -> None:
     (tmp_path / "hotter").mkdir()
     request, *_ = begin(tmp_path / "hotter", "--temperature", "1")
     begin(tmp_path)
-    written(tmp_path / "answers.jsonl", [answer(request, content="a")])
+    write_lines(tmp_path / "answers.jsonl", [answer(request, content="a")])
     assert "other settings" in refused("import", "answers.jsonl", "--out", "run", cwd=tmp_path).sentence
 
 
-def test_a_file_that_breaks_off_adds_nothing(tmp_path: Path) -> None:
+def test_a_truncated_file_adds_nothing(tmp_path: Path) -> None:
     first, second, *_ = begin(tmp_path)
-    file = written(tmp_path / "answers.jsonl", [answer(first, content="a"), answer(second, content="b")])
+    file = write_lines(tmp_path / "answers.jsonl", [answer(first, content="a"), answer(second, content="b")])
     file.write_bytes(file.read_bytes()[:-40])
     assert refused("import", "answers.jsonl", "--out", "run", cwd=tmp_path).at == ("answers.jsonl", 2)
     assert (tmp_path / "run" / "completions.jsonl").read_bytes() == b""
@@ -308,20 +308,20 @@ def test_a_file_that_breaks_off_adds_nothing(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_answers_need_their_run_and_its_suite(tmp_path: Path) -> None:
     first, *_ = begin(tmp_path)
-    written(tmp_path / "answers.jsonl", [answer(first, content="a")])
+    write_lines(tmp_path / "answers.jsonl", [answer(first, content="a")])
     assert "--requests" in refused("import", "answers.jsonl", "--out", "other", cwd=tmp_path).sentence
     assert not (tmp_path / "other").exists()
     refusal = refused("import", "answers.jsonl", "--out", "run", "--suite", "plus", cwd=tmp_path)
     assert '"paper"' in refusal.sentence
 
 
-def test_fresh_tasks_by_a_batch(tmp_path: Path) -> None:
+def test_a_batch_can_have_fresh_tasks(tmp_path: Path) -> None:
     suite = ("--suite", "families-test-7-2")
     model = ("--model", MODEL, "--base-url", URL, "--num-completions", "1")
     ended = roboeval("generate", *suite, *model, "--requests", "requests.jsonl", cwd=tmp_path)
     assert ended.status == 0
     (run,) = (tmp_path / "runs").iterdir()
-    requests = lines(tmp_path / "requests.jsonl")
-    written(tmp_path / "answers.jsonl", [answer(request, content="pass") for request in requests])
+    requests = read_lines(tmp_path / "requests.jsonl")
+    write_lines(tmp_path / "answers.jsonl", [answer(request, content="pass") for request in requests])
     assert roboeval("import", "answers.jsonl", "--out", run, *suite, cwd=tmp_path).status == 0
-    assert len(lines(run / "completions.jsonl")) == len(requests) == 8
+    assert len(read_lines(run / "completions.jsonl")) == len(requests) == 8

@@ -83,5 +83,5 @@ def test_by_default_half_of_the_prompts_are_measured(
     assert ("2 of 3 prompts" in " ".join(ended.out.split())) is (judged < len(counts))
 
 
-def test_too_few_completions(source: Path) -> None:
+def test_too_few_completions_are_refused(source: Path) -> None:
     assert "--candidates" in refused("clarify", source, "--candidates", "10", "--workers", "1").sentence

@@ -1,4 +1,4 @@
-"""The command line as a person meets it: results on stdout, one sentence and status 2 for what is wrong."""
+"""The command line: results on stdout, and one sentence and status 2 for bad input."""
 
 import csv
 import json
@@ -55,7 +55,7 @@ def test_an_empty_file(tmp_path: Path) -> None:
     assert "no completion" in refusal.sentence
 
 
-def test_a_line_that_is_no_json(tmp_path: Path) -> None:
+def test_a_line_that_is_not_json(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + "{oops\n" + row(1))
     refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
     assert refusal.at == ("a.jsonl", 2)
@@ -64,14 +64,14 @@ def test_a_line_that_is_no_json(tmp_path: Path) -> None:
     assert example.keys() == {"task", "prompt", "index", "program"}
 
 
-def test_a_last_line_that_is_no_json_and_has_no_end(tmp_path: Path) -> None:
+def test_an_unfinished_last_line(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + '{"task": "SayGoodDay", "program": "x')
     refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
     assert refusal.at == ("a.jsonl", 2)
     assert "not JSON;" in refusal.sentence
 
 
-def test_a_program_is_no_file_of_completions(tmp_path: Path) -> None:
+def test_a_program_is_not_a_file_of_completions(tmp_path: Path) -> None:
     (tmp_path / "program.py").write_text(GREETS)
     refusal = refused("evaluate", "program.py", cwd=tmp_path)
     assert refusal.at == ("program.py", None)
@@ -80,7 +80,7 @@ def test_a_program_is_no_file_of_completions(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("verb", ["evaluate", "import"])
-def test_a_file_is_no_run(tmp_path: Path, verb: str) -> None:
+def test_a_file_is_not_a_run(tmp_path: Path, verb: str) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     (tmp_path / "verdicts").write_text("mine")
     refusal = refused(verb, "a.jsonl", "--out", "verdicts", cwd=tmp_path)
@@ -105,7 +105,7 @@ def test_misnamed_python_files_are_refused(tmp_path: Path, command: tuple[str, .
     assert "TASK_PROMPT_INDEX.py" in refusal.sentence
 
 
-def test_hidden_and_other_files_beside_programs_are_ignored(tmp_path: Path) -> None:
+def test_hidden_and_other_files_among_programs_are_ignored(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
         for name in ("SayGoodDay_0_0.py", "notes.txt", "__MACOSX/._SayGoodDay_0_0.py"):
             archive.writestr(name, "completion = ''")
@@ -123,7 +123,7 @@ def test_a_zip_with_a_damaged_member(tmp_path: Path) -> None:
     assert "not a readable zip" in refusal.sentence
 
 
-def test_a_line_that_is_no_object(tmp_path: Path) -> None:
+def test_a_line_that_is_not_an_object(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + "[]\n")
     refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
     assert refusal.at == ("a.jsonl", 2)
@@ -164,7 +164,7 @@ def test_an_unknown_task_of_a_published_file(tmp_path: Path) -> None:
         (True, "True", "whole number"),
     ],
 )
-def test_a_prompt_that_is_no_number(tmp_path: Path, prompt: object, value: str, expected: str) -> None:
+def test_a_prompt_that_is_not_an_integer(tmp_path: Path, prompt: object, value: str, expected: str) -> None:
     (tmp_path / "a.jsonl").write_text(row(prompt=prompt))
     refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
     assert refusal.at == ("a.jsonl", 1)
@@ -172,7 +172,7 @@ def test_a_prompt_that_is_no_number(tmp_path: Path, prompt: object, value: str, 
         assert said in refusal.sentence
 
 
-def test_a_program_that_is_no_text(tmp_path: Path) -> None:
+def test_a_program_that_is_not_a_string(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + row(1, program=["x"]))
     refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
     assert refusal.at == ("a.jsonl", 2)
@@ -203,14 +203,14 @@ def test_a_row_of_ten_megabytes(tmp_path: Path) -> None:
     assert "5,000,000 bytes" in refusal.sentence
 
 
-def test_a_zip_that_is_none(tmp_path: Path) -> None:
+def test_a_zip_that_is_not_a_zip(tmp_path: Path) -> None:
     (tmp_path / "a.zip").write_text("hello")
     refusal = refused("evaluate", "a.zip", cwd=tmp_path)
     assert refusal.at == ("a.zip", None)
     assert "not a readable zip" in refusal.sentence
 
 
-def test_a_file_that_swells_in_a_zip(tmp_path: Path) -> None:
+def test_a_zip_member_that_is_too_large(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("SayGoodDay_0_0.py", " " * 5_000_001)
     refusal = refused("evaluate", "a.zip", cwd=tmp_path)
@@ -218,7 +218,7 @@ def test_a_file_that_swells_in_a_zip(tmp_path: Path) -> None:
     assert "5,000,000 bytes" in refusal.sentence
 
 
-def test_a_published_file_that_is_not_assignments_of_texts(tmp_path: Path) -> None:
+def test_a_published_file_with_code_is_refused_and_not_run(tmp_path: Path) -> None:
     folder = tmp_path / "py"
     folder.mkdir()
     marker = tmp_path / "imported"
@@ -232,7 +232,7 @@ def test_a_published_file_that_is_not_assignments_of_texts(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
+def test_a_run_that_another_process_writes_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     script = (
         "import pathlib, sys\nfrom roboeval.evaluation.runs.folder import RunFolder\n"
@@ -267,13 +267,13 @@ def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
         (["--tasks", "SayGoodDay", "--ablation"], ["SayGoodDay", "ablation"]),
     ],
 )
-def test_an_option_that_cannot_be_followed(tmp_path: Path, options: list[str], named: list[str]) -> None:
+def test_wrong_options_are_refused(tmp_path: Path, options: list[str], named: list[str]) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     refusal = refused("evaluate", "a.jsonl", *options, cwd=tmp_path)
     assert all(name in refusal.sentence for name in named), refusal
 
 
-def test_a_task_of_which_there_is_no_completion(tmp_path: Path) -> None:
+def test_a_task_without_completions(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     refusal = refused("evaluate", "a.jsonl", "--tasks", "LunchTime", cwd=tmp_path)
     assert refusal.at == ("a.jsonl", None)
@@ -281,7 +281,7 @@ def test_a_task_of_which_there_is_no_completion(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("arguments", [(), ("evaluate",), ("show", "a", "b", "c"), ("dance",), ("--frob",)])
-def test_a_command_that_is_none(arguments: tuple[str, ...]) -> None:
+def test_missing_and_unknown_commands(arguments: tuple[str, ...]) -> None:
     if arguments:
         command = "roboeval evaluate" if arguments == ("evaluate",) else "roboeval"
         assert any(each.startswith(command) for each in refused(*arguments).commands)
@@ -291,7 +291,7 @@ def test_a_command_that_is_none(arguments: tuple[str, ...]) -> None:
         assert "evaluate" in ended.out
 
 
-def test_a_question_ends_as_one() -> None:
+def test_a_suggestion_ends_with_a_question_mark() -> None:
     refusal = refused("generat")
     assert "generate" in refusal.sentence
     assert "? See `" in refusal.sentence
@@ -299,13 +299,13 @@ def test_a_question_ends_as_one() -> None:
 
 
 @pytest.mark.slow
-def test_worlds_of_another_seed_are_judged_shown_and_gone_on_with(tmp_path: Path) -> None:
+def test_worlds_of_another_seed_are_judged_shown_and_continued(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     drawn = ("--suite", "plus", "--worlds", "33", "--seed", "9")
     ended = roboeval("evaluate", "a.jsonl", "--out", "run", *drawn, cwd=tmp_path)
     assert ended.status == 0, ended.err
-    told = json.loads((tmp_path / "run" / "evaluations" / "plus.json").read_text())
-    assert (told["worlds"], told["seed"], told["rules"]["events"]) == (33, 9, "as-happened")
+    found = json.loads((tmp_path / "run" / "evaluations" / "plus.json").read_text())
+    assert (found["worlds"], found["seed"], found["rules"]["events"]) == (33, 9, "as-happened")
     (judged,) = (tmp_path / "run" / "evaluations" / "plus.jsonl").read_text().splitlines()
     assert len(json.loads(judged)["verdicts"]) >= 33
     shown = roboeval("show", "run", "SayGoodDay/0/0", "--suite", "plus", cwd=tmp_path)
@@ -322,22 +322,22 @@ def test_worlds_of_another_seed_are_judged_shown_and_gone_on_with(tmp_path: Path
 
 @pytest.mark.parametrize("verb", ["evaluate", "import"])
 @pytest.mark.parametrize("out", ["run", "some/new/run"])
-def test_nothing_is_left_behind_when_a_row_is_wrong(tmp_path: Path, verb: str, out: str) -> None:
+def test_a_wrong_row_leaves_no_files(tmp_path: Path, verb: str, out: str) -> None:
     (tmp_path / "a.jsonl").write_text(row() + "{oops\n" + row(1))
     refused(verb, "a.jsonl", "--out", out, cwd=tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["a.jsonl"]
 
 
-# --- a machine that cannot
+# --- limits of the machine
 
 
 FULL = r"[^\n]*: File too large; [^\n]*\n"
-SMALL_DISK = "ulimit -f 900;"  # in KiB: no file may grow beyond it
+SMALL_DISK = "ulimit -f 900;"  # The limit of the size of a file, in KiB.
 LONG = 'def task_program(): say("good day " * 1000)\n'
 
 
 @pytest.mark.slow
-def test_a_full_disk_ends_an_evaluation_in_one_sentence_and_it_goes_on(tmp_path: Path) -> None:
+def test_an_evaluation_continues_after_a_full_disk(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text("".join(row(index, f"{LONG}# {index}") for index in range(30)))
     assert roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
     ended = roboeval("evaluate", "run", cwd=tmp_path, before=SMALL_DISK)
@@ -351,7 +351,7 @@ def test_a_full_disk_ends_an_evaluation_in_one_sentence_and_it_goes_on(tmp_path:
 
 
 @pytest.mark.slow
-def test_a_full_disk_leaves_no_half_run(tmp_path: Path) -> None:
+def test_a_full_disk_leaves_no_incomplete_run(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text("".join(row(index, "#" * 100_000) for index in range(12)))
     ended = roboeval("import", "a.jsonl", "--out", "new/run", cwd=tmp_path, before=SMALL_DISK)
     assert (ended.status, ended.out) == (1, "")
@@ -360,7 +360,7 @@ def test_a_full_disk_leaves_no_half_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_full_disk_leaves_an_exported_table_as_it_was(tmp_path: Path) -> None:
+def test_a_full_disk_leaves_an_exported_table_unchanged(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text("".join(map(row, range(12))))
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
     for kind in ("csv", "parquet"):
@@ -374,7 +374,7 @@ def test_a_full_disk_leaves_an_exported_table_as_it_was(tmp_path: Path) -> None:
         assert not (tmp_path / "table.new").exists()
 
 
-def test_a_table_takes_the_place_of_no_other_file(tmp_path: Path) -> None:
+def test_a_table_replaces_only_tables(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row(task="LunchTime"))
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
     for file in ("a.jsonl", "run/completions.jsonl"):
@@ -388,7 +388,7 @@ def test_a_table_takes_the_place_of_no_other_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("verb", ["evaluate", "import"])
-def test_a_folder_of_other_things_is_no_place_for_a_run(tmp_path: Path, verb: str) -> None:
+def test_a_folder_with_other_files_cannot_become_a_run(tmp_path: Path, verb: str) -> None:
     (tmp_path / "a.jsonl").write_text(row(task="LunchTime"))
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs" / "mine.md").write_text("mine")
@@ -399,22 +399,22 @@ def test_a_folder_of_other_things_is_no_place_for_a_run(tmp_path: Path, verb: st
 
 
 @pytest.mark.parametrize("columns", ["0", "000", ""])
-def test_a_terminal_of_no_columns_is_one_of_unknown_width(columns: str) -> None:
+def test_a_terminal_with_no_columns_has_an_unknown_width(columns: str) -> None:
     unknown = {name: value for name, value in ENVIRONMENT.items() if name != "COLUMNS"}
-    told = roboeval("tasks", environment=unknown | {"COLUMNS": columns}).out
-    assert told == roboeval("tasks", environment=unknown).out
-    assert "LunchTime" in told
+    found = roboeval("tasks", environment=unknown | {"COLUMNS": columns}).out
+    assert found == roboeval("tasks", environment=unknown).out
+    assert "LunchTime" in found
 
 
 @pytest.mark.slow
-def test_an_output_that_is_full_or_closed() -> None:
+def test_a_full_or_closed_output() -> None:
     ended = roboeval("tasks", "--json", after="> /dev/full")
     assert ended.status == 1
     assert re.fullmatch(r"roboeval: [^\n]*: No space left on device; [^\n]*\n", ended.err)
     assert roboeval("tasks", "--json", after="| head -c 1").err == ""
 
 
-def test_progress_counts_what_has_been_passed_on(
+def test_progress_counts_consumed_items(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("roboeval.cli.output.QUIET_S", 0.0)
@@ -439,7 +439,7 @@ SLOW = "def task_program():\n    for i in range(150000): pass\n# {}\n"
         (["a.jsonl"], ["--out"], False),
     ],
 )
-def test_ctrl_c_ends_in_one_true_sentence(
+def test_ctrl_c_ends_with_a_sentence_about_the_kept_rows(
     tmp_path: Path, arguments: list[str], options: list[str], *, kept: bool
 ) -> None:
     (tmp_path / "a.jsonl").write_text("".join(row(i, SLOW.format(i)) for i in range(400)))
@@ -469,7 +469,7 @@ def test_a_run_that_was_not_judged(tmp_path: Path) -> None:
     assert "completions.jsonl" in refusal.sentence
 
 
-def test_other_completions_are_refused_with_both_ways_out(tmp_path: Path) -> None:
+def test_changed_completions_are_refused_with_two_suggestions(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
     changed = row().replace("task_program", "task_program ")
@@ -481,7 +481,7 @@ def test_other_completions_are_refused_with_both_ways_out(tmp_path: Path) -> Non
     assert roboeval(*shlex.split(again)[1:], cwd=tmp_path).status == 0
 
 
-def test_a_run_that_was_judged_by_another_suite(tmp_path: Path) -> None:
+def test_a_run_that_another_suite_judged(tmp_path: Path) -> None:
     roboeval("tasks", "--new", "MakeTea", "--suite", "mine", cwd=tmp_path)
     (tmp_path / "a.jsonl").write_text(row(task="MakeTea"))
     assert roboeval("evaluate", "a.jsonl", "--out", "run", "--suite", "mine", cwd=tmp_path).status == 0
@@ -493,7 +493,7 @@ def test_a_run_that_was_judged_by_another_suite(tmp_path: Path) -> None:
     assert roboeval("show", "run", "--suite", "mine", cwd=tmp_path).status == 0
 
 
-# --- what it is for
+# --- normal use
 
 
 @pytest.fixture(scope="module")
@@ -507,7 +507,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "run"
 
 
-def test_json_is_for_machines_alone(run: Path) -> None:
+def test_json_output_comes_without_messages(run: Path) -> None:
     for arguments in (
         ("show", run),
         ("show", run, "SayGoodDay"),
@@ -520,7 +520,7 @@ def test_json_is_for_machines_alone(run: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_pipe_is_a_file_of_completions(tmp_path: Path) -> None:
+def test_completions_can_come_from_a_pipe(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + row(1, "go_to('nowhere')"))
     ended = roboeval("evaluate", "--json", cwd=tmp_path, after="<(cat a.jsonl)")
     assert json.loads(ended.out)["completions"] == 2
@@ -533,12 +533,12 @@ def test_a_pipe_is_a_file_of_completions(tmp_path: Path) -> None:
     assert "JSON; " in wrong.sentence
 
 
-def test_the_version() -> None:
+def test_the_version_is_printed() -> None:
     assert re.fullmatch(r"roboeval \d+\.\d+\.\d+\n", roboeval("--version").out)
 
 
-def pasted(sentence: str, cwd: Path) -> Ended:
-    """How the command ends that a sentence names."""
+def run_named_command(sentence: str, cwd: Path) -> Ended:
+    """Run the command that a sentence names."""
     (command,) = re.findall("`([^`]+)`", sentence)
     name, *arguments = shlex.split(command)
     assert name == "roboeval"
@@ -550,21 +550,21 @@ def test_commands_in_sentences_can_be_pasted(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row(task="MakeTea"))
     imported = roboeval("import", "a.jsonl", "--out", "my run", "--suite", "my suite", cwd=tmp_path)
     unjudged = refused("show", "my run", "--suite", "my suite", cwd=tmp_path)
-    assert pasted(unjudged.sentence, tmp_path).status == 0
-    judged = pasted(imported.err, tmp_path)
+    assert run_named_command(unjudged.sentence, tmp_path).status == 0
+    judged = run_named_command(imported.err, tmp_path)
     assert judged.status == 0
-    shown = pasted(judged.err, tmp_path)
+    shown = run_named_command(judged.err, tmp_path)
     assert shown.out.startswith("MakeTea/0/0  failed check")
 
 
-def test_commands_in_sentences_say_what_was_ablated(tmp_path: Path) -> None:
+def test_commands_in_sentences_keep_the_ablation(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row(task="LunchTime"))
     imported = roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path)
     assert "run has 1 completion" in imported.err
     unjudged = refused("show", "run", "--ablation", cwd=tmp_path)
     assert unjudged.commands == ["roboeval evaluate run --ablation"]
-    judged = pasted(unjudged.sentence, tmp_path)
-    assert pasted(judged.err.splitlines()[-1], tmp_path).out.startswith("LunchTime/0/0")
+    judged = run_named_command(unjudged.sentence, tmp_path)
+    assert run_named_command(judged.err.splitlines()[-1], tmp_path).out.startswith("LunchTime/0/0")
 
 
 def test_an_unfinished_evaluation_says_so(tmp_path: Path) -> None:
@@ -588,7 +588,7 @@ def test_an_unfinished_evaluation_says_so(tmp_path: Path) -> None:
     assert "GetDrink" in data["missing"]["not_selected"]
     exported = roboeval("export", "run", cwd=tmp_path).err
     assert exported.startswith("only judged completions count: 2 of 4 completions")
-    assert pasted(shown.err, tmp_path).status == 0
+    assert run_named_command(shown.err, tmp_path).status == 0
     assert roboeval("show", "run", cwd=tmp_path).err == ""
 
 
@@ -641,7 +641,7 @@ def test_show_gives_pass_at_any_k_that_the_run_can_estimate(run: Path) -> None:
     assert re.search(r"\b4\b.* 1 to 3", refusal)
 
 
-def test_a_row_that_is_none_gets_a_sentence(tmp_path: Path) -> None:
+def test_a_damaged_row_is_named_by_its_line(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
     rows = tmp_path / "run" / "evaluations" / "paper.jsonl"
@@ -680,7 +680,7 @@ def test_a_table_with_costs(tmp_path: Path) -> None:
         assert price in refused("export", "run", "--price", price, cwd=tmp_path).sentence
 
 
-def test_an_evaluation_goes_on_without_judging_again(run: Path) -> None:
+def test_a_finished_evaluation_judges_nothing_again(run: Path) -> None:
     before = (run / "evaluations" / "paper.jsonl").read_bytes()
     ended = roboeval("evaluate", run)
     assert ended.status == 0
@@ -737,21 +737,19 @@ def test_help_costs_little() -> None:
     used = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
     heavy = "{'pydantic', 'yaml', 'rich', 'polars'}"
     bare = f"import sys, roboeval.cli.app; print(bool({heavy} & sys.modules.keys()))"
-    assert (
-        float(used) < 3.0
-    )  # a figure for machines far slower than ours; what it costs here stands in the benches
+    assert float(used) < 3.0  # Slow machines need the time; the benches measure the real costs.
     assert subprocess.run(
         [sys.executable, "-c", bare], capture_output=True, text=True, check=True
     ).stdout == ("False\n")
 
 
-def test_ctrl_c_in_the_middle_of_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_ctrl_c_while_a_row_is_counted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
 
-    def interrupted(_: Row) -> None:
+    def interrupt(_: Row) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(counts, "outcome_of", interrupted)
+    monkeypatch.setattr(counts, "outcome_of", interrupt)
     ended = roboeval("evaluate", "a.jsonl", cwd=tmp_path)
     assert (ended.status, ended.out) == (130, "")
     assert ended.err.splitlines()[-1].startswith("roboeval: stopped; ")
@@ -767,13 +765,13 @@ def test_ctrl_c_in_the_middle_of_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path
         "mutate SayGoodDay --mutants 3",
     ],
 )
-def test_a_user_can_give_each_run_a_process_of_its_own(
+def test_each_run_can_have_a_process_of_its_own(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, command: str
 ) -> None:
     alone: list[bool] = []
     start = Worker.__init__
 
-    def started(self: Worker, *, one_process_per_run: bool = False) -> None:
+    def note_start(self: Worker, *, one_process_per_run: bool = False) -> None:
         alone.append(one_process_per_run)
         start(self, one_process_per_run=one_process_per_run)
 
@@ -781,6 +779,6 @@ def test_a_user_can_give_each_run_a_process_of_its_own(
         (tmp_path / "a.jsonl").write_text(row())
         assert roboeval("evaluate", "a.jsonl", "--out", "judged", cwd=tmp_path).status == 0
     shared_workers.end_all()
-    monkeypatch.setattr(Worker, "__init__", started)
+    monkeypatch.setattr(Worker, "__init__", note_start)
     ended = roboeval(*command.split(), "--one-process-per-run", cwd=tmp_path)
     assert (ended.status, alone[0], all(alone)) == (0, True, True), ended.err

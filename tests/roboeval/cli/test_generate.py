@@ -1,4 +1,4 @@
-"""generate, run and resample as a person meets them."""
+"""The commands generate, run and resample."""
 
 import json
 import re
@@ -27,7 +27,7 @@ def keys(run: Path) -> list[tuple[str, int, int]]:
     return [(row["task"], row["prompt"], row["index"]) for row in rows]
 
 
-def served(url: str, *more: str, model: str = "completions:tiny", tasks: str = TASKS) -> list[str]:
+def generate_words(url: str, *more: str, model: str = "completions:tiny", tasks: str = TASKS) -> list[str]:
     options = ["--model", model, "--base-url", url, "--tasks", tasks, "--out", "run", *more]
     return ["generate", *options]
 
@@ -36,7 +36,7 @@ def served(url: str, *more: str, model: str = "completions:tiny", tasks: str = T
 
 
 @pytest.mark.slow
-def test_from_nothing_to_tables_and_a_report(tmp_path: Path) -> None:
+def test_run_makes_tables_and_a_report(tmp_path: Path) -> None:
     words = ["run", "--model", "recorded:hasty", "--num-completions", "3", "--tasks", TASKS]
     ended = roboeval(*words, cwd=tmp_path)
     assert ended.status == 0
@@ -57,7 +57,7 @@ def test_from_nothing_to_tables_and_a_report(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_report_that_is_interrupted_costs_nothing(tmp_path: Path) -> None:
+def test_an_interrupted_report_keeps_its_checks(tmp_path: Path) -> None:
     words = ["run", "--model", "recorded:hasty", "--num-completions", "4", "--out", "run", "--workers", "1"]
     words += ["--tasks", "LunchBreak,LunchTime,SayGoodDay,StaplerSupply"]
     process = Forked("roboeval", *words, cwd=tmp_path, environment=ENVIRONMENT)
@@ -76,7 +76,7 @@ def test_a_report_that_is_interrupted_costs_nothing(tmp_path: Path) -> None:
     assert roboeval("show", "run", cwd=tmp_path).status == 0
 
 
-def test_further_tasks_are_generated_and_judged_beside_those_there(tmp_path: Path) -> None:
+def test_further_tasks_are_added_to_a_run(tmp_path: Path) -> None:
     words = ["run", "--num-completions", "2", "--no-report", "--out", "run"]
     assert roboeval(*words, "--tasks", "LunchTime", cwd=tmp_path).status == 0
     rows, verdicts = tmp_path / "run" / "completions.jsonl", tmp_path / "run" / "evaluations" / "paper.jsonl"
@@ -94,18 +94,18 @@ def test_further_tasks_are_generated_and_judged_beside_those_there(tmp_path: Pat
     assert kept == (rows.read_bytes(), verdicts.read_bytes(), (tmp_path / "run" / "run.json").read_bytes())
 
 
-def test_tasks_that_were_requested_since_are_missing_and_not_left_out(tmp_path: Path) -> None:
+def test_tasks_of_an_interrupted_batch_are_missing(tmp_path: Path) -> None:
     words = ["run", "--num-completions", "2", "--no-report", "--out", "run"]
     assert roboeval(*words, "--tasks", "LunchTime", cwd=tmp_path).status == 0
     about = tmp_path / "run" / "run.json"
     data = json.loads(about.read_text())
-    data["batches"].append({"tasks": ["LunchTime", "SayGoodDay"], "num_completions": 2})  # and it was stopped
+    data["batches"].append({"tasks": ["LunchTime", "SayGoodDay"], "num_completions": 2})  # It was stopped.
     about.write_text(json.dumps(data))
     shown = json.loads(roboeval("show", "run", "--json", cwd=tmp_path).out)
     assert (shown["judged"], shown["to_judge"], shown["requested"]) == (10, 10, 20)
 
 
-def test_a_run_that_cannot_be_judged_is_refused_before_anything_is_paid(tmp_path: Path) -> None:
+def test_a_run_that_cannot_be_judged_is_refused_before_any_request(tmp_path: Path) -> None:
     words = ["run", "--no-report", "--out", "run", "--tasks", "LunchTime", "--num-completions"]
     assert roboeval(*words, "1", cwd=tmp_path).status == 0
     head = tmp_path / "run" / "evaluations" / "paper.json"
@@ -122,15 +122,15 @@ LOST = "```python\ndef task_program():\n    go_to('the moon')\n```\n"
 GREETS = "```python\ndef task_program():\n    say('good day')\n```\n"
 
 
-def repaired(request: Request) -> str:
-    """The wrong room at first; in a repair, or for a sample of a further round, a greeting."""
+def answer_repairs(request: Request) -> str:
+    """Go to a wrong room first, and greet in a repair or a further round."""
     is_repair = any("the moon" in message["content"] for message in request.body["messages"])
     return GREETS if is_repair or request.body.get("seed", 0) > 1000 else LOST
 
 
 @pytest.mark.parametrize("option", ["repair", "retries"])
 def test_rejected_programs_are_requested_again_in_rounds(option: str, tmp_path: Path) -> None:
-    with Server(answer=repaired) as server:
+    with Server(answer=answer_repairs) as server:
         words = ["run", "--model", "openai:m", "--base-url", server.url, "--tasks", "SayGoodDay"]
         words += ["--seed", "0", "--num-completions", "1", "--out", "run", "--no-report", f"--{option}", "2"]
         ended = roboeval(*words, cwd=tmp_path)
@@ -138,13 +138,13 @@ def test_rejected_programs_are_requested_again_in_rounds(option: str, tmp_path: 
         assert len(server.requests) == 10
         folder = tmp_path / "run" / ("repair-1" if option == "repair" else "retry-1")
         assert len([*read_rows(folder / "completions.jsonl")]) == 5
-        assert ended.out.count("5 completions, 5 prompts of 1 task") == 2  # of both rounds
+        assert ended.out.count("5 completions, 5 prompts of 1 task") == 2  # Both rounds have five.
         assert "round 1: the check rejects 5 completions of 5" in ended.err
         assert roboeval(*words, cwd=tmp_path).out == ended.out
-        assert len(server.requests) == 10  # nothing is paid for twice
+        assert len(server.requests) == 10  # Nothing is paid for twice.
 
 
-def test_generate_says_where_and_what_next(tmp_path: Path) -> None:
+def test_generate_names_the_folder_and_the_next_command(tmp_path: Path) -> None:
     ended = roboeval("generate", "--tasks", "LunchTime", "--num-completions", "1", cwd=tmp_path)
     assert (ended.status, ended.out) == (0, "")
     assert ended.err.splitlines()[0] == RECORDED_NOTICE
@@ -158,7 +158,7 @@ def test_generate_says_where_and_what_next(tmp_path: Path) -> None:
     ]
 
 
-def test_other_settings_are_refused_in_a_sentence(tmp_path: Path) -> None:
+def test_another_model_is_refused(tmp_path: Path) -> None:
     assert roboeval("generate", "--num-completions", "1", cwd=tmp_path).status == 0
     about = tmp_path / "runs/recorded-careful/run.json"
     before = about.read_bytes()
@@ -181,7 +181,7 @@ def test_other_settings_are_refused_in_a_sentence(tmp_path: Path) -> None:
         (("--base-url", "http://me:secret@localhost/v1"), ["base URL", "password"]),
     ],
 )
-def test_what_is_asked_wrongly_leaves_nothing(
+def test_wrong_options_are_refused_and_leave_no_files(
     tmp_path: Path, words: tuple[str, ...], named: list[str]
 ) -> None:
     refusal = refused("generate", *words, cwd=tmp_path)
@@ -191,8 +191,8 @@ def test_what_is_asked_wrongly_leaves_nothing(
 
 
 @pytest.mark.parametrize("command", ["generate", "run"])
-def test_no_more_than_10000_completions_of_a_prompt(tmp_path: Path, command: str) -> None:
-    words = (command, "--model", "recorded:nobody", "--num-completions")  # it is asked for nothing
+def test_at_most_10000_completions_of_a_prompt(tmp_path: Path, command: str) -> None:
+    words = (command, "--model", "recorded:nobody", "--num-completions")  # The model is not asked.
     refusal = refused(*words, "10001", cwd=tmp_path)
     assert "'--num-completions'" in refusal.sentence
     assert "10000" in refusal.sentence
@@ -200,20 +200,20 @@ def test_no_more_than_10000_completions_of_a_prompt(tmp_path: Path, command: str
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_suite_that_nobody_recorded(tmp_path: Path) -> None:
+def test_a_suite_without_recorded_programs_is_refused(tmp_path: Path) -> None:
     roboeval("tasks", "--new", "MakeTea", "--suite", "mine", cwd=tmp_path)
     assert "recorded:careful" in refused("generate", "--suite", "mine", cwd=tmp_path, lines=5).sentence
     assert not (tmp_path / "runs").exists()
 
 
-# --- with a served model
+# --- with a model server
 
 
 @pytest.mark.slow
-def test_a_wrong_key_is_one_sentence_and_stands_nowhere(tmp_path: Path) -> None:
+def test_a_wrong_key_is_refused_and_shown_nowhere(tmp_path: Path) -> None:
     with Server(fault=lambda _: Fault.UNAUTHORIZED) as server:
         for model in ("completions:tiny", "openai:tiny"):
-            ended = roboeval(*served(server.url, model=model), cwd=tmp_path, environment=WITH_KEY)
+            ended = roboeval(*generate_words(server.url, model=model), cwd=tmp_path, environment=WITH_KEY)
             assert ended.status == 2
             assert ended.err.count("\n") == 1
             assert "401" in ended.err
@@ -224,11 +224,11 @@ def test_a_wrong_key_is_one_sentence_and_stands_nowhere(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("model", ["completions:tiny", "openai:tiny", "vllm:tiny"])
 @pytest.mark.parametrize("key", ["sk-one\nsk-two", "sk-schl\u00fcssel"])
-def test_a_key_that_cannot_be_sent_is_one_sentence(tmp_path: Path, model: str, key: str) -> None:
+def test_a_key_that_cannot_be_sent_is_refused(tmp_path: Path, model: str, key: str) -> None:
     variable = "VLLM_API_KEY" if model.startswith("vllm") else "OPENAI_API_KEY"
     with Server() as server:
         ended = roboeval(
-            *served(server.url, model=model), cwd=tmp_path, environment={**ENVIRONMENT, variable: key}
+            *generate_words(server.url, model=model), cwd=tmp_path, environment={**ENVIRONMENT, variable: key}
         )
     assert (ended.status, ended.out) == (2, "")
     assert ended.err.startswith(f"roboeval: the key in {variable} has ")
@@ -245,11 +245,11 @@ def test_the_key_is_in_no_file_of_a_run(tmp_path: Path, model: str) -> None:
     with Server(answer=lambda request: replies[int(request.body.get("seed", 0)) % 2]) as server:
         server.faults.extend([None, *faults])
         ended = roboeval(
-            *served(server.url, "--num-completions", "2", "--seed", "0", model=model),
+            *generate_words(server.url, "--num-completions", "2", "--seed", "0", model=model),
             cwd=tmp_path,
             environment=WITH_KEY,
         )
-    assert ended.status == 1  # one request was refused for good
+    assert ended.status == 1  # The unauthorised request is not repeated.
     assert "1 completion " in ended.err
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert len(keys(tmp_path / "run")) == 19
@@ -259,9 +259,9 @@ def test_the_key_is_in_no_file_of_a_run(tmp_path: Path, model: str) -> None:
         assert KEY[3:] not in text
 
 
-def test_a_budget_stops_with_a_sentence_and_goes_on_later(tmp_path: Path) -> None:
+def test_a_run_continues_after_a_token_budget(tmp_path: Path) -> None:
     with Server() as server:
-        words = served(server.url, "--num-completions", "2", "--concurrency", "1")
+        words = generate_words(server.url, "--num-completions", "2", "--concurrency", "1")
         ended = roboeval(*words, "--token-budget", "5000", cwd=tmp_path)
         assert ended.status == 1
         assert ended.out == ""
@@ -275,10 +275,10 @@ def test_a_budget_stops_with_a_sentence_and_goes_on_later(tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_kill_minus_nine_at_random_moments_costs_only_what_was_under_way(tmp_path: Path) -> None:
+def test_kill_minus_nine_loses_only_pending_requests(tmp_path: Path) -> None:
     times, lost = 3, 0
     with Server(delay=0.1, fault=lambda _: Fault.SLOW) as server:
-        words = served(server.url, "--num-completions", "20", "--concurrency", "4", "--seed", "0")
+        words = generate_words(server.url, "--num-completions", "20", "--concurrency", "4", "--seed", "0")
         for kill in range(times):
             with Forked("roboeval", *words, cwd=tmp_path, environment=ENVIRONMENT) as process:
                 while len(server.requests) < 15 * (kill + 1) + 4 * kill and process.poll() is None:
@@ -296,13 +296,13 @@ def test_kill_minus_nine_at_random_moments_costs_only_what_was_under_way(tmp_pat
     assert re.search(r"^[1-4] pending requests? ", ended.err, re.MULTILINE)
     twice = json.loads((tmp_path / "run" / "run.json").read_text())["possibly_paid_twice"]
     assert len(server.requests) - 200 == lost
-    assert lost <= twice <= lost + times  # a request that was noted need not have arrived
+    assert lost <= twice <= lost + times  # A noted request need not have arrived.
 
 
 @pytest.mark.slow
-def test_control_c_says_how_to_go_on(tmp_path: Path) -> None:
+def test_ctrl_c_says_how_to_continue(tmp_path: Path) -> None:
     with Server(delay=0.1, fault=lambda _: Fault.SLOW) as server:
-        words = served(server.url, "--concurrency", "4")
+        words = generate_words(server.url, "--concurrency", "4")
         process = Forked("roboeval", *words, cwd=tmp_path, environment=ENVIRONMENT)
         while len(server.requests) < 10 and process.poll() is None:
             time.sleep(0.005)
@@ -314,7 +314,7 @@ def test_control_c_says_how_to_go_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_one_in_ten_requests_fails_over_both_protocols(tmp_path: Path) -> None:
+def test_a_run_completes_if_one_request_in_ten_fails(tmp_path: Path) -> None:
     faults = [
         Fault.SERVER_ERROR,
         Fault.TOO_MANY,
@@ -326,7 +326,7 @@ def test_one_in_ten_requests_fails_over_both_protocols(tmp_path: Path) -> None:
     for model in ("completions:tiny", "openai:tiny"):
         with Server() as server:
             server.faults.extend(fault for bad in faults for fault in [*[None] * 9, bad])
-            words = served(server.url, "--num-completions", "8", model=model)
+            words = generate_words(server.url, "--num-completions", "8", model=model)
             words[words.index("run")] = model.partition(":")[0]
             ended = roboeval(*words, cwd=tmp_path)
         run = tmp_path / model.partition(":")[0]
@@ -361,9 +361,9 @@ def test_resampling_checks_once_and_prints_both_figures(tmp_path: Path) -> None:
     lies = [{**json.loads(line), "problems": []} for line in whole.splitlines()]
     checks.write_text("".join(json.dumps(line) + "\n" for line in lies))
     trusting = json.loads(roboeval("resample", "run", "--json", cwd=tmp_path).out)
-    assert trusting["limits"][0]["accepted"] == 1  # what stands there is not checked again ...
+    assert trusting["limits"][0]["accepted"] == 1  # Stored results are not checked again.
     other = json.loads(roboeval("resample", "run", "--json", "--samples", "6", cwd=tmp_path).out)
-    assert other["limits"][0]["accepted"] < 1  # ... unless it was checked otherwise
+    assert other["limits"][0]["accepted"] < 1  # Other settings check again.
     assert roboeval("resample", "run", "--retries", "1", cwd=tmp_path).out.count("%") == 6
 
 
@@ -378,7 +378,7 @@ def test_resampling_needs_a_judged_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_resampling_counts_only_what_was_judged_as_it_stands(tmp_path: Path) -> None:
+def test_resampling_counts_only_judged_and_unchanged_programs(tmp_path: Path) -> None:
     words = ["generate", "--model", "recorded:hasty", "--num-completions", "2", "--tasks", TASKS]
     assert roboeval(*words, "--out", "run", cwd=tmp_path).status == 0
     assert roboeval("evaluate", "run", "--tasks", "LunchTime", cwd=tmp_path).status == 0

@@ -1,4 +1,4 @@
-"""Evaluations with house rules: their files, what they show, and that they are the same on every road."""
+"""House rules in evaluations: their files, their results, and the same rows with any processes."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def judged(folder: Path, *more: str) -> bytes:
+def evaluate_with_rules(folder: Path, *more: str) -> bytes:
     ended = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, *more, cwd=folder)
     assert ended.status == 0, ended.err
     return (folder / "run" / "evaluations" / "paper-rules-house.jsonl").read_bytes()
 
 
 @pytest.mark.slow
-def test_verdicts_with_rules_stand_beside_those_without(folder: Path) -> None:
+def test_verdicts_with_rules_are_kept_apart_from_those_without(folder: Path) -> None:
     assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
     plain = (folder / "run" / "evaluations" / "paper.jsonl").read_bytes()
     ended = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)
@@ -56,48 +56,48 @@ def test_verdicts_with_rules_stand_beside_those_without(folder: Path) -> None:
     assert head["house_rules"] == {"house": hashlib.sha256(RULES.encode()).hexdigest()}
     shown = roboeval("show", "run", "LunchBreak/0/0", "--rules", "house.yaml", cwd=folder)
     assert 'the rule "knock" forbids going to "' in shown.out
-    told = json.loads(roboeval("show", "run", "--rules", "house.yaml", "--json", cwd=folder).out)
-    assert set(told["house_rules"]["programs_by_rule"]) <= {"knock", "once"}
-    assert told["house_rules"]["cost"]["mean"] < 0
+    found = json.loads(roboeval("show", "run", "--rules", "house.yaml", "--json", cwd=folder).out)
+    assert set(found["house_rules"]["programs_by_rule"]) <= {"knock", "once"}
+    assert found["house_rules"]["cost"]["mean"] < 0
 
 
 @pytest.mark.slow
-def test_where_rules_are_not_named_their_verdicts_are_told_of(folder: Path) -> None:
+def test_commands_without_rules_name_the_evaluations_with_rules(folder: Path) -> None:
     evaluated = roboeval(
         "evaluate", "recorded:careful", "--out", "run", "--rules", "house.yaml", *TASKS, cwd=folder
     )
     assert evaluated.status == 0
     (folder / "kit.yaml").write_text(RULES)
     for more in ([], ["--rules", "kit.yaml"]):
-        told = refused("show", "run", *more, cwd=folder)
-        assert told.file == "run"
-        assert "only as paper-rules-house; choose with --suite and --rules" in told.sentence
+        found = refused("show", "run", *more, cwd=folder)
+        assert found.file == "run"
+        assert "only as paper-rules-house; choose with --suite and --rules" in found.sentence
     assert roboeval("evaluate", "run", *TASKS, cwd=folder).status == 0
     reported = roboeval("report", "run", "--rules", "house.yaml", "--out", "kept", "--no-check", cwd=folder)
     assert reported.status == 0, reported.err
     assert "knock" in (folder / "kept" / "index.html").read_text()
 
 
-def accepted(folder: Path, *arguments: str) -> int:
-    """How many programs of a run the check accepts."""
-    told = json.loads(roboeval("resample", *arguments, "--json", cwd=folder).out)
-    return sum(prompt["accepted"] for prompt in told["prompts"])
+def count_accepted(folder: Path, *arguments: str) -> int:
+    """Count the programs of a run that the check accepts."""
+    found = json.loads(roboeval("resample", *arguments, "--json", cwd=folder).out)
+    return sum(prompt["accepted"] for prompt in found["prompts"])
 
 
 @pytest.mark.slow
-def test_rejection_sampling_rejects_what_breaks_a_rule(folder: Path) -> None:
+def test_rejection_sampling_rejects_programs_that_break_a_rule(folder: Path) -> None:
     of_suite = ("--suite", "rules", "--tasks", "FetchMugConflict")
     assert roboeval("evaluate", "recorded:hasty", *of_suite, "--out", "own", cwd=folder).status == 0
-    assert accepted(folder, "own", "--suite", "rules") == 1  # of two, one of which breaks no rule
+    assert count_accepted(folder, "own", "--suite", "rules") == 1  # One of the two breaks no rule.
     assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
-    judged(folder)
-    without = accepted(folder, "run")
-    assert accepted(folder, "run", "--rules", "house.yaml") < without
-    assert accepted(folder, "run") == without
+    evaluate_with_rules(folder)
+    without = count_accepted(folder, "run")
+    assert count_accepted(folder, "run", "--rules", "house.yaml") < without
+    assert count_accepted(folder, "run") == without
 
 
 @pytest.mark.slow
-def test_an_interval_of_what_is_alike_everywhere_is_unknown(folder: Path) -> None:
+def test_an_interval_without_variation_is_unknown(folder: Path) -> None:
     rule = "rules: [{name: silent, says: Say nothing., always: 'not tr.Exists(goto(\".*\"))'}]"
     (folder / "house.yaml").write_text(rule)
     assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
@@ -112,48 +112,48 @@ def test_an_interval_of_what_is_alike_everywhere_is_unknown(folder: Path) -> Non
 
 
 @pytest.mark.slow
-def test_rows_are_the_same_with_any_number_of_workers_and_on_both_roads(folder: Path) -> None:
+def test_rows_are_the_same_with_any_workers_and_processes(folder: Path) -> None:
     assert roboeval("evaluate", "recorded:hasty", "--out", "run", *TASKS, cwd=folder).status == 0
-    one = judged(folder, "--workers", "1")
+    one = evaluate_with_rules(folder, "--workers", "1")
     assert b'"RuleViolation"' in one
-    assert judged(folder, "--redo", "--workers", "4") == one
-    assert judged(folder, "--redo", "--one-process-per-run") == one
+    assert evaluate_with_rules(folder, "--redo", "--workers", "4") == one
+    assert evaluate_with_rules(folder, "--redo", "--one-process-per-run") == one
 
 
 @pytest.mark.slow
-def test_other_rules_do_not_go_on_with_an_evaluation(folder: Path) -> None:
+def test_changed_rules_cannot_continue_an_evaluation(folder: Path) -> None:
     assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
-    judged(folder)
+    evaluate_with_rules(folder)
     (folder / "house.yaml").write_text(RULES.replace("3)", "4)"))
-    told = refused("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)
-    assert "judged differently: house rules was" in told.sentence
-    assert "--redo starts over" in told.sentence
+    found = refused("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)
+    assert "judged differently: house rules was" in found.sentence
+    assert "--redo starts over" in found.sentence
     for command in (("show", "run"), ("report", "run", "--out", "report")):
-        told = refused(*command, "--rules", "house.yaml", cwd=folder)
-        assert told.file == "house.yaml"
+        found = refused(*command, "--rules", "house.yaml", cwd=folder)
+        assert found.file == "house.yaml"
         assert re.search(
-            "has changed since the run was judged; `.* --rules house.yaml --redo` judges", told.sentence
+            "has changed since the run was judged; `.* --rules house.yaml --redo` judges", found.sentence
         )
 
 
 def test_rules_are_read_before_anything_is_judged(folder: Path) -> None:
     (folder / "bad.yaml").write_text(RULES.replace("always: not", "always: nut"))
-    told = refused("evaluate", "recorded:careful", "--out", "run", "--rules", "bad.yaml", cwd=folder)
-    assert told.file == "bad.yaml"
+    found = refused("evaluate", "recorded:careful", "--out", "run", "--rules", "bad.yaml", cwd=folder)
+    assert found.file == "bad.yaml"
     assert not (folder / "run").exists()
     (folder / "My Rules.yaml").write_text(RULES)
-    told = refused("evaluate", "recorded:careful", "--rules", "My Rules.yaml", cwd=folder)
-    assert "lower-case letters" in told.sentence
+    found = refused("evaluate", "recorded:careful", "--rules", "My Rules.yaml", cwd=folder)
+    assert "lower-case letters" in found.sentence
 
 
-def test_a_suite_with_rules_of_its_own_takes_no_others(folder: Path) -> None:
+def test_a_suite_with_its_own_rules_refuses_others(folder: Path) -> None:
     hasty = ("evaluate", "recorded:hasty", "--suite", "rules", "--out", "run")
-    told = refused(*hasty, "--rules", "house.yaml", cwd=folder)
-    assert "has its own house rules; leave out --rules" in str(told)
+    found = refused(*hasty, "--rules", "house.yaml", cwd=folder)
+    assert "has its own house rules; leave out --rules" in str(found)
     assert not (folder / "run").exists()
 
 
-def test_a_room_that_no_world_of_the_suite_has_is_refused(folder: Path) -> None:
+def test_a_room_in_no_world_of_the_suite_is_refused(folder: Path) -> None:
     path = folder / "house.yaml"
     path.write_text(RULES.replace('not tr.AtLeast(check("person"), 3)', 'not tr.Exists(goto("kichen"))'))
     arguments = ("evaluate", "recorded:careful", "--rules", "house.yaml", *TASKS)

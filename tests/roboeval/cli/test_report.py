@@ -1,4 +1,4 @@
-"""`roboeval report` as a person meets it."""
+"""The command `roboeval report`."""
 
 import json
 import shutil
@@ -78,7 +78,7 @@ def test_completions_are_read_once_for_all_evaluations(command: str, runs: Path,
 
 
 @pytest.mark.slow
-def test_an_unfinished_run_is_reported_as_far_as_it_goes(runs: Path) -> None:
+def test_an_unfinished_run_is_reported_with_its_counts(runs: Path) -> None:
     shutil.copytree(runs / "careful", runs / "part", ignore=shutil.ignore_patterns("checks"))
     rows = runs / "part" / "evaluations" / "paper.jsonl"
     lines = rows.read_text().splitlines(keepends=True)
@@ -99,20 +99,20 @@ def test_an_unfinished_run_is_reported_as_far_as_it_goes(runs: Path) -> None:
     assert "0 of 40 completions" in nothing.err
 
 
-def test_prices_that_are_none(runs: Path) -> None:
+def test_wrong_prices_are_refused(runs: Path) -> None:
     refusal = refused("report", runs / "careful", "--out", runs / "x", "--price", "careful", "--no-check")
     assert '"careful"' in refusal.sentence
     assert "MODEL=INPUT/OUTPUT" in refusal.sentence
     assert not (runs / "x").exists()
 
 
-def test_labels_that_are_none(runs: Path) -> None:
+def test_labels_of_unknown_runs_are_refused(runs: Path) -> None:
     refusal = refused("report", runs / "careful", "--out", runs / "x", "--label", "other=A", "--no-check")
     assert '"other"' in refusal.sentence
     assert not (runs / "x").exists()
 
 
-def test_what_is_refused(runs: Path, tmp_path: Path) -> None:
+def test_wrong_folders_are_refused(runs: Path, tmp_path: Path) -> None:
     refusal = refused("report", tmp_path, "--out", tmp_path / "r")
     assert refusal.at == (str(tmp_path), None)
     assert "completions.jsonl" in refusal.sentence
@@ -123,7 +123,7 @@ def test_what_is_refused(runs: Path, tmp_path: Path) -> None:
     assert refused("report", runs / "careful", "--out", "").sentence.endswith("a folder")
 
 
-def test_a_folder_of_other_things_is_no_place_for_a_report(runs: Path, tmp_path: Path) -> None:
+def test_a_folder_with_other_files_cannot_become_a_report(runs: Path, tmp_path: Path) -> None:
     mine = tmp_path / "figures" / "tasks.pdf"
     mine.parent.mkdir()
     mine.write_text("mine")
@@ -135,7 +135,7 @@ def test_a_folder_of_other_things_is_no_place_for_a_report(runs: Path, tmp_path:
     assert (mine.read_text(), (tmp_path / "index.html").read_text()) == ("mine", "my own page")
 
 
-def test_runs_of_different_suites_are_not_set_side_by_side(runs: Path) -> None:
+def test_runs_of_different_suites_are_not_compared(runs: Path) -> None:
     head = runs / "careful" / "evaluations" / "paper.json"
     kept = head.read_text()
     head.write_text(json.dumps(json.loads(kept) | {"digest": "f" * 64}))
@@ -147,8 +147,8 @@ def test_runs_of_different_suites_are_not_set_side_by_side(runs: Path) -> None:
     assert not (runs / "mixed").exists()
 
 
-def test_help_imports_nothing_that_draws() -> None:
+def test_help_imports_no_heavy_library() -> None:
     code = "import sys, roboeval.cli.app\n"
     code += "print([m for m in ('matplotlib', 'numpy', 'polars') if m in sys.modules])"
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert told.stdout == "[]\n"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stdout == "[]\n"

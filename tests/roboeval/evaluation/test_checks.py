@@ -1,4 +1,4 @@
-"""What checking rejects of programs that models wrote, with one seed; bench/check.py takes more."""
+"""How many model-written programs a check rejects, with one seed; bench/check.py takes more."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -35,9 +35,7 @@ def test_rates_on_real_programs(
 
 
 @pytest.mark.slow
-def test_right_ones_of_the_careful_programs_are_accepted_and_wrong_ones_for_their_error(
-    paper: Suite, pool: WorkerPool
-) -> None:
+def test_right_careful_programs_are_accepted_and_wrong_ones_rejected(paper: Suite, pool: WorkerPool) -> None:
     rows = [(c.task, c.program) for c in recorded_completions("recorded:careful", paper)]
     sources: list[Source] = list(dict.fromkeys(rows))
     true = truths(sources, paper, 1)

@@ -1,4 +1,4 @@
-"""What a question gains is measured with a person who judges options by the task's requirements."""
+"""Measure questions with a simulated person who judges options by the task's requirements."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -50,7 +50,7 @@ def completions(*programs: str, usage: int | None = None) -> list[Completion]:
     ]
 
 
-def measured(
+def measure(
     programs: Sequence[Completion], paper: Suite, pool: WorkerPool, candidates: int = 4, noise: float = 0.0
 ) -> PromptShares:
     (found,) = clarify(programs, paper, pool, ClarifySettings(candidates, noise))
@@ -59,19 +59,19 @@ def measured(
 
 @pytest.mark.slow
 def test_a_person_takes_the_option_that_passes(paper: Suite, pool: WorkerPool) -> None:
-    found = measured(completions(WRONG, WRONG, RIGHT, SILENT), paper, pool)
+    found = measure(completions(WRONG, WRONG, RIGHT, SILENT), paper, pool)
     assert found == shares(0.25, majority=0, question=1, mattered=1)
 
 
 @pytest.mark.slow
 def test_none_of_the_options_counts_as_failed(paper: Suite, pool: WorkerPool) -> None:
-    found = measured(completions(WRONG, WRONG, SILENT), paper, pool, 3)
+    found = measure(completions(WRONG, WRONG, SILENT), paper, pool, 3)
     assert found == shares(0, majority=0, question=0, mattered=0)
 
 
 @pytest.mark.slow
 def test_without_a_question_the_largest_cluster_counts(paper: Suite, pool: WorkerPool) -> None:
-    found = measured(completions(RIGHT, RIGHT, RIGHT, WRONG), paper, pool)
+    found = measure(completions(RIGHT, RIGHT, RIGHT, WRONG), paper, pool)
     assert found == shares(0.75, majority=1, question=1, asked=0)
 
 
@@ -79,14 +79,14 @@ def test_without_a_question_the_largest_cluster_counts(paper: Suite, pool: Worke
 def test_a_person_who_is_always_wrong_never_takes_the_option_that_passes(
     paper: Suite, pool: WorkerPool
 ) -> None:
-    found = measured(completions(RIGHT, RIGHT, WRONG, SILENT), paper, pool, noise=1.0)
+    found = measure(completions(RIGHT, RIGHT, WRONG, SILENT), paper, pool, noise=1.0)
     assert found == shares(0.5, majority=1, question=0, mattered=1)
 
 
 @pytest.mark.slow
 def test_tokens_are_counted_for_a_group(paper: Suite, pool: WorkerPool) -> None:
-    assert measured(completions(RIGHT, SILENT, usage=9), paper, pool, 2)["tokens"] == 20
-    assert measured(completions(RIGHT, SILENT), paper, pool, 2)["tokens"] is None
+    assert measure(completions(RIGHT, SILENT, usage=9), paper, pool, 2)["tokens"] == 20
+    assert measure(completions(RIGHT, SILENT), paper, pool, 2)["tokens"] is None
 
 
 def test_too_few_completions_are_refused(paper: Suite, pool: WorkerPool) -> None:
@@ -115,7 +115,7 @@ def shares(
     }
 
 
-def test_prompts_count_equally_but_what_mattered_is_of_questions(paper: Suite) -> None:
+def test_prompts_count_equally_but_mattered_counts_questions(paper: Suite) -> None:
     prompts = [
         shares(0.75, majority=0.5, question=1, asked=0.5, mattered=1),
         shares(0, majority=1, question=1, mattered=0, tokens=30),
@@ -133,7 +133,7 @@ def test_nothing_mattered_without_a_question(paper: Suite) -> None:
 # --- measurements in a run
 
 
-def judged_by(suite: Suite, written: Sequence[Completion], run: Path) -> Results:
+def results_by(suite: Suite, written: Sequence[Completion], run: Path) -> Results:
     results = results_of([], suite, completions=written, head={"digest": suite.digest})
     return replace(results, run=RunFolder(run))
 
@@ -146,14 +146,14 @@ def test_a_stored_measurement_is_outdated_when_programs_or_the_suite_change(
     data = measurement_data(written, paper, ClarifySettings(2, 0.1, 7), prompts)
     path = store_measurement(RunFolder(tmp_path), paper, data)
     assert (path.parent, json.loads(path.read_text())) == (RunFolder(tmp_path).questions("paper"), data)
-    results = judged_by(paper, written, tmp_path)
+    results = results_by(paper, written, tmp_path)
     ((found, is_current),) = read_measurements(results)
     assert (found["candidates"], found["noise"], found["seed"], is_current) == (2, 0.1, 7, True)
     assert (found["question"], found["mattered"], found["prompts"][0]["task"]) == (1.0, 1.0, TASK)
     others = [
-        judged_by(paper, completions(RIGHT, WRONG), tmp_path),
-        judged_by(paper, [replace(one, prompt=1) for one in written], tmp_path),
-        judged_by(replace(paper, digest="0"), written, tmp_path),
+        results_by(paper, completions(RIGHT, WRONG), tmp_path),
+        results_by(paper, [replace(one, prompt=1) for one in written], tmp_path),
+        results_by(replace(paper, digest="0"), written, tmp_path),
     ]
     assert [is_current for each in others for _, is_current in read_measurements(each)] == [False] * 3
     store_measurement(RunFolder(tmp_path), paper, {**data, "candidates": 10})
@@ -166,5 +166,5 @@ def test_a_damaged_measurement_is_named(paper: Suite, tmp_path: Path, content: s
     path.parent.mkdir(parents=True)
     path.write_text(content)
     with pytest.raises(UserError, match="clarify") as refused:
-        list(read_measurements(judged_by(paper, [], tmp_path)))
+        list(read_measurements(results_by(paper, [], tmp_path)))
     assert refused.value.file == path

@@ -1,6 +1,6 @@
-"""Verdicts on programs that real models wrote, compared with what a correct evaluator must give.
+"""Compare verdicts on programs of real models with those of a correct evaluator.
 
-The folder is named by CODEBOTLER_CORPUS; without it these tests are skipped and say so.
+CODEBOTLER_CORPUS names the folder; without it, these tests are skipped.
 """
 
 import json
@@ -36,11 +36,11 @@ CUT_AT = 40
 Row = dict[str, Any]
 
 
-def read(path: Path) -> list[Row]:
+def read_rows(path: Path) -> list[Row]:
     return [json.loads(line) for line in path.read_text().splitlines()]
 
 
-def judged(rows: list[Row], suite: Suite) -> list[Row]:
+def judge_rows(rows: list[Row], suite: Suite) -> list[Row]:
     completions = [
         Completion(task=row["task"], prompt=0, index=index, program=row["program"])
         for index, row in enumerate(rows)
@@ -49,7 +49,7 @@ def judged(rows: list[Row], suite: Suite) -> list[Row]:
 
 
 def expected_kinds(error: str) -> set[str]:
-    """The kinds that an error of the original evaluator may have here."""
+    """Return the kinds that an error of the original evaluator may have here."""
     kind, _, message = error.partition(": ")
     if kind != "Exception":
         return {kind}
@@ -71,12 +71,12 @@ def trace_of(verdict: Row) -> list[list[object]]:
 
 @pytest.fixture(scope="module")
 def programs(corpus: Path) -> list[Row]:
-    return read(corpus / "corpus" / "programs.jsonl")
+    return read_rows(corpus / "corpus" / "programs.jsonl")
 
 
 @pytest.fixture(scope="module")
 def evaluations(programs: list[Row], paper: Suite) -> list[Row]:
-    return judged(programs, paper)
+    return judge_rows(programs, paper)
 
 
 def pairs(programs: list[Row], evaluations: list[Row]) -> list[tuple[str, Row, Row]]:
@@ -87,9 +87,9 @@ def pairs(programs: list[Row], evaluations: list[Row]) -> list[tuple[str, Row, R
     ]
 
 
-def test_a_sample_of_programs_is_judged_as_it_should_be(programs: list[Row], paper: Suite) -> None:
+def test_a_sample_of_programs_is_judged_correctly(programs: list[Row], paper: Suite) -> None:
     sample = programs[::20]
-    for key, verdict, true in pairs(sample, judged(sample, paper)):
+    for key, verdict, true in pairs(sample, judge_rows(sample, paper)):
         assert (verdict["satisfied"], status_of(verdict)) == (true["satisfied"], true["status"]), key
 
 
@@ -137,9 +137,7 @@ def test_all_traces_are_right(programs: list[Row], evaluations: list[Row]) -> No
 
 
 @pytest.mark.slow
-def test_a_question_nobody_can_answer_is_told_apart_from_one_nobody_hears(
-    programs: list[Row], evaluations: list[Row]
-) -> None:
+def test_unheard_questions_differ_from_unanswerable_ones(programs: list[Row], evaluations: list[Row]) -> None:
     kinds = Counter(
         verdict["error"]["kind"]
         for _, verdict, true in pairs(programs, evaluations)
@@ -149,10 +147,10 @@ def test_a_question_nobody_can_answer_is_told_apart_from_one_nobody_hears(
 
 
 @pytest.mark.slow
-def test_programs_written_by_hand(corpus: Path, paper: Suite) -> None:
-    rows = read(corpus / "tasks" / "synthetic.jsonl")
+def test_programs_written_by_hand_are_judged_correctly(corpus: Path, paper: Suite) -> None:
+    rows = read_rows(corpus / "tasks" / "synthetic.jsonl")
     compared = 0
-    for row, evaluation in zip(rows, judged(rows, paper), strict=True):
+    for row, evaluation in zip(rows, judge_rows(rows, paper), strict=True):
         true_verdicts = row["should"] if "bug_of_original" in row else row["verdicts"]
         for verdict, true in zip(evaluation["verdicts"], true_verdicts, strict=True):
             if true is None:
@@ -169,7 +167,7 @@ def test_programs_written_by_hand(corpus: Path, paper: Suite) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("file", "model"), [("gpt-4", "GPT-4"), ("palm-2", "PaLM2")])
-def test_published_results(corpus: Path, paper: Suite, file: str, model: str) -> None:
+def test_published_results_are_reproduced(corpus: Path, paper: Suite, file: str, model: str) -> None:
     published = json.loads((corpus / "reference" / "published_results.json").read_text())
     completions = list(read_completions(corpus / "corpus" / "completions" / f"{file}.jsonl"))
     passed: Counter[tuple[str, int]] = Counter()
@@ -185,7 +183,7 @@ def test_published_results(corpus: Path, paper: Suite, file: str, model: str) ->
 
 
 @pytest.mark.slow
-def test_the_table_in_the_readme(corpus: Path) -> None:
+def test_the_table_in_the_readme_is_correct(corpus: Path) -> None:
     published = json.loads((corpus / "reference" / "published_results.json").read_text())
     read_me = (Path(__file__).parents[3] / "README.md").read_text()
     rows = [
@@ -201,8 +199,8 @@ def test_the_table_in_the_readme(corpus: Path) -> None:
         means[task] = [mean(prompt[column] for prompt in prompts) for column in columns]
     means["**all 16**"] = [mean(column) for column in zip(*means.values(), strict=True)]
     for task, shares in means.items():
-        told = [table[task][at] for at in (0, 2, 4, 5, 6)]
-        assert told == [f"{share:.3f}" for share in shares], task
+        shown = [table[task][at] for at in (0, 2, 4, 5, 6)]
+        assert shown == [f"{share:.3f}" for share in shares], task
     for file, at in (("gpt-4", 1), ("palm-2", 3)):
         completions = list(read_completions(corpus / "corpus" / "completions" / f"{file}.jsonl"))
         ours: dict[str, list[str]] = defaultdict(list)
@@ -219,7 +217,7 @@ def test_the_table_in_the_readme(corpus: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("file", ["gpt-4", "palm-2"])
-def test_published_ablation(corpus: Path, paper: Suite, file: str) -> None:
+def test_published_ablations_are_reproduced(corpus: Path, paper: Suite, file: str) -> None:
     completions = list(read_completions(corpus / "corpus" / "completions" / f"{file}.jsonl"))
     for completion, row in zip(
         completions, evaluate(completions, paper, ablated=True, workers=2), strict=True

@@ -1,4 +1,4 @@
-"""Views of prompts and completions: reasons, storyboards, and that programs stay text on the terminal."""
+"""Views of prompts and completions: reasons, storyboards, and programs that stay text on the terminal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trac
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import Explanation, Formula, explain, parse
 from codebotler.simulator.settings import SimulationSettings
-from made_results import as_driven, results_of, row_of
+from made_results import results_of, row_of, with_places
 from roboeval.analysis.counting.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import completion_view as view_of_completion
 from roboeval.cli.views.completions import prompt_view
@@ -43,13 +43,13 @@ WORLD = World(
 )
 
 
-def required(name: str, rtl: str) -> Requirement:
+def requirement(name: str, rtl: str) -> Requirement:
     return Requirement(name, name, parse(rtl), "Location")
 
 
-VISITS = required("visits", 'tr.Exists(goto("office"))')
-GREETS = required('greets("amy")', 'tr.ActAtFirst("office", say("hello"))')
-BIDS = required("bids_farewell", 'tr.Exists(say("bye"))')
+VISITS = requirement("visits", 'tr.Exists(goto("office"))')
+GREETS = requirement('greets("amy")', 'tr.ActAtFirst("office", say("hello"))')
+BIDS = requirement("bids_farewell", 'tr.Exists(say("bye"))')
 WAITING = replace(WORLD, about="nobody comes", may_wait_forever=True)
 TASK = Task(
     name="Visit",
@@ -67,7 +67,7 @@ SUITE = Suite("small", 1, "", SimulationSettings(), {"Visit": TASK}, "0")
 
 GOTO, HELLO = Event("goto", "office"), Event("say", "hello")
 FINE = Outcome(Status.FINISHED, (GOTO, HELLO))
-MUTE = Outcome(Status.FINISHED, as_driven(WORLD, GOTO, Event("goto", "lab"), HELLO))
+MUTE = Outcome(Status.FINISHED, with_places(WORLD, GOTO, Event("goto", "lab"), HELLO))
 
 
 def completion(index: int = 0, program: str = "x = 1\ny = 2\n", **fields: Any) -> Completion:  # noqa: ANN401 - any field
@@ -80,11 +80,11 @@ def row(written: Completion, *outcomes: Outcome, ablated: bool = False) -> dict[
     return dict(row_of(written, judgement(verdicts)))
 
 
-def failed(status: Status, kind: str, message: str, *events: Event, line: int | None = None) -> Outcome:
+def failure(status: Status, kind: str, message: str, *events: Event, line: int | None = None) -> Outcome:
     return Outcome(status, events, RunError(kind, message), line)
 
 
-def printed(renderable: RenderableType, width: int = 80, *, colour: bool = False) -> str:
+def text_of(renderable: RenderableType, width: int = 80, *, colour: bool = False) -> str:
     console = Console(width=width, force_terminal=colour, color_system="standard" if colour else None)
     with console.capture() as captured:
         console.print(renderable)
@@ -106,13 +106,13 @@ def results(
 # --- a prompt
 
 
-LOST = failed(Status.ROBOT_ERROR, "GoToInvalidLocation", 'there is no room "moon"', line=2)
-THREE = [completion(0), completion(1), completion(2, "mute"), completion(3, "lost")]
-ROWS = [row(c, o, FINE) for c, o in zip(THREE, [FINE, FINE, MUTE, LOST], strict=True)]
+LOST = failure(Status.ROBOT_ERROR, "GoToInvalidLocation", 'there is no room "moon"', line=2)
+COMPLETIONS = [completion(0), completion(1), completion(2, "mute"), completion(3, "lost")]
+ROWS = [row(c, o, FINE) for c, o in zip(COMPLETIONS, [FINE, FINE, MUTE, LOST], strict=True)]
 
 
 def test_a_prompt_groups_equal_programs_and_gives_reasons() -> None:
-    data = prompt_data(results(ROWS, THREE), "Visit", 0)
+    data = prompt_data(results(ROWS, COMPLETIONS), "Visit", 0)
     json.dumps(data)
     assert (data["completions"], data["passed"], data["pass@1"]) == (4, 2, 0.5)
     assert [program["indices"] for program in data["programs"]] == [[0, 1], [2], [3]]
@@ -123,7 +123,7 @@ def test_a_prompt_groups_equal_programs_and_gives_reasons() -> None:
 
 
 def test_a_prompt_is_shown_line_by_line() -> None:
-    text = printed(prompt_view(prompt_data(results(ROWS, THREE), "Visit", 0)), 160)
+    text = text_of(prompt_view(prompt_data(results(ROWS, COMPLETIONS), "Visit", 0)), 160)
     unrecorded = f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}"
     assert text.startswith(
         f"Visit/0  2 of 4 passed (pass@1 0.50)\n{unrecorded}\nVisit Amy.\n\n  0  x2  passed\n"
@@ -140,7 +140,7 @@ def test_a_prompt_is_shown_line_by_line() -> None:
 def test_a_completion_is_shown_world_by_world() -> None:
     written = completion(program="go_to('office')\nsay('hello')\n", instruction="Visit her.", model="m")
     answered = Event("ask", "lunch?", (Option("yes"), Option("5", is_text=False)), answer="yes")
-    trace = as_driven(
+    trace = with_places(
         WORLD,
         Event("check", "amy", found=False),
         GOTO,
@@ -152,7 +152,7 @@ def test_a_completion_is_shown_world_by_world() -> None:
         Event("place", "mug"),
         Event("wave", "amy"),
     )
-    text = printed(completion_view(row(written, Outcome(Status.FINISHED, trace)), written, SUITE), 110)
+    text = text_of(completion_view(row(written, Outcome(Status.FINISHED, trace)), written, SUITE), 110)
     assert text.startswith("Visit/0/0  failed check: Location\nwritten by m\nVisit her.\n\n")
     assert "  1 go_to('office')\n  2 say('hello')\n" in text
     story = """World: amy is in
@@ -171,37 +171,37 @@ not satisfied, finished
     assert story in text
 
 
-def test_the_line_of_an_error_is_marked_and_that_of_an_allowed_timeout_is_not() -> None:
-    waits = failed(Status.TIMEOUT, "TimeoutError", "1,000 skill calls", line=1)
-    text = printed(completion_view(row(completion(), LOST, waits), completion(), SUITE, in_full=True))
+def test_an_error_marks_its_line_and_an_allowed_timeout_does_not() -> None:
+    waits = failure(Status.TIMEOUT, "TimeoutError", "1,000 skill calls", line=1)
+    text = text_of(completion_view(row(completion(), LOST, waits), completion(), SUITE, in_full=True))
     assert "  1 x = 1\n❱ 2 y = 2\n" in text
     assert 'not satisfied, robot-error: GoToInvalidLocation, line 2: there is no room "moon"' in text
     assert "\n  the robot did nothing" in text
     assert "satisfied, timeout (allowed here): TimeoutError, line 1: 1,000 skill calls" in text
 
 
-TWICE = replace(SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WAITING, ()), TASK.scenarios[0]))})
+BOTH = replace(SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WAITING, ()), TASK.scenarios[0]))})
 
 
-def test_world_that_decided_comes_first_and_satisfied_ones_are_lines() -> None:
-    waits = failed(Status.TIMEOUT, "TimeoutError", "1,000 skill calls", GOTO, line=1)
-    verdicts = [judge(o, s) for o, s in zip((waits, MUTE), TWICE.tasks["Visit"].scenarios, strict=True)]
+def test_the_deciding_world_comes_first_and_satisfied_ones_are_single_lines() -> None:
+    waits = failure(Status.TIMEOUT, "TimeoutError", "1,000 skill calls", GOTO, line=1)
+    verdicts = [judge(o, s) for o, s in zip((waits, MUTE), BOTH.tasks["Visit"].scenarios, strict=True)]
     judged = row_of(completion(), judgement(verdicts))
-    text = printed(completion_view(judged, completion(), TWICE), 120)
+    text = text_of(completion_view(judged, completion(), BOTH), 120)
     short = "World 1 of 2: nobody comes  satisfied, timeout (allowed here), 1 step\n--all shows"
     assert text.index("World 2 of 2: amy is in\nnot satisfied") < text.index(short)
     assert re.search(r"❱ 3 +said", text)
-    full = printed(completion_view(judged, completion(), TWICE, in_full=True), 120)
+    full = text_of(completion_view(judged, completion(), BOTH, in_full=True), 120)
     assert full.index("World 2 of 2") < full.index(
         "World 1 of 2: nobody comes\nsatisfied, timeout (allowed here)"
     )
     assert "--all" not in full
-    worlds = completion_data(judged, completion(), TWICE)["worlds"]
+    worlds = completion_data(judged, completion(), BOTH)["worlds"]
     assert [world["world"] for world in worlds] == ["nobody comes", "amy is in"]
 
 
 @pytest.mark.parametrize(("recorded", "prompt"), [(None, 0), ("Visit her.", 0), (None, 7)])
-def test_text_of_the_suite_is_a_field_of_its_own(recorded: str | None, prompt: int) -> None:
+def test_the_suites_instruction_is_a_separate_field(recorded: str | None, prompt: int) -> None:
     written = completion(instruction=recorded)
     data = completion_data({**row(written, FINE), "prompt": prompt}, written, SUITE)
     assert data["instruction"] == recorded
@@ -209,38 +209,38 @@ def test_text_of_the_suite_is_a_field_of_its_own(recorded: str | None, prompt: i
     assert completion_data(row(written, FINE), written, None)["suite_instruction"] is None
 
 
-def test_an_error_without_a_message_is_told_by_its_kind_and_line() -> None:
+def test_an_error_without_a_message_shows_its_kind_and_line() -> None:
     for line, where in ((2, ", line 2"), (None, "")):
-        full = row(completion(), failed(Status.KILLED, "MemoryError", "", line=line))
-        text = printed(completion_view(full, completion(), SUITE))
+        full = row(completion(), failure(Status.KILLED, "MemoryError", "", line=line))
+        text = text_of(completion_view(full, completion(), SUITE))
         assert f"\nnot satisfied, killed: MemoryError{where}\n" in text
-        text = printed(prompt_view(prompt_data(results([full], [completion()]), "Visit", 0)))
+        text = text_of(prompt_view(prompt_data(results([full], [completion()]), "Visit", 0)))
         assert text.endswith('MemoryError in "amy is in"' + ("\n     line 2" if line else ""))
 
 
-def test_lines_keep_their_numbers_whatever_ends_them() -> None:
+def test_lines_keep_their_numbers_with_any_line_ending() -> None:
     written = completion(program="\n\r\n\rx = (\n\n\n")
-    text = printed(completion_view(row(written, LOST), written, SUITE))
+    text = text_of(completion_view(row(written, LOST), written, SUITE))
     assert "  4 x = (\n" in text
     assert "  5" not in text
 
 
-def test_what_was_not_recorded_is_said_and_the_text_of_the_suite_is_marked() -> None:
-    text = printed(completion_view(row(completion(), FINE), completion(program=""), SUITE))
+def test_a_completion_without_instruction_shows_the_suites() -> None:
+    text = text_of(completion_view(row(completion(), FINE), completion(program=""), SUITE))
     assert f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}\nVisit Amy." in text
 
 
-def test_of_a_prompt_it_is_said_that_its_instruction_was_not_recorded() -> None:
+def test_tasks_and_prompts_say_that_no_instruction_was_recorded() -> None:
     for text in (
-        printed(task_view(task_data(results(ROWS, THREE[:1]), "Visit"))),
-        printed(prompt_view(prompt_data(results(ROWS, THREE[:1]), "Visit", 0))),
+        text_of(task_view(task_data(results(ROWS, COMPLETIONS[:1]), "Visit"))),
+        text_of(prompt_view(prompt_data(results(ROWS, COMPLETIONS[:1]), "Visit", 0))),
     ):
         assert "instruction not recorded" in text
 
 
-def test_a_completion_as_data_holds_every_step() -> None:
+def test_a_completion_as_json_has_every_step() -> None:
     written = completion(model="m")
-    trace = as_driven(WORLD, *[GOTO] * 999)
+    trace = with_places(WORLD, *[GOTO] * 999)
     data = completion_data(row(written, Outcome(Status.FINISHED, trace)), written, SUITE)
     json.dumps(data)
     world = data["worlds"][0]
@@ -264,7 +264,7 @@ def test_an_ablation_is_explained_by_its_own_requirements() -> None:
     assert '"bye"' in of_prompt["programs"][0]["explanation"]
 
 
-def test_worlds_of_one_name_are_told_apart_by_their_order() -> None:
+def test_worlds_with_the_same_name_are_matched_by_order() -> None:
     suite = replace(
         SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WORLD, ()), Scenario(WORLD, (BIDS,))))}
     )
@@ -273,7 +273,7 @@ def test_worlds_of_one_name_are_told_apart_by_their_order() -> None:
     assert '"bye"' in data["worlds"][1]["failed_checks"][0]["explanation"]
 
 
-def test_a_suite_that_has_changed_since_is_named() -> None:
+def test_a_suite_that_has_changed_is_mentioned() -> None:
     gone = replace(SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WORLD, (VISITS,)),))})
     met = replace(TASK, scenarios=(Scenario(WORLD, (replace(VISITS, text='greets("amy")'),)),))
     cases = [
@@ -281,14 +281,14 @@ def test_a_suite_that_has_changed_since_is_named() -> None:
         (replace(SUITE, tasks={"Visit": met}), "the suite has changed .* now satisfied"),
     ]
     for suite, sentence in cases:
-        text = printed(completion_view(row(completion(), MUTE), completion(), suite), 160)
+        text = text_of(completion_view(row(completion(), MUTE), completion(), suite), 160)
         assert re.search(rf'failed greets\("amy"\): {sentence}', text)
 
 
-def test_a_world_that_the_suite_has_no_more_still_shows_its_trace() -> None:
+def test_a_world_missing_from_the_suite_still_shows_its_trace() -> None:
     renamed = replace(TASK, scenarios=(Scenario(replace(WORLD, about="amy is out"), (VISITS, GREETS)),))
     for suite in (replace(SUITE, tasks={}), replace(SUITE, tasks={"Visit": renamed})):
-        text = printed(completion_view(row(completion(), MUTE), completion(), suite), 160)
+        text = text_of(completion_view(row(completion(), MUTE), completion(), suite), 160)
         assert '1  start → office\n2  office → lab\n3      said "hello"\n' in text
 
 
@@ -297,35 +297,35 @@ def test_a_world_that_the_suite_has_no_more_still_shows_its_trace() -> None:
 
 def test_a_long_trace_is_shortened_in_its_middle() -> None:
     waits = [Event("check", "amy", found=False), Event("say", "hm")] * 499
-    trace = as_driven(WORLD, GOTO, *waits, Event("goto", "start"))
-    text = printed(completion_view(row(completion(), Outcome(Status.FINISHED, trace)), completion(), SUITE))
+    trace = with_places(WORLD, GOTO, *waits, Event("goto", "start"))
+    text = text_of(completion_view(row(completion(), Outcome(Status.FINISHED, trace)), completion(), SUITE))
     assert "     ... 982 more ...\n" in text
     assert "\n1000  office → start\n" in text
     assert "\n 500 " not in text
 
 
-def test_a_step_that_an_explanation_names_is_never_left_out() -> None:
-    once = required("is_silent", 'not tr.Exists(say("hm"))')
+def test_a_step_in_an_explanation_is_never_omitted() -> None:
+    once = requirement("is_silent", 'not tr.Exists(say("hm"))')
     suite = replace(SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WORLD, (once,)),))})
     trace = (*[Event("check", f"n{i}", found=False) for i in range(500)], Event("say", "hm"), *[GOTO] * 100)
     verdict = judge(Outcome(Status.FINISHED, trace), suite.tasks["Visit"].scenarios[0])
-    text = printed(completion_view(row_of(completion(), judgement([verdict])), completion(), suite))
+    text = text_of(completion_view(row_of(completion(), judgement([verdict])), completion(), suite))
     assert '\n       ... 488 more ...\n❱ 501      said "hm"\n       ... 94 more ...\n' in text
 
 
 def test_a_long_text_is_shortened() -> None:
     trace = (Event("say", "a" * 10_000), Event("ask", "q", (Option("o"),) * 30))
-    text = printed(completion_view(row(completion(), Outcome(Status.FINISHED, trace)), completion(), SUITE))
+    text = text_of(completion_view(row(completion(), Outcome(Status.FINISHED, trace)), completion(), SUITE))
     assert "9,500 more characters" in text.replace("\n      ", "")
     assert "10 more] → no answer" in text
     assert len(text) < 3_000
 
 
-# --- what a model wrote is text
+# --- text of models
 
 
 @pytest.mark.parametrize("colour", [False, True])
-def test_nothing_a_model_wrote_reaches_the_terminal_as_more_than_text(*, colour: bool) -> None:
+def test_hostile_text_of_a_model_stays_text(*, colour: bool) -> None:
     trace = (
         Event("say", HOSTILE),
         Event("goto", HOSTILE),
@@ -333,7 +333,7 @@ def test_nothing_a_model_wrote_reaches_the_terminal_as_more_than_text(*, colour:
         Event(HOSTILE, HOSTILE),
     )
     silent = Outcome(Status.FINISHED, trace)
-    fails = failed(Status.PYTHON_ERROR, HOSTILE, HOSTILE, *trace, line=1)
+    fails = failure(Status.PYTHON_ERROR, HOSTILE, HOSTILE, *trace, line=1)
     written = completion(program=f"say('{HOSTILE}')\r\n\t# {HOSTILE}", instruction=HOSTILE, model=HOSTILE)
     rows = [row(written, silent), row(written, fails), row(written, fails)]
     rows[2]["verdicts"][0]["world"] = HOSTILE
@@ -344,7 +344,7 @@ def test_nothing_a_model_wrote_reaches_the_terminal_as_more_than_text(*, colour:
             task_view(task_data(results([one], [written]), "Visit")),
         ]
         for shown in views:
-            text = printed(shown, 400, colour=colour)
+            text = text_of(shown, 400, colour=colour)
             assert SHOWN in text
             for control in ("\x1b[2J", "\x07", "\u202e", "\ud800"):
                 assert control not in text
@@ -353,29 +353,29 @@ def test_nothing_a_model_wrote_reaches_the_terminal_as_more_than_text(*, colour:
 
 @pytest.mark.parametrize("width", [80, 120])
 def test_views_fit_the_width(width: int) -> None:
-    judged = results(ROWS, THREE)
+    judged = results(ROWS, COMPLETIONS)
     for view in (
         task_view(task_data(judged, "Visit")),
         prompt_view(prompt_data(judged, "Visit", 0)),
-        completion_view(ROWS[2], THREE[2], SUITE),
+        completion_view(ROWS[2], COMPLETIONS[2], SUITE),
     ):
-        text = printed(view, width)
+        text = text_of(view, width)
         assert max(map(len, text.splitlines())) <= width
 
 
-def test_of_very_long_traces_only_the_first_are_explained(monkeypatch: pytest.MonkeyPatch) -> None:
-    told = [Event("say", "no " * 1_000)] * 10
+def test_only_the_first_very_long_traces_are_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    events = [Event("say", "no " * 1_000)] * 10
     task = replace(TASK, scenarios=tuple(Scenario(replace(WORLD, about=str(n)), (BIDS,)) for n in range(30)))
     suite = replace(SUITE, tasks={"Visit": task})
-    verdicts = [judge(Outcome(Status.FINISHED, tuple(told)), s) for s in task.scenarios]
+    verdicts = [judge(Outcome(Status.FINISHED, tuple(events)), s) for s in task.scenarios]
     one = row_of(completion(), judgement(verdicts))
     compared = []
 
-    def noting(formula: Formula, trace: Trace) -> Explanation | None:
+    def note_length(formula: Formula, trace: Trace) -> Explanation | None:
         compared.append(sum(len(event.text) for event in trace))
         return explain(formula, trace)
 
-    monkeypatch.setattr("roboeval.evaluation.judging.explanation.explain", noting)
+    monkeypatch.setattr("roboeval.evaluation.judging.explanation.explain", note_length)
     worlds = completion_data(one, completion(), suite)["worlds"]
     why = [check["explanation"] for world in worlds for check in world["failed_checks"]]
     assert len(why) == 30
@@ -384,11 +384,11 @@ def test_of_very_long_traces_only_the_first_are_explained(monkeypatch: pytest.Mo
     assert 0 < sum(compared) <= 100_000
 
 
-def test_lowered_texts_are_shown_as_they_are_judged_and_explained() -> None:
+def test_lowercased_texts_are_shown_as_judged() -> None:
     said = Outcome(Status.FINISHED, (GOTO, Event("say", "good day")))
     for settings in (SimulationSettings(), SimulationSettings(literals="as-written")):
         suite = replace(SUITE, settings=settings)
         written = replace(completion(), program="def task_program():\n    say('Good Day')\n")
-        text = printed(completion_view(row(written, said), written, suite), 120)
+        text = text_of(completion_view(row(written, said), written, suite), 120)
         assert 'said "good day"' in text
         assert (LOWERCASED_NOTE in text) is (settings == SimulationSettings())

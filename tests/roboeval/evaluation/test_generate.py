@@ -1,4 +1,4 @@
-"""Whatever happens meanwhile, a run gets exactly the completions it shall have, each once."""
+"""A run gets exactly the requested completions, each once, despite failures and interruptions."""
 
 import json
 import os
@@ -33,7 +33,7 @@ CUT = ModelError("the connection was cut", may_pass=True)
 REFUSED = ModelError("the key in SCRIPTED_API_KEY is refused", may_pass=False)
 
 
-def generated(
+def generate(
     run: RunFolder,
     suite: Suite,
     model: Scripted,
@@ -63,11 +63,11 @@ def about(run: RunFolder) -> dict[str, Any]:
     return data
 
 
-def test_a_run_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite) -> None:
+def test_a_run_has_the_documented_files_and_rows(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "runs" / "one")
     sent = SamplingSettings(temperature=0.7, seed=5, base_url="http://a/v1")
     model = Scripted(settings=sent)
-    progress = generated(run, paper, model)
+    progress = generate(run, paper, model)
     assert (progress.done, progress.total, progress.missing, progress.interrupted) == (30, 30, None, 0)
     assert model.closed
     assert keys(run) == expected(3)
@@ -100,28 +100,28 @@ def test_a_run_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite
 
 def test_first_completions_of_all_prompts_come_first(tmp_path: Path, paper: Suite) -> None:
     model = Scripted()
-    generated(RunFolder(tmp_path / "run"), paper, model, count=2, pace=Pace(concurrency=1))
+    generate(RunFolder(tmp_path / "run"), paper, model, count=2, pace=Pace(concurrency=1))
     assert [number for _, number in model.asked] == [0] * 10 + [1] * 10
 
 
-def test_a_completed_run_asks_for_nothing_and_keeps_its_end(tmp_path: Path, paper: Suite) -> None:
+def test_a_completed_run_requests_nothing_and_stays_the_same(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
-    generated(run, paper, Scripted())
+    generate(run, paper, Scripted())
     before = run.completions.read_bytes(), run.about.read_bytes()
     model = Scripted()
-    assert generated(run, paper, model).found == 30
+    assert generate(run, paper, model).found == 30
     assert model.asked == []
     assert (run.completions.read_bytes(), run.about.read_bytes()) == before
 
 
-def test_more_can_be_asked_for_later_and_fewer_take_nothing_away(tmp_path: Path, paper: Suite) -> None:
+def test_a_run_can_grow_but_not_shrink(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
-    generated(run, paper, Scripted(), count=1)
+    generate(run, paper, Scripted(), count=1)
     model = Scripted()
-    progress = generated(run, paper, model, count=3)
+    progress = generate(run, paper, model, count=3)
     assert (progress.found, len(model.asked)) == (10, 20)
     assert keys(run) == expected(3)
-    assert generated(run, paper, Scripted(), count=2).missing is None
+    assert generate(run, paper, Scripted(), count=2).missing is None
     assert keys(run) == expected(3)
 
 
@@ -134,7 +134,7 @@ def test_each_batch_of_requests_keeps_its_settings(tmp_path: Path, paper: Suite)
     assert len(model.asked) == 10
     before = run.about.read_bytes()
     generate_run(run, GenerationPlan(paper, frozenset({"SayGoodDay"}), 1), Scripted(settings=first), Pace())
-    assert run.about.read_bytes() == before  # it asked for nothing
+    assert run.about.read_bytes() == before  # It requested nothing.
     batches = about(run)["batches"]
     assert [(one["tasks"], one["settings"]["timeout"]) for one in batches] == [
         (["LunchTime"], 5.0),
@@ -142,13 +142,13 @@ def test_each_batch_of_requests_keeps_its_settings(tmp_path: Path, paper: Suite)
     ]
 
 
-def test_as_many_at_the_same_time_as_allowed(tmp_path: Path, paper: Suite) -> None:
+def test_concurrency_limits_simultaneous_requests(tmp_path: Path, paper: Suite) -> None:
     model = Scripted(seconds=0.002)
-    generated(RunFolder(tmp_path / "run"), paper, model, count=5, pace=Pace(concurrency=3))
+    generate(RunFolder(tmp_path / "run"), paper, model, count=5, pace=Pace(concurrency=3))
     assert model.most == 3
 
 
-def test_each_completion_is_in_the_file_when_it_counts(tmp_path: Path, paper: Suite) -> None:
+def test_each_completion_is_in_the_file_before_it_counts(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
     done: list[int] = []
 
@@ -156,18 +156,18 @@ def test_each_completion_is_in_the_file_when_it_counts(tmp_path: Path, paper: Su
         done.append(progress.done)
         assert len(rows(run)) >= progress.done
 
-    generated(run, paper, Scripted(seconds=0.001), on_progress=count)
+    generate(run, paper, Scripted(seconds=0.001), on_progress=count)
     assert done == list(range(31))
 
 
-def test_a_completion_counts_only_once_it_is_on_the_disk(
+def test_a_completion_counts_only_after_its_sync(
     tmp_path: Path, paper: Suite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = RunFolder(tmp_path / "run")
     on_disk = [0]
     sync = Appender.sync
 
-    def noted(file: Appender) -> None:
+    def note_sync(file: Appender) -> None:
         lines = file.path.read_bytes().count(b"\n")
         sync(file)
         if file.path == run.completions:
@@ -176,11 +176,11 @@ def test_a_completion_counts_only_once_it_is_on_the_disk(
     def check(progress: GenerationProgress) -> None:
         assert on_disk[0] >= progress.done
 
-    monkeypatch.setattr(Appender, "sync", noted)
-    assert generated(run, paper, Scripted(seconds=0.001), on_progress=check).missing is None
+    monkeypatch.setattr(Appender, "sync", note_sync)
+    assert generate(run, paper, Scripted(seconds=0.001), on_progress=check).missing is None
 
 
-# --- what goes on and what does not
+# --- continuing a run
 
 
 @pytest.mark.parametrize(
@@ -196,83 +196,83 @@ def test_other_settings_are_refused(
     tmp_path: Path, paper: Suite, settings: SamplingSettings, what: str
 ) -> None:
     run = RunFolder(tmp_path / "run")
-    generated(run, paper, Scripted())
+    generate(run, paper, Scripted())
     before = run.completions.read_bytes(), run.about.read_bytes()
     with pytest.raises(UserError, match=re.escape(what)) as error:
-        generated(run, paper, Scripted(settings=settings))
+        generate(run, paper, Scripted(settings=settings))
     assert error.value.file == run.about
     assert (run.completions.read_bytes(), run.about.read_bytes()) == before
 
 
 def test_another_model_or_template_is_refused(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
-    generated(run, paper, Scripted())
+    generate(run, paper, Scripted())
     with pytest.raises(UserError, match=r"\(scripted:one, now scripted:two\)"):
-        generated(run, paper, Scripted(name="scripted:two"))
+        generate(run, paper, Scripted(name="scripted:two"))
     run.about.write_text(json.dumps(about(run) | {"template": "0" * 64}))
     with pytest.raises(UserError, match=r"template \(0{23}…, now "):
-        generated(run, paper, Scripted())
+        generate(run, paper, Scripted())
 
 
-def test_another_timeout_or_address_is_no_matter(tmp_path: Path, paper: Suite) -> None:
+def test_another_timeout_or_address_is_accepted(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
-    generated(run, paper, Scripted(), count=1)
+    generate(run, paper, Scripted(), count=1)
     moved = SamplingSettings(timeout=5, base_url="http://other/v1")
-    generated(run, paper, Scripted(settings=moved), count=2)
+    generate(run, paper, Scripted(settings=moved), count=2)
     assert keys(run) == expected(2)
 
 
-def test_completions_from_elsewhere_are_left_alone(tmp_path: Path, paper: Suite) -> None:
+def test_a_run_of_other_completions_is_refused(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
     run.path.mkdir()
     run.completions.write_bytes(to_line({"task": "LunchTime", "prompt": 0, "index": 0, "program": ""}))
     with pytest.raises(UserError, match="missing") as error:
-        generated(run, paper, Scripted())
+        generate(run, paper, Scripted())
     assert error.value.file == run.about
     run.about.write_text('{"model": null}')
     with pytest.raises(UserError, match="imported"):
-        generated(run, paper, Scripted())
+        generate(run, paper, Scripted())
 
 
 def test_completions_of_another_instruction_are_refused(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
-    generated(run, paper, Scripted())
+    generate(run, paper, Scripted())
     first, *others = rows(run)
     changed = [first | {"instruction": "Do something else."}, *others]
     run.completions.write_bytes(b"".join(map(to_line, changed)))
     with pytest.raises(UserError, match=r"/0/0 .* instruction"):
-        generated(run, paper, Scripted())
+        generate(run, paper, Scripted())
 
 
 def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
     with run.writing(), pytest.raises(UserError, match="another process"):
-        generated(run, paper, Scripted())
+        generate(run, paper, Scripted())
 
 
-# --- what goes wrong
+# --- failures
 
 
 @pytest.mark.parametrize("cut", [1, 10, 200])
-def test_a_torn_last_line_is_asked_for_again(tmp_path: Path, paper: Suite, cut: int) -> None:
+def test_a_torn_last_line_is_requested_again(tmp_path: Path, paper: Suite, cut: int) -> None:
     run = RunFolder(tmp_path / "run")
-    generated(run, paper, Scripted())
+    generate(run, paper, Scripted())
     run.completions.write_bytes(run.completions.read_bytes()[:-cut])
     model = Scripted()
-    generated(run, paper, model)
+    generate(run, paper, model)
     assert len(model.asked) == 1
     assert keys(run) == expected(3)
 
 
-def test_what_fails_is_missing_and_asked_for_again_later(tmp_path: Path, paper: Suite) -> None:
+def test_failed_requests_are_missing_and_repeated_later(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
     refusing = Scripted(fails=lambda number: REFUSED if number in {3, 7} else None)
-    progress = generated(run, paper, refusing, pace=Pace(concurrency=1))
+    progress = generate(run, paper, refusing, pace=Pace(concurrency=1))
     assert progress.missing is not None
     assert progress.missing.startswith("2 completions ")
     assert "SCRIPTED_API_KEY" in progress.missing
     model = Scripted()
-    assert generated(run, paper, model).missing is None
+    assert generate(run, paper, model).missing is None
     assert (len(model.asked), keys(run)) == (2, expected(3))
     assert len(about(run)["batches"]) == 1
     assert about(run)["possibly_paid_twice"] == 0
@@ -284,7 +284,7 @@ REFUSAL = ModelError("the server answered with status 400 (no)", may_pass=False,
 def test_refused_prompt_is_a_completion_without_a_program(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
     model = Scripted(fails=lambda number: REFUSAL if number in {0, 5, 29} else None)
-    progress = generated(run, paper, model, pace=Pace(concurrency=1))
+    progress = generate(run, paper, model, pace=Pace(concurrency=1))
     assert (progress.done, progress.missing, keys(run)) == (30, None, expected(3))
     refused = [row for row in rows(run) if row["no_program"] == "refusal"]
     assert [(row["program"], row["raw_reply"]) for row in refused] == [("", REFUSAL.sentence)] * 3
@@ -293,65 +293,63 @@ def test_refused_prompt_is_a_completion_without_a_program(tmp_path: Path, paper:
 def test_refusals_of_every_prompt_are_an_error(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
     with pytest.raises(ModelError, match="400"):
-        generated(run, paper, Scripted(fails=lambda _: REFUSAL), pace=Pace(concurrency=1))
+        generate(run, paper, Scripted(fails=lambda _: REFUSAL), pace=Pace(concurrency=1))
     assert not run.completions.exists()
 
 
-def test_refusals_in_a_row_are_no_completions(tmp_path: Path, paper: Suite) -> None:
+def test_refusals_in_a_row_stop_a_run_and_are_not_kept(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
-    model = Scripted(fails=lambda number: REFUSAL if number >= 10 else None)  # such as a key without money
-    progress = generated(run, paper, model, pace=Pace(concurrency=1))
+    model = Scripted(fails=lambda number: REFUSAL if number >= 10 else None)  # No credit is left.
+    progress = generate(run, paper, model, pace=Pace(concurrency=1))
     assert progress.stopped is not None
     assert progress.missing is not None
     assert [row["no_program"] for row in rows(run)] == [None] * 10
 
 
-def test_a_model_that_fails_now_and_then_is_not_given_up(tmp_path: Path, paper: Suite) -> None:
+def test_occasional_failures_do_not_stop_a_run(tmp_path: Path, paper: Suite) -> None:
     model = Scripted(fails=lambda number: REFUSED if number % 3 else None)
-    progress = generated(RunFolder(tmp_path / "run"), paper, model, pace=Pace(concurrency=1))
+    progress = generate(RunFolder(tmp_path / "run"), paper, model, pace=Pace(concurrency=1))
     assert (len(model.asked), progress.done, progress.stopped) == (30, 10, None)
 
 
 @pytest.mark.parametrize(("concurrency", "most"), [(1, 3), (8, 15)])
-def test_a_model_that_only_fails_is_given_up_and_leaves_nothing(
+def test_a_model_that_always_fails_stops_a_run_without_files(
     tmp_path: Path, paper: Suite, concurrency: int, most: int
 ) -> None:
     model = Scripted(fails=lambda _: REFUSED)
     with pytest.raises(ModelError, match="SCRIPTED_API_KEY"):
-        generated(RunFolder(tmp_path / "runs" / "run"), paper, model, pace=Pace(concurrency))
+        generate(RunFolder(tmp_path / "runs" / "run"), paper, model, pace=Pace(concurrency))
     assert len(model.asked) <= most
     assert list(tmp_path.iterdir()) == []
     assert model.closed
 
 
-def test_a_reply_too_long_to_be_kept_is_a_failure(tmp_path: Path, paper: Suite) -> None:
+def test_a_reply_that_is_too_long_is_a_failure(tmp_path: Path, paper: Suite) -> None:
     with pytest.raises(ModelError, match=r"too long .* 6,0\d\d,\d\d\d bytes"):
-        generated(RunFolder(tmp_path / "run"), paper, Scripted(text="#" * 3_000_000), pace=Pace(1))
+        generate(RunFolder(tmp_path / "run"), paper, Scripted(text="#" * 3_000_000), pace=Pace(1))
 
 
-def test_a_budget_stops_cleanly_and_a_second_one_goes_on(tmp_path: Path, paper: Suite) -> None:
+def test_a_token_budget_stops_cleanly_and_a_second_one_continues(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
-    progress = generated(run, paper, Scripted(), pace=Pace(concurrency=1, token_budget=1000))
+    progress = generate(run, paper, Scripted(), pace=Pace(concurrency=1, token_budget=1000))
     assert progress.done == 10
     assert progress.missing is not None
     assert re.match(r"20 completions .*\btoken budget of 1,000\b", progress.missing)
     assert len(rows(run)) == 10
     assert not run.in_flight.exists()
-    progress = generated(run, paper, Scripted(), pace=Pace(concurrency=1, token_budget=1000))
+    progress = generate(run, paper, Scripted(), pace=Pace(concurrency=1, token_budget=1000))
     assert (progress.found, progress.done, progress.interrupted) == (10, 20, 0)
-    generated(run, paper, Scripted())
+    generate(run, paper, Scripted())
     assert keys(run) == expected(3)
 
 
-def test_spent_budget_counts_the_requests_that_were_under_way(tmp_path: Path, paper: Suite) -> None:
+def test_a_token_budget_counts_pending_requests(tmp_path: Path, paper: Suite) -> None:
     pace = Pace(concurrency=4, token_budget=1000)
-    progress = generated(RunFolder(tmp_path / "run"), paper, Scripted(seconds=0.001), pace=pace)
+    progress = generate(RunFolder(tmp_path / "run"), paper, Scripted(seconds=0.001), pace=pace)
     assert f"{110 * progress.done:,} tokens were used" in (progress.missing or "")
 
 
-def test_a_request_that_failed_is_no_longer_under_way_while_the_next_try_waits(
-    tmp_path: Path, paper: Suite
-) -> None:
+def test_a_failed_request_is_not_pending_while_its_retry_waits(tmp_path: Path, paper: Suite) -> None:
     run = RunFolder(tmp_path / "run")
     notes: list[list[str]] = []
 
@@ -359,7 +357,7 @@ def test_a_request_that_failed_is_no_longer_under_way_while_the_next_try_waits(
         notes.append([next(iter(row)) for _, row in read_rows(run.in_flight)])
         return CUT if number == 0 else None
 
-    generated(run, paper, Scripted(fails=fails), count=1, pace=Pace(concurrency=1))
+    generate(run, paper, Scripted(fails=fails), count=1, pace=Pace(concurrency=1))
     assert notes[:3] == [
         ["sent"],
         ["sent", "ended", "sent"],
@@ -368,7 +366,7 @@ def test_a_request_that_failed_is_no_longer_under_way_while_the_next_try_waits(
 
 
 @pytest.mark.slow
-def test_4000_completions_of_which_one_request_in_ten_fails(tmp_path: Path, paper: Suite) -> None:
+def test_4000_completions_although_one_request_in_ten_fails(tmp_path: Path, paper: Suite) -> None:
     chance = random.Random(3)
     run = RunFolder(tmp_path / "run")
     model = Scripted(fails=lambda _: CUT if chance.random() < 0.1 else None)
@@ -398,7 +396,7 @@ generate_run(
 """
 
 
-def started(
+def start_process(
     run: RunFolder, log: Path, *, count: int, seconds: float = 0.01, before: str = ""
 ) -> subprocess.Popen[bytes]:
     script = SCRIPT.format(
@@ -417,7 +415,7 @@ def started(
 
 
 def wait_for_notes(log: Path, count: int) -> None:
-    """Wait until the model has noted so much."""
+    """Wait until the model has noted so many events."""
     deadline = time.monotonic() + 30
     while (log.read_bytes().count(b"\n") if log.exists() else 0) < count:
         assert time.monotonic() < deadline
@@ -425,28 +423,28 @@ def wait_for_notes(log: Path, count: int) -> None:
 
 
 def asked_of(log: Path, pid: int, suite: Suite) -> set[tuple[str, int, int]]:
-    """The completions that a process asked for, as the model noted it."""
+    """Return the completions that a process requested according to the model's log."""
     prompts = {
         instruction: (task.name, number)
         for task in suite.tasks.values()
         for number, instruction in enumerate(task.prompts)
     }
     noted = log.read_bytes() if log.exists() else b""
-    if noted and not noted.endswith(b"\n"):  # a kill tears a line where a page of memory ends
+    if noted and not noted.endswith(b"\n"):  # A kill tears a line at the end of a memory page.
         os.truncate(log, noted.rfind(b"\n") + 1)
     notes = [json.loads(line) for line in noted.splitlines(keepends=True) if line.endswith(b"\n")]
-    return {(*prompts[told], index) for what, told, index, by in notes if what == "asked" and by == pid}
+    return {(*prompts[prompt], index) for what, prompt, index, by in notes if what == "asked" and by == pid}
 
 
 @pytest.mark.slow
-def test_kill_minus_nine_loses_only_what_was_under_way(tmp_path: Path, paper: Suite) -> None:
+def test_kill_minus_nine_loses_only_pending_requests(tmp_path: Path, paper: Suite) -> None:
     run, log = RunFolder(tmp_path / "run"), tmp_path / "log"
     chance = random.Random(5)
     lost: Counter[tuple[str, int, int]] = Counter()
     kills = 0
     for _ in range(5):
         notes = log.read_bytes().count(b"\n") if log.exists() else 0
-        process = started(run, log, count=60)
+        process = start_process(run, log, count=60)
         wait_for_notes(log, notes + chance.randint(10, 100))
         time.sleep(chance.uniform(0, 0.01))
         process.kill()
@@ -455,22 +453,22 @@ def test_kill_minus_nine_loses_only_what_was_under_way(tmp_path: Path, paper: Su
         done = {completion.key for completion in read_completions(run.completions, growing=True)}
         under_way = asked_of(log, process.pid, paper) - done
         assert len(under_way) <= 5
-        # A request is noted before the model hears of it, so that at most those being sent are counted too.
+        # A request is noted before it is sent, so the count may include requests that never arrived.
         assert len(under_way) <= RequestLog(run.in_flight, done).interrupted <= 5
         lost.update(under_way)
     assert kills == 5
-    generated(run, paper, Scripted(), count=60)
+    generate(run, paper, Scripted(), count=60)
     assert Counter(keys(run)) == Counter(expected(60))
     assert 0 < sum(lost.values()) <= about(run)["possibly_paid_twice"] <= sum(lost.values()) + kills
     lines = map(json.loads, log.read_text().splitlines())
-    asked = Counter((told, index) for what, told, index, _ in lines if what == "asked")
+    asked = Counter((prompt, index) for what, prompt, index, _ in lines if what == "asked")
     assert sum(n - 1 for n in asked.values()) <= about(run)["possibly_paid_twice"]
 
 
 @pytest.mark.slow
-def test_control_c_keeps_what_came_and_counts_what_was_under_way(tmp_path: Path, paper: Suite) -> None:
+def test_ctrl_c_keeps_completions_and_counts_pending_requests(tmp_path: Path, paper: Suite) -> None:
     run, log = RunFolder(tmp_path / "run"), tmp_path / "log"
-    process = started(run, log, count=60, seconds=0.05)
+    process = start_process(run, log, count=60, seconds=0.05)
     wait_for_notes(log, 50)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
@@ -478,29 +476,29 @@ def test_control_c_keeps_what_came_and_counts_what_was_under_way(tmp_path: Path,
     done = set(keys(run))
     under_way = asked_of(log, process.pid, paper) - done
     assert 0 < len(under_way) <= 5
-    progress = generated(run, paper, Scripted(), count=60)
+    progress = generate(run, paper, Scripted(), count=60)
     assert progress.interrupted == len(under_way)
     assert about(run)["possibly_paid_twice"] == len(under_way)
     assert Counter(keys(run)) == Counter(expected(60))
     assert not run.in_flight.exists()
 
 
-def test_an_interruption_counts_what_waits_for_the_disk(
+def test_an_interruption_counts_completions_that_wait_for_a_sync(
     tmp_path: Path, paper: Suite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = RunFolder(tmp_path / "run")
     seen: list[GenerationProgress] = []
     sync, once = Appender.sync, threading.Lock()
 
-    def interrupted(file: Appender) -> None:
+    def interrupt_sync(file: Appender) -> None:
         late = file.path == run.completions and file.path.read_bytes().count(b"\n") > 10
-        if late and once.acquire(blocking=False):  # others sync at the same time
+        if late and once.acquire(blocking=False):  # Other threads sync too.
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(0.2)
         sync(file)
 
-    monkeypatch.setattr(Appender, "sync", interrupted)
-    plan = GenerationPlan(paper, SMALL, 100)  # so many that it cannot be over by then
+    monkeypatch.setattr(Appender, "sync", interrupt_sync)
+    plan = GenerationPlan(paper, SMALL, 100)  # So many last until the interrupt.
     with pytest.raises(KeyboardInterrupt):
         generate_run(run, plan, Scripted(seconds=0.1), Pace(), on_progress=seen.append)
     progress = seen[0]
@@ -508,13 +506,13 @@ def test_an_interruption_counts_what_waits_for_the_disk(
 
 
 @pytest.mark.slow
-def test_a_full_disk_leaves_whole_rows_and_asks_no_further(tmp_path: Path, paper: Suite) -> None:
+def test_a_full_disk_leaves_whole_rows_and_stops_requests(tmp_path: Path, paper: Suite) -> None:
     run, log = RunFolder(tmp_path / "run"), tmp_path / "log"
     limit = (
         "import resource, signal\nsignal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000))\n"
     )
-    process = started(run, log, count=20, seconds=0.0, before=limit)
+    process = start_process(run, log, count=20, seconds=0.0, before=limit)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 1
     assert b"OSError: [Errno 27] File too large" in err
@@ -522,16 +520,16 @@ def test_a_full_disk_leaves_whole_rows_and_asks_no_further(tmp_path: Path, paper
     done = set(keys(run))
     under_way = asked_of(log, process.pid, paper) - done
     assert len(under_way) <= 5
-    progress = generated(run, paper, Scripted(), count=20)
+    progress = generate(run, paper, Scripted(), count=20)
     assert len(under_way) <= progress.interrupted <= 5
     assert Counter(keys(run)) == Counter(expected(20))
 
 
 @pytest.mark.parametrize("line", ["{}", '{"sent": 3}', '{"sent": ["a", "b", 1]}'])
-def test_a_note_that_somebody_broke_is_refused(tmp_path: Path, paper: Suite, line: str) -> None:
+def test_a_damaged_request_log_is_refused(tmp_path: Path, paper: Suite, line: str) -> None:
     run = RunFolder(tmp_path / "run")
-    generated(run, paper, Scripted())
+    generate(run, paper, Scripted())
     run.in_flight.write_text(f'{{"sent": ["A", 0, 0]}}\n{line}\n')
     with pytest.raises(UserError, match="request") as error:
-        generated(run, paper, Scripted())
+        generate(run, paper, Scripted())
     assert (error.value.file, error.value.line) == (run.in_flight, 2)

@@ -1,4 +1,4 @@
-"""What house rules do to a few programs; bench/rules.py measures many."""
+"""Effects of house rules on a few programs; bench/rules.py measures many."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -49,7 +49,7 @@ def effects(measuring: Measuring, task: str, program: str) -> dict[str, Effect]:
     return {effect.house: effect for effect in found}
 
 
-def test_there_are_three_rules_or_more_of_eight_kinds() -> None:
+def test_there_are_eight_kinds_of_three_or_more_rules() -> None:
     kinds = Counter(house.kind for house in houses())
     del kinds[ALL]
     assert len(kinds) == 8
@@ -57,7 +57,7 @@ def test_there_are_three_rules_or_more_of_eight_kinds() -> None:
 
 
 @pytest.mark.slow
-def test_rules_stop_what_breaks_them_and_nothing_else(measuring: Measuring) -> None:
+def test_rules_stop_only_what_breaks_them(measuring: Measuring) -> None:
     found = effects(measuring, "GetDrink", HASTY)
     broken = {name for name, effect in found.items() if effect.broken}
     assert {"permission-to-take", "holding-in-the-lobby", ALL} <= broken
@@ -68,18 +68,18 @@ def test_rules_stop_what_breaks_them_and_nothing_else(measuring: Measuring) -> N
         assert effect.rejected == (effect.broken > 0)
 
 
-def test_what_was_refused_would_have_failed(measuring: Measuring) -> None:
+def test_a_refused_call_would_have_failed(measuring: Measuring) -> None:
     found = effects(measuring, "GetDrink", IN_VAIN)["permission-to-take"]
     assert (found.broken, found.failing, found.altered) == (0, 3, 0)
 
 
 @pytest.mark.slow
-def test_a_guard_that_sees_nothing_is_noticed(measuring: Measuring, monkeypatch: pytest.MonkeyPatch) -> None:
-    def nothing(_: RuleGuard, *events: Event, is_drive: bool = False) -> None:
-        """Take what there is."""
+def test_a_blind_guard_is_noticed(measuring: Measuring, monkeypatch: pytest.MonkeyPatch) -> None:
+    def ignore_events(_: RuleGuard, *events: Event, is_drive: bool = False) -> None:
+        """Ignore all events."""
 
-    monkeypatch.setattr(RuleGuard, "judge", nothing)
-    monkeypatch.setattr(RuleGuard, "happened", nothing)
+    monkeypatch.setattr(RuleGuard, "judge", ignore_events)
+    monkeypatch.setattr(RuleGuard, "happened", ignore_events)
     found = effects(measuring, "GetDrink", HASTY)["permission-to-take"]
     assert (found.broken, found.executed) == (3, 3)
 

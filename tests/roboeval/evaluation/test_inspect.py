@@ -1,4 +1,4 @@
-"""The benchmark in Inspect: the same verdicts as ours, told in a log that its viewer opens.
+"""The benchmark in Inspect: the same verdicts as ours, in a log that its viewer opens.
 
 Inspect is an extra; `make test-inspect` runs this file.
 """
@@ -45,14 +45,14 @@ TASK = "codebotler/roboeval"
 
 
 @pytest.fixture(scope="module", autouse=True)
-def streams_left_open() -> Iterator[None]:
-    """Collected while the mark above holds: at the end of a session it no longer does."""
+def collect_open_streams() -> Iterator[None]:
+    """Collect the open streams while the mark above applies; it does not at the end of a session."""
     yield
     gc.collect()
 
 
-def answering(completions: list[Completion], rules: Sequence[str] = ()) -> Any:  # noqa: ANN401 - Inspect has no types here
-    """A model that answers with recorded programs, those for the same prompt in turns."""
+def model_of(completions: list[Completion], rules: Sequence[str] = ()) -> Any:  # noqa: ANN401 - Inspect has no types here
+    """Return a model that answers with recorded programs, which take turns for the same prompt."""
     programs: dict[str, list[str]] = defaultdict(list)
     for completion in completions:
         assert completion.instruction is not None
@@ -64,7 +64,7 @@ def answering(completions: list[Completion], rules: Sequence[str] = ()) -> Any: 
         known = programs[said[-1].text]
         program = known[next(turns[said[-1].text]) % len(known)]
         output = ModelOutput.from_content("mockllm", f"Here it is:\n```python\n{program}```\n")
-        output.usage = ModelUsage()  # otherwise it is counted with a table from the network
+        output.usage = ModelUsage()  # Inspect would download a table to count tokens.
         return output
 
     return get_model("mockllm/model", custom_outputs=answer)
@@ -77,22 +77,22 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def recorded(paper: Suite) -> list[Completion]:
-    """Right and wrong ones of all tasks."""
+    """Return right and wrong completions of all tasks."""
     return [*recorded_completions("recorded:hasty", paper)]
 
 
 @pytest.fixture(scope="module")
-def judged(logs: Path, recorded: list[Completion]) -> EvalLog:
-    """What Inspect makes of them."""
+def eval_log(logs: Path, recorded: list[Completion]) -> EvalLog:
+    """Let Inspect judge the recorded completions."""
     most = max(Counter((completion.task, completion.prompt) for completion in recorded).values())
     (log,) = inspect_eval(
-        TASK, model=answering(recorded), epochs=most, log_dir=str(logs), log_realtime=False, display="none"
+        TASK, model=model_of(recorded), epochs=most, log_dir=str(logs), log_realtime=False, display="none"
     )
     assert log.status == "success", log.error
     return read_eval_log(log.location)
 
 
-def test_cut_off_reply_fails_for_want_of_a_program(tmp_path: Path) -> None:
+def test_a_cut_off_reply_fails_without_a_program(tmp_path: Path) -> None:
     output = ModelOutput.from_content(
         "mockllm", "```python\ndef task_program():\n    say(", stop_reason="max_tokens"
     )
@@ -109,18 +109,18 @@ def test_cut_off_reply_fails_for_want_of_a_program(tmp_path: Path) -> None:
     assert {score.metadata["failure"]["kind"] for score in scores} == {"cut-off"}
 
 
-def test_all_recorded_completions_get_the_verdicts_that_we_give(
-    judged: EvalLog, recorded: list[Completion], paper: Suite
+def test_all_recorded_completions_get_our_verdicts(
+    eval_log: EvalLog, recorded: list[Completion], paper: Suite
 ) -> None:
     ours = {
         (c.task, c.prompt, c.program.rstrip()): row
         for c, row in zip(recorded, evaluate(recorded, paper, workers=2), strict=True)
     }
-    told = {}
-    for sample in judged.samples or []:
+    found = {}
+    for sample in eval_log.samples or []:
         (score,) = (sample.scores or {}).values()
         key = sample.metadata["task"], sample.metadata["prompt"], score.answer.rstrip()
-        told[key] = score
+        found[key] = score
         row = ours[key]
         assert (score.value == CORRECT) == row["passed"]
         assert score.metadata["failure"] == row["failure"]
@@ -134,9 +134,9 @@ def test_all_recorded_completions_get_the_verdicts_that_we_give(
             assert ended in score.explanation.splitlines()
             for failed in world["failed_checks"]:
                 assert f"- {failed['check']}: {failed['explanation']}" in score.explanation
-    assert told.keys() == ours.keys()
-    shares = judged.results.scores[0].metrics
-    samples = judged.samples or []
+    assert found.keys() == ours.keys()
+    shares = eval_log.results.scores[0].metrics
+    samples = eval_log.samples or []
     passed = sum(next(iter((s.scores or {}).values())).value == CORRECT for s in samples)
     assert shares["accuracy"].value == pytest.approx(passed / len(samples))
     assert shares.keys() >= {"accuracy", "stderr", *paper.tasks}
@@ -148,7 +148,7 @@ def test_the_suite_of_house_rules_is_judged_by_its_rules(tmp_path: Path, model: 
     recorded = [*recorded_completions(f"recorded:{model}", suite)]
     (log,) = inspect_eval(
         TASK,
-        model=answering(recorded, suite.house_sentences),
+        model=model_of(recorded, suite.house_sentences),
         task_args={"suite": "rules"},
         log_dir=str(tmp_path),
         log_realtime=False,
@@ -163,7 +163,7 @@ def test_the_suite_of_house_rules_is_judged_by_its_rules(tmp_path: Path, model: 
     assert set(passed.values()) == {model == "careful"}
 
 
-def test_a_sample_is_a_prompt_with_what_our_command_asks(paper: Suite) -> None:
+def test_a_sample_has_the_prompt_of_our_command(paper: Suite) -> None:
     made = inspecting.roboeval(tasks="LunchTime,SayGoodDay")
     assert [sample.id for sample in made.dataset] == [
         f"{task}/{number}" for task in ("LunchTime", "SayGoodDay") for number in range(5)
@@ -171,9 +171,9 @@ def test_a_sample_is_a_prompt_with_what_our_command_asks(paper: Suite) -> None:
     (instruction, asked) = (paper.tasks["SayGoodDay"].prompts[2], made.dataset[7].input)
     assert asked == instruction
     state = SimpleNamespace(input_text=asked, messages=[])
-    told = asyncio.run(made.setup(state, None)).messages
+    found = asyncio.run(made.setup(state, None)).messages
     ours = prompt_for(instruction).messages
-    assert [(said.role, said.text) for said in told] == [(said.role, said.text) for said in ours]
+    assert [(said.role, said.text) for said in found] == [(said.role, said.text) for said in ours]
     assert (made.config.temperature, made.config.top_p, made.config.max_tokens) == (0.2, 0.95, None)
     with pytest.raises(UserError, match='"Sing"'):
         inspecting.roboeval(tasks=["Sing"])
@@ -181,37 +181,37 @@ def test_a_sample_is_a_prompt_with_what_our_command_asks(paper: Suite) -> None:
         inspecting.roboeval(worlds=3)
 
 
-def scored(program: str) -> Any:  # noqa: ANN401 - Inspect has no types here
+def score_program(program: str) -> Any:  # noqa: ANN401 - Inspect has no types here
     about = {"task": "SayGoodDay", "prompt": 0}
     state = SimpleNamespace(metadata=about, output=SimpleNamespace(completion=program, choices=[]))
-    return inspecting.verdict()(state, Target(""))  # all of a state that is looked at
+    return inspecting.verdict()(state, Target(""))  # The scorer reads only these fields.
 
 
-def test_what_a_log_cannot_hold_is_no_reason_to_stop() -> None:
-    score = asyncio.run(scored("def task_program():\n    go_to('amy\\'s lab')\n    say('\\ud800')\n"))
+def test_text_that_a_log_cannot_contain_is_replaced() -> None:
+    score = asyncio.run(score_program("def task_program():\n    go_to('amy\\'s lab')\n    say('\\ud800')\n"))
     assert score.metadata["worlds"][0]["steps"][-1]["text"] == "?"
     assert score.model_dump_json()
 
 
-def test_the_loop_goes_on_while_a_program_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_event_loop_runs_while_a_program_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     went_on = threading.Event()
 
-    def slowly(*arguments: Any, **options: Any) -> Iterator[Row]:  # noqa: ANN401 - whatever it takes
-        assert went_on.wait(20), "the loop stands still"
+    def evaluate_slowly(*arguments: Any, **options: Any) -> Iterator[Row]:  # noqa: ANN401 - the arguments of evaluate
+        assert went_on.wait(20), "the event loop is blocked"
         return evaluate(*arguments, **options)
 
-    monkeypatch.setattr(inspecting, "evaluate", slowly)
+    monkeypatch.setattr(inspecting, "evaluate", evaluate_slowly)
 
-    async def both() -> Any:  # noqa: ANN401 - as above
-        judging = asyncio.ensure_future(scored("def task_program():\n    pass\n"))
+    async def judge_meanwhile() -> Any:  # noqa: ANN401 - Inspect has no types here
+        judging = asyncio.ensure_future(score_program("def task_program():\n    pass\n"))
         await asyncio.sleep(0.1)
         went_on.set()
         return await judging
 
-    assert asyncio.run(both()).value != CORRECT
+    assert asyncio.run(judge_meanwhile()).value != CORRECT
 
 
-# --- as a user has it
+# --- the command and the viewer
 
 COMMAND = """
 import tiktoken
@@ -269,11 +269,11 @@ def viewer(logs: Path, tmp_path: Path) -> Iterator[str]:
         viewing.wait()
 
 
-def test_the_viewer_opens_the_log(judged: EvalLog, viewer: str, pytestconfig: pytest.Config) -> None:
+def test_the_viewer_opens_the_log(eval_log: EvalLog, viewer: str, pytestconfig: pytest.Config) -> None:
     browser_path = chromium()
     if browser_path is None:
         pytest.skip("there is no Chromium here: apt-get install chromium-headless-shell")
-    sample = next(one for one in judged.samples or [] if one.scores["verdict"].metadata["failure"])
+    sample = next(one for one in eval_log.samples or [] if one.scores["verdict"].metadata["failure"])
     failed = next(w for w in sample.scores["verdict"].metadata["worlds"] if not w["satisfied"])
     shots = pytestconfig.getoption("--shots")
     with sync_playwright() as playwright:

@@ -1,4 +1,4 @@
-"""Missions of agents in Inspect: the same verdicts as ours, in a log with each call and its result.
+"""Missions of agents in Inspect: our verdicts, in a log with each call and its result.
 
 Inspect is an extra; `make test-inspect` runs this file.
 """
@@ -37,20 +37,20 @@ from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Row
 from roboeval.suites.load import Suite, load_suite
-from small_suite import a_suite
+from small_suite import write_suite
 
 # Inspect leaves one of its own streams open for each sample.
 pytestmark = pytest.mark.filterwarnings("ignore:Unclosed <MemoryObjectReceiveStream:ResourceWarning")
 
 Turn: TypeAlias = Sequence[tuple[str, Any]] | str
-"""What the model replies: calls with arguments, or with a text that is not JSON; or else a text."""
+"""A reply of the model: calls with arguments, which may be invalid JSON, or a text."""
 
 MAX_TURNS = 9
 GO: Turn = [("go_to", {"location": "kitchen"})]
 LOOK: Turn = [("is_in_room", {"entity": "jill"})]
 HELLO: Turn = [("say", {"message": "hello"})]
 STOP: Turn = [("give_up", {"reason": "I cannot."})]
-CUT_OFF = "I will now"  # a reply that reaches the limit of tokens
+CUT_OFF = "I will now"  # This reply reaches the limit of tokens.
 UNLOGGABLE = "lone surrogates"
 SCRIPTS: dict[str, tuple[Sequence[Turn], tuple[str, str] | None]] = {
     "passes": ([GO, LOOK, HELLO, "Done."], None),
@@ -89,15 +89,15 @@ worlds:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def streams_left_open() -> Iterator[None]:
-    """Collected while the mark above holds: at the end of a session it no longer does."""
+def collect_open_streams() -> Iterator[None]:
+    """Collect the open streams while the mark above applies; it does not at the end of a session."""
     yield
     gc.collect()
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return a_suite(tmp_path_factory.mktemp("suite"), TASK)
+    return write_suite(tmp_path_factory.mktemp("suite"), TASK)
 
 
 @pytest.fixture(scope="module")
@@ -106,12 +106,12 @@ def suite(folder: str) -> Suite:
 
 
 @pytest.fixture(scope="module")
-def logged(folder: str, tmp_path_factory: pytest.TempPathFactory) -> EvalLog:
-    """All scripts in all worlds, at the same time."""
-    return acted(folder, tmp_path_factory.mktemp("logs"))
+def eval_log(folder: str, tmp_path_factory: pytest.TempPathFactory) -> EvalLog:
+    """Carry out all scripts in all worlds at the same time."""
+    return run_inspect(folder, tmp_path_factory.mktemp("logs"))
 
 
-def acted(folder: str, logs: Path, **options: Any) -> EvalLog:  # noqa: ANN401 - those of Inspect
+def run_inspect(folder: str, logs: Path, **options: Any) -> EvalLog:  # noqa: ANN401 - options of Inspect
     (log,) = inspect_eval(
         "codebotler/roboeval",
         model=get_model("mockllm/model", custom_outputs=answer, memoize=False),
@@ -129,7 +129,7 @@ async def answer(said: list[Any], *_: object) -> ModelOutput:
     """Reply with the turn of the script that follows those in the conversation."""
     turns, _failure = SCRIPTS[said[1].text]
     turn = turns[sum(message.role == "assistant" for message in said)]
-    await anyio.lowlevel.checkpoint()  # lets other samples act between the turns of this one
+    await anyio.lowlevel.checkpoint()  # Other samples can act between the turns.
     if isinstance(turn, str):
         reason = "max_tokens" if turn == CUT_OFF else "stop"
         output = ModelOutput.from_content("mockllm", turn, stop_reason=reason)
@@ -154,7 +154,7 @@ def score_of(sample: EvalSample) -> Score:
 
 
 def replay(mission: AgentMission, turns: Sequence[Turn]) -> list[tuple[str, str]]:
-    """Carry out a script ourselves, and return each call with its result."""
+    """Carry out a script without Inspect, and return each call with its result."""
     results: list[tuple[str, str]] = []
     for turn in turns[:MAX_TURNS]:
         if mission.ending is not None:
@@ -179,13 +179,13 @@ class Expected:
     """A mission that is carried out and judged without Inspect."""
 
     mission: AgentMission
-    results: Sequence[tuple[str, str]]  # each call with its result
+    results: Sequence[tuple[str, str]]  # Each pair is the name of a call and its result.
     row: Row
 
 
 @pytest.fixture(scope="module")
 def expected(suite: Suite) -> dict[str, Expected]:
-    """All scripts in all worlds, by the names of samples."""
+    """Carry out all scripts in all worlds, and return the results by the names of samples."""
     names, missions, completions = [], [], []
     for (prompt, (turns, failure)), world in product(enumerate(SCRIPTS.values()), range(2)):
         mission = AgentMission(suite, suite.task("T").scenarios[world].asked_by(prompt))
@@ -201,13 +201,13 @@ def expected(suite: Suite) -> dict[str, Expected]:
 
 @pytest.mark.parametrize("world", [0, 1])
 @pytest.mark.parametrize("name", [name for name in SCRIPTS if name != UNLOGGABLE])
-def test_a_mission_gets_the_verdict_that_we_give_and_shows_its_calls(
-    logged: EvalLog, expected: dict[str, Expected], name: str, world: int
+def test_a_mission_gets_our_verdict_and_shows_its_calls(
+    eval_log: EvalLog, expected: dict[str, Expected], name: str, world: int
 ) -> None:
     prompt, (_turns, failure) = list(SCRIPTS).index(name), SCRIPTS[name]
     ours = expected[f"T/{prompt}/{world}"]
     mission, results, row = ours.mission, ours.results, ours.row
-    (sample,) = (one for one in logged.samples or [] if one.id == f"T/{prompt}/{world}")
+    (sample,) = (one for one in eval_log.samples or [] if one.id == f"T/{prompt}/{world}")
     score = score_of(sample)
     assert (score.value == CORRECT) == row["passed"] == (failure is None)
     assert score.metadata["failure"] == row["failure"]
@@ -225,16 +225,16 @@ def test_a_mission_gets_the_verdict_that_we_give_and_shows_its_calls(
     ]
 
 
-def test_what_a_log_cannot_hold_does_not_end_the_evaluation(logged: EvalLog) -> None:
+def test_text_that_a_log_cannot_contain_is_replaced(eval_log: EvalLog) -> None:
     prompt = list(SCRIPTS).index(UNLOGGABLE)
-    for sample in (one for one in logged.samples or [] if one.id in {f"T/{prompt}/0", f"T/{prompt}/1"}):
+    for sample in (one for one in eval_log.samples or [] if one.id in {f"T/{prompt}/0", f"T/{prompt}/1"}):
         assert score_of(sample).value == CORRECT
         first = next(event for event in sample.events if event.event == "tool")
         assert (first.arguments, first.result) == ({"message": "?"}, "done")
 
 
-def test_the_model_gets_our_prompt_and_tools(logged: EvalLog, suite: Suite) -> None:
-    (sample,) = (one for one in logged.samples or [] if one.id == "T/0/0")
+def test_the_model_gets_our_prompt_and_tools(eval_log: EvalLog, suite: Suite) -> None:
+    (sample,) = (one for one in eval_log.samples or [] if one.id == "T/0/0")
     first = next(event for event in sample.events if event.event == "model")
     assert [(tool.name, tool.description) for tool in first.tools] == [
         (tool.name, tool.description) for tool in tools_for(suite.skills)
@@ -248,10 +248,10 @@ def test_the_model_gets_our_prompt_and_tools(logged: EvalLog, suite: Suite) -> N
     assert (first.config.temperature, first.config.top_p) == (0.2, 0.95)
 
 
-def test_a_log_of_missions_can_be_judged_again(logged: EvalLog) -> None:
-    again = inspect_score(logged, inspecting.verdict(logged.eval.task_args["suite"]), action="overwrite")
+def test_a_log_of_missions_can_be_judged_again(eval_log: EvalLog) -> None:
+    again = inspect_score(eval_log, inspecting.verdict(eval_log.eval.task_args["suite"]), action="overwrite")
     assert [score_of(one).value for one in again.samples or []] == [
-        score_of(one).value for one in logged.samples or []
+        score_of(one).value for one in eval_log.samples or []
     ]
     assert {one.scores["verdict"].metadata["ending"] for one in again.samples or []} >= {
         "answer",
@@ -261,7 +261,7 @@ def test_a_log_of_missions_can_be_judged_again(logged: EvalLog) -> None:
 
 @pytest.mark.parametrize("limit", [{"message_limit": 4}, {"turn_limit": 1}, {"token_limit": 4}])
 def test_a_limit_of_inspect_ends_a_mission(folder: str, tmp_path: Path, limit: dict[str, int]) -> None:
-    (sample,) = acted(folder, tmp_path, limit=1, **limit).samples or []
+    (sample,) = run_inspect(folder, tmp_path, limit=1, **limit).samples or []
     score = score_of(sample)
     assert sample.limit is not None
     assert score.metadata["failure"]["kind"] == "TimeoutError"

@@ -1,4 +1,4 @@
-"""What is right and wrong: errors, limits, worlds that may wait, options that cannot be judged."""
+"""Judging: errors, limits, worlds that may wait, and options that cannot be judged."""
 
 import logging
 from dataclasses import replace
@@ -18,7 +18,7 @@ from roboeval.evaluation.judging.judge import MAX_RESULT_EVENTS, ResultCache, ev
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Failure, Row
 from roboeval.suites.load import Scenario, Suite, load_suite
-from small_suite import a_suite
+from small_suite import write_suite
 
 SUITE = "name: mine\nversion: 1\n"
 TASK = """\
@@ -51,7 +51,7 @@ def suite(tmp_path: Path) -> Suite:
     return load_suite(str(tmp_path))
 
 
-def judged(suite: Suite, *programs: str) -> list[Row]:
+def judge_programs(suite: Suite, *programs: str) -> list[Row]:
     completions = [Completion(task="T", prompt=0, index=i, program=p) for i, p in enumerate(programs)]
     return list(evaluate(completions, suite, workers=2))
 
@@ -64,7 +64,7 @@ def test_a_program_is_judged_by_what_its_prompt_asks_for(
         """[goes, not asks, {check: 'not says("hi")', prompts: {1: not a word, 2: silence}}]""",
     )
     assert task != TASK
-    suite = load_suite(a_suite(tmp_path, task))
+    suite = load_suite(write_suite(tmp_path, task))
     says, errs = (
         f"def task_program():\n    go_to('kitchen')\n    {last}\n" for last in ("say('hi')", "say(1)")
     )
@@ -80,11 +80,11 @@ def test_a_program_is_judged_by_what_its_prompt_asks_for(
     assert [row["verdicts"][0]["satisfied"] for row in rows] == [True, *[False] * 5]
     assert [row["failure"] for row in rows[1::2]] == [rows[1]["failure"]] * 3
     started = [record for record in caplog.records if record.getMessage().endswith("started")]
-    assert len(started) == 2 * 2  # each program once in each world
+    assert len(started) == 2 * 2  # Each program runs once in each world.
 
 
 def first_failure(suite: Suite, program: str) -> Failure | None:
-    (row,) = judged(suite, program)
+    (row,) = judge_programs(suite, program)
     assert row["passed"] == (row["failure"] is None)
     return row["failure"]
 
@@ -105,15 +105,15 @@ def test_the_first_failed_check_decides(suite: Suite) -> None:
     }
 
 
-def test_an_error_decides_whatever_was_done_before(suite: Suite) -> None:
+def test_an_error_decides_over_earlier_actions(suite: Suite) -> None:
     why = first_failure(suite, GOOD + "    pick('x')\n")
     assert why == {"class": "RobotExecutionError", "kind": "PickInvalidObject", "world": 0, "check": None}
     why = first_failure(suite, GOOD + "    undefined\n")
     assert why == {"class": "PythonError", "kind": "NameError", "world": 0, "check": None}
 
 
-def test_the_trace_of_a_run_that_ended_in_an_error_is_kept_but_not_judged(suite: Suite) -> None:
-    (row,) = judged(suite, GOOD + "    undefined\n")
+def test_the_trace_before_an_error_is_kept_but_not_judged(suite: Suite) -> None:
+    (row,) = judge_programs(suite, GOOD + "    undefined\n")
     verdict = row["verdicts"][0]
     assert verdict["trace"] == [["goto", "the kitchen"], ["say", "hi"]]
     assert verdict["failed_checks"] == []
@@ -129,8 +129,8 @@ def test_a_limit_fails_a_world_that_may_not_wait(suite: Suite) -> None:
     }
 
 
-def test_a_limit_leaves_the_requirements_to_decide_where_a_world_may_wait(suite: Suite) -> None:
-    (waits, waits_elsewhere) = judged(
+def test_requirements_decide_at_a_limit_if_a_world_may_wait(suite: Suite) -> None:
+    (waits, waits_elsewhere) = judge_programs(
         suite,
         GOOD + "    while True: time.sleep(1)\n",
         "def task_program():\n    while True: time.sleep(1)\n",
@@ -141,7 +141,7 @@ def test_a_limit_leaves_the_requirements_to_decide_where_a_world_may_wait(suite:
     assert waits_elsewhere["verdicts"][1]["failed_checks"] == ["goes"]
 
 
-def test_an_option_that_is_no_text_cannot_be_judged_negated_or_not(suite: Suite) -> None:
+def test_an_option_that_is_not_text_cannot_be_judged(suite: Suite) -> None:
     program = GOOD + "    ask('', 'coffee?', [1, 2])\n"
     assert first_failure(suite, program) == {
         "class": "TaskCompletionError",
@@ -149,13 +149,13 @@ def test_an_option_that_is_no_text_cannot_be_judged_negated_or_not(suite: Suite)
         "world": 0,
         "check": "not asks",
     }
-    (row,) = judged(suite, program)
+    (row,) = judge_programs(suite, program)
     assert row["verdicts"][0]["status"] == "finished"
     assert row["verdicts"][0]["error"] is None
     assert row["verdicts"][0]["trace"][-1] == ["ask", "coffee?", [{"no text": "1"}, {"no text": "2"}], "1"]
 
 
-def test_a_program_is_judged_exactly_as_it_stands(suite: Suite) -> None:
+def test_a_program_is_judged_without_changes(suite: Suite) -> None:
     assert first_failure(suite, "```python\n" + GOOD + "```") == {
         "class": "PythonError",
         "kind": "SyntaxError",
@@ -174,11 +174,11 @@ def test_a_program_is_judged_exactly_as_it_stands(suite: Suite) -> None:
 
 def test_rows_come_in_the_order_of_completions(suite: Suite) -> None:
     programs = [f"def task_program():\n    say('{n}')\n" for n in (3, 1, 2, 1, 3)]
-    said = [row["verdicts"][0]["trace"][0][1] for row in judged(suite, *programs)]
+    said = [row["verdicts"][0]["trace"][0][1] for row in judge_programs(suite, *programs)]
     assert said == ["3", "1", "2", "1", "3"]
 
 
-def test_what_a_killed_process_is_called(suite: Suite) -> None:
+def test_a_killed_process_is_a_crash(suite: Suite) -> None:
     assert first_failure(suite, "import os\nos._exit(0)") == {
         "class": "PythonError",
         "kind": "Crash",
@@ -187,7 +187,7 @@ def test_what_a_killed_process_is_called(suite: Suite) -> None:
     }
 
 
-# --- judging alone
+# --- judging outcomes
 
 WORLD = Scenario(World((Room("kitchen"),), "kitchen", about="w"), ())
 GREETING: Trace = (Event("say", "hi"),)
@@ -211,7 +211,7 @@ def test_the_first_unsatisfied_world_decides() -> None:
     assert failure_of_verdicts(verdicts[:1]) is None
 
 
-def test_options_are_compared_as_they_were_offered() -> None:
+def test_options_of_different_types_differ() -> None:
     assert Option("1", is_text=False) != Option("1")
 
 
@@ -226,7 +226,7 @@ OURS = Completion(task="Visit", prompt=0, index=0, program="")
         (OURS.row, "dict.* Completion"),
     ],
 )
-def test_what_is_no_completion_of_the_suite_is_refused(paper: Suite, wrong: object, named: str) -> None:
+def test_anything_but_a_completion_of_the_suite_is_refused(paper: Suite, wrong: object, named: str) -> None:
     task = next(iter(paper.tasks))
     if isinstance(wrong, Completion) and wrong.task == OURS.task:
         wrong = replace(wrong, task=task)
@@ -235,7 +235,7 @@ def test_what_is_no_completion_of_the_suite_is_refused(paper: Suite, wrong: obje
         list(evaluate([completion], paper))
 
 
-def test_evaluating_takes_an_ablation(paper: Suite) -> None:
+def test_evaluating_a_task_without_its_ablation_is_refused(paper: Suite) -> None:
     task = next(task.name for task in paper.tasks.values() if task.ablation is None)
     completion = replace(OURS, task=task)
     with pytest.raises(UserError, match=f'"{task}" .*ablation'):
@@ -258,10 +258,10 @@ HALF = 'def task_program():\n    go_to("kitchen")\n'
         ("def task_program():\n    say(", {"finish_reason": "length"}, ("NoProgram", "cut-off")),
         ("Sorry.", {"raw_reply": "Sorry.", "finish_reason": "stop"}, ("NoProgram", "no-code")),
         ("Sorry.", {"finish_reason": "tool_calls"}, ("NoProgram", "tool-call")),
-        ("Sorry.", {}, ("PythonError", "SyntaxError")),  # nobody said what the reply was
+        ("Sorry.", {}, ("PythonError", "SyntaxError")),  # The raw reply is unknown.
         ("x = task", {"no_program": None}, ("PythonError", "NameError")),
         (GOOD, {"finish_reason": "length"}, None),
-        (GOOD, {"no_program": "cut-off"}, None),  # a verdict is about the program
+        (GOOD, {"no_program": "cut-off"}, None),  # The verdict is about the program.
         (HALF, {"finish_reason": "length", "raw_reply": f"```\n{HALF}"}, ("NoProgram", "cut-off")),
         (
             HALF,
@@ -292,41 +292,41 @@ def test_kind_that_does_not_exist_is_refused() -> None:
 
 
 @pytest.fixture
-def tested(monkeypatch: pytest.MonkeyPatch) -> list[Trace]:
-    """The traces on which a formula was tested, of which none is remembered."""
+def tested_traces(monkeypatch: pytest.MonkeyPatch) -> list[Trace]:
+    """Record the traces on which a formula is tested, with an empty cache."""
     traces: list[Trace] = []
     monkeypatch.setattr("roboeval.evaluation.judging.judge.REQUIREMENT_CACHE", ResultCache())
 
-    def counted(formula: Formula, trace: Trace) -> bool:
+    def record_trace(formula: Formula, trace: Trace) -> bool:
         traces.append(trace)
         return holds(formula, trace)
 
-    monkeypatch.setattr("roboeval.evaluation.judging.judge.holds", counted)
+    monkeypatch.setattr("roboeval.evaluation.judging.judge.holds", record_trace)
     return traces
 
 
-def test_what_a_run_has_met_is_found_once_for_what_a_world_requires(
-    suite: Suite, tested: list[Trace]
+def test_equal_traces_are_tested_once_for_equal_requirements(
+    suite: Suite, tested_traces: list[Trace]
 ) -> None:
     one, other = suite.tasks["T"].scenarios
     for time in range(3):
         run = Outcome(Status.FINISHED, tuple(replace(event, time=time) for event in HI))
         assert [judge(run, one).satisfied, judge(run, other).satisfied] == [True, True]
-    assert len(tested) == len(one.require) + len(other.require)
+    assert len(tested_traces) == len(one.require) + len(other.require)
     alike = replace(one, world=replace(one.world, about="another"))
     assert judge(Outcome(Status.FINISHED, HI), alike).satisfied
-    assert len(tested) == len(one.require) + len(other.require)
+    assert len(tested_traces) == len(one.require) + len(other.require)
     assert not judge(Outcome(Status.FINISHED, HI[:1]), one).satisfied
 
 
-def test_long_runs_are_not_remembered_and_others_forgotten(
-    suite: Suite, tested: list[Trace], monkeypatch: pytest.MonkeyPatch
+def test_long_traces_are_not_cached_and_old_ones_are_evicted(
+    suite: Suite, tested_traces: list[Trace], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("roboeval.evaluation.judging.judge.MAX_RESULTS", 2)
     scenario = suite.tasks["T"].scenarios[1]
     long = Outcome(Status.FINISHED, HI * MAX_RESULT_EVENTS)
     runs = [Outcome(Status.FINISHED, (*HI, Event("say", text))) for text in "abc"]
     for run, times in ((long, 2), (runs[0], 1), (runs[1], 1), (runs[2], 1), (runs[0], 1)):
-        tested.clear()
+        tested_traces.clear()
         assert [judge(run, scenario).satisfied for _ in range(2)] == [True, True]
-        assert len(tested) == times
+        assert len(tested_traces) == times

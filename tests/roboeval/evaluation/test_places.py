@@ -1,4 +1,4 @@
-"""The judge, explanations and searches agree about where events happened, and what the robot held."""
+"""Judging, explaining and searching agree on where events happened and what the robot held."""
 
 from __future__ import annotations
 
@@ -58,17 +58,17 @@ def suite_of(world: World, rules: SimulationSettings, *formulas: str, skills: Sk
 
 
 def judge(worker: Worker, suite: Suite, program: str) -> tuple[Outcome, dict[str, Any]]:
-    """How a program ends, and its row as it is read back."""
+    """Run and judge a program, and return its outcome and its row as it is read back."""
     (ran,) = run_in_worlds(suite, worker, [("T", program)], ablated=False)
-    told = judge_outcomes(suite, ran, ablated=False)
-    assert told is not None
-    line = row_line(replace(WRITTEN, program=program), told[0])
+    judged = judge_outcomes(suite, ran, ablated=False)
+    assert judged is not None
+    line = row_line(replace(WRITTEN, program=program), judged[0])
     assert key_of(decode_row(line)) == ("T", 0, 0)
     return ran.outcomes[0], json.loads(line)
 
 
-def explained(row: dict[str, Any], suite: Suite) -> list[str]:
-    """The explanations of all requirements, as if each had failed."""
+def explain_all(row: dict[str, Any], suite: Suite) -> list[str]:
+    """Explain all requirements as if each had failed."""
     texts = [one.text for one in suite.tasks["T"].scenarios[0].require]
     verdicts = [{**verdict, "failed_checks": texts} for verdict in row["verdicts"]]
     (world,) = completion_data({**row, "verdicts": verdicts}, WRITTEN, suite)["worlds"]
@@ -83,13 +83,13 @@ def expect_agreement(worker: Worker, suite: Suite, program: str) -> list[bool]:
     outcome, row = judge(worker, suite, program)
     require = suite.tasks["T"].scenarios[0].require
     met = [is_met(one, outcome.trace) for one in require]
-    assert [why.startswith(SUITE_CHANGED) for why in explained(row, suite)] == met
+    assert [why.startswith(SUITE_CHANGED) for why in explain_all(row, suite)] == met
     assert [bool(find(row, one.text).worlds) for one in require] == met
     return met
 
 
 @pytest.mark.parametrize("matching", ["whole-words", "label-in-request"])
-def test_rooms_whose_names_contain_each_other(worker: Worker, matching: Any) -> None:  # noqa: ANN401 - a literal
+def test_names_of_rooms_may_contain_each_other(worker: Worker, matching: Any) -> None:  # noqa: ANN401 - a literal
     rules = SimulationSettings(literals="as-written", matching=matching)
     suite = suite_of(OFFICES, rules, SAYS_THERE, 'tr.Exists(at("kitchen", goto("office")))')
     assert expect_agreement(worker, suite, THERE) == [matching == "whole-words", True]
@@ -213,7 +213,7 @@ def test_judge_explanations_and_searches_agree_at_length(
 # --- drives that fail, skills of a user's own, processes
 
 
-def test_drives_that_fail_lead_nowhere(worker: Worker) -> None:
+def test_failed_drives_have_no_destination(worker: Worker) -> None:
     program = "def task_program():\n    go_to('kitchen')\n    go_to('moon')\n"
     suite = suite_of(OFFICES, STRICT, 'tr.Exists(at("kitchen", goto("moon")))')
     _, row = judge(worker, suite, program)
@@ -231,7 +231,7 @@ def bring_from_kitchen(sim: Simulation, obj: str) -> None:
     sim.take(obj)
 
 
-def test_events_within_skills_of_a_users_own(worker: Worker) -> None:
+def test_events_in_a_users_own_skill_have_places(worker: Worker) -> None:
     world = World(OFFICES.rooms, "office", about="w")
     formulas = (
         'tr.Exists(at("kitchen", pick("mug")))',
@@ -247,7 +247,7 @@ def test_events_within_skills_of_a_users_own(worker: Worker) -> None:
     assert (drive["place"], drive["to"]) == ("office", "kitchen")
 
 
-def test_runs_that_a_rule_ends(worker: Worker) -> None:
+def test_a_run_that_a_rule_ends_has_places(worker: Worker) -> None:
     rule = Rule("quiet", "Be quiet in the office.", parse('not tr.Exists(at("office", say(".*")))'))
     formula = 'tr.Last(at("kitchen", goto("office")))'
     suite = replace(suite_of(OFFICES, STRICT, formula), house=HouseRules("", (rule,), "0"))
@@ -267,7 +267,7 @@ PROGRAM = (
 )
 
 
-def test_both_kinds_of_processes_say_where_events_happen(worker: Worker) -> None:
+def test_both_kinds_of_processes_record_places(worker: Worker) -> None:
     suite = suite_of(OFFICES, STRICT)
     outcome, row = judge(worker, suite, PROGRAM)
     alone = Worker(one_process_per_run=True)

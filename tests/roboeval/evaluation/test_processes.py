@@ -1,4 +1,4 @@
-"""Judging in several processes of this machine: the same rows, and nothing is left behind."""
+"""Judging in several local processes: the same rows, and no processes left."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ from roboeval.suites.load import load_suite
 
 
 @pytest.mark.slow
-def test_the_rows_are_those_of_threads() -> None:
+def test_processes_give_the_rows_of_threads() -> None:
     suite = load_suite()
     completions = list(recorded_completions("recorded:hasty", suite))
     in_threads = list(evaluate(completions, suite, engine=Local(2)))
     assert list(evaluate(completions, suite, engine=nullcontext(Processes(3)))) == in_threads
 
 
-def test_python_collects_garbage_as_before_once_judging_has_ended() -> None:
-    outside = gc.get_threshold()  # perhaps as somebody left it who judged in this process
+def test_judging_restores_the_thresholds_of_the_garbage_collector() -> None:
+    outside = gc.get_threshold()  # An earlier test may have changed it.
     gc.set_threshold(123, 4, 5)
     try:
         with Local(1):
@@ -48,20 +48,20 @@ def test_python_collects_garbage_as_before_once_judging_has_ended() -> None:
         gc.set_threshold(*outside)
 
 
-# Called by name in other processes, which can import this module.
+# Other processes import this module and call these functions by name.
 
 
-def pids(_: Worker, works: Sequence[Work]) -> list[int]:
+def list_pids(_: Worker, works: Sequence[Work]) -> list[int]:
     return [os.getpid()] * len(works)
 
 
-def sleeps(_: Worker, works: Sequence[Work]) -> list[int]:
+def sleep_after_first(_: Worker, works: Sequence[Work]) -> list[int]:
     if works[0][1] != "0":
         time.sleep(60)
-    return pids(_, works)
+    return list_pids(_, works)
 
 
-def dies(_: Worker, works: Sequence[Work]) -> list[int]:
+def kill_worker(_: Worker, works: Sequence[Work]) -> list[int]:
     os.kill(os.getpid(), signal.SIGKILL)
     return [0] * len(works)
 
@@ -70,12 +70,12 @@ def are_alone(worker: Worker, works: Sequence[Work]) -> list[bool]:
     return [worker._one_process_per_run for _ in works]
 
 
-def numbered(count: int) -> list[Work]:
+def make_works(count: int) -> list[Work]:
     return [("", str(number)) for number in range(count)]
 
 
 def has_ended(pid: int) -> bool:
-    """Whether a process is gone, or will be in a moment."""
+    """Wait for the end of a process for up to 10 seconds, and return whether it ended."""
     for _ in range(100):
         try:
             os.kill(pid, 0)
@@ -87,37 +87,37 @@ def has_ended(pid: int) -> bool:
 
 @pytest.mark.slow
 def test_processes_end_with_the_results() -> None:
-    found = set(Processes(2).map_distinct(pids, numbered(100), abs))
+    found = set(Processes(2).map_distinct(list_pids, make_works(100), abs))
     assert found
     assert os.getpid() not in found
     assert all(map(has_ended, found))
 
 
 @pytest.mark.slow
-def test_nobody_waits_for_what_is_no_longer_wanted() -> None:
-    results = Processes(2).map_distinct(sleeps, numbered(100), abs)
+def test_closing_the_results_ends_their_processes() -> None:
+    results = Processes(2).map_distinct(sleep_after_first, make_works(100), abs)
     pid = next(results)
     began = time.monotonic()
-    results.close()  # type: ignore[attr-defined]  # it is a generator
+    results.close()  # type: ignore[attr-defined]  # It is a generator.
     assert has_ended(pid)
     assert time.monotonic() - began < 30
 
 
 @pytest.mark.slow
-def test_a_lost_process_is_one_sentence() -> None:
+def test_a_lost_process_is_an_engine_error() -> None:
     with pytest.raises(EngineError, match="worker process died"):
-        list(Processes(2).map_distinct(dies, numbered(3), abs))
+        list(Processes(2).map_distinct(kill_worker, make_works(3), abs))
 
 
-def ends_at_the_last(worker: Worker, works: Sequence[Work]) -> list[int]:
+def kill_worker_at_the_last(worker: Worker, works: Sequence[Work]) -> list[int]:
     if works[-1][1] == "99":
         os.kill(os.getpid(), signal.SIGKILL)
-    return pids(worker, works)
+    return list_pids(worker, works)
 
 
 @pytest.mark.slow
-def test_what_was_done_before_a_process_was_lost_has_results() -> None:
-    results = Processes(1).map_distinct(ends_at_the_last, numbered(100), abs)
+def test_results_before_a_lost_process_are_kept() -> None:
+    results = Processes(1).map_distinct(kill_worker_at_the_last, make_works(100), abs)
     assert next(results)
     with pytest.raises(EngineError, match="worker process died"):
         list(results)
@@ -127,10 +127,10 @@ def test_what_was_done_before_a_process_was_lost_has_results() -> None:
 def test_each_run_can_have_a_process_of_its_own() -> None:
     for alone in (False, True):
         engine = Processes(1, one_process_per_run=alone)
-        assert list(engine.map_distinct(are_alone, numbered(3), bool)) == [alone] * 3
+        assert list(engine.map_distinct(are_alone, make_works(3), bool)) == [alone] * 3
 
 
-def refuses(worker: Worker, works: Sequence[Work]) -> list[int]:
+def refuse(worker: Worker, works: Sequence[Work]) -> list[int]:
     own_worker.cache_clear()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(engines, "Worker", lambda **_: SimpleNamespace(has_seccomp=False, close=lambda: None))
@@ -141,28 +141,28 @@ def refuses(worker: Worker, works: Sequence[Work]) -> list[int]:
 
 @pytest.mark.slow
 def test_missing_isolation_is_refused() -> None:
-    assert list(Processes(1, require_isolation=True).map_distinct(refuses, numbered(1), int)) == [1]
+    assert list(Processes(1, require_isolation=True).map_distinct(refuse, make_works(1), int)) == [1]
 
 
-def handled(_: Worker, works: Sequence[Work]) -> list[bool]:
+def is_sigint_blocked(_: Worker, works: Sequence[Work]) -> list[bool]:
     return [signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())] * len(works)
 
 
 @pytest.mark.slow
-def test_ctrl_c_is_left_to_the_command() -> None:
-    assert list(Processes(1).map_distinct(handled, numbered(1), bool)) == [True]
+def test_worker_processes_leave_ctrl_c_to_the_command() -> None:
+    assert list(Processes(1).map_distinct(is_sigint_blocked, make_works(1), bool)) == [True]
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 @pytest.mark.slow
-def test_processes_end_with_the_one_that_started_them(tmp_path: Path) -> None:
+def test_processes_end_with_their_parent(tmp_path: Path) -> None:
     (tmp_path / "killed.py").write_text(
         dedent("""
-        from test_processes import numbered, sleeps
+        from test_processes import make_works, sleep_after_first
         from roboeval.evaluation.engines.processes import Processes
 
         if __name__ == "__main__":
-            results = Processes(2).map_distinct(sleeps, numbered(100), abs)
+            results = Processes(2).map_distinct(sleep_after_first, make_works(100), abs)
             print(next(results), flush=True)
             next(results)
         """)
@@ -187,21 +187,21 @@ def test_many_programs_are_judged_in_processes(monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.setattr(engine_choice, "MIN_PROGRAMS_FOR_PROCESSES", 80)
     chosen: list[str] = []
 
-    def noted(engine: type[Local | Processes]) -> None:
+    def record_choice(engine: type[Local | Processes]) -> None:
         maps = engine.map_distinct
 
-        def mapped(*given: Any) -> Any:  # noqa: ANN401 - as in Engine
+        def record_and_map(*given: Any) -> Any:  # noqa: ANN401 - the arguments of Engine
             chosen.append(engine.__name__)
             return maps(*given)
 
-        monkeypatch.setattr(engine, "map_distinct", mapped)
+        monkeypatch.setattr(engine, "map_distinct", record_and_map)
 
-    noted(Local)
-    noted(Processes)
+    record_choice(Local)
+    record_choice(Processes)
     with monkeypatch.context() as patch:
         patch.setattr("codebotler.simulator.pool.cores", lambda: 2)
         assert roboeval("evaluate", "recorded:hasty", "--workers", "3").status == 0
     for words in (["--tasks", "SayGoodDay", "--workers", "3"], ["--workers", "2"], ["--workers", "3"]):
-        told = roboeval("evaluate", "recorded:hasty", *words, cwd=tmp_path)
-        assert told.status == 0, told.err
+        ended = roboeval("evaluate", "recorded:hasty", *words, cwd=tmp_path)
+        assert ended.status == 0, ended.err
     assert chosen == ["Local", "Local", "Local", "Processes"]

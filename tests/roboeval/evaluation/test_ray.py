@@ -30,7 +30,7 @@ from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite
 
-# Read when Ray is imported.
+# Ray reads these variables when it is imported.
 LOOPBACK_ONLY = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
 os.environ |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": "0123456789abcdef" * 4, LOOPBACK_ONLY: "0"}
 pytest.importorskip("ray", reason="Ray is an extra")
@@ -40,8 +40,8 @@ HERE = "127.0.0.1"
 EVALUATE = ("evaluate", "recorded:hasty", "--engine", "ray", "--out")
 
 
-def started(cwd: Path, *words: str, **variables: str | None) -> subprocess.Popen[str]:
-    """Python in a process of its own, since Ray reads some variables only once."""
+def start(cwd: Path, *words: str, **variables: str | None) -> subprocess.Popen[str]:
+    """Start Python in a process of its own, since Ray reads some variables only once."""
     environment = {**ENVIRONMENT, **os.environ, **variables}
     return subprocess.Popen(
         [sys.executable, *words],
@@ -53,29 +53,29 @@ def started(cwd: Path, *words: str, **variables: str | None) -> subprocess.Popen
     )
 
 
-def numbered(numbers: range) -> Iterator[Work]:
+def make_works(numbers: range) -> Iterator[Work]:
     return (("", str(number)) for number in numbers)
 
 
-# Cluster processes cannot import this module: a function of it, but no lambda, would be looked for there.
-NUMBERS: RunPrograms[int] = lambda _, works: [int(number) for _, number in works]  # noqa: E731 - see above
+# Cluster processes cannot import this module, so they can run its lambdas but not its functions.
+NUMBERS: RunPrograms[int] = lambda _, works: [int(number) for _, number in works]  # noqa: E731 - a function cannot be sent
 
 
 # --- without a cluster
 
 
-def test_another_version_does_not_judge() -> None:
+def test_another_version_is_refused() -> None:
     functions = (lambda _, works: works, list)
     with pytest.raises(EngineError, match=r"has codebotler .*, not codebotler 0\.0\.1"):
         run_shard(functions, [], "codebotler 0.0.1 with Python 3.9", {})
 
 
-def test_missing_isolation_is_warned_of_once_or_refused(
+def test_missing_isolation_is_refused_or_causes_one_warning(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(engines, "Worker", lambda **_: SimpleNamespace(has_seccomp=False, close=lambda: None))
     monkeypatch.setattr(rayengine, "own_worker", engines.own_worker.__wrapped__)
-    functions, works = (NUMBERS, abs), list(numbered(range(2)))
+    functions, works = (NUMBERS, abs), list(make_works(range(2)))
     with pytest.raises(EngineError, match=re.escape(NO_SECCOMP)):
         run_shard(functions, works, VERSIONS, {"require_isolation": True})
     result = run_shard(functions, works, VERSIONS, {})
@@ -102,9 +102,7 @@ print(ray.is_initialized())
 
 
 @pytest.mark.parametrize("address", [f"{HERE}:1", "nonsense", f"http://{HERE}:8265"])
-def test_without_a_cluster_at_the_address_the_command_ends_soon_and_leaves_nothing(
-    tmp_path: Path, address: str
-) -> None:
+def test_an_address_without_a_cluster_ends_the_command_without_files(tmp_path: Path, address: str) -> None:
     environment = {**ENVIRONMENT, **os.environ, "RAY_ADDRESS": address}
     ended = roboeval(*EVALUATE, "far", cwd=tmp_path, environment=environment)
     assert (ended.status, ended.out, ended.err.count("\n")) == (2, "", 1), ended
@@ -126,7 +124,7 @@ class Nodes:
         self.address = str(self._cluster.address)
 
     def kill(self) -> None:
-        """Kill a node with all that belongs to it, as a machine that loses its power."""
+        """Kill a node and all its processes, as a power failure does."""
         self._cluster.remove_node(self._nodes.pop(), allow_graceful=False)
 
     def end(self) -> None:
@@ -135,15 +133,15 @@ class Nodes:
 
 @pytest.fixture(scope="module")
 def background(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, subprocess.Popen[str]]]:
-    """Processes that mostly wait, while the nodes start: for an own cluster, and for one that is none."""
+    """Start commands that mostly wait, one with a cluster of its own and one without any."""
     cwd = tmp_path_factory.mktemp("background")
     with ThreadingHTTPServer((HERE, 0), BaseHTTPRequestHandler) as server, TemporaryDirectory() as folder:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         other = {"RAY_ADDRESS": f"{HERE}:{server.server_port}", "RAY_py_gcs_connect_timeout_s": "1"}
-        alone = {"RAY_ADDRESS": None, "RAY_TMPDIR": folder, LOOPBACK_ONLY: None}  # short: it holds sockets
+        alone = {"RAY_ADDRESS": None, "RAY_TMPDIR": folder, LOOPBACK_ONLY: None}  # Sockets need short paths.
         processes = {
-            "alone": started(cwd, "-c", ALONE, **alone),
-            "other": started(cwd, "-m", "roboeval", *EVALUATE, "other", **other),
+            "alone": start(cwd, "-c", ALONE, **alone),
+            "other": start(cwd, "-m", "roboeval", *EVALUATE, "other", **other),
         }
         yield processes
         for process in processes.values():
@@ -160,7 +158,7 @@ def nodes(
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAY_ADDRESS", nodes.address)
         locked = tmp_path_factory.mktemp("locked")
-        background["locked"] = started(locked, "-m", "roboeval", *EVALUATE, "run", RAY_AUTH_MODE="disabled")
+        background["locked"] = start(locked, "-m", "roboeval", *EVALUATE, "run", RAY_AUTH_MODE="disabled")
         yield nodes
     nodes.end()
 
@@ -173,8 +171,8 @@ def cluster(nodes: Nodes) -> Iterator[RayCluster]:
 
 
 @pytest.fixture(scope="module")
-def local(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run that is judged and checked on this machine."""
+def local_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Judge and check a run on this machine."""
     folder = tmp_path_factory.mktemp("local")
     assert roboeval("evaluate", "recorded:hasty", "--out", "run", cwd=folder).status == 0
     assert roboeval("resample", "run", cwd=folder).status == 0
@@ -182,29 +180,29 @@ def local(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.usefixtures("nodes")
-def test_commands_write_the_same_bytes(local: Path, tmp_path: Path) -> None:
+def test_commands_on_a_cluster_write_the_same_bytes(local_run: Path, tmp_path: Path) -> None:
     assert roboeval(*EVALUATE, "run", cwd=tmp_path).status == 0
     assert roboeval("resample", "run", "--engine", "ray", cwd=tmp_path).status == 0
     for name in ("evaluations/paper.jsonl", "evaluations/paper.json"):
-        assert (tmp_path / "run" / name).read_bytes() == (local / name).read_bytes()
+        assert (tmp_path / "run" / name).read_bytes() == (local_run / name).read_bytes()
     checks = (tmp_path / "run" / "checks" / "paper.jsonl").read_bytes()
-    assert checks == (local / "checks" / "paper.jsonl").read_bytes() != b""
+    assert checks == (local_run / "checks" / "paper.jsonl").read_bytes() != b""
 
 
-def test_control_c_ends_it_and_keeps_what_was_judged(nodes: Nodes, tmp_path: Path) -> None:
+def test_ctrl_c_keeps_the_judged_rows(nodes: Nodes, tmp_path: Path) -> None:
     words = ("-m", "roboeval", *EVALUATE, "run", "--workers", "1")
-    process = started(tmp_path, *words, RAY_ADDRESS=nodes.address)
+    process = start(tmp_path, *words, RAY_ADDRESS=nodes.address)
     rows = tmp_path / "run" / "evaluations" / "paper.jsonl"
     while process.poll() is None and not (rows.exists() and rows.stat().st_size):
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate()
     assert process.returncode == 130
-    assert any(line.startswith("roboeval: stopped; ") for line in err.splitlines()), err  # Ray may log more
+    assert any(line.startswith("roboeval: stopped; ") for line in err.splitlines()), err  # Ray may log more.
     assert all(json.loads(line) for line in rows.read_text().splitlines())
 
 
-def test_programs_are_read_as_they_are_needed_and_equal_ones_are_one_call(cluster: RayCluster) -> None:
+def test_programs_are_read_on_demand_and_equal_ones_run_once(cluster: RayCluster) -> None:
     read: list[int] = []
 
     def works() -> Iterator[Work]:
@@ -220,28 +218,28 @@ def test_programs_are_read_as_they_are_needed_and_equal_ones_are_one_call(cluste
     assert len(read) <= 50 + MAX_KEYS_AHEAD
     more = [next(results) for _ in range(6000)]
     del results
-    assert more[2950:3000] == first  # the very same calls
+    assert more[2950:3000] == first  # They are the same calls.
     assert len(read) <= 6050 + MAX_KEYS_AHEAD
 
 
-def test_what_a_call_raises_is_raised_here(cluster: RayCluster) -> None:
+def test_an_error_of_a_call_is_raised_here(cluster: RayCluster) -> None:
     results = cluster.map_distinct(
-        lambda _, works: [1 // (int(number) - 1) for _, number in works], numbered(range(2)), abs
+        lambda _, works: [1 // (int(number) - 1) for _, number in works], make_works(range(2)), abs
     )
     with pytest.raises(ZeroDivisionError):
         list(results)
 
 
-def test_results_that_are_not_wanted_do_no_harm(cluster: RayCluster) -> None:
-    for number in range(40):  # a shard that was cancelled when just done would abort this process soon
-        results = cluster.map_distinct(NUMBERS, numbered(range(500)), abs)
+def test_dropping_results_does_no_harm(cluster: RayCluster) -> None:
+    for number in range(40):  # Cancelling a shard that had just ended aborted this process.
+        results = cluster.map_distinct(NUMBERS, make_works(range(500)), abs)
         assert [next(results) for _ in range(number + 1)] == [*range(number + 1)]
         del results
 
 
 @pytest.mark.parametrize("name", ["locked", "other"])
 @pytest.mark.usefixtures("nodes")
-def test_a_cluster_that_refuses_or_is_none_ends_the_command(
+def test_a_cluster_that_refuses_or_does_not_answer_ends_the_command(
     name: str, background: dict[str, subprocess.Popen[str]]
 ) -> None:
     out, err = background[name].communicate()
@@ -251,15 +249,15 @@ def test_a_cluster_that_refuses_or_is_none_ends_the_command(
     assert ("RAY_AUTH_MODE" in last) == (name == "locked")
 
 
-def test_a_cluster_is_started_where_there_is_none_and_only_this_machine_reaches_it(
+def test_without_an_address_a_local_cluster_is_started(
     background: dict[str, subprocess.Popen[str]],
 ) -> None:
     out, err = background["alone"].communicate()
     assert out.splitlines() == ["[1, 2, 1]", "['127.0.0.1']", "{'127.0.0.1'}", "False"], err
 
 
-class Same:
-    """A cluster that is open already."""
+class OpenCluster:
+    """A cluster that is already open."""
 
     def __init__(self, cluster: RayCluster) -> None:
         self.cluster = cluster
@@ -271,13 +269,13 @@ class Same:
         pass
 
 
-def test_nodes_that_are_killed_lose_nothing_until_there_is_none(
+def test_killed_nodes_lose_nothing_until_none_is_left(
     nodes: Nodes, cluster: RayCluster, paper: Suite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     completions = list(recorded_completions("recorded:hasty", paper))
     here = list(evaluate(completions, paper, engine=Local(2)))
     there: list[Row] = []
-    for row in evaluate(completions, paper, engine=Same(cluster)):
+    for row in evaluate(completions, paper, engine=OpenCluster(cluster)):
         there.append(row)
         if len(there) == 20:
             nodes.kill()
@@ -285,4 +283,4 @@ def test_nodes_that_are_killed_lose_nothing_until_there_is_none(
     nodes.kill()
     monkeypatch.setattr(rayengine, "RAY_POLL_SECONDS", 1)
     with pytest.raises(EngineError, match="no free core"):
-        list(cluster.map_distinct(NUMBERS, numbered(range(2)), int))
+        list(cluster.map_distinct(NUMBERS, make_works(range(2)), int))

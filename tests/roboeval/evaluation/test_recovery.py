@@ -1,4 +1,4 @@
-"""Each skill call of a right program fails once, and another program does the rest."""
+"""Each skill call of a right program fails once, and another program continues."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ def completion(program: str = BRING) -> Completion:
 
 
 @pytest.fixture(scope="module")
-def holding(worker: Worker, suite: Suite) -> Interruption:
-    """The mission that failed when it held the drink."""
+def mission(worker: Worker, suite: Suite) -> Interruption:
+    """Return the mission that failed while the robot held the drink."""
     found = find_interruptions(worker, suite, completion())
     return next(one for one in found if isinstance(one, Interruption) and one.past.held)
 
@@ -102,7 +102,7 @@ def test_each_call_fails_in_each_world(worker: Worker, suite: Suite) -> None:
     assert last.prompt(suite).last_step == last.past.steps[-1]
 
 
-def test_an_error_that_the_program_handles_ends_no_mission(worker: Worker, suite: Suite) -> None:
+def test_an_error_that_the_program_handles_does_not_end_the_mission(worker: Worker, suite: Suite) -> None:
     lines = BRING.splitlines()
     program = "\n".join(
         [*lines[:2], "    try:\n        say('Hello')\n    except Exception:\n        pass", *lines[2:]]
@@ -127,17 +127,17 @@ def test_only_the_first_right_program_counts(worker: Worker, suite: Suite) -> No
         (['go_to("lobby")'], "rejected", (0, 0)),
     ],
 )
-def test_what_becomes_of_a_mission(
-    worker: Worker, holding: Interruption, rest: list[str], end: str, counts: tuple[int, int]
+def test_a_continuation_passes_fails_or_is_rejected(
+    worker: Worker, mission: Interruption, rest: list[str], end: str, counts: tuple[int, int]
 ) -> None:
     program = "def task_program():\n" + "".join(f"    {line}\n" for line in rest)
-    result = try_continuation(worker, load_suite(), holding, program)
+    result = try_continuation(worker, load_suite(), mission, program)
     assert (result.end, (result.steps, result.repeated)) == (end, counts)
     assert bool(result.why) is (end in {"failed", "rejected"})
 
 
-def test_a_mission_without_a_continuation_is_counted(worker: Worker, holding: Interruption) -> None:
-    assert try_continuation(worker, load_suite(), holding, None).end == "missing"
+def test_a_mission_without_a_continuation_is_counted(worker: Worker, mission: Interruption) -> None:
+    assert try_continuation(worker, load_suite(), mission, None).end == "missing"
 
 
 def test_shares_are_of_missions_with_a_continuation() -> None:
@@ -164,7 +164,7 @@ def test_shares_are_of_missions_with_a_continuation() -> None:
     assert recovery_data([one])["passed"] is None
 
 
-class Refusing:
+class RefusingModel:
     """A model that counts requests, and refuses some."""
 
     name, settings = "m", None
@@ -184,23 +184,23 @@ class Refusing:
 
 
 def test_equal_requests_are_sent_once() -> None:
-    model = Refusing()
+    model = RefusingModel()
     prompts = [Prompt(name, (), "", (), "") for name in ("a", "bad", "a")]
     done: list[int] = []
-    found = write_continuations(model, prompts, 2, lambda number, _: done.append(number))  # type: ignore[arg-type]  # no settings
+    found = write_continuations(model, prompts, 2, lambda number, _: done.append(number))  # type: ignore[arg-type]  # Nothing reads its settings.
     assert (found, done) == (["a", None, "a"], [1, 2])
     assert sorted(model.asked) == ["a", "bad"]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["careful", "hasty"])
-def test_recorded_continuations_are_as_they_say(worker: Worker, name: str) -> None:
+def test_careful_continuations_pass_and_hasty_ones_do_not(worker: Worker, name: str) -> None:
     suite = load_suite()
     model = recorded_model_for(f"recorded:{name}", suite)
     found = find_first_right(worker, suite, recorded_completions("recorded:careful", suite))
     used, ends = set(), defaultdict(set)
     for one in (fault for each in found for fault in each):
-        if isinstance(one, Interruption) and (program := _recorded(model, one)) is not None:
+        if isinstance(one, Interruption) and (program := _recorded_rest(model, one)) is not None:
             used.add(program)
             result = try_continuation(worker, suite, one, program)
             ends[result.task].add(result.end)
@@ -213,7 +213,7 @@ def test_recorded_continuations_are_as_they_say(worker: Worker, name: str) -> No
     assert used == {rest for (instruction, _), rest in model.rests.items() if instruction in prompts}
 
 
-def _recorded(model: RecordedModel, one: Interruption) -> str | None:
+def _recorded_rest(model: RecordedModel, one: Interruption) -> str | None:
     return model.rests.get((one.past.instruction, (one.past.steps or ["nothing"])[-1]))
 
 

@@ -1,4 +1,4 @@
-"""Rewards: 1 exactly for what passes, nothing for nothing, from any thread and any process."""
+"""Rewards: 1 exactly for programs that pass, 0 for doing nothing, from any thread and any process."""
 
 import gc
 import logging
@@ -29,7 +29,7 @@ from roboeval.evaluation.rewards import Share, reward, total
 from roboeval.evaluation.runs.source import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 from roboeval.suites.suite import HouseRules
-from small_suite import a_suite
+from small_suite import write_suite
 
 RIGHT = """
 def task_program():
@@ -48,24 +48,24 @@ def distinct(count: int, mark: str) -> list[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", ["recorded:careful", "recorded:hasty"])
-def test_the_reward_is_1_exactly_for_what_passes(model: str, paper: Suite) -> None:
+def test_the_reward_is_1_exactly_for_programs_that_pass(model: str, paper: Suite) -> None:
     completions = list(recorded_completions(model, paper))
     passed = [row["passed"] for row in evaluate(completions, paper, workers=2)]
     by_task = groupby(completions, key=lambda completion: completion.task)
-    told = [one for task, its in by_task for one in reward(task, 0, [c.program for c in its])]
-    assert [one == 1 for one in told] == passed
-    assert all(0 <= one <= 1 for one in told)
+    results = [one for task, its in by_task for one in reward(task, 0, [c.program for c in its])]
+    assert [one == 1 for one in results] == passed
+    assert all(0 <= one <= 1 for one in results)
     if model == "recorded:hasty":
-        assert len({round(one, 3) for one in told}) > 20  # of which most are partly right
+        assert len({round(one, 3) for one in results}) > 20  # Most are partly right.
 
 
-def test_nothing_is_worth_nothing_in_any_task(paper: Suite) -> None:
+def test_doing_nothing_earns_0_in_any_task(paper: Suite) -> None:
     assert {task: reward(task, 0, NOTHING) for task in paper.tasks} == {
         task: [0.0] * len(NOTHING) for task in paper.tasks
     }
 
 
-def test_who_errs_gets_half_of_who_returns() -> None:
+def test_an_error_halves_the_reward() -> None:
     at_once, late = "    go_to('nowhere')\n", "    return\n"
     part = RIGHT.replace("Good day!", "Good morning!")
     returned, erred, right, spoiled = reward(
@@ -76,8 +76,8 @@ def test_who_errs_gets_half_of_who_returns() -> None:
     assert (right, spoiled) == (1, 0.5)
 
 
-def test_what_was_let_be_only_scales_what_was_gained(paper: Suite) -> None:
-    scenario = paper.tasks["SayGoodDay"].scenarios[3]  # nobody is in a lab
+def test_kept_prohibitions_only_scale_the_gain(paper: Suite) -> None:
+    scenario = paper.tasks["SayGoodDay"].scenarios[3]  # Nobody is in a lab.
     assert [requirement.text for requirement in scenario.require] == [
         "visits_every_lab",
         "visits_nothing_else",
@@ -94,12 +94,12 @@ def test_what_was_let_be_only_scales_what_was_gained(paper: Suite) -> None:
     assert Share.of(Outcome(Status.FINISHED, ()), scenario, at_start) == Share(gained=0.0, kept=1.0)
 
 
-def test_a_world_that_only_asks_to_let_something_be_counts_as_the_others_do() -> None:
+def test_a_world_with_only_prohibitions_counts_like_the_others() -> None:
     let_be = Share(gained=None, kept=1.0)
     assert total([Share(0.0, 1.0), let_be]) == 0
     assert total([Share(0.5, 1.0), let_be]) == 0.5
     assert total([Share(1.0, 1.0), Share(None, 0.5)]) == 0.75
-    assert total([let_be]) == 1  # where nothing is to be done anywhere
+    assert total([let_be]) == 1  # No world requires an action.
 
 
 def test_equal_programs_are_judged_once(caplog: pytest.LogCaptureFixture) -> None:
@@ -108,7 +108,7 @@ def test_equal_programs_are_judged_once(caplog: pytest.LogCaptureFixture) -> Non
         first = reward("SayGoodDay", 0, [program] * 50)
         assert reward("SayGoodDay", 0, [program]) == first[:1] == [1.0]
     started = [record for record in caplog.records if record.getMessage().endswith("started")]
-    assert len(started) == 4  # one a world
+    assert len(started) == 4  # There are four worlds.
 
 
 def test_each_prompt_is_rewarded_for_what_it_asks(tmp_path: Path) -> None:
@@ -126,7 +126,7 @@ worlds:
     require: [goes, {check: not says, prompts: {1: say nothing}}]
 """
     suite, program = (
-        load_suite(a_suite(tmp_path, task)),
+        load_suite(write_suite(tmp_path, task)),
         "def task_program():\n    go_to('lab')\n    say('x')\n",
     )
     assert [reward("T", prompt, [program], suite=suite) for prompt in range(3)] == [[1.0], [0.0], [1.0]]
@@ -145,11 +145,11 @@ worlds:
     rooms: [hall, lab]
     require: [{check: goes, prompts: {0: go}}]
 """
-    suite = load_suite(a_suite(tmp_path, task))
+    suite = load_suite(write_suite(tmp_path, task))
     assert reward("T", 1, ["def task_program():\n    pass\n"], suite=suite) == [1.0]
 
 
-def test_house_rules_count_even_if_a_program_was_rewarded_without_them(tmp_path: Path, paper: Suite) -> None:
+def test_house_rules_count_even_after_a_reward_without_them(tmp_path: Path, paper: Suite) -> None:
     file = tmp_path / "quiet.yaml"
     file.write_text('rules:\n  - {name: quiet, says: Hush., always: not tr.Exists(say(".*"))}\n')
     (program,) = distinct(1, "with and without rules")
@@ -160,55 +160,55 @@ def test_house_rules_count_even_if_a_program_was_rewarded_without_them(tmp_path:
 
 
 @pytest.mark.slow
-def test_it_may_be_called_from_many_threads_at_once() -> None:
+def test_many_threads_may_call_reward_at_once() -> None:
     shared = [*distinct(10, "shared"), *NOTHING]
 
-    def one(number: int) -> list[float]:
+    def reward_in_thread(number: int) -> list[float]:
         return reward("SayGoodDay", 0, [*shared, *distinct(2, f"thread {number}")])
 
     with ThreadPoolExecutor(12) as threads:
-        told = list(threads.map(one, range(12)))
-    assert told == [[1.0] * 10 + [0.0] * len(NOTHING) + [1.0] * 2] * 12
+        results = list(threads.map(reward_in_thread, range(12)))
+    assert results == [[1.0] * 10 + [0.0] * len(NOTHING) + [1.0] * 2] * 12
 
 
 @pytest.fixture
-def uncollected() -> Iterator[None]:
-    """No garbage is collected meanwhile: Python loses an interrupt that comes in a `__del__`."""
+def no_garbage_collection() -> Iterator[None]:
+    """Collect no garbage, because Python loses an interrupt that arrives in a `__del__`."""
     gc.collect()
     gc.disable()
     yield
     gc.enable()
 
 
-@pytest.mark.usefixtures("uncollected")
-def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # in the place of polars' own
+@pytest.mark.usefixtures("no_garbage_collection")
+def test_an_interrupt_cancels_only_programs_that_nobody_else_awaits(monkeypatch: pytest.MonkeyPatch) -> None:
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # This replaces polars' handler.
     pool, gate, patience = shared_pool(), threading.Event(), 60
     here, submit = pool.here, pool.submit
     monkeypatch.setattr(pool, "here", lambda: gate.wait(patience) and here())
     futures: list[Future[object]] = []
 
-    def noted(*call: Any) -> Future[object]:  # noqa: ANN401 - passed on
+    def submit_and_record(*call: Any) -> Future[object]:  # noqa: ANN401 - passed on
         futures.append(submit(*call))
         return futures[-1]
 
-    monkeypatch.setattr(pool, "submit", noted)
+    monkeypatch.setattr(pool, "submit", submit_and_record)
     waited_for, given_up = distinct(8, "interrupted"), distinct(300, "given up")
 
-    def submitted(more_than: int) -> int:
+    def wait_for_submissions(more_than: int) -> int:
         while len(futures) <= more_than:
             time.sleep(0.01)
         time.sleep(0.1)
         return len(futures)
 
     def interrupt() -> None:
-        submitted(few)
+        wait_for_submissions(few)
         os.kill(os.getpid(), signal.SIGINT)
 
-    with ThreadPoolExecutor(2) as beside:
-        other = beside.submit(reward, "SayGoodDay", 0, waited_for)
-        few = submitted(0)
-        beside.submit(interrupt)
+    with ThreadPoolExecutor(2) as threads:
+        other = threads.submit(reward, "SayGoodDay", 0, waited_for)
+        few = wait_for_submissions(0)
+        threads.submit(interrupt)
         with pytest.raises(KeyboardInterrupt):
             reward("SayGoodDay", 0, given_up)
         assert [future.cancelled() for future in futures] == [number >= few for number in range(len(futures))]
@@ -216,7 +216,7 @@ def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.Mo
         assert other.result() == [1.0] * len(waited_for)
 
 
-def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
+def test_wrong_arguments_are_refused(paper: Suite) -> None:
     with pytest.raises(UserError, match="a list"):
         reward("SayGoodDay", 0, RIGHT)
     with pytest.raises(UserError, match='"Sing"'):
@@ -241,7 +241,7 @@ def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
         (["LunchTime"], 0, [], ['"paper"', "no task"]),
     ],
 )
-def test_arguments_of_another_kind_are_refused(
+def test_arguments_of_another_type_are_refused(
     task: object, prompt: object, programs: object, named: list[str]
 ) -> None:
     wrong: Any = (task, prompt, programs)
@@ -253,7 +253,7 @@ def test_arguments_of_another_kind_are_refused(
 # --- processes
 
 
-def told_by_child(programs: list[str], queue: "multiprocessing.SimpleQueue[object]") -> None:
+def reward_in_child(programs: list[str], queue: "multiprocessing.SimpleQueue[object]") -> None:
     signal.alarm(60)
     queue.put((reward("SayGoodDay", 0, programs), children_of(os.getpid())))
 
@@ -267,7 +267,7 @@ def test_a_forked_process_has_an_engine_of_its_own() -> None:
     forking = multiprocessing.get_context("fork")
     queue = forking.SimpleQueue()
     children = [
-        forking.Process(target=told_by_child, args=([*programs, *distinct(20, f"child {n}")], queue))
+        forking.Process(target=reward_in_child, args=([*programs, *distinct(20, f"child {n}")], queue))
         for n in range(2)
     ]
     stop = threading.Event()
@@ -300,23 +300,23 @@ def test_a_forked_process_has_an_engine_of_its_own() -> None:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
-def test_a_process_that_is_started_anew_is_given_the_suite_itself() -> None:
+def test_a_spawned_process_can_receive_a_suite() -> None:
     asked = partial(reward, "SayGoodDay", 0, [RIGHT, *NOTHING])
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        told = pool.submit(asked, suite=load_suite("plus")).result()
-    assert told == asked(suite="plus")
-    assert any(told)
+        results = pool.submit(asked, suite=load_suite("plus")).result()
+    assert results == asked(suite="plus")
+    assert any(results)
 
 
-def test_nobody_forks_in_the_middle_of_a_start() -> None:
+def test_a_fork_waits_for_the_start_of_a_process() -> None:
     began = threading.Event()
 
-    def starting() -> None:
+    def hold_start_lock() -> None:
         with START_LOCK:
             began.set()
             time.sleep(0.3)
 
-    other = threading.Thread(target=starting)
+    other = threading.Thread(target=hold_start_lock)
     other.start()
     assert began.wait(10)
     child = os.fork()
@@ -329,21 +329,21 @@ def test_nobody_forks_in_the_middle_of_a_start() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
-def test_a_forked_process_does_not_wait_for_threads_of_the_one_before(
+def test_a_forked_process_does_not_wait_for_its_parents_threads(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pool, gate, patience = shared_pool(), threading.Event(), 60
     here, began = pool.here, threading.Event()
 
-    def held() -> Worker:
+    def wait_at_gate() -> Worker:
         began.set()
         gate.wait(patience)
         return here()
 
-    monkeypatch.setattr(pool, "here", held)
+    monkeypatch.setattr(pool, "here", wait_at_gate)
     (program,) = distinct(1, "under way")
-    with ThreadPoolExecutor(1) as beside:
-        other = beside.submit(reward, "SayGoodDay", 0, [program])
+    with ThreadPoolExecutor(1) as threads:
+        other = threads.submit(reward, "SayGoodDay", 0, [program])
         assert began.wait(patience)
         child = os.fork()
         if child == 0:
@@ -387,7 +387,7 @@ print("parent", *parents, flush=True)
 
 
 @pytest.mark.slow
-def test_all_processes_end_with_the_one_that_asked_for_them() -> None:
+def test_all_processes_end_with_their_parents() -> None:
     command = [sys.executable, "-W", "error", "-W", "ignore:.*use of fork:DeprecationWarning", "-c", SCRIPT]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert (ended.returncode, ended.stderr) == (0, "")

@@ -1,4 +1,4 @@
-"""The linter of tasks: each kind of finding, by a task that has it and one that has not."""
+"""The linter of tasks: each kind of finding, with a task that has it and one that does not."""
 
 import json
 import re
@@ -41,8 +41,8 @@ def head_of(formula: str, category: str = "SayAtLocation") -> str:
 
 
 @pytest.fixture
-def linted(tmp_path: Path) -> Lint:
-    """Writes a task into a suite of its own and returns its findings, often without those on programs."""
+def linter(tmp_path: Path) -> Lint:
+    """Return a function that writes a task and returns its findings, by default without those on programs."""
 
     def write(
         checks: dict[str, str],
@@ -99,64 +99,64 @@ GOES = 'tr.Exists(goto("kitchen"))'
 STAYS = 'not tr.Exists(goto("kitchen"))'
 
 
-def test_a_sound_task_has_no_finding(linted: Lint) -> None:
-    assert linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], untripped=True) == []
+def test_a_sound_task_has_no_finding(linter: Lint) -> None:
+    assert linter({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], untripped=True) == []
 
 
 # --- kinds
 
 
-def test_a_requirement_that_cannot_hold(linted: Lint) -> None:
-    (finding,) = linted({"odd": 'tr.Exists(say("a")) and not tr.Exists(say("a|b"))'}, ["odd"])
+def test_a_requirement_that_cannot_hold(linter: Lint) -> None:
+    (finding,) = linter({"odd": 'tr.Exists(say("a")) and not tr.Exists(say("a|b"))'}, ["odd"])
     assert finding.name == "unsatisfiable: odd"
     assert '"odd"' in finding.message
     assert "world 1" in finding.message
-    assert finding.line == 13  # of the requirement
-    assert linted({"even": 'tr.Exists(say("a|b")) and not tr.Exists(say("a"))'}, ["even"]) == []
+    assert finding.line == 13  # It is the line of the requirement.
+    assert linter({"even": 'tr.Exists(say("a|b")) and not tr.Exists(say("a"))'}, ["even"]) == []
 
 
 @pytest.mark.parametrize(("matching", "can_hold"), [("label-in-request", False), ("longest-name", True)])
 def test_a_place_is_reached_if_the_suite_prefers_longer_names(
-    linted: Lint, matching: str, *, can_hold: bool
+    linter: Lint, matching: str, *, can_hold: bool
 ) -> None:
     places = ("rooms: [kitchen, ", "rooms: [{{name: kitchen, places: [kitchen table]}}, ")
     formula = 'tr.Exists(at("kitchen table", place("mug")))'
-    found = linted({"puts": formula}, ["puts"], replaced=places, matching=matching)
+    found = linter({"puts": formula}, ["puts"], replaced=places, matching=matching)
     assert ("unsatisfiable" in {one.kind for one in found}) is not can_hold
 
 
-def test_requirements_that_cannot_hold_together(linted: Lint) -> None:
+def test_requirements_that_cannot_hold_together(linter: Lint) -> None:
     checks = {"goes": GOES, "stays": STAYS, "speaks": SPEAKS}
-    (finding,) = linted(checks, ["speaks", "goes", "stays"])
+    (finding,) = linter(checks, ["speaks", "goes", "stays"])
     assert (finding.name, finding.line) == ("unsatisfiable: goes and stays", 15)
-    assert linted(checks, ["speaks", "goes"], ["stays", "speaks"]) == []
+    assert linter(checks, ["speaks", "goes"], ["stays", "speaks"]) == []
 
 
-def test_what_needs_a_visit_to_an_absent_room_cannot_hold(linted: Lint) -> None:
+def test_a_requirement_in_an_absent_room_cannot_hold(linter: Lint) -> None:
     checks = {"greets": 'tr.ActAtFirst("lobby", say("hello"))'}
-    findings = linted(checks, ["greets"])
+    findings = linter(checks, ["greets"])
     assert names(findings) == ["absent: lobby in greets", "unsatisfiable: greets"]
     assert [one.line for one in findings] == [13, 13]
 
 
-def test_a_requirement_that_follows_from_another(linted: Lint) -> None:
+def test_a_requirement_that_follows_from_another(linter: Lint) -> None:
     checks = {"greets": GREETS_THERE, "goes": GOES, "speaks": SPEAKS}
-    (one, other) = linted(checks, ["greets", "goes", "speaks"])
+    (one, other) = linter(checks, ["greets", "goes", "speaks"])
     assert (one.name, other.name) == ("implied: goes", "implied: speaks")
     for name in ('"goes"', "world 1", '"greets"'):
         assert name in one.message
-    assert linted(checks, ["goes", "speaks"], ["greets"]) == []
+    assert linter(checks, ["goes", "speaks"], ["greets"]) == []
 
 
-def test_what_follows_only_by_a_prompt_that_asks_for_more_is_no_finding(linted: Lint) -> None:
+def test_a_requirement_implied_only_by_some_prompts_is_no_finding(linter: Lint) -> None:
     checks = {"greets": GREETS_THERE, "goes": GOES}
     more = ("[Say hello in the kitchen.]", "[Say hello in the kitchen., Go there.]")
     greets = "{check: greets, prompts: {0: Say hello in the kitchen}}"
-    assert names(linted(checks, ["goes", "greets"])) == ["implied: goes"]
-    assert linted(checks, ["goes", "greets"], edited=(more, ("'greets'", greets))) == []
+    assert names(linter(checks, ["goes", "greets"])) == ["implied: goes"]
+    assert linter(checks, ["goes", "greets"], edited=(more, ("'greets'", greets))) == []
 
 
-def test_a_clause_that_no_check_covers(linted: Lint) -> None:
+def test_a_clause_that_no_check_covers(linter: Lint) -> None:
     checks = {"speaks": SPEAKS, "goes": GOES}
     lines = (
         "facts:",
@@ -167,23 +167,23 @@ def test_a_clause_that_no_check_covers(linted: Lint) -> None:
     )
     facts = ("checks:", "\n".join(lines))
     more = ("[Say hello in the kitchen.]", "['Say hello in the kitchen, and then come back here.']")
-    (finding,) = linted(checks, ["speaks", "goes"], edited=(facts, more))
+    (finding,) = linter(checks, ["speaks", "goes"], edited=(facts, more))
     assert finding.name == "uncovered: 0: and then come back here."
-    assert linted(checks, ["speaks", "goes"], edited=(facts,)) == []
+    assert linter(checks, ["speaks", "goes"], edited=(facts,)) == []
     forgotten = ("what: [speaks]", "")
-    assert names(linted(checks, ["speaks", "goes"], edited=(facts, forgotten))) == ["uncovered: what"]
+    assert names(linter(checks, ["speaks", "goes"], edited=(facts, forgotten))) == ["uncovered: what"]
     reason = ("what: [speaks]", "what: it goes without saying")
-    assert linted(checks, ["speaks", "goes"], edited=(facts, reason)) == []
+    assert linter(checks, ["speaks", "goes"], edited=(facts, reason)) == []
     skipping = ("[hello]", "['hello.*here']")
-    assert names(linted(checks, ["speaks", "goes"], edited=(facts, more, skipping))) == []
+    assert names(linter(checks, ["speaks", "goes"], edited=(facts, more, skipping))) == []
     between = ("and then come back here", "sing a long song, and then come back here")
-    (finding,) = linted(checks, ["speaks", "goes"], edited=(facts, more, skipping, between))
+    (finding,) = linter(checks, ["speaks", "goes"], edited=(facts, more, skipping, between))
     assert finding.name == "uncovered: 0: sing a long song,"
     quoted = ("'goes'", "{check: goes, prompts: {0: and then come back here}}")
-    assert linted(checks, ["speaks", "goes"], edited=(facts, more, quoted)) == []
+    assert linter(checks, ["speaks", "goes"], edited=(facts, more, quoted)) == []
 
 
-def test_a_clause_ends_with_its_sentence(linted: Lint) -> None:
+def test_a_clause_ends_with_its_sentence(linter: Lint) -> None:
     lines = (
         "facts: [{fact: where, words: [kitchen]}, {fact: what, words: [hello]}]",
         "covered_by: {where: [speaks], what: [speaks]}",
@@ -200,93 +200,93 @@ def test_a_clause_ends_with_its_sentence(linted: Lint) -> None:
         ("Say hello in kitchen 2. Once it is done, come back.", "Once it is done, come back."),
     ):
         prompt = ("[Say hello in the kitchen.]", f"['{said}']")
-        found = linted({"speaks": SPEAKS}, ["speaks"], edited=(facts, prompt))
+        found = linter({"speaks": SPEAKS}, ["speaks"], edited=(facts, prompt))
         assert names(found) == [f"uncovered: 0: {left}"]
 
 
-def test_a_requirement_that_follows_from_several(linted: Lint) -> None:
+def test_a_requirement_that_follows_from_several(linter: Lint) -> None:
     asks_first = 'tr.AfterFirst(goto("kitchen")).BeforeFirst(say("hello")).Exists(ask("tea", ".*"))'
     checks = {"greets": GREETS_THERE, "asks_first": asks_first}
     checks["asks"] = 'tr.ActAtFirst("kitchen", ask("tea", ".*"))'
-    (finding,) = linted(checks, ["greets", "asks_first", "asks"])
+    (finding,) = linter(checks, ["greets", "asks_first", "asks"])
     for name in ('"asks"', "world 1", '"greets" and "asks_first"'):
         assert name in finding.message
-    assert linted(checks, ["asks_first", "asks"], ["greets", "asks"]) == []
+    assert linter(checks, ["asks_first", "asks"], ["greets", "asks"]) == []
 
 
-def test_a_requirement_that_always_holds(linted: Lint) -> None:
-    (finding,) = linted({"any": 'tr.AtLeast(say("a"), 0)'}, ["any"])
+def test_a_requirement_that_always_holds(linter: Lint) -> None:
+    (finding,) = linter({"any": 'tr.AtLeast(say("a"), 0)'}, ["any"])
     assert '"any" in world 1' in finding.message
     assert "without" not in finding.message
     assert finding.line == 13
     checks = {"none(x)": 'tr.AtLeast(say("{x}"), 0)', "speaks": SPEAKS}
-    found = linted(checks, ["speaks"], ['none("b")', "speaks"])
+    found = linter(checks, ["speaks"], ['none("b")', "speaks"])
     assert [(one.name, one.line) for one in found if one.kind == "implied"] == [('implied: none("b")', 22)]
 
 
-def test_what_takes_too_long_is_said(linted: Lint) -> None:
+def test_requirements_that_take_too_long_are_undecided(linter: Lint) -> None:
     started = time.monotonic()
-    findings = linted({"many": 'tr.Count(say("a"), 1000000000)', "speaks": SPEAKS}, ["many", "speaks"])
+    findings = linter({"many": 'tr.Count(say("a"), 1000000000)', "speaks": SPEAKS}, ["many", "speaks"])
     assert names(findings) == ["undecided: world 1", "undecided: many", "undecided: speaks"]
     assert [one.line for one in findings] == [9, 14, 14]
     assert time.monotonic() - started < 10
-    assert linted({"some": 'tr.Count(say("a"), 100)'}, ["some"]) == []
+    assert linter({"some": 'tr.Count(say("a"), 100)'}, ["some"]) == []
 
 
-def test_a_check_that_nothing_requires(linted: Lint) -> None:
-    (finding,) = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks"])
+def test_a_check_that_nothing_requires(linter: Lint) -> None:
+    (finding,) = linter({"speaks": SPEAKS, "goes": GOES}, ["speaks"])
     assert finding.name == "unused: goes"
     assert finding.line == 6
-    assert linted({"speaks": SPEAKS, "goes": GOES}, ["speaks"], ["not goes", "speaks"]) == []
+    assert linter({"speaks": SPEAKS, "goes": GOES}, ["speaks"], ["not goes", "speaks"]) == []
 
 
-def test_a_check_that_no_wrong_program_trips(linted: Lint) -> None:
+def test_a_check_that_no_wrong_program_trips(linter: Lint) -> None:
     checks = {"speaks": SPEAKS, "swears": 'tr.Exists(say("darn"))'}
-    (finding,) = linted(checks, ["speaks", "not swears"], untripped=True)
+    (finding,) = linter(checks, ["speaks", "not swears"], untripped=True)
     assert finding.name == "untripped: not swears"
     assert finding.line == 6
     swears = SOLUTIONS.replace("pass", "say('darn')")
-    assert linted(checks, ["speaks", "not swears"], solutions=swears, untripped=True) == []
+    assert linter(checks, ["speaks", "not swears"], solutions=swears, untripped=True) == []
 
 
-def test_it_is_said_how_many_programs_trip_nothing(linted: Lint) -> None:
+def test_the_number_of_programs_that_trip_nothing_is_named(linter: Lint) -> None:
     checks = {"speaks": SPEAKS, "swears": 'tr.Exists(say("darn"))'}
-    (finding,) = linted(checks, ["speaks", "not swears"], untripped=True)
+    (finding,) = linter(checks, ["speaks", "not swears"], untripped=True)
     assert '"not swears"' in finding.message
     assert "1 incorrect program " in finding.message
     two = (
         SOLUTIONS
         + "    - {about: goes, fails: SayAtLocation, program: 'def task_program(): go_to(\"kitchen\")'}\n"
     )
-    (finding,) = linted(checks, ["speaks", "not swears"], solutions=two, untripped=True)
+    (finding,) = linter(checks, ["speaks", "not swears"], solutions=two, untripped=True)
     assert "2 incorrect programs" in finding.message
 
 
-def test_the_form_that_nothing_trips_is_said_of_a_check_that_is_required_both_ways(linted: Lint) -> None:
+def test_the_untripped_form_of_a_check_required_both_ways_is_named(linter: Lint) -> None:
     speaks = SOLUTIONS.replace("pass", "say('hello')")
-    found = linted({"speaks": SPEAKS}, ["speaks"], ["not speaks"], solutions=speaks, untripped=True)
+    found = linter({"speaks": SPEAKS}, ["speaks"], ["not speaks"], solutions=speaks, untripped=True)
     (message,) = (one.message for one in found if one.kind == "untripped")
     for name in ("2 incorrect programs", '"speaks"', '"not"'):
         assert name in message
 
 
-def test_a_task_without_wrong_programs(linted: Lint) -> None:
+def test_a_task_without_wrong_programs(linter: Lint) -> None:
     for file in ("programs: []", SOLUTIONS.replace("pass", "say('hello')")):
-        findings = linted({"speaks": SPEAKS}, ["speaks"], solutions=file, untripped=True)
+        findings = linter({"speaks": SPEAKS}, ["speaks"], solutions=file, untripped=True)
         assert [one.name for one in findings if one.kind != "misjudged"] == ["untripped: Hello"]
 
 
 @pytest.mark.parametrize("text", ['"a^b"', '"$x"', r'words(r"\bno\b", without("no"))', 'words("a", "(?!)")'])
-def test_a_regex_that_matches_nothing(linted: Lint, text: str) -> None:
-    findings = linted({"says": f"not tr.Exists(say({text}))", "speaks": SPEAKS}, ["says", "speaks"])
+def test_a_regex_that_matches_nothing(linter: Lint, text: str) -> None:
+    findings = linter({"says": f"not tr.Exists(say({text}))", "speaks": SPEAKS}, ["says", "speaks"])
     assert [one.kind for one in findings] == ["dead-regex", "implied"]
-    asked = linted({"asks": f'not tr.Exists(ask(".*", {text}))', "speaks": SPEAKS}, ["asks", "speaks"])
+    asked = linter({"asks": f'not tr.Exists(ask(".*", {text}))', "speaks": SPEAKS}, ["asks", "speaks"])
     assert [one.kind for one in asked] == ["dead-regex", "implied"]
 
 
 @pytest.mark.parametrize("text", ['words("no", without("no"))', '"^a b$"', r'" 4"', '"[^a]{3}"', '"(a)b"'])
-def test_a_regex_that_matches_something(linted: Lint, text: str) -> None:
-    assert linted({"says": f"tr.Exists(say({text}))"}, ["says"]) == []
+def test_a_regex_that_matches_something(linter: Lint, text: str) -> None:
+    assert linter({"says": f"tr.Exists(say({text}))"}, ["says"]) == []
 
 
 @pytest.mark.parametrize(
@@ -300,51 +300,51 @@ def test_a_regex_that_matches_something(linted: Lint, text: str) -> None:
         pytest.param(r"(\bten\b.?)+\bpercent\b", marks=pytest.mark.slow),
     ],
 )
-def test_words_of_which_a_regex_says_only_that_they_stand_apart(linted: Lint, text: str) -> None:
-    found = linted({"says": f'tr.Exists(say(r"{text}"))'}, ["says"])
+def test_a_regex_of_words_at_any_distance_may_only_be_slow(linter: Lint, text: str) -> None:
+    found = linter({"says": f'tr.Exists(say(r"{text}"))'}, ["says"])
     assert {one.kind for one in found} <= {"slow-regex"}
 
 
 @pytest.mark.parametrize("option", ["^ yes", "yes $", "^ yes $"])
-def test_options_may_have_outer_spaces(linted: Lint, option: str) -> None:
+def test_options_may_have_outer_spaces(linter: Lint, option: str) -> None:
     checks = {"asks": f'not tr.Exists(ask("tea", "{option}"))', "speaks": SPEAKS}
-    assert linted(checks, ["asks", "speaks"]) == []
-    said = linted({"says": f'not tr.Exists(say("{option}"))', "speaks": SPEAKS}, ["says", "speaks"])
+    assert linter(checks, ["asks", "speaks"]) == []
+    said = linter({"says": f'not tr.Exists(say("{option}"))', "speaks": SPEAKS}, ["says", "speaks"])
     assert [one.kind for one in said] == ["dead-regex", "implied"]
 
 
 @pytest.mark.slow
-def test_a_regex_that_takes_much_longer_the_longer_a_text_is(linted: Lint) -> None:
-    (finding,) = linted({"greets": 'tr.Exists(say("a.*b"))'}, ["greets"])
+def test_a_regex_that_is_slow_on_long_texts(linter: Lint) -> None:
+    (finding,) = linter({"greets": 'tr.Exists(say("a.*b"))'}, ["greets"])
     assert finding.name == "slow-regex: a.*b"
     assert finding.line == 5
     assert '"greets"' in finding.message
-    assert not linted({"greets": 'tr.Exists(say("a[^a]*b"))'}, ["greets"])
+    assert not linter({"greets": 'tr.Exists(say("a[^a]*b"))'}, ["greets"])
 
 
-def test_a_regex_without_words(linted: Lint) -> None:
+def test_a_regex_without_words(linter: Lint) -> None:
     checks = {"greets": 'tr.Exists(say("a[^a]*b"))', "speaks": SPEAKS}
-    (finding,) = linted(checks, ["greets", "speaks"], unworded=True)
+    (finding,) = linter(checks, ["greets", "speaks"], unworded=True)
     assert (finding.name, finding.line) == ("unworded: greets", 5)
     assert "means" in finding.message
     assert "[^a]" not in finding.message
     named = ("greets: {category", "greets: {means: a greeting, category")
-    assert not linted(checks, ["greets", "speaks"], unworded=True, edited=[named])
+    assert not linter(checks, ["greets", "speaks"], unworded=True, edited=[named])
 
 
-def test_an_argument_without_words(linted: Lint) -> None:
+def test_an_argument_without_words(linter: Lint) -> None:
     checks = {"says(number)": 'tr.Exists(say("{number}"))', "speaks": SPEAKS}
-    found = linted(checks, ['says("[^a]b")', "speaks"], unworded=True)
+    found = linter(checks, ['says("[^a]b")', "speaks"], unworded=True)
     assert names(found) == ["unworded: says"]
 
 
-def test_a_visit_that_leads_nowhere(linted: Lint) -> None:
-    (dead, absent) = linted({"goes": 'not tr.Exists(goto("^attic$"))', "speaks": SPEAKS}, ["goes", "speaks"])[
+def test_a_visit_that_leads_nowhere(linter: Lint) -> None:
+    (dead, absent) = linter({"goes": 'not tr.Exists(goto("^attic$"))', "speaks": SPEAKS}, ["goes", "speaks"])[
         :2
     ]
     assert {dead.kind, absent.kind} == {"dead-regex", "absent"} or dead.kind == "dead-regex"
     assert "world 1" in dead.message
-    fine = linted({"goes": 'not tr.Exists(goto("^(the )?kitchen$"))', "speaks": SPEAKS}, ["goes", "speaks"])
+    fine = linter({"goes": 'not tr.Exists(goto("^(the )?kitchen$"))', "speaks": SPEAKS}, ["goes", "speaks"])
     assert fine == []
 
 
@@ -355,8 +355,8 @@ def test_a_visit_that_leads_nowhere(linted: Lint) -> None:
         *('holding("cup", say(".*"))', 'to("lobby", ask(".*", ".*"))'),
     ],
 )
-def test_something_that_is_not_in_the_world(linted: Lint, formula: str) -> None:
-    found = linted({"does": f"not tr.Exists({formula})", "speaks": SPEAKS}, ["speaks", "does"])
+def test_something_that_is_not_in_the_world(linter: Lint, formula: str) -> None:
+    found = linter({"does": f"not tr.Exists({formula})", "speaks": SPEAKS}, ["speaks", "does"])
     assert [one.subject for one in found if one.kind == "absent"] == [
         f"{re.findall('lobby|cup', formula)[0]} in does"
     ]
@@ -378,24 +378,24 @@ def test_something_that_is_not_in_the_world(linted: Lint, formula: str) -> None:
         'say("lobby")',
     ],
 )
-def test_something_that_is_in_the_world(linted: Lint, formula: str) -> None:
-    found = linted({"does": f"not tr.Exists({formula})", "speaks": SPEAKS}, ["speaks", "does"])
+def test_something_that_is_in_the_world(linter: Lint, formula: str) -> None:
+    found = linter({"does": f"not tr.Exists({formula})", "speaks": SPEAKS}, ["speaks", "does"])
     assert "absent" not in [one.kind for one in found]
 
 
-def test_a_person_who_is_not_in_the_world(linted: Lint) -> None:
+def test_a_person_who_is_not_in_the_world(linter: Lint) -> None:
     checks = {"greets(person)": 'tr.Exists(say("{person}"))'}
-    (finding,) = linted(checks, ['not greets("bob")', 'greets("ann")'])
+    (finding,) = linter(checks, ['not greets("bob")', 'greets("ann")'])
     assert finding.name == 'absent: bob in not greets("bob")'
     assert finding.message.count('"bob"') == 2
     assert "world 1" in finding.message
 
 
-def test_a_person_of_another_room_or_named_by_another_parameter(linted: Lint) -> None:
+def test_a_person_of_another_room_or_named_by_another_parameter(linter: Lint) -> None:
     checks = {"greets(whom)": 'tr.Exists(say("{whom}"))'}
-    assert names(linted(checks, ['not greets("bob")', 'greets("Ann")'])) == []
+    assert names(linter(checks, ['not greets("bob")', 'greets("Ann")'])) == []
     kitchen, office = "rooms: [kitchen,", 'rooms: ["bob\'s office", kitchen,'
-    (finding,) = linted(checks, ['not greets("Bob")', 'greets("Ann")'], replaced=(kitchen, office))
+    (finding,) = linter(checks, ['not greets("Bob")', 'greets("Ann")'], replaced=(kitchen, office))
     assert finding.name == 'absent: Bob in not greets("Bob")'
 
 
@@ -413,7 +413,7 @@ def lead_to(sim: Simulation, person: str, room: str) -> None:
 """
 
 
-def test_own_skills_may_take_descriptions_that_a_prompt_contains(linted: Lint) -> None:
+def test_own_skills_may_take_descriptions_from_a_prompt(linter: Lint) -> None:
     checks = {
         "counts": 'tr.Exists(count_here("red fruits?"))',
         "hides": 'tr.Exists(count_here("coins?"))',
@@ -421,14 +421,14 @@ def test_own_skills_may_take_descriptions_that_a_prompt_contains(linted: Lint) -
     }
     prompt = ("Say hello in the kitchen.", "Count the red fruit and lead the waving person to the kitchen.")
     require = ["counts", 'leads("waving person")', 'leads("ann")', "hides"]
-    found = linted(checks, require, edited=[prompt], skills=OWN_SKILLS)
+    found = linter(checks, require, edited=[prompt], skills=OWN_SKILLS)
     assert names(found) == ["absent: coins? in hides"]
 
 
-def test_one_of_several_alternatives_that_is_not_in_the_world(linted: Lint) -> None:
-    assert names(linted({"goes": 'tr.Exists(goto("kitchen|attic"))'}, ["goes"])) == ["absent: attic in goes"]
-    assert linted({"goes": 'tr.Exists(goto("kitchen|conference room"))'}, ["goes"]) == []
-    found = linted({"says": 'tr.Exists(at("kitchn", say("hello")))'}, ["says"])
+def test_one_of_several_alternatives_that_is_not_in_the_world(linter: Lint) -> None:
+    assert names(linter({"goes": 'tr.Exists(goto("kitchen|attic"))'}, ["goes"])) == ["absent: attic in goes"]
+    assert linter({"goes": 'tr.Exists(goto("kitchen|conference room"))'}, ["goes"]) == []
+    found = linter({"says": 'tr.Exists(at("kitchn", say("hello")))'}, ["says"])
     assert "absent: kitchn in says" in names(found)
 
 
@@ -443,8 +443,8 @@ def test_one_of_several_alternatives_that_is_not_in_the_world(linted: Lint) -> N
         ("kitchen|", []),
     ],
 )
-def test_alternatives_without_a_group(linted: Lint, pattern: str, absent: list[str]) -> None:
-    found = linted({"goes": f'tr.Exists(goto("{pattern}"))'}, ["goes"])
+def test_alternatives_without_a_group(linter: Lint, pattern: str, absent: list[str]) -> None:
+    found = linter({"goes": f'tr.Exists(goto("{pattern}"))'}, ["goes"])
     assert [one.subject.removesuffix(" in goes") for one in found if one.kind == "absent"] == absent
 
 
@@ -483,45 +483,45 @@ def test_a_person_in_a_text_who_is_in_another_world_only(
     ]
 
 
-def test_worlds_that_cannot_be_satisfied_do_not_require_the_same(linted: Lint) -> None:
+def test_worlds_that_cannot_be_satisfied_do_not_require_the_same(linter: Lint) -> None:
     checks = {"goes": GOES, "stays": STAYS, "speaks": SPEAKS}
-    found = linted(checks, ["goes", "stays", "speaks"], ["goes", "not goes"], ["speaks"])
+    found = linter(checks, ["goes", "stays", "speaks"], ["goes", "not goes"], ["speaks"])
     assert {one.kind for one in found} == {"unsatisfiable"}
 
 
-def test_worlds_of_an_ablation_that_require_the_same(linted: Lint) -> None:
-    def ablated(*texts: str) -> list[str]:
+def test_worlds_of_an_ablation_that_require_the_same(linter: Lint) -> None:
+    def lint_ablation(*texts: str) -> list[str]:
         require = "\n    ".join(("require: {require}", "ablation: [" + ", ".join(texts) + "]"))
-        found = linted(checks, ["speaks"], ["goes"], replaced=("require: {require}", require))
+        found = linter(checks, ["speaks"], ["goes"], replaced=("require: {require}", require))
         return [each.name for each in found if each.kind == "same-worlds"]
 
     checks = {"speaks": SPEAKS, "goes": GOES}
-    assert ablated("speaks") == ["same-worlds: ablation 1 and 2"]
-    assert ablated() == ["same-worlds: ablation 1 and 2"]
+    assert lint_ablation("speaks") == ["same-worlds: ablation 1 and 2"]
+    assert lint_ablation() == ["same-worlds: ablation 1 and 2"]
 
 
-def test_worlds_that_require_the_same(linted: Lint) -> None:
+def test_worlds_that_require_the_same(linter: Lint) -> None:
     checks = {"speaks": SPEAKS, "goes": GOES}
-    (finding,) = linted(checks, ["speaks", "goes"], ["speaks"], ["goes", "speaks"])
-    assert (finding.name, finding.line) == ("same-worlds: 1 and 3", 25)  # where world 3 begins
-    assert linted(checks, ["speaks"], ["not speaks"], ["goes"]) == []
+    (finding,) = linter(checks, ["speaks", "goes"], ["speaks"], ["goes", "speaks"])
+    assert (finding.name, finding.line) == ("same-worlds: 1 and 3", 25)  # World 3 begins there.
+    assert linter(checks, ["speaks"], ["not speaks"], ["goes"]) == []
 
 
-# --- accepting and showing
+# --- accepting and rendering
 
 
-def test_accepted_findings(linted: Lint) -> None:
+def test_accepted_findings(linter: Lint) -> None:
     checks = {"speaks": SPEAKS, "goes": GOES}
-    (finding,) = linted(checks, ["speaks"], accepted={"unused: goes": "for later"})
+    (finding,) = linter(checks, ["speaks"], accepted={"unused: goes": "for later"})
     assert finding.accepted == "for later"
-    (still, stale) = linted(checks, ["speaks"], accepted={"unused: gone": "for later"})
+    (still, stale) = linter(checks, ["speaks"], accepted={"unused: gone": "for later"})
     assert (still.name, still.accepted) == ("unused: goes", None)
     assert stale.name == "stale-acceptance: unused: gone"
     assert stale.line == 17
 
 
-def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    findings = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks"])
+def test_rendering(linter: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    findings = linter({"speaks": SPEAKS, "goes": GOES}, ["speaks"])
     path = findings[0].path
     monkeypatch.chdir(path.parent)
     line = f"Hello.yaml:6: warning: {findings[0].message} [unused: goes]"
@@ -532,15 +532,15 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert shown == line
     assert re.search(r"^1 accepted finding .* --accepted", more)
     assert re.search(r"^2 accepted findings .* --accepted", render([accepted, accepted]))
-    told = line.replace("warning", "accepted") + ": for later"
-    assert render([*findings, accepted], accepted=True) == f"{line}\n{told}"
-    assert render([accepted], accepted=True) == told
+    accepted_line = line.replace("warning", "accepted") + ": for later"
+    assert render([*findings, accepted], accepted=True) == f"{line}\n{accepted_line}"
+    assert render([accepted], accepted=True) == accepted_line
     assert render([], accepted=True) == render([]) == "no findings"
     monkeypatch.chdir(tmp_path / "suite0" / "solutions")
     assert render(findings).startswith(f"{path}:6: ")
 
 
-# --- solutions that end otherwise than their file says
+# --- misjudged solutions
 
 
 @pytest.mark.parametrize(
@@ -557,11 +557,9 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
         ),
     ],
 )
-def test_a_solution_that_ends_otherwise_than_its_file_says(
-    linted: Lint, solution: str, named: list[str]
-) -> None:
+def test_a_solution_that_does_not_end_as_declared(linter: Lint, solution: str, named: list[str]) -> None:
     solutions = SOLUTIONS + f"    - {solution}\n".replace("`", '"')
-    found = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], solutions=solutions, untripped=True)
+    found = linter({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], solutions=solutions, untripped=True)
     (finding,) = (one for one in found if one.kind == "misjudged")
     assert all(name in finding.message for name in named), finding
     assert finding.path.parts[-2] == "solutions"
@@ -572,7 +570,7 @@ def test_a_solution_that_ends_otherwise_than_its_file_says(
 # --- a new task
 
 
-def test_a_new_task_has_no_finding_and_judges_its_programs_as_they_say(tmp_path: Path) -> None:
+def test_a_new_task_has_no_finding_and_judges_its_programs_as_declared(tmp_path: Path) -> None:
     new_task(tmp_path, "MakeTea")
     suite = load_suite(str(tmp_path))
     task = suite.task("MakeTea")
@@ -585,7 +583,7 @@ def test_a_new_task_has_no_finding_and_judges_its_programs_as_they_say(tmp_path:
     assert kinds == [one.fails for one in solutions(task)] == [None, "SayAtLocation", "SayAtLocation"]
 
 
-def test_a_new_task_leaves_the_solutions_that_there_are(tmp_path: Path) -> None:
+def test_a_new_task_keeps_existing_solutions(tmp_path: Path) -> None:
     path = tmp_path / "solutions" / "MakeTea.yaml"
     path.parent.mkdir()
     path.write_text("programs: []\n")
@@ -623,7 +621,7 @@ def test_a_fact_that_a_prompt_does_not_say(
     ] == found
 
 
-# --- drawn worlds
+# --- random worlds
 
 NAMES = [f"{letter}am" for letter in "bcdfghjklmnprtwz"]
 DRAWN = f"""
@@ -654,8 +652,8 @@ require:
 
 
 @pytest.fixture
-def an_end() -> Iterator[None]:
-    """End a test that would go on for hours."""
+def one_minute_limit() -> Iterator[None]:
+    """Fail a test that would run for hours."""
     before = signal.signal(signal.SIGALRM, lambda *_: pytest.fail("it has not ended after a minute"))
     signal.alarm(60)
     yield
@@ -663,8 +661,8 @@ def an_end() -> Iterator[None]:
     signal.signal(signal.SIGALRM, before)
 
 
-@pytest.mark.usefixtures("an_end")
-def test_of_requirements_that_one_line_makes_a_few_stand_for_all(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("one_minute_limit")
+def test_only_a_few_requirements_from_one_line_are_checked(tmp_path: Path) -> None:
     (tmp_path / "tasks").mkdir()
     (tmp_path / "suite.yaml").write_text("name: mine\nversion: 1\nworlds: 2\nseed: 1\n")
     (tmp_path / "tasks" / "Hello.yaml").write_text(DRAWN)

@@ -1,4 +1,4 @@
-"""`roboeval mutate` as a person meets it."""
+"""The command `roboeval mutate`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from command_line import ENVIRONMENT, Ended, refused, roboeval
-from small_suite import a_suite
+from small_suite import write_suite
 
 WIDE = {**ENVIRONMENT, "COLUMNS": "160"}
 LINE = re.compile(r"^(\w+) +(\d+) +(\d+) +(\d+) +(\d+) +0 +(\d+)  ([01]\.\d{3}) .*\d$", re.MULTILINE)
@@ -60,9 +60,9 @@ def test_two_tasks_from_end_to_end(tmp_path: Path) -> None:
 
 @pytest.fixture
 def small(tmp_path: Path) -> Path:
-    """The folder of a suite with one task, two correct programs, and two that are not right."""
+    """Write a suite with one task, two correct programs, and two wrong ones."""
     (tmp_path / "small").mkdir()
-    own = Path(a_suite(tmp_path / "small"))
+    own = Path(write_suite(tmp_path / "small"))
     bodies = {
         "goes": "go_to('kitchen')",
         "broken": "go_to('kitchen'",
@@ -78,7 +78,7 @@ def small(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_the_same_bytes_whatever_the_number_of_workers(tmp_path: Path) -> None:
+def test_the_number_of_workers_does_not_change_the_bytes(tmp_path: Path) -> None:
     first, second = (
         mutate("SayGoodDay", "--out", f"out{workers}", cwd=tmp_path, workers=workers) for workers in (1, 3)
     )
@@ -89,7 +89,7 @@ def test_the_same_bytes_whatever_the_number_of_workers(tmp_path: Path) -> None:
         assert (tmp_path / "out1" / file).read_bytes() == (tmp_path / "out3" / file).read_bytes()
 
 
-def test_another_seed_draws_others(small: Path) -> None:
+def test_another_seed_samples_other_mutants(small: Path) -> None:
     for seed in ("1", "2"):
         words = ("--suite", small, "--mutants", "3", "--seed", seed, "--out", small / seed)
         assert roboeval("mutate", *words, "--workers", "1").status == 0
@@ -98,7 +98,7 @@ def test_another_seed_draws_others(small: Path) -> None:
     assert one != two
 
 
-def test_brief_is_without_survivors(small: Path) -> None:
+def test_brief_output_has_no_survivors(small: Path) -> None:
     brief, whole = (mutate("--suite", small, *words, cwd=small) for words in (["--brief"], []))
     assert whole.out.startswith(brief.out)
     assert "@@" not in brief.out
@@ -107,7 +107,7 @@ def test_brief_is_without_survivors(small: Path) -> None:
 
 
 @pytest.mark.slow
-def test_programs_that_a_user_names(tmp_path: Path) -> None:
+def test_programs_that_a_user_names_are_mutated(tmp_path: Path) -> None:
     programs = [
         GREETS,
         GREETS.replace("good day", "a good day"),
@@ -129,7 +129,7 @@ def test_programs_that_a_user_names(tmp_path: Path) -> None:
     assert "mine.jsonl:SayGoodDay/0/1" in mutated
 
 
-def test_a_right_program_that_the_suite_finds_wrong(small: Path) -> None:
+def test_solutions_that_the_suite_judges_wrong_are_not_mutated(small: Path) -> None:
     ended = mutate("--suite", small, "--brief", cwd=small)
     assert ended.status == 0, ended
     assert re.findall(r"^not mutated .*: (T, .*)$", ended.err, re.MULTILINE) == [
@@ -139,7 +139,7 @@ def test_a_right_program_that_the_suite_finds_wrong(small: Path) -> None:
     assert re.search(r"^warning: T: .*\b\d mutants", ended.err, re.MULTILINE)
 
 
-def test_a_score_that_is_too_low(small: Path) -> None:
+def test_a_score_that_is_too_low_fails(small: Path) -> None:
     assert mutate("--suite", small, "--brief", "--at-least", "0.1", cwd=small).status == 0
     assert mutate("--suite", small, "--brief", "--at-least", "0.999", cwd=small).status == 1
 
@@ -170,13 +170,13 @@ def test_an_equivalent_mutant_is_not_shown_again(small: Path) -> None:
         (("SayGoodDay", "--suite", "nowhere"), ['"nowhere"']),
     ],
 )
-def test_what_cannot_be_used(words: tuple[str, ...], named: list[str], tmp_path: Path) -> None:
+def test_wrong_options_are_refused(words: tuple[str, ...], named: list[str], tmp_path: Path) -> None:
     refusal = refused("mutate", *words, cwd=tmp_path)
     assert all(name in refusal.sentence for name in named), refusal
     assert not list(tmp_path.iterdir())
 
 
-def test_programs_that_are_not_there(tmp_path: Path) -> None:
+def test_missing_programs_are_refused(tmp_path: Path) -> None:
     refusal = refused("mutate", "SayGoodDay", "--also", "no.jsonl", cwd=tmp_path)
     assert refusal.at == ("no.jsonl", None)
     assert "does not exist" in refusal.sentence

@@ -1,4 +1,4 @@
-"""Each operator by an example: what it changes in a program, and in what the robot then does."""
+"""Each operator by an example: what it changes in a program and in the robot's actions."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ RULES = SimulationSettings(literals="as-written", limits=Limits(calls=20))
 
 
 @skill(fails={"CupFull": "the cup is full"})
-def pour(sim: Simulation, cup: str, size: Literal["small", "large"]) -> bool:  # noqa: ARG001 - as programs call it
+def pour(sim: Simulation, cup: str, size: Literal["small", "large"]) -> bool:  # noqa: ARG001 - the signature that programs call
     """Pour something into a cup; False if it runs out of it."""
     if cup == "full":
         sim.fail("CupFull")
@@ -51,8 +51,8 @@ TABLE = SKILLS.with_skill(pour)
 
 
 @pytest.fixture(autouse=True)
-def declared(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the name mean this skill, whatever another test of this process has declared under it."""
+def register_pour(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Register this skill, even if an earlier test has registered another one by this name."""
     monkeypatch.setitem(declaration._DECLARED, "pour", pour)
 
 
@@ -60,7 +60,7 @@ BY_NAME = {operator.name: operator for operator in MUTATION_OPERATORS}
 
 
 class Example(TypedDict):
-    """What an operator makes of the body of a `task_program`, and what the robot does before and after."""
+    """An operator's change to the body of a `task_program`, and what the robot does before and after."""
 
     operator: str
     before: str
@@ -74,12 +74,12 @@ NAMES = [example["operator"] for example in EXAMPLES]
 
 
 def program(body: str) -> str:
-    """A program with this body, as all programs with its tree are written."""
+    """Return a program with this body, in the form that comes from its tree."""
     return ast.unparse(ast.parse("def task_program():\n" + textwrap.indent(body, "    ")))
 
 
 def mutants(operator: Operator, body: str) -> Iterator[str]:
-    """What an operator makes of a body."""
+    """Yield the mutants that an operator makes of a body."""
     source = parse_tree(program(body))
     assert source is not None
     found = (apply_edit(source, edit) for edit in operator.edits(source, CONTEXT))
@@ -87,20 +87,20 @@ def mutants(operator: Operator, body: str) -> Iterator[str]:
 
 
 @cache
-def outcomes() -> dict[str, Outcome]:
-    """How all programs of the examples ended."""
+def run_examples() -> dict[str, Outcome]:
+    """Run all programs of the examples."""
     programs = [program(body) for example in EXAMPLES for body in (example["before"], example["after"])]
     ended = run(((source, WORLD) for source in programs), workers=2, settings=RULES, skills=TABLE)
     return dict(zip(programs, ended, strict=True))
 
 
-def told(outcome: Outcome) -> str:
-    """What a robot did, on one line."""
+def describe(outcome: Outcome) -> str:
+    """Describe in one line what a robot did."""
     end = "" if outcome.status is Status.FINISHED else f"({outcome.error.kind if outcome.error else ''})"
-    return "; ".join([*map(told_event, outcome.trace[:8]), *([end] if end else [])])
+    return "; ".join([*map(describe_event, outcome.trace[:8]), *([end] if end else [])])
 
 
-def told_event(event: Event) -> str:
+def describe_event(event: Event) -> str:
     found = {None: "", True: ": yes", False: ": no"}[event.found]
     return f"{event.kind} {event.text}{found}{'' if event.answer is None else ': ' + event.answer}"
 
@@ -114,18 +114,18 @@ def test_each_operator_has_an_example_a_name_and_a_sentence() -> None:
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=NAMES)
-def test_what_it_makes_of_a_program(example: Example) -> None:
+def test_an_operator_makes_the_mutant_of_its_example(example: Example) -> None:
     made = list(mutants(BY_NAME[example["operator"]], example["before"]))
     assert program(example["after"]) in made
     assert program(example["before"]) not in made
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=NAMES)
-def test_what_the_robot_does_instead(example: Example) -> None:
-    did, does = (outcomes()[program(example[body])] for body in ("before", "after"))
-    assert told(did) == example["did"]
-    assert told(does) == example["does"]
-    assert told(did) != told(does)
+def test_the_mutant_makes_the_robot_act_differently(example: Example) -> None:
+    did, does = (run_examples()[program(example[body])] for body in ("before", "after"))
+    assert describe(did) == example["did"]
+    assert describe(does) == example["does"]
+    assert describe(did) != describe(does)
 
 
 LEFT_ALONE = {
@@ -141,22 +141,22 @@ LEFT_ALONE = {
     "say-before-asking": ("answer = ask('bob', 'Lunch?', ['yes', 'no'])\nsay(answer)",),
     "drop-a-condition": ("while get_current_location() != 'lobby':\n    go_to('lobby')",),
 }
-"""What an operator has no business with: there it would make nothing wrong, or no program at all."""
+"""Bodies that an operator must not change: no mutant would be wrong, or it would not be a program."""
 
 
 @pytest.mark.parametrize(("name", "body"), [(name, body) for name in LEFT_ALONE for body in LEFT_ALONE[name]])
-def test_what_it_leaves_alone(name: str, body: str) -> None:
+def test_an_operator_leaves_some_bodies_alone(name: str, body: str) -> None:
     assert list(mutants(BY_NAME[name], body)) == []
 
 
-def test_names_by_place_and_by_keyword_are_the_same_to_operators() -> None:
+def test_positional_and_keyword_arguments_are_the_same_to_operators() -> None:
     body = "start = get_current_location()\ngo_to(location={})\nsay(message='hello')"
     assert program(body.format("get_current_location()")) in mutants(
         BY_NAME["return-to-here"], body.format("start")
     )
 
 
-def test_another_person_keeps_the_spelling_of_the_first() -> None:
+def test_only_one_spelling_of_a_person_is_replaced() -> None:
     assert list(mutants(BY_NAME["wrong-person"], "say('BOB and bob')")) == [program("say('Alice and bob')")]
 
 
@@ -172,7 +172,7 @@ LEFT_OUT = [
 
 
 @pytest.mark.parametrize(("name", "body", "asking"), LEFT_OUT, ids=[name for name, *_ in LEFT_OUT])
-def test_what_no_phrasing_asks_for_may_be_left_out(name: str, body: str, asking: str) -> None:
+def test_actions_that_no_phrasing_asks_for_have_no_mutants(name: str, body: str, asking: str) -> None:
     source = parse_tree(program(body))
     assert source is not None
     made = {
@@ -192,9 +192,7 @@ def test_what_no_phrasing_asks_for_may_be_left_out(name: str, body: str, asking:
     ],
 )
 @pytest.mark.parametrize("name", ["forget-to-place", "place-by-words"])
-def test_what_is_only_to_be_brought_here_may_be_held(
-    name: str, phrasings: tuple[str, ...], made: int
-) -> None:
+def test_objects_to_bring_here_need_not_be_put_down(name: str, phrasings: tuple[str, ...], made: int) -> None:
     source = parse_tree(program("pick('mug')\nplace('mug')"))
     assert source is not None
     assert len([*BY_NAME[name].edits(source, Context.of([WORLD], phrasings))]) == made

@@ -1,4 +1,4 @@
-"""The page about mutation says what is so."""
+"""The page about mutation agrees with the operators and the command."""
 
 from __future__ import annotations
 

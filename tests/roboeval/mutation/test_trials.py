@@ -1,4 +1,4 @@
-"""What becomes of a mutant: killed by a check or an error, alive, the same as before, or no robot program."""
+"""Results of mutants: killed by a check or an error, survived, equivalent, unchanged, or crashed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from roboeval.mutation.score import MutantResult, MutantStatus, MutationScore, T
 from roboeval.mutation.trials import judge_mutant, mutation_score, mutation_worlds
 from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.solutions import equivalent_mutants
-from small_suite import a_suite
+from small_suite import write_suite
 
 TASK = """\
 name: T
@@ -55,7 +55,7 @@ def pool() -> Iterator[WorkerPool]:
 
 @pytest.fixture
 def suite(tmp_path: Path) -> Suite:
-    return load_suite(a_suite(tmp_path, TASK))
+    return load_suite(write_suite(tmp_path, TASK))
 
 
 @pytest.fixture
@@ -90,12 +90,12 @@ def outcomes_of(source: str, suite: Suite, pool: WorkerPool) -> list[Outcome]:
         ("go_to('kitchen'); say('hi'); [say('bye') for _ in [1] if is_in_room('x')]", MutantResult(SURVIVED)),
     ],
 )
-def test_what_becomes_of_a_mutant(body: str, result: MutantResult, suite: Suite, pool: WorkerPool) -> None:
+def test_the_result_of_a_mutant(body: str, result: MutantResult, suite: Suite, pool: WorkerPool) -> None:
     before, now = (outcomes_of(source, suite, pool) for source in (RIGHT.program, program(body)))
     assert judge_mutant(now, before, suite.task("T").scenarios) == result
 
 
-def test_an_original_that_is_wrong_says_where(suite: Suite, task: Task, pool: WorkerPool) -> None:
+def test_a_wrong_original_names_its_world_and_reason(suite: Suite, task: Task, pool: WorkerPool) -> None:
     wrong = Original("wrong", program("go_to('kitchen')")), Original("broken", "def (")
     score = mutation_score(task, suite, pool, further=[RIGHT, *wrong])
     assert score.right == (RIGHT,)
@@ -105,7 +105,7 @@ def test_an_original_that_is_wrong_says_where(suite: Suite, task: Task, pool: Wo
     )
 
 
-def test_mutants_are_judged_by_all_prompts_for_which_their_original_is_right(
+def test_mutants_are_judged_by_all_prompts_that_their_original_passes(
     tmp_path: Path, pool: WorkerPool
 ) -> None:
     asks_twice = (
@@ -117,7 +117,7 @@ def test_mutants_are_judged_by_all_prompts_for_which_their_original_is_right(
         )
         .replace("not says]", "{check: not says, prompts: {0: p}}]")
     )
-    suite = load_suite(a_suite(tmp_path, asks_twice))
+    suite = load_suite(write_suite(tmp_path, asks_twice))
     twice = Original(
         "twice", RIGHT.program.replace("    if is", "    go_to('hall')\n    go_to('kitchen')\n    if is")
     )
@@ -144,7 +144,7 @@ def test_the_score_is_the_share_of_wrong_mutants_that_are_killed() -> None:
     assert score_of(SAME).score is None
 
 
-def test_what_makes_a_score_doubtful() -> None:
+def test_few_mutants_or_many_equivalent_ones_cause_a_warning() -> None:
     assert score_of(*[KILLED] * 60).warnings == ()
     (few,) = score_of(*[KILLED] * 59, SAME).warnings
     assert re.match(r"T: .*\b59 mutants\b", few)
@@ -156,7 +156,7 @@ def test_what_makes_a_score_doubtful() -> None:
 # --- equivalent mutants
 
 
-def filled(*mutants: Mutant) -> str:
+def yaml_with_reasons(*mutants: Mutant) -> str:
     return to_yaml(mutants).replace("because: ''", "because: It does no harm.")
 
 
@@ -168,9 +168,9 @@ def test_a_survivor_on_the_list_is_equivalent(suite: Suite, task: Task, pool: Wo
     path = task.path.parents[1] / "solutions" / "T.yaml"
     path.parent.mkdir()
     for listed, equivalent in (
-        (filled(survivor, killed), 1),
-        (filled(survivor).replace("-1,", "-9,"), 1),
-        (filled(other), 0),
+        (yaml_with_reasons(survivor, killed), 1),
+        (yaml_with_reasons(survivor).replace("-1,", "-9,"), 1),
+        (yaml_with_reasons(other), 0),
     ):
         path.write_text(listed)
         found = mutation_score(task, suite, pool, further=[RIGHT])
@@ -190,7 +190,7 @@ def test_a_survivor_on_the_list_is_equivalent(suite: Suite, task: Task, pool: Wo
     ],
     ids=["without a reason", "unknown key"],
 )
-def test_a_list_that_is_wrong(task: Task, text: str, line: int, named: str) -> None:
+def test_a_wrong_list_of_equivalent_mutants_is_refused(task: Task, text: str, line: int, named: str) -> None:
     path = task.path.parents[1] / "solutions" / "T.yaml"
     path.parent.mkdir()
     path.write_text(text)
@@ -202,13 +202,13 @@ def test_a_list_that_is_wrong(task: Task, text: str, line: int, named: str) -> N
 # --- worlds
 
 
-def test_worlds_that_are_written_out(suite: Suite, task: Task) -> None:
+def test_worlds_written_by_hand_cannot_be_sampled(suite: Suite, task: Task) -> None:
     assert mutation_worlds(suite, task, None, 1) == task.scenarios
     with pytest.raises(UserError, match=r'"mine".* --worlds'):
         mutation_worlds(suite, task, 200, 1)
 
 
-def test_worlds_that_a_suite_makes_for_mutants_are_not_those_it_judges_by(
+def test_mutants_run_in_other_worlds_than_evaluations(
     suite: Suite, task: Task, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[tuple[int, int]] = []

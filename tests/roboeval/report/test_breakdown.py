@@ -1,4 +1,4 @@
-"""Abilities, coming back and phrasing, counted by hand."""
+"""Abilities, returns to the start, and phrasings, counted by hand."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,8 +8,8 @@ import pytest
 
 from codebotler.core.trace import Event, trace_data
 from codebotler.core.world import Room, World
-from made_results import VERDICT, as_driven, results_of
-from made_up_runs import SUITE, made_up
+from made_results import VERDICT, results_of, with_places
+from made_up_runs import SUITE, new_run
 from roboeval.evaluation.runs.rows import Row
 from roboeval.evaluation.runs.traces import circumstances
 from roboeval.report.runs import JudgedRun
@@ -32,17 +32,17 @@ ABLE = replace(SUITE, tasks={"Visit": VISIT, "FindBook": FIND})
 
 
 def test_abilities_by_hand() -> None:
-    run = made_up("a", {"Visit": (10, 4), "FindBook": (0,)}, suite=ABLE)
+    run = new_run("a", {"Visit": (10, 4), "FindBook": (0,)}, suite=ABLE)
     navigation, report = ability_sheet([run]).rows
     assert navigation[:3] == ["navigation", "a", 2]
     assert report[:3] == ["report-back", "a", 1]
     assert [navigation[3], report[3]] == pytest.approx([14 / 30, 0.7])
     assert sum(navigation[6:]) == pytest.approx(16 / 30)
-    assert ability_sheet([made_up("a", {"Visit": (1,)})]).rows == []
+    assert ability_sheet([new_run("a", {"Visit": (1,)})]).rows == []
 
 
 def row(*drives: str, index: int = 0, kind: str = "SayAtLocation") -> dict[str, Any]:
-    trace = as_driven(WORLD, Event("say", "hello"), *(Event("goto", room) for room in drives))
+    trace = with_places(WORLD, Event("say", "hello"), *(Event("goto", room) for room in drives))
     why = {"class": "TaskCompletionError", "kind": kind, "world": 0, "check": "c"}
     verdict = {**VERDICT, "satisfied": False, "trace": trace_data(trace), **circumstances(trace)}
     named = {"task": "Visit", "prompt": 0, "index": index, "passed": False}
@@ -61,11 +61,11 @@ def row(*drives: str, index: int = 0, kind: str = "SayAtLocation") -> dict[str, 
         (("kitchen", "to start please", "kitchen"), False),
     ],
 )
-def test_who_never_returned(drives: Sequence[str], *, away: bool) -> None:
+def test_a_robot_that_stays_away_never_returned(drives: Sequence[str], *, away: bool) -> None:
     assert never_returned(cast("Row", row(*drives))) is away
 
 
-def test_coming_back_by_hand() -> None:
+def test_returns_by_hand() -> None:
     passed = {"task": "Visit", "prompt": 0, "index": 0, "passed": True}
     failed = [
         row("kitchen", index=1),
@@ -81,21 +81,21 @@ def test_coming_back_by_hand() -> None:
     assert report_back_sheet([JudgedRun(other, other.table)]).rows == []
 
 
-def test_tasks_without_a_report_stand_beside() -> None:
-    run = made_up("a", {"FindBook": (2,), "Visit": (1,)}, suite=ABLE)
+def test_tasks_without_a_report_are_counted_separately() -> None:
+    run = new_run("a", {"FindBook": (2,), "Visit": (1,)}, suite=ABLE)
     found = report_back_sheet([run]).rows
     assert [one[1] for one in found] == [REPORTING_TASKS, "others"]
     assert [one[3] for one in found] == pytest.approx([0.1, 0.2])
-    assert report_back_sheet([made_up("a", {"FindBook": (2,)}, suite=ABLE)]).rows == []
+    assert report_back_sheet([new_run("a", {"FindBook": (2,)}, suite=ABLE)]).rows == []
 
 
 def test_spread_by_hand() -> None:
-    (found,) = spread_sheet([made_up("a", {"Visit": (4, 9, 2, 9, 2), "FindBook": (3,)})]).rows
+    (found,) = spread_sheet([new_run("a", {"Visit": (4, 9, 2, 9, 2), "FindBook": (3,)})]).rows
     assert found[:7] == ["Visit", "a", pytest.approx(0.7), 2, 0.2, 1, 0.9]
 
 
-def test_which_phrasing_hurts() -> None:
-    runs = [made_up("a", {"Visit": (10, 4)}), made_up("b", {"Visit": (6, 2), "FindBook": (1,)})]
+def test_phrasings_are_ranked_by_their_effect() -> None:
+    runs = [new_run("a", {"Visit": (10, 4)}), new_run("b", {"Visit": (6, 2), "FindBook": (1,)})]
     worst, best = phrasing_sheet(runs).rows
     assert worst[:5] == ["Visit", 1, pytest.approx(-0.25), 2, 2]
     assert best[2:4] == [pytest.approx(0.25), 0]

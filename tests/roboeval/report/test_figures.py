@@ -1,4 +1,4 @@
-"""Figures look as they did when a person last looked at them, and break on nothing."""
+"""Figures look as they did at the last review, and no case breaks them."""
 
 import io
 import os
@@ -15,7 +15,7 @@ from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
-from made_up_runs import cases, made_up
+from made_up_runs import cases, new_run
 from roboeval.analysis.metrics import overall
 from roboeval.analysis.resample import LIMITS, accepted_after
 from roboeval.evaluation.judging.failures import FAILURE_CLASSES, FailureClass
@@ -61,19 +61,19 @@ KEPT += [
 ]
 KEPT += [("all failures", "causes"), ("no failures", "causes")]
 SIZE = (480, 480)
-TOLERANCE = 0.012  # of the whole range, on average over all points
+TOLERANCE = 0.012  # A share of the whole range, averaged over all points.
 
 
 @cache
 def picture(case: str, name: str) -> Image.Image:
-    return drawn_anew(case, name)
+    return draw_picture(case, name)
 
 
-def drawn_anew(case: str, name: str) -> Image.Image:
+def draw_picture(case: str, name: str) -> Image.Image:
     runs = cases()[case]
     with use_style():
         figure = DRAWINGS[name](runs if name == "overall" else runs_to_draw(runs)[0])
-        figure.savefig(file := io.BytesIO(), format="png")  # the other two kinds take as long again
+        figure.savefig(file := io.BytesIO(), format="png")  # Two more formats would take twice as long.
     drawn = Image.open(file).convert("RGB")
     drawn.thumbnail(SIZE)
     return drawn
@@ -88,7 +88,7 @@ def drawn_anew(case: str, name: str) -> Image.Image:
         if runs[0].checked or name not in {"accepted", "rejection-sampling"}
     ],
 )
-def test_nothing_breaks_a_figure(case: str, name: str) -> None:
+def test_no_case_breaks_a_figure(case: str, name: str) -> None:
     drawn = picture(case, name)
     dark = np.asarray(drawn).mean(axis=2) < 128
     assert 0.0005 < dark.mean() < 0.6
@@ -101,7 +101,7 @@ def test_nothing_breaks_a_figure(case: str, name: str) -> None:
 def test_figures_look_as_they_did(case: str, name: str) -> None:
     drawn = picture(case, name)
     path = PICTURES / f"{case} {name}.png".replace(" ", "-")
-    if os.environ.get("REDRAW"):  # then somebody looks at them
+    if os.environ.get("REDRAW"):  # A person reviews them then.
         drawn.quantize(64).save(path, optimize=True)
     kept = Image.open(path).convert("RGB")
     assert kept.size == drawn.size
@@ -137,7 +137,7 @@ def test_a_further_class_of_failures_is_drawn(monkeypatch: pytest.MonkeyPatch) -
     assert labels[-1] == "broken rules"
 
 
-def test_class_without_programs_is_drawn_only_where_it_happened() -> None:
+def test_the_class_without_programs_is_drawn_only_if_it_occurs() -> None:
     def titles(case: str) -> list[str]:
         with use_style():
             figure = DRAWINGS["causes"](cases()[case])
@@ -161,7 +161,7 @@ def test_classes_keep_their_colours() -> None:
 
 
 def test_whisker_is_the_interval_and_marks_are_the_worst_and_the_best_prompt() -> None:
-    run = made_up("a", {"Visit": (4, 5, 6), "CountMugs": (4,), "BringTea": (3, 3, 3)})
+    run = new_run("a", {"Visit": (4, 5, 6), "CountMugs": (4,), "BringTea": (3, 3, 3)})
     with use_style():
         (axes,) = draw_task_scores([run]).axes
     (ends,) = [np.asarray(line)[:, 1] for lines in axes.collections for line in lines.get_segments()]  # type: ignore[attr-defined]  # error bars are lines
@@ -196,8 +196,8 @@ def test_long_names_fit_into_legends(name: str) -> None:
 
 
 def test_lines_end_where_the_axis_ends() -> None:
-    run = made_up("a", {"Visit": (1,), "Wait": (0,)}, of=50)
-    other = made_up("b", {"Visit": (5,)}, accepted=~pl.col("passed"))  # after 100 retries nearly none passes
+    run = new_run("a", {"Visit": (1,), "Wait": (0,)}, of=50)
+    other = new_run("b", {"Visit": (5,)}, accepted=~pl.col("passed"))  # After 100 retries almost none passes.
     with use_style():
         drawn = {1 / 50: draw_thresholds([run]), 1 / 10: draw_limits({"b": retry_curves(other.checked)}, 10)}
     for end, figure in drawn.items():
@@ -212,7 +212,7 @@ def test_lines_end_where_the_axis_ends() -> None:
         assert {float(xs.min()) for xs in lines} == {float(xs[-1]) for xs in lines} == {end}
 
 
-def test_numbers_stand_out_from_their_shades() -> None:
+def test_numbers_are_legible_on_their_shades() -> None:
     shares = [n / 100 for n in range(101)]
     with use_style():
         figure = new_figure(PAGE_WIDTH, PAGE_WIDTH)
@@ -221,7 +221,7 @@ def test_numbers_stand_out_from_their_shades() -> None:
         figure.draw_without_rendering()
         cells = np.asarray(axes.collections[0].get_facecolor())
     for text, cell in zip(axes.texts, cells, strict=True):
-        one, other = sorted((light(to_rgb(text.get_color())), light(to_rgb(to_hex(cell)))))
+        one, other = sorted((luminance(to_rgb(text.get_color())), luminance(to_rgb(to_hex(cell)))))
         assert (other + 0.05) / (one + 0.05) > 4, (text.get_text(), text.get_color(), cell)
 
 
@@ -231,29 +231,29 @@ def test_each_colour_has_one_meaning() -> None:
     assert not shaded & {colour.lower() for colour in COLOURS}
 
 
-def light(colour: tuple[float, float, float]) -> float:
-    """How light a colour is, as the guidelines for accessible pages reckon it."""
+def luminance(colour: tuple[float, float, float]) -> float:
+    """Compute the luminance of a colour as the guidelines for accessible pages do."""
     parts = [v / 12.92 if v <= 0.03928 else ((v + 0.055) / 1.055) ** 2.4 for v in colour]
     return float(np.dot(parts, [0.2126, 0.7152, 0.0722]))
 
 
 @pytest.mark.slow
 def test_the_same_numbers_give_the_same_bytes() -> None:
-    def drawn() -> dict[str, bytes]:
+    def draw() -> dict[str, bytes]:
         with use_style():
             return render(draw_task_scores(cases()["usual"]))
 
-    first = drawn()
+    first = draw()
     assert set(first) == {"png", "pdf", "svg"}
-    assert first == drawn()
+    assert first == draw()
     for kind in first.values():
         assert b"CreationDate" not in kind
         assert b"<dc:date>" not in kind
 
 
 @pytest.mark.slow
-def test_a_readers_own_style_plays_no_part(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = drawn_anew("one prompt", "tasks")
+def test_a_users_own_style_has_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = draw_picture("one prompt", "tasks")
     monkeypatch.setitem(mpl.rcParams, "axes.facecolor", "red")
-    after = drawn_anew("one prompt", "tasks")
+    after = draw_picture("one prompt", "tasks")
     assert before.tobytes() == after.tobytes()

@@ -1,4 +1,4 @@
-"""What a careful reader asks: coming back, phrasing, prices, differences, groups of failures."""
+"""Questions of a careful reader: returns, phrasings, prices, differences and groups of failures."""
 
 import re
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from codebotler.core.errors import UserError
-from made_up_runs import SUITE, made_up, usual
+from made_up_runs import SUITE, new_run, usual
 from roboeval.evaluation.clarify import (
     ClarifySettings,
     PromptShares,
@@ -48,8 +48,8 @@ def as_dicts(table: Sheet) -> list[dict[str, Any]]:
 # --- abilities
 
 
-def test_abilities_of_several_runs_stand_together() -> None:
-    runs = [made_up(name, {"Visit": (10, 4), "FindBook": (0,)}, suite=ABLE) for name in "ab"]
+def test_abilities_of_several_runs_are_in_one_table() -> None:
+    runs = [new_run(name, {"Visit": (10, 4), "FindBook": (0,)}, suite=ABLE) for name in "ab"]
     found = as_dicts(ability_sheet(runs))
     assert [(row["ability"], row["model"]) for row in found] == [
         *(("navigation", "a"), ("navigation", "b"), ("report-back", "a"), ("report-back", "b"))
@@ -60,8 +60,8 @@ def test_abilities_of_several_runs_stand_together() -> None:
     assert ability_sheet(usual()).rows == []
 
 
-def test_coming_back() -> None:
-    run = made_up("a", {"Visit": (3,), "FindBook": (2,)}, suite=ABLE)
+def test_returns_are_counted() -> None:
+    run = new_run("a", {"Visit": (3,), "FindBook": (2,)}, suite=ABLE)
     table = report_back_sheet([run])
     with_report, others = as_dicts(table)
     assert (with_report["failed"], with_report["never returned"], with_report["no such room"]) == (7, 0, 1)
@@ -70,34 +70,38 @@ def test_coming_back() -> None:
     assert report_back_sheet(usual()).rows == []
 
 
-def test_coming_back_without_failures() -> None:
-    table = report_back_sheet([made_up("a", {"Visit": (10,)}, suite=ABLE)])
+def test_without_failures_the_share_of_returns_is_unknown() -> None:
+    table = report_back_sheet([new_run("a", {"Visit": (10,)}, suite=ABLE)])
     assert as_dicts(table)[0]["share never returned"] is None
 
 
 # --- phrasing
 
 
-def asked(instructions: Sequence[str]) -> JudgedRun:
-    return made_up("a", {"Visit": (9, 2)}, written=lambda prompt, _: {"instruction": instructions[prompt]})
+def run_with_instructions(instructions: Sequence[str]) -> JudgedRun:
+    return new_run("a", {"Visit": (9, 2)}, written=lambda prompt, _: {"instruction": instructions[prompt]})
 
 
 def test_the_spread_and_the_words_that_differ() -> None:
-    run = asked(["Ask him what's there.", "Inquire of him, what's there?"])
+    run = run_with_instructions(["Ask him what's there.", "Inquire of him, what's there?"])
     (found,) = as_dicts(spread_sheet([run]))
     assert found["spread"] == pytest.approx(0.7)
     assert (found["worst prompt"], found["best prompt"]) == (1, 0)
     assert (found["words of the worst only"], found["words of the best only"]) == ("inquire of", "ask")
 
 
-def test_words_that_nobody_recorded() -> None:
+def test_distinct_words_of_unrecorded_and_long_instructions() -> None:
     assert distinct_words(None, "a") == ("instruction not recorded",) * 2
     assert distinct_words("a a b", "b") == ("a", "")
     assert distinct_words(" ".join(map(str, range(20))), "")[0].endswith("11 and 8 more")
 
 
-def test_which_phrasing_hurts() -> None:
-    runs = [asked(["one", "two"]), asked(["one", "three"]), made_up("b", {"Visit": (6, 2), "FindBook": (1,)})]
+def test_phrasings_are_ranked_by_their_effect() -> None:
+    runs = [
+        run_with_instructions(["one", "two"]),
+        run_with_instructions(["one", "three"]),
+        new_run("b", {"Visit": (6, 2), "FindBook": (1,)}),
+    ]
     worst, best = as_dicts(phrasing_sheet(runs))
     assert (worst["prompt"], worst["instruction"]) == (1, "three / two")
     assert worst["beside its task"] == pytest.approx(-0.9 / 3)
@@ -110,9 +114,9 @@ def test_which_phrasing_hurts() -> None:
 # --- cost
 
 
-def test_costs_of_those_who_count_them() -> None:
+def test_costs_are_of_runs_that_count_tokens() -> None:
     usage = {"usage": {"input_tokens": 1_000, "output_tokens": 500}}
-    runs = [made_up("a", {"Visit": (4,)}, written=lambda *_: usage), made_up("b", {"Visit": (4,)})]
+    runs = [new_run("a", {"Visit": (4,)}, written=lambda *_: usage), new_run("b", {"Visit": (4,)})]
     runs = price_runs(runs, {"a": Price(10.0, 20.0)})
     (found,) = as_dicts(cost_sheet(runs))
     assert (found["model"], found["input tokens"], found["seconds"]) == ("a", 10_000, None)
@@ -126,18 +130,18 @@ def test_costs_of_those_who_count_them() -> None:
     assert cost_sheet(runs[1:]).rows == []
 
 
-def test_prices() -> None:
+def test_prices_are_read_and_checked() -> None:
     prices = read_prices(["openai-chat:gpt=1.5/6", "b=0/0"])
     assert prices == {"openai-chat:gpt": Price(1.5, 6.0), "b": Price(0.0, 0.0)}
     for wrong in ("gpt", "gpt=1", "=1/2", "gpt=a/b", "gpt=-1/2", "gpt=nan/1", "gpt=1/2/3"):
         with pytest.raises(UserError, match="INPUT/OUTPUT"):
             read_prices([wrong])
     with pytest.raises(UserError, match=r'--price .*"x".*\ba$'):
-        price_runs([made_up("a", {"Visit": (1,)})], {"x": Price(1, 1)})
+        price_runs([new_run("a", {"Visit": (1,)})], {"x": Price(1, 1)})
 
 
-def test_a_price_for_a_folder_goes_before_that_for_its_model() -> None:
-    run = made_up("a", {"Visit": (1,)}, folder="cheap")
+def test_a_price_for_a_folder_overrides_that_for_its_model() -> None:
+    run = new_run("a", {"Visit": (1,)}, folder="cheap")
     for prices, of_run in (
         ({"a": Price(2, 2), "cheap": Price(1, 1)}, Price(1, 1)),
         ({"a": Price(2, 2)}, Price(2, 2)),
@@ -146,25 +150,25 @@ def test_a_price_for_a_folder_goes_before_that_for_its_model() -> None:
         assert [one.price for one in price_runs([run], prices)] == [of_run]
 
 
-# --- differences, groups, and where it comes from
+# --- differences, groups and origins
 
 
-def test_all_pairs_or_each_with_the_best() -> None:
+def test_differences_are_of_all_pairs_or_with_the_best() -> None:
     said, table = differences(usual()).parts
     assert isinstance(said, Prose)
     assert isinstance(table, Sheet)
     assert [row[0] for row in table.rows] == ["middle minus strong", "weak minus strong", "weak minus middle"]
     assert len(said.paragraphs) == 3
     assert differences(usual()[:1]).parts == []
-    _, table = differences([made_up(f"m{n}", {"Visit": (n,)}) for n in range(8)]).parts
+    _, table = differences([new_run(f"m{n}", {"Visit": (n,)}) for n in range(8)]).parts
     assert isinstance(table, Sheet)
     assert {row[0].split(" minus ")[0] for row in table.rows} == {"m7"}
-    assert differences([made_up("a", {"Visit": (1,)}), made_up("b", {"FindBook": (1,)})]).parts == []
+    assert differences([new_run("a", {"Visit": (1,)}), new_run("b", {"FindBook": (1,)})]).parts == []
 
 
-def test_pairs_that_were_asked_otherwise_are_told() -> None:
+def test_pairs_with_different_settings_have_a_note() -> None:
     one, other = (
-        made_up(name, {"Visit": (n,)}, about={"settings": {"temperature": n}}) for n, name in enumerate("ab")
+        new_run(name, {"Visit": (n,)}, about={"settings": {"temperature": n}}) for n, name in enumerate("ab")
     )
     _, table = differences([one, other]).parts
     assert isinstance(table, Sheet)
@@ -172,8 +176,8 @@ def test_pairs_that_were_asked_otherwise_are_told() -> None:
     assert re.search(r"^a and b: temperature\b.* 0 and 1", note)
 
 
-def test_groups_of_failures_and_what_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    run = made_up("a", {"Visit": (3,)})
+def test_the_number_of_shown_groups_is_limited_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = new_run("a", {"Visit": (3,)})
     _, groups, table = failures_section([run]).parts
     assert isinstance(groups, Groups)
     assert sum(len(one.members) for _, one in groups.shown) == 7
@@ -189,11 +193,11 @@ def test_groups_of_failures_and_what_is_left_out(monkeypatch: pytest.MonkeyPatch
     assert len(groups.shown) == 2
     assert isinstance(table, Sheet)
     assert as_dicts(table) == rows
-    assert failures_section([made_up("a", {"Visit": (10,)})]).parts == []
+    assert failures_section([new_run("a", {"Visit": (10,)})]).parts == []
 
 
-def test_where_it_comes_from() -> None:
-    run = made_up("a", {"Visit": (3,)}, about={"settings": {"temperature": 0.2, "seed": None}})
+def test_the_origin_of_a_run_is_listed() -> None:
+    run = new_run("a", {"Visit": (3,)}, about={"settings": {"temperature": 0.2, "seed": None}})
     (found,) = as_dicts(origin_sheet([run]))
     assert found["settings"] == "temperature 0.2, seed null"
     assert found["suite hash"] == SUITE.digest
@@ -204,8 +208,8 @@ def test_where_it_comes_from() -> None:
 # --- one question
 
 
-def test_what_a_question_gains_by_run_and_by_prompt(tmp_path: Path) -> None:
-    measured, plain = made_up("a", {"Visit": (5, 5)}, folder=str(tmp_path), key="small"), made_up("b", {})
+def test_gains_of_a_question_by_run_and_by_prompt(tmp_path: Path) -> None:
+    measured, plain = new_run("a", {"Visit": (5, 5)}, folder=str(tmp_path), key="small"), new_run("b", {})
     silent: PromptShares = {
         "task": "Visit", "prompt": 1, "one": 0.5, "majority": 0, "question": 0, "asked": 0,
         "mattered": None, "tokens": None,

@@ -1,4 +1,4 @@
-"""The tables of a report: hand-computed numbers, the paper's beside ours, and CSV that holds them all."""
+"""The tables of a report: numbers by hand, numbers of the paper beside ours, and all of them as CSV."""
 
 import csv
 import re
@@ -9,7 +9,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import to_line
-from made_up_runs import HOSTILE, UNCHECKED, made_up, unfinished, usual
+from made_up_runs import HOSTILE, UNCHECKED, new_run, unfinished, usual
 from roboeval.analysis.resample import accepted_after
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.judging.failures import FAILURE_CLASSES
@@ -42,12 +42,12 @@ def test_tasks_have_mean_worst_and_best_prompt() -> None:
 
 
 def test_the_curve_as_a_table() -> None:
-    table = curve_sheet([made_up("a", {"Visit": (10, 5, 5, 0)}), made_up("b", {"Visit": (10, 2)})])
+    table = curve_sheet([new_run("a", {"Visit": (10, 5, 5, 0)}), new_run("b", {"Visit": (10, 2)})])
     assert table.rows == [[1.0, 0.25, 0.5], [0.5, 0.75, 0.5], [0.2, 0.75, 1.0]]
 
 
 def test_intervals_of_prompts_and_of_tasks() -> None:
-    table = overall_sheet([made_up("a", {"Visit": (10, 10), "CountMugs": (0, 0)})])
+    table = overall_sheet([new_run("a", {"Visit": (10, 10), "CountMugs": (0, 0)})])
     row = dict(zip((c.head for c in table.columns), table.rows[0], strict=True))
     assert row["pass@1"] == 0.5
     assert (row["tasks: low"], row["tasks: high"]) == (0.0, 1.0)
@@ -55,20 +55,20 @@ def test_intervals_of_prompts_and_of_tasks() -> None:
 
 
 def test_an_unfinished_run_says_so() -> None:
-    run = unfinished(made_up("a", {"Visit": (1,)}), 99)
+    run = unfinished(new_run("a", {"Visit": (1,)}), 99)
     table = overall_sheet([run])
     assert (*column(table, "completions"), *column(table, "of")) == (10, 99)
 
 
 def test_an_interval_without_width_is_in_the_table() -> None:
-    alike = made_up("a", {"Visit": (5, 5), "CountMugs": (5,)})
-    others = made_up("b", {"Visit": (4, 5), "CountMugs": (5,)})
+    alike = new_run("a", {"Visit": (5, 5), "CountMugs": (5,)})
+    others = new_run("b", {"Visit": (4, 5), "CountMugs": (5,)})
     table = overall_sheet([alike, others])
     assert column(table, "tasks: low")[0] == column(table, "tasks: high")[0] == 0.5
 
 
-def test_retries_as_they_are_elsewhere() -> None:
-    run, other = made_up("a", {"Visit": (5,)}), made_up("b", {"Visit": (5,)}, accepted=UNCHECKED)
+def test_retries_agree_with_shares_of_accepted_programs() -> None:
+    run, other = new_run("a", {"Visit": (5,)}), new_run("b", {"Visit": (5,)}, accepted=UNCHECKED)
     share = accepted_after(run.checked, 100)
     found = [part for part in rejection_sampling([run, other]).parts if isinstance(part, Sheet)]
     assert column(found[0], "at the limit") == pytest.approx([1 - share[n] for n in (0, 2, 4, 8, 100)])
@@ -81,9 +81,9 @@ def test_retries_as_they_are_elsewhere() -> None:
 # --- the paper's numbers
 
 
-def paper_run(name: str, **changes: Any) -> JudgedRun:  # noqa: ANN401 - of a made up run
+def paper_run(name: str, **changes: Any) -> JudgedRun:  # noqa: ANN401 - the options of new_run
     manifest = {"suite": "paper", "digest": "0", **changes.pop("manifest", {})}
-    return made_up(name, {"CountSavory": (5,) * 5}, manifest=manifest, **changes)
+    return new_run(name, {"CountSavory": (5,) * 5}, manifest=manifest, **changes)
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def paper_run(name: str, **changes: Any) -> JudgedRun:  # noqa: ANN401 - of a ma
         ("openai-chat:gpt-3.5", None),
         ("gpt-3.5", "GPT-3.5"),
         ("starcoder", "StarCoder"),
-        ("openai-chat:starcoder", None),  # a server calls what it likes so, a smaller one as well
+        ("openai-chat:starcoder", None),  # A server may give any model this name.
         ("codellama", "CodeLlama"),
         ("openai-chat:codellama", None),
         ("palm-2", "PaLM2"),
@@ -114,7 +114,7 @@ def test_names_of_the_papers_models(name: str, model: str | None) -> None:
     assert paper.model_of(paper_run(name, manifest={"suite": "mine"})) is None
 
 
-def test_a_folder_names_a_model_only_where_nobody_else_does() -> None:
+def test_a_folder_names_a_model_only_if_its_rows_do_not() -> None:
     assert paper.model_of(paper_run("x", model=None, folder="gpt-4")) == "GPT-4"
     assert paper.model_of(paper_run("x", model="gpt-5", folder="gpt-4")) is None
     mixed = paper_run("x", folder="gpt-4", written=lambda _, index: {"model": f"m{index}"})
@@ -127,7 +127,7 @@ def test_the_page_names_the_model_of_the_paper() -> None:
     assert paper.recognised_models(runs[1:]) == []
 
 
-def test_cells_stand_only_beside_the_authors_own_prompts(paper_suite: Suite) -> None:
+def test_published_cells_are_shown_only_for_the_authors_prompts(paper_suite: Suite) -> None:
     theirs = paper_run("gpt-4", suite=paper_suite)
     heads = [c.head for c in prompt_sheet([theirs]).columns]
     assert heads == ["task", "prompt", "gpt-4", "gpt-4, published"]
@@ -163,7 +163,7 @@ def test_published_causes_are_of_known_classes_and_kinds() -> None:
         assert kinds.keys() - {"ZeroDivisionError"} <= set(FAILURE_CLASSES[name].kinds)
 
 
-def test_published_causes_only_where_asked_for() -> None:
+def test_published_causes_are_shown_only_on_request() -> None:
     runs = [paper_run("gpt-4"), paper_run("mine")]
     assert [name for name, _ in all_causes(runs, with_published=False)] == ["gpt-4", "mine"]
     both = all_causes(runs, with_published=True)
@@ -179,7 +179,7 @@ def test_published_causes_only_where_asked_for() -> None:
     assert shares["InitialTerminal"] == pytest.approx(0.317)
 
 
-def judged_in(folder: Path, completions: Path, suite: Suite) -> JudgedRun:
+def judge_in(folder: Path, completions: Path, suite: Suite) -> JudgedRun:
     run = RunFolder(folder)
     run.keep(open_source(str(completions), suite).completions)
     for _ in evaluate_run(run, suite, tasks=None, ablated=False, redo=False, workers=2):
@@ -194,7 +194,7 @@ def judged_in(folder: Path, completions: Path, suite: Suite) -> JudgedRun:
 def test_reports_of_published_completions_equal_the_published_cells(
     corpus: Path, paper_suite: Suite, tmp_path: Path, file: str, model: str
 ) -> None:
-    run = judged_in(tmp_path / file, corpus / "corpus" / "completions" / f"{file}.jsonl", paper_suite)
+    run = judge_in(tmp_path / file, corpus / "corpus" / "completions" / f"{file}.jsonl", paper_suite)
     table = prompt_sheet([run])
     assert len(table.rows) == 20
     assert column(table, file) == pytest.approx(column(table, f"{file}, published"))
@@ -209,7 +209,7 @@ def test_labels_name_runs() -> None:
     paths = [Path("runs/a"), Path("runs/b")]
     labels = read_labels(["runs/a/=Base", "b= Mine "], paths)
     assert labels == {0: "Base", 1: "Mine"}
-    runs = [made_up(name, {"Visit": (1,)}) for name in ("x", "y")]
+    runs = [new_run(name, {"Visit": (1,)}) for name in ("x", "y")]
     assert [run.name for run in name_runs(runs, labels)] == ["Base", "Mine"]
     assert [run.name for run in name_runs(runs, {1: "Mine"})] == ["x", "Mine"]
 
@@ -224,37 +224,37 @@ def test_labels_name_runs() -> None:
         (["d=x"], "more than one"),
     ],
 )
-def test_labels_that_are_wrong_are_refused(texts: list[str], why: str) -> None:
+def test_wrong_labels_are_refused(texts: list[str], why: str) -> None:
     with pytest.raises(UserError, match=why):
         read_labels(texts, [Path("runs/a"), Path("runs/b"), Path("one/d"), Path("two/d")])
 
 
-def test_runs_are_name_runs() -> None:
+def test_runs_get_distinct_names() -> None:
     folders = ["a", "b", "b"]
-    runs = [made_up("gpt-4", {"Visit": (1,)}, folder=folder) for folder in folders]
-    names = [one.name for one in name_runs([*runs, made_up("x", {"Visit": (1,)})])]
+    runs = [new_run("gpt-4", {"Visit": (1,)}, folder=folder) for folder in folders]
+    names = [one.name for one in name_runs([*runs, new_run("x", {"Visit": (1,)})])]
     assert names == ["gpt-4 (a)", "gpt-4 (b) #2", "gpt-4 (b) #3", "x"]
 
 
-def test_a_run_as_it_is_read(paper_suite: Suite, tmp_path: Path) -> None:
+def test_a_run_of_two_models_is_mixed(paper_suite: Suite, tmp_path: Path) -> None:
     one = {"task": "LunchTime", "prompt": 0, "program": "def task_program():\n    1\n"}
     rows = [{**one, "index": n, "model": model} for n, model in enumerate(("gpt-4", "other"))]
     (tmp_path / "a.jsonl").write_bytes(b"".join(map(to_line, rows)))
-    read = judged_in(tmp_path / "gpt-4", tmp_path / "a.jsonl", paper_suite)
+    read = judge_in(tmp_path / "gpt-4", tmp_path / "a.jsonl", paper_suite)
     assert (read.is_mixed, read.model, read.name) == (True, None, "gpt-4")
     assert read.completions.height == 2
 
 
 def test_a_very_long_name_keeps_both_ends() -> None:
     names = "begin" + "x" * 4_000 + "end", "x" * 100
-    shortened, whole = (run.name for run in name_runs([made_up(name, {"Visit": (1,)}) for name in names]))
+    shortened, whole = (run.name for run in name_runs([new_run(name, {"Visit": (1,)}) for name in names]))
     assert re.fullmatch("beginx+…x+end", shortened)
     assert len(shortened) == 100
     assert whole == names[1]
 
 
-def test_names_stay_apart_whatever_they_are() -> None:
-    run, other = (made_up(name, {"Visit": (1,)}, folder="f") for name in ("m", "m (f) #2"))
+def test_names_stay_distinct_even_if_a_run_has_a_numbered_name() -> None:
+    run, other = (new_run(name, {"Visit": (1,)}, folder="f") for name in ("m", "m (f) #2"))
     names = [one.name for one in name_runs([run, run, other])]
     assert len(set(names)) == 3
 
@@ -262,8 +262,8 @@ def test_names_stay_apart_whatever_they_are() -> None:
 @pytest.mark.parametrize(
     "names", [("task", "prompt"), ("threshold", "retries"), ("=x", "'=x"), ("task #2", "task")]
 )
-def test_models_may_be_called_as_columns_are(names: tuple[str, str], tmp_path: Path) -> None:
-    runs = [made_up(name, {"Visit": (3, 1)}) for name in names]
+def test_models_may_have_the_names_of_columns(names: tuple[str, str], tmp_path: Path) -> None:
+    runs = [new_run(name, {"Visit": (3, 1)}) for name in names]
     for section in sections(runs):
         for part in section.parts:
             if isinstance(part, Sheet):
@@ -274,7 +274,7 @@ def test_models_may_be_called_as_columns_are(names: tuple[str, str], tmp_path: P
     assert rows[0] == ["Visit", "0", "0.3", "0.3"]
 
 
-def test_csv_holds_all_digits_and_no_formula(tmp_path: Path) -> None:
+def test_csv_has_all_digits_and_escapes_formulas(tmp_path: Path) -> None:
     columns = [Column("name"), Column("share", "share"), Column("=n", "count")]
     table = Sheet("t", columns, [["=1+1", 1 / 3, 4], [HOSTILE, None, None]])
     write_csv(table, tmp_path)
@@ -286,7 +286,7 @@ def test_csv_holds_all_digits_and_no_formula(tmp_path: Path) -> None:
     assert "<script>" in second[0]
 
 
-def test_cells_as_people_read_them() -> None:
+def test_cells_are_formatted_for_people() -> None:
     assert [
         format_cell(None, "share"),
         format_cell(0.12345, "share"),
@@ -313,7 +313,7 @@ def test_cells_as_people_read_them() -> None:
     ]
 
 
-def test_all_that_page_yaml_describes_is_there() -> None:
+def test_all_sections_and_tables_are_described() -> None:
     found = sections(usual(), with_published=True)
     assert {section.name for section in found} <= {*page_words()["sections"]}
     for part in (part for section in found for part in section.parts):

@@ -1,4 +1,4 @@
-"""Suites of fresh tasks: found by name, the same everywhere, and with tasks that other seeds do not have."""
+"""Suites of fresh tasks: found by name, the same everywhere, and different for each seed."""
 
 import json
 import pickle
@@ -20,7 +20,7 @@ from roboeval.web.run_store import RunStore
 SMALL = "families-test-7-2"
 
 
-def test_a_suite_has_a_task_of_each_family_unless_a_number_is_named() -> None:
+def test_a_suite_has_a_task_of_each_family_by_default() -> None:
     usual = FamilyTasks("test", 7)
     assert usual.name == "families-test-7"
     assert len({family for _, family, _ in usual.seeds()}) == usual.count == 17
@@ -28,7 +28,7 @@ def test_a_suite_has_a_task_of_each_family_unless_a_number_is_named() -> None:
     assert names[17:] == [f"{name}-2" for name in names[:2]]
 
 
-def test_tasks_are_those_of_the_prompts_to_train_on() -> None:
+def test_tasks_are_those_of_the_training_prompts() -> None:
     tasks = load_suite(SMALL).tasks
     rows = load_prompts("test", count=2, seed=7)
     assert [*tasks] == sorted(row["family"] for row in rows)
@@ -39,7 +39,7 @@ def test_tasks_are_those_of_the_prompts_to_train_on() -> None:
         assert tasks[row["family"]].path.is_file()
 
 
-def test_a_suite_is_the_same_each_time_and_another_for_another_seed() -> None:
+def test_a_seed_always_makes_the_same_suite() -> None:
     suite, other = load_suite(SMALL), load_suite("families-test-8-2")
     assert suite == pickle.loads(pickle.dumps(suite))
     digest = evaluation_metadata(suite)["digest"]
@@ -55,7 +55,7 @@ def test_seeds_and_splits_share_no_task() -> None:
 @pytest.mark.parametrize(
     "name", ["families-test-07", "families-test-7-17", "families-test", "families-test-1-x"]
 )
-def test_a_suite_has_one_name(name: str) -> None:
+def test_other_spellings_of_a_name_are_refused(name: str) -> None:
     assert not has_suite(name)
     with pytest.raises(UserError, match="unknown suite"):
         load_suite(name)
@@ -71,12 +71,12 @@ def test_a_suite_has_one_name(name: str) -> None:
         (("test", 0, MAX_FAMILY_TASKS + 1), f"at most {MAX_FAMILY_TASKS}"),
     ],
 )
-def test_mistakes_are_refused(wrong: tuple[str, int, int], sentence: str) -> None:
+def test_wrong_splits_seeds_and_counts_are_refused(wrong: tuple[str, int, int], sentence: str) -> None:
     with pytest.raises(UserError, match=sentence):
         FamilyTasks(*wrong)
 
 
-def test_its_worlds_cannot_be_drawn_again() -> None:
+def test_worlds_of_a_suite_from_families_cannot_be_resampled() -> None:
     with pytest.raises(UserError, match=f'"{SMALL}" are determined by its name'):
         load_suite(SMALL).with_worlds(4)
 
@@ -96,7 +96,7 @@ def test_recorded_models_know_right_and_wrong_programs() -> None:
 FRESH = ("--suite", SMALL)
 
 
-def test_from_fresh_tasks_to_tables_and_again_on_another_machine(tmp_path: Path) -> None:
+def test_a_run_of_fresh_tasks_can_be_judged_on_another_machine(tmp_path: Path) -> None:
     words = ("--model", "recorded:careful", "--num-completions", "1")
     ended = roboeval("run", *FRESH, *words, "--no-report", cwd=tmp_path)
     assert ended.status == 0
@@ -120,7 +120,7 @@ def test_completions_of_another_seed_are_not_judged(tmp_path: Path) -> None:
     assert roboeval("generate", *FRESH, "--num-completions", "1", "--out", "run", cwd=tmp_path).status == 0
     refusal = refused(
         "evaluate", "run", "--suite", "families-test-24-2", cwd=tmp_path
-    )  # of the same families
+    )  # It has the same families.
     assert refusal.at == ("run/completions.jsonl", 1)
     assert not (tmp_path / "run" / "evaluations").exists()
 
@@ -133,6 +133,6 @@ def test_completions_of_another_seed_are_not_judged(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("command", ["generate", "run"])
-def test_misuse_leaves_nothing(tmp_path: Path, command: str, words: tuple[str, ...], named: str) -> None:
+def test_wrong_names_leave_no_files(tmp_path: Path, command: str, words: tuple[str, ...], named: str) -> None:
     assert named in refused(command, *words, cwd=tmp_path).sentence
     assert list(tmp_path.iterdir()) == []

@@ -1,4 +1,4 @@
-"""Suites that packages bring: found without importing them, and refused in a sentence where names clash."""
+"""Suites of installed packages: found without importing them, and refused if names clash."""
 
 import os
 from collections.abc import Callable
@@ -17,7 +17,7 @@ Install = Callable[..., Path]
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
-    """Puts a package with a suite on the path, with the metadata that an installer writes."""
+    """Return a function that puts a package with a suite on the path, with the metadata of an installer."""
     site = tmp_path / "site"
     site.mkdir()
     monkeypatch.syspath_prepend(str(site))
@@ -61,7 +61,7 @@ def test_a_suite_is_found_by_its_name_without_running_its_package(install: Insta
     assert "garden" in listed.err
 
 
-def test_it_may_lie_in_a_folder_of_the_package(install: Install) -> None:
+def test_a_suite_may_be_in_a_subfolder_of_its_package(install: Install) -> None:
     folder = install(place="garden_suite.suites.roses")
     (folder / "suites").mkdir()
     for one in ("suite.yaml", "tasks", "solutions"):
@@ -70,7 +70,7 @@ def test_it_may_lie_in_a_folder_of_the_package(install: Install) -> None:
     assert list(load_suite("garden").tasks) == ["WaterPlants"]
 
 
-def test_the_pages_show_runs_that_were_judged_by_it(
+def test_pages_find_installed_suites_and_warn_of_broken_ones(
     install: Install, capsys: pytest.CaptureFixture[str]
 ) -> None:
     install()
@@ -87,14 +87,14 @@ def test_the_pages_show_runs_that_were_judged_by_it(
     assert '"broken"' in warning
 
 
-def test_two_packages_with_one_name(install: Install) -> None:
+def test_two_packages_with_the_same_suite_name_are_refused(install: Install) -> None:
     install()
     install("other-suite")
     with pytest.raises(UserError, match='"garden": garden_suite and other_suite;'):
         load_suite("garden")
 
 
-def test_a_folder_here_with_the_name_of_a_package(install: Install) -> None:
+def test_a_folder_with_the_name_of_an_installed_suite_is_refused(install: Install) -> None:
     install()
     new_task(Path("garden"), "WaterPlants")
     with pytest.raises(UserError, match=r"garden_suite and \./garden;"):
@@ -102,7 +102,7 @@ def test_a_folder_here_with_the_name_of_a_package(install: Install) -> None:
     assert load_suite("./garden").folder == Path("garden").resolve()
 
 
-def test_a_package_cannot_take_the_name_of_a_suite_that_ships(install: Install) -> None:
+def test_a_package_cannot_take_the_name_of_a_shipped_suite(install: Install) -> None:
     folder = install(name="paper")
     assert load_suite("paper").folder != folder
 
@@ -116,7 +116,7 @@ def test_a_package_cannot_take_the_name_of_a_suite_that_ships(install: Install) 
         ({"point": "roses", "name": "garden"}, r'line 1: .*"garden", .*"roses"'),
     ],
 )
-def test_a_broken_package(install: Install, changed: dict[str, str], named: str) -> None:
+def test_a_broken_package_is_refused(install: Install, changed: dict[str, str], named: str) -> None:
     install(**changed)
     asked = changed.get("point", "garden")
     with pytest.raises(UserError, match=named):
@@ -125,7 +125,7 @@ def test_a_broken_package(install: Install, changed: dict[str, str], named: str)
     assert (ended.status, ended.err.count("\n"), "Traceback" in ended.err) == (2, 1, False)
 
 
-def test_nobody_starts_a_task_in_a_suite_of_somebody_else(install: Install) -> None:
+def test_new_tasks_in_installed_and_shipped_suites_are_refused(install: Install) -> None:
     install()
     for suite in ("garden", "plus"):
         ended = roboeval(

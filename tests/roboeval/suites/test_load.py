@@ -1,4 +1,4 @@
-"""Task and suite files: what they may say, and one sentence for each way they can be wrong."""
+"""Task and suite files: valid ones, and a sentence for each way in which they can be wrong."""
 
 import copy
 import pickle
@@ -11,22 +11,22 @@ from codebotler.rtl import parse
 from codebotler.rtl.reasoning.alphabet import elements
 from roboeval.suites.load import load_suite
 from roboeval.suites.new_task import new_task
-from small_suite import SUITE, TASK, a_suite
+from small_suite import SUITE, TASK, write_suite
 
 
 def test_a_requirement_is_its_check_with_the_arguments_filled_in(tmp_path: Path) -> None:
-    goes, not_bye = load_suite(a_suite(tmp_path)).task("T").scenarios[0].require
+    goes, not_bye = load_suite(write_suite(tmp_path)).task("T").scenarios[0].require
     assert goes.formula == parse('tr.Exists(goto("kitchen"))')
     assert not_bye.formula == parse('not tr.Exists(say("bye"))')
     assert (not_bye.text, not_bye.check, not_bye.category) == ('not says("bye")', "says", "SayAtLocation")
 
 
-def test_a_requirement_may_rest_on_the_words_of_some_prompts(tmp_path: Path) -> None:
+def test_a_requirement_may_apply_to_some_prompts_only(tmp_path: Path) -> None:
     task = TASK.replace("[p]", "[p, Please say  bye to nobody.]").replace(
         """not says("bye")]""", """{check: 'not says("bye")', prompts: {1: say bye to NOBODY}}]"""
     )
     assert task != TASK
-    (scenario,) = load_suite(a_suite(tmp_path, task)).task("T").scenarios
+    (scenario,) = load_suite(write_suite(tmp_path, task)).task("T").scenarios
     goes, not_bye = scenario.require
     assert (goes.words, not_bye.words) == ((), ((1, "say bye to NOBODY"),))
     assert [scenario.asked_by(prompt).require for prompt in range(2)] == [(goes,), (goes, not_bye)]
@@ -35,17 +35,17 @@ def test_a_requirement_may_rest_on_the_words_of_some_prompts(tmp_path: Path) -> 
 def test_a_check_says_what_its_texts_mean(tmp_path: Path) -> None:
     task = TASK.replace("says(what): {", 'says(what): {means: "that {what} is over, at {start}", ')
     assert task != TASK
-    suite = load_suite(a_suite(tmp_path, task))
+    suite = load_suite(write_suite(tmp_path, task))
     _, not_bye = suite.task("T").scenarios[0].require
     (said,) = elements(not_bye.formula)
     assert said.means == "that bye is over, at kitchen"
     (tmp_path / "plain").mkdir()
-    assert suite.digest == load_suite(a_suite(tmp_path / "plain", TASK)).digest
+    assert suite.digest == load_suite(write_suite(tmp_path / "plain", TASK)).digest
 
 
 def test_a_check_may_name_where_the_robot_starts(tmp_path: Path) -> None:
     task = TASK.replace('goto("kitchen")', 'at("{start}", check("x"))')
-    goes, _ = load_suite(a_suite(tmp_path, task)).task("T").scenarios[0].require
+    goes, _ = load_suite(write_suite(tmp_path, task)).task("T").scenarios[0].require
     assert goes.formula == parse('tr.Exists(at("kitchen", check("x")))')
 
 
@@ -53,7 +53,7 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
     task = TASK.replace(
         """'tr.Exists(say("{what}"))'""", """'tr.Exists(say("a")) or tr.Exists(say("{what}"))'"""
     )
-    requirement = load_suite(a_suite(tmp_path, task)).task("T").scenarios[0].require[1]
+    requirement = load_suite(write_suite(tmp_path, task)).task("T").scenarios[0].require[1]
     assert requirement.formula == parse('not (tr.Exists(say("a")) or tr.Exists(say("bye")))')
 
 
@@ -136,10 +136,10 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
         ("summary: s", "summary: [s", 3, "YAML"),
     ],
 )
-def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, line: int, named: str) -> None:
+def test_a_wrong_task_file_names_its_line(tmp_path: Path, old: str, new: str, line: int, named: str) -> None:
     assert old in TASK
     with pytest.raises(UserError) as caught:
-        load_suite(a_suite(tmp_path, TASK.replace(old, new, 1)))
+        load_suite(write_suite(tmp_path, TASK.replace(old, new, 1)))
     assert (caught.value.file, caught.value.line) == (tmp_path / "tasks" / "T.yaml", line)
     assert named in caught.value.sentence
     assert "\n" not in str(caught.value)
@@ -192,38 +192,40 @@ def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, l
         ("", None, ["empty"]),
     ],
 )
-def test_a_rule_that_is_not_known_gets_a_sentence(
+def test_a_wrong_suite_file_names_its_line(
     tmp_path: Path, suite: str, line: int | None, named: list[str]
 ) -> None:
     with pytest.raises(UserError) as caught:
-        load_suite(a_suite(tmp_path, suite=suite))
+        load_suite(write_suite(tmp_path, suite=suite))
     assert (caught.value.file, caught.value.line) == (tmp_path / "suite.yaml", line)
     assert all(name in caught.value.sentence for name in named), caught.value
 
 
 def test_a_clock_may_start_at_any_offset(tmp_path: Path) -> None:
-    suite = load_suite(a_suite(tmp_path, suite=SUITE + "rules:\n  clock_starts: 2024-01-01T12:00:00+02:00\n"))
+    suite = load_suite(
+        write_suite(tmp_path, suite=SUITE + "rules:\n  clock_starts: 2024-01-01T12:00:00+02:00\n")
+    )
     assert suite.settings.clock_starts.timestamp() == 1_704_103_200
 
 
-def test_an_unknown_suite_gets_a_sentence() -> None:
+def test_an_unknown_suite_is_refused() -> None:
     with pytest.raises(UserError, match=r'"nonsense"; .*paper, plus'):
         load_suite("nonsense")
 
 
-def test_the_hash_covers_what_verdicts_rest_on_and_no_comments(tmp_path: Path) -> None:
+def test_the_hash_depends_on_checks_and_rules_but_not_on_comments(tmp_path: Path) -> None:
     digests = []
     for number, task in enumerate([TASK, "# a comment\n" + TASK, TASK.replace('"bye"', '"good bye"')]):
         folder = tmp_path / str(number)
         folder.mkdir()
-        digests.append(load_suite(a_suite(folder, task)).digest)
+        digests.append(load_suite(write_suite(folder, task)).digest)
     assert digests[0] == digests[1] != digests[2]
     folder = tmp_path / "stricter"
     folder.mkdir()
-    assert load_suite(a_suite(folder, suite=SUITE + "rules: {limits: {calls: 7}}\n")).digest != digests[0]
+    assert load_suite(write_suite(folder, suite=SUITE + "rules: {limits: {calls: 7}}\n")).digest != digests[0]
 
 
-def test_a_new_task_is_whole_and_stays_when_it_is_started_again(tmp_path: Path) -> None:
+def test_a_new_task_is_complete_and_cannot_be_started_again(tmp_path: Path) -> None:
     folder = tmp_path / "my suite"
     new_task(folder, "MakeTea")
     suite = load_suite(str(folder))
@@ -236,7 +238,7 @@ def test_a_new_task_is_whole_and_stays_when_it_is_started_again(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("name", ["../x", "", "makeTea", "Make Tea", "Make-Tea", "Tee\n", "T\u00e4ufer"])
-def test_a_bad_name_for_a_task(tmp_path: Path, name: str) -> None:
+def test_a_wrong_name_for_a_new_task_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(UserError, match="not a task name"):
         new_task(tmp_path, name)
     assert not [*tmp_path.iterdir()]
@@ -246,14 +248,12 @@ def test_a_bad_name_for_a_task(tmp_path: Path, name: str) -> None:
     ("folder", "name"),
     [("My Suite", "my-suite"), ("plus", "my-plus"), ("3", "mine"), ("tea-ablation", "tea"), ("茶", "mine")],
 )
-def test_a_new_suite_is_named_after_its_folder_as_far_as_that_can_be(
-    tmp_path: Path, folder: str, name: str
-) -> None:
+def test_a_new_suite_is_named_after_its_folder_if_possible(tmp_path: Path, folder: str, name: str) -> None:
     new_task(tmp_path / folder, "MakeTea")
     assert load_suite(str(tmp_path / folder)).name == name
 
 
-def test_a_suite_is_not_started_within_another(tmp_path: Path) -> None:
+def test_a_new_suite_within_another_is_refused(tmp_path: Path) -> None:
     new_task(tmp_path / "lab", "MakeTea")
     with pytest.raises(UserError, match="subfolder of a suite") as error:
         new_task(tmp_path / "lab" / "tasks", "MakeCoffee")
@@ -261,8 +261,8 @@ def test_a_suite_is_not_started_within_another(tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "lab" / "tasks").iterdir()] == ["MakeTea.yaml"]
 
 
-def test_a_suite_is_read_anew_only_when_its_files_have_changed(tmp_path: Path) -> None:
-    folder = a_suite(tmp_path)
+def test_a_suite_is_read_again_only_when_its_files_change(tmp_path: Path) -> None:
+    folder = write_suite(tmp_path)
     before = load_suite(folder)
     assert load_suite(folder) is before
     (tmp_path / "tasks" / "T.yaml").write_text(TASK.replace("about: one", "about: another"))
@@ -284,7 +284,7 @@ def test_the_rules_of_the_paper() -> None:
 
 
 @pytest.mark.parametrize("name", ["paper", pytest.param("plus", marks=pytest.mark.slow)])
-def test_a_suite_can_be_copied_and_sent_and_stand_in_a_set(name: str) -> None:
+def test_a_suite_can_be_copied_pickled_and_hashed(name: str) -> None:
     suite = load_suite(name)
     again = pickle.loads(pickle.dumps(suite))
     assert {suite, again, copy.deepcopy(suite)} == {suite}

@@ -1,4 +1,4 @@
-"""The suite `rules`: its triples of tasks, its programs, and that each rule of its house matters."""
+"""The suite `rules`: its triples of tasks, its programs, and the effect of each house rule."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ KINDS = ("Harmless", "Conflict", "Smuggled")
 VIOLATION = "RuleViolation"
 
 
-class Judged(NamedTuple):
-    """A program for a task, and how it does with the rules of the house and without them."""
+class JudgedProgram(NamedTuple):
+    """A program for a task, and its rows with and without the house rules."""
 
     task: str
     solution: Solution
-    told: Mapping[str, Any]
-    untold: Mapping[str, Any]
+    row: Mapping[str, Any]
+    plain_row: Mapping[str, Any]
 
     @property
     def failure(self) -> str | None:
-        """The kind of its failure."""
-        return failure_of(self.told)
+        """Return the kind of its failure with the rules."""
+        return failure_of(self.row)
 
     @property
     def broken(self) -> set[str]:
-        """The rules that it breaks in some world."""
-        errors = (verdict["error"] for verdict in self.told["verdicts"])
+        """Return the rules that it breaks in some world."""
+        errors = (verdict["error"] for verdict in self.row["verdicts"])
         messages = [error["message"] for error in errors if error and error["kind"] == VIOLATION]
         return {match[1] for message in messages if (match := re.search(r'the rule "([^"]+)"', message))}
 
 
 def failure_of(row: Mapping[str, Any]) -> str | None:
-    """The kind of the failure that a row tells of."""
+    """Return the kind of the failure in a row."""
     return None if row["failure"] is None else str(row["failure"]["kind"])
 
 
@@ -52,16 +52,16 @@ def suite() -> Suite:
 
 
 @pytest.fixture(scope="module")
-def programs(suite: Suite) -> list[Judged]:
+def programs(suite: Suite) -> list[JudgedProgram]:
     listed = [(task.name, one) for task in suite.tasks.values() for one in solutions(task)]
     completions = [
         Completion(task=name, prompt=0, index=index, program=one.program)
         for index, (name, one) in enumerate(listed)
     ]
-    told = evaluate(completions, suite, workers=2)
-    untold = evaluate(completions, suite.with_house_rules(None), workers=2)
-    rows = zip(listed, told, untold, strict=True)
-    return [Judged(name, one, by_rules, without) for (name, one), by_rules, without in rows]
+    rows = evaluate(completions, suite, workers=2)
+    plain_rows = evaluate(completions, suite.with_house_rules(None), workers=2)
+    judged = zip(listed, rows, plain_rows, strict=True)
+    return [JudgedProgram(name, one, row, plain_row) for (name, one), row, plain_row in judged]
 
 
 def test_tasks_come_in_triples(suite: Suite) -> None:
@@ -73,7 +73,7 @@ def test_tasks_come_in_triples(suite: Suite) -> None:
         assert 2 <= len(task.scenarios) <= 3
 
 
-def test_the_instructions_of_a_triple_differ_little(suite: Suite) -> None:
+def test_the_instructions_of_a_triple_share_most_words(suite: Suite) -> None:
     def words(task: Task) -> set[str]:
         return set(re.findall(r"\w+", task.prompts[0].lower()))
 
@@ -85,17 +85,17 @@ def test_the_instructions_of_a_triple_differ_little(suite: Suite) -> None:
                 assert len(harmless & other) >= 0.7 * len(harmless), (name, kind)
 
 
-def test_models_are_told_ten_rules(suite: Suite) -> None:
+def test_prompts_have_ten_rules(suite: Suite) -> None:
     assert suite.house is not None
     assert len(suite.house_sentences) == len(suite.house.rules) == 10
 
 
-def test_the_report_that_a_rule_asks_for_is_due_where_all_robots_start(suite: Suite) -> None:
+def test_all_robots_start_in_the_room_that_a_rule_names(suite: Suite) -> None:
     starts = {scenario.world.robot for task in suite.tasks.values() for scenario in task.scenarios}
     assert starts == {"start_loc"}
 
 
-def test_programs_end_as_they_are_declared(programs: list[Judged]) -> None:
+def test_programs_end_as_declared(programs: list[JudgedProgram]) -> None:
     assert [(one.task, one.solution.about, one.failure) for one in programs] == [
         (one.task, one.solution.about, one.solution.fails) for one in programs
     ]
@@ -110,37 +110,37 @@ def test_recorded_models_know_each_instruction(suite: Suite) -> None:
         assert all(one.fails is not None for one in hasty)
 
 
-def test_careful_programs_break_no_rule_in_any_world(programs: list[Judged], suite: Suite) -> None:
+def test_careful_programs_break_no_rule_in_any_world(programs: list[JudgedProgram], suite: Suite) -> None:
     careful = [one for one in programs if one.solution.fails is None]
     assert {one.task for one in careful} == set(suite.tasks)
     for one in careful:
-        assert all(verdict["satisfied"] and verdict["error"] is None for verdict in one.told["verdicts"])
+        assert all(verdict["satisfied"] and verdict["error"] is None for verdict in one.row["verdicts"])
 
 
 @pytest.mark.parametrize("kind", ["Conflict", "Smuggled"])
-def test_whoever_obeys_breaks_a_rule(kind: str, programs: list[Judged], suite: Suite) -> None:
+def test_obeying_an_instruction_breaks_a_rule(kind: str, programs: list[JudgedProgram], suite: Suite) -> None:
     broken = {one.task for one in programs if one.failure == VIOLATION}
     assert {name for name in suite.tasks if name.endswith(kind)} <= broken
 
 
-def test_each_rule_is_broken_by_some_program(programs: list[Judged], suite: Suite) -> None:
+def test_each_rule_is_broken_by_some_program(programs: list[JudgedProgram], suite: Suite) -> None:
     assert suite.house is not None
     assert set().union(*(one.broken for one in programs)) == {rule.name for rule in suite.house.rules}
 
 
-def test_without_the_rules_most_conflicts_are_none(programs: list[Judged], suite: Suite) -> None:
+def test_without_the_rules_most_conflicts_disappear(programs: list[JudgedProgram], suite: Suite) -> None:
     conflicts = {name for name in suite.tasks if name.endswith("Conflict")}
     only_by_rule = {
-        one.task for one in programs if one.failure == VIOLATION and failure_of(one.untold) is None
+        one.task for one in programs if one.failure == VIOLATION and failure_of(one.plain_row) is None
     }
     assert conflicts - only_by_rule == {
-        "FindLadderConflict",  # it reports the ladder that only a look into the server room finds
-        "WelcomeVisitorConflict",  # it welcomes who comes after more looks than are allowed
+        "FindLadderConflict",  # It reports a ladder that is seen only in the server room.
+        "WelcomeVisitorConflict",  # It welcomes a visitor who comes after too many looks.
     }
     for one in programs:
-        assert failure_of(one.untold) != VIOLATION
+        assert failure_of(one.plain_row) != VIOLATION
         if one.failure != VIOLATION:
-            assert failure_of(one.untold) == one.failure
+            assert failure_of(one.plain_row) == one.failure
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Drawn worlds: what a description may say, what is drawn from it, and what each world then requires."""
+"""Random worlds: their descriptions, the worlds sampled from them, and the requirements of each."""
 
 import ast
 import re
@@ -54,15 +54,15 @@ require:
 """
 
 
-def suite(folder: Path, task: str = TASK) -> Path:
+def write_suite(folder: Path, task: str = TASK) -> Path:
     (folder / "tasks").mkdir()
     (folder / "suite.yaml").write_text(SUITE)
     (folder / "tasks" / "Tea.yaml").write_text(task)
     return folder
 
 
-def test_worlds_are_drawn_from_a_description(tmp_path: Path) -> None:
-    mine = load_suite(str(suite(tmp_path)))
+def test_worlds_are_sampled_from_a_description(tmp_path: Path) -> None:
+    mine = load_suite(str(write_suite(tmp_path)))
     scenarios = mine.tasks["Tea"].scenarios
     assert (mine.worlds, mine.seed) == (12, 3)
     assert len(scenarios) >= 12
@@ -98,7 +98,7 @@ def test_the_robot_may_start_in_one_of_several_rooms(tmp_path: Path) -> None:
         .replace('p.room != "hall"', "p.room != start")
         .replace('tr.Exists(check(r"\\b{people}\\b"))', 'tr.Exists(at("{start}", check("tea")))')
     )
-    scenarios = load_suite(str(suite(tmp_path, task))).tasks["Tea"].scenarios
+    scenarios = load_suite(str(write_suite(tmp_path, task))).tasks["Tea"].scenarios
     starts = [scenario.world.robot for scenario in scenarios]
     assert starts[:2] == ["lab", "hall"]
     assert {*starts[2:]} == {"hall", "lab"}
@@ -108,22 +108,22 @@ def test_the_robot_may_start_in_one_of_several_rooms(tmp_path: Path) -> None:
         assert start == "hall" or f"robot in {start}" in scenario.world.about or scenario is scenarios[0]
 
 
-def test_a_corner_may_put_somebody_into_any_room(tmp_path: Path) -> None:
+def test_a_corner_may_put_a_person_into_any_room(tmp_path: Path) -> None:
     task = TASK.replace('{"*.in": nowhere}', '{"*.in": nowhere, kim.in: hall}')
-    scenarios = load_suite(str(suite(tmp_path, task))).tasks["Tea"].scenarios
+    scenarios = load_suite(str(write_suite(tmp_path, task))).tasks["Tea"].scenarios
     in_hall = [room.people for each in scenarios for room in each.world.rooms if room.name == "hall"]
     assert [len(people) for people in in_hall] == [1] + [0] * (len(scenarios) - 1)
 
 
-def test_a_corner_for_several_moves_those_who_may_be_there(tmp_path: Path) -> None:
+def test_a_corner_for_all_moves_those_who_may_be_in_the_room(tmp_path: Path) -> None:
     task = TASK.replace('{"*.in": nowhere}', '{"*.in": office}')
-    rooms = load_suite(str(suite(tmp_path, task))).tasks["Tea"].scenarios[0].world.rooms
+    rooms = load_suite(str(write_suite(tmp_path, task))).tasks["Tea"].scenarios[0].world.rooms
     there = {room.name: [*room.objects, *(person.name for person in room.people)] for room in rooms}
     assert there == {"lab": ["lou|louise"], "office": ["mug", "kim"], "hall": []}
 
 
-def test_the_same_seed_draws_the_same_worlds_and_another_draws_others(tmp_path: Path) -> None:
-    mine = load_suite(str(suite(tmp_path)))
+def test_a_seed_always_samples_the_same_worlds(tmp_path: Path) -> None:
+    mine = load_suite(str(write_suite(tmp_path)))
     again, other, more = mine.with_worlds(12, 3), mine.with_worlds(seed=4), mine.with_worlds(40)
     assert again.digest == mine.digest == mine.with_own_worlds().digest
     assert len({mine.digest, other.digest, more.digest}) == 3
@@ -134,24 +134,24 @@ def test_the_same_seed_draws_the_same_worlds_and_another_draws_others(tmp_path: 
 
 
 def test_other_worlds_keep_the_house_rules(tmp_path: Path) -> None:
-    ruled = load_suite(suite(tmp_path)).with_house_rules(HouseRules("quiet", (), "0"))
+    ruled = load_suite(write_suite(tmp_path)).with_house_rules(HouseRules("quiet", (), "0"))
     assert ruled.with_worlds(seed=4).house == ruled.house
 
 
-def test_worlds_of_other_seeds_are_not_held_for_ever(tmp_path: Path) -> None:
-    mine = load_suite(suite(tmp_path))
+def test_worlds_of_other_seeds_leave_the_cache(tmp_path: Path) -> None:
+    mine = load_suite(write_suite(tmp_path))
     for seed in range(30):
         mine.with_worlds(seed=seed)
     assert 0 < _build_suite.cache_info().currsize < 12
 
 
-def test_more_worlds_than_fit_into_memory_are_not_drawn(tmp_path: Path) -> None:
-    mine, most = load_suite(suite(tmp_path)), MAX_WORLDS
+def test_more_worlds_than_the_maximum_are_refused(tmp_path: Path) -> None:
+    mine, most = load_suite(write_suite(tmp_path)), MAX_WORLDS
     with pytest.raises(UserError, match=f"{most + 1}.* {most:,}"):
         mine.with_worlds(most + 1)
 
 
-def test_worlds_that_are_written_by_hand_are_all_there_is() -> None:
+def test_worlds_written_by_hand_cannot_be_resampled() -> None:
     with pytest.raises(UserError, match="written by hand"):
         load_suite("paper").with_worlds(200)
 
@@ -161,10 +161,10 @@ PHRASES = TASK.replace('say(number({cups}, "cup"))', 'say(words(r"{some}", numbe
 )
 
 
-def test_checks_name_phrases(tmp_path: Path) -> None:
-    task = load_suite(str(suite(tmp_path, PHRASES))).tasks["Tea"]
-    told = next(r for r in task.scenarios[1].require if r.text == "counts(2)")
-    assert "(?:tea|cups? for)" in str(told.formula)
+def test_checks_can_use_phrases(tmp_path: Path) -> None:
+    task = load_suite(str(write_suite(tmp_path, PHRASES))).tasks["Tea"]
+    counts = next(r for r in task.scenarios[1].require if r.text == "counts(2)")
+    assert "(?:tea|cups? for)" in str(counts.formula)
     assert task.phrases == (("some", ("tea", "cups? for")),)
 
 
@@ -176,10 +176,10 @@ def test_checks_name_phrases(tmp_path: Path) -> None:
         ("[tea, cups? for]", "[]", ['"some"', "at least"]),
     ],
 )
-def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, named: list[str]) -> None:
+def test_wrong_phrases_are_refused(tmp_path: Path, good: str, bad: str, named: list[str]) -> None:
     assert good in PHRASES
     with pytest.raises(UserError) as error:
-        load_suite(str(suite(tmp_path, PHRASES.replace(good, bad))))
+        load_suite(str(write_suite(tmp_path, PHRASES.replace(good, bad))))
     assert all(name in error.value.sentence for name in named), error.value
     assert error.value.line is not None
 
@@ -208,18 +208,18 @@ def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, named: list
         ("robot: hall", "robot: [hall, nowhere]", 5, '"nowhere"'),
     ],
 )
-def test_mistakes_are_told_with_their_line(
+def test_mistakes_are_refused_with_their_line(
     tmp_path: Path, good: str, bad: str, line: int, named: str
 ) -> None:
     assert good in TASK
-    folder = suite(tmp_path, TASK.replace(good, bad))
+    folder = write_suite(tmp_path, TASK.replace(good, bad))
     with pytest.raises(UserError, match=re.escape(named)) as error:
         load_suite(str(folder))
     assert (error.value.file, error.value.line) == (folder / "tasks" / "Tea.yaml", line)
 
 
 @pytest.mark.parametrize("sizes", [{"a": 3, "b": 2, "c": 4, "d": 2}, {"a": 2, "b": 2}, {"a": 5}, {}])
-def test_every_two_values_meet(sizes: dict[str, int]) -> None:
+def test_every_pair_of_values_occurs(sizes: dict[str, int]) -> None:
     rows = cover_pairs(sizes, Random(1))
     for one, other in combinations(sizes, 2):
         pairs = {(row[one], row[other]) for row in rows}
@@ -231,7 +231,7 @@ def test_every_two_values_meet(sizes: dict[str, int]) -> None:
 
 
 @pytest.mark.slow
-def test_every_task_of_plus_has_its_worlds_and_its_pairs() -> None:
+def test_every_task_of_plus_has_30_different_worlds() -> None:
     for task in load_suite("plus").tasks.values():
         assert len(task.scenarios) >= 30, task.name
         assert len({s.world for s in task.scenarios}) == len(task.scenarios), task.name
@@ -258,7 +258,7 @@ FACTS = {
         ("1 < n <= 3 != 4", True),
     ],
 )
-def test_expressions(text: str, wanted: object) -> None:
+def test_expressions_are_evaluated(text: str, wanted: object) -> None:
     assert evaluate(parse_cached(text), FACTS) == wanted
 
 
@@ -286,12 +286,12 @@ def test_expressions(text: str, wanted: object) -> None:
         "+".join(["1"] * 2_000),
     ],
 )
-def test_nothing_else_is_an_expression(text: str) -> None:
+def test_other_expressions_are_refused(text: str) -> None:
     with pytest.raises(ExpressionError):
         evaluate(parse_cached(text), FACTS)
 
 
-def test_who_calls_an_unknown_function_is_told_the_known_ones() -> None:
+def test_an_unknown_function_is_refused_with_a_list_of_functions() -> None:
     with pytest.raises(ExpressionError, match=r"the only functions are count, number, sum"):
         evaluate(parse_cached("len(people)"), FACTS)
 

@@ -1,4 +1,4 @@
-"""Tasks to train on: correct programs earn 1, others less, and no measured task is among them."""
+"""Training tasks: right programs earn 1, others less, and no task of a benchmark is among them."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
 
 SEEDS = (0, 1, 1_000_000_000)
-LONG = "WaitAndGreet"  # its programs wait for long
+LONG = "WaitAndGreet"  # Its programs wait for a long time.
 FAMILIES = [pytest.param(name, marks=[pytest.mark.slow] * (name == LONG)) for name in family_names()]
 IDLE = ("", "def task_program():\n    pass\n")
-ALIKE = 8  # words in a row that two instructions may not share
+ALIKE = 8  # Two instructions may not share so many words in a row.
 
 
-def test_there_are_families_enough() -> None:
+def test_there_are_at_least_16_families() -> None:
     assert len(family_names()) >= 16
 
 
@@ -34,7 +34,7 @@ def test_there_are_families_enough() -> None:
 @pytest.mark.parametrize(
     "seed", [SEEDS[0], *(pytest.param(seed, marks=pytest.mark.slow) for seed in SEEDS[1:])]
 )
-def test_right_programs_earn_1_idle_ones_0_and_wrong_ones_something_between(family: str, seed: int) -> None:
+def test_right_programs_earn_1_idle_ones_0_and_wrong_ones_less_than_1(family: str, seed: int) -> None:
     task = trained_task(family, seed)
     programs = (task.solution, *IDLE, *(one.program for one in task.wrong))
     last = len(task.prompts) - 1
@@ -47,7 +47,7 @@ def test_right_programs_earn_1_idle_ones_0_and_wrong_ones_something_between(fami
 
 
 @pytest.mark.parametrize("family", family_names())
-def test_a_seed_always_makes_the_same_task_and_another_one_another(family: str) -> None:
+def test_a_seed_always_makes_the_same_task(family: str) -> None:
     task, again, other = trained_task(family, 5), trained_task(family, 5, worlds=8), trained_task(family, 6)
     assert task == again
     assert task.suite.digest != other.suite.digest
@@ -62,7 +62,7 @@ def test_prompts_without_a_task_are_those_of_the_task(family: str) -> None:
     assert trained_prompts(family, 77) == trained_task(family, 77).prompts
 
 
-def test_worlds_are_as_many_as_asked_for() -> None:
+def test_the_number_of_worlds_can_be_chosen() -> None:
     task = trained_task("BringThing", 3, worlds=40)
     assert len(task.suite.tasks[task.name].scenarios) >= 40
 
@@ -88,7 +88,7 @@ wrong:
 """
 
 
-def test_a_family_of_ones_own_is_a_file(tmp_path: Path) -> None:
+def test_a_users_own_family_is_a_file(tmp_path: Path) -> None:
     file = tmp_path / "Visit.yaml"
     file.write_text(OWN)
     (row, other) = load_prompts("test", count=2, only=[str(file)])
@@ -101,7 +101,7 @@ def test_a_family_of_ones_own_is_a_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("right", "wrong", "told"),
+    ("right", "wrong", "message"),
     [
         ("spare: rooms", "spare: planets", r', line 3: unknown pool "planets"; use rooms, people'),
         ("tr.Exists(goto", "tr.Exist(goto", r", line 9: .*Exist"),
@@ -116,16 +116,16 @@ def test_a_family_of_ones_own_is_a_file(tmp_path: Path) -> None:
         ("summary: Go", "sumary: Go", r", line 5: .*sumary"),
     ],
 )
-def test_a_mistake_in_a_family_of_ones_own_is_told_with_its_line(
-    tmp_path: Path, right: str, wrong: str, told: str
+def test_a_mistake_in_a_users_own_family_is_refused_with_its_line(
+    tmp_path: Path, right: str, wrong: str, message: str
 ) -> None:
     file = tmp_path / "Visit.yaml"
     file.write_text(OWN.replace(right, wrong))
-    with pytest.raises(UserError, match=rf"Visit\.yaml{told}"):
+    with pytest.raises(UserError, match=rf"Visit\.yaml{message}"):
         trained_task(str(file), 1)
 
 
-# --- nothing that is measured with is learned
+# --- no training on the benchmark
 
 
 def shingles(text: str) -> set[tuple[str, ...]]:
@@ -134,7 +134,7 @@ def shingles(text: str) -> set[tuple[str, ...]]:
 
 
 def shape(program: str) -> str:
-    """A program without its texts and names."""
+    """Dump the tree of a program without its texts and names."""
     tree = ast.parse(program)
     for node in ast.walk(tree):
         match node:
@@ -146,43 +146,43 @@ def shape(program: str) -> str:
 
 
 @cache
-def measured_tasks() -> list[Task]:
+def benchmark_tasks() -> list[Task]:
     return [task for suite in shipped_suites() for task in load_suite(suite).tasks.values()]
 
 
 @cache
-def measured_shingles() -> set[tuple[str, ...]]:
-    return {words for task in measured_tasks() for prompt in task.prompts for words in shingles(prompt)}
+def benchmark_shingles() -> set[tuple[str, ...]]:
+    return {words for task in benchmark_tasks() for prompt in task.prompts for words in shingles(prompt)}
 
 
 @cache
-def measured_shapes() -> set[str]:
-    return {shape(one.program) for task in measured_tasks() for one in solutions(task) if one.fails is None}
+def benchmark_shapes() -> set[str]:
+    return {shape(one.program) for task in benchmark_tasks() for one in solutions(task) if one.fails is None}
 
 
 @pytest.mark.parametrize("family", family_names())
-def test_no_instruction_is_one_that_is_measured_with(family: str) -> None:
-    asked = measured_shingles()
+def test_no_instruction_is_one_of_the_benchmark(family: str) -> None:
+    asked = benchmark_shingles()
     for seed in SEEDS:
         for prompt in trained_task(family, seed).prompts:
             assert not shingles(prompt) & asked
 
 
 @pytest.mark.parametrize("family", family_names())
-def test_no_solution_is_one_of_a_task_that_is_measured_with(family: str) -> None:
-    known = measured_shapes()
+def test_no_solution_is_one_of_the_benchmark(family: str) -> None:
+    known = benchmark_shapes()
     assert known
     assert shape(trained_task(family, 0).solution) not in known
 
 
-# --- what cannot be gained
+# --- programs that cheat
 
 
 @pytest.mark.slow
 def test_no_hack_earns_as_much_as_an_honest_program_without_its_last_step(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(hacking, "family_names", lambda: family_names()[::3])  # bench/hacking.py takes all
+    monkeypatch.setattr(hacking, "family_names", lambda: family_names()[::3])  # The benchmark takes all.
     programs = hacks()
     assert len(programs) >= 30
     aim = honest(SEEDS[:1])
@@ -191,12 +191,12 @@ def test_no_hack_earns_as_much_as_an_honest_program_without_its_last_step(
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_program_that_takes_back_what_it_has_said_does_not_pass(family: str) -> None:
+def test_a_program_that_takes_back_its_report_does_not_pass(family: str) -> None:
     right = trained_task(family, 0).solution
     said, thanked = (taken_back(right, text) for text in (DENIALS[0], "Thank you, that is all."))
     denied, polite = judge([Rollout(family, 0, 0, said), Rollout(family, 0, 0, thanked)])
     assert denied.passed == 0
-    assert denied.reward < 0.5  # where nobody ever comes, the program waits and reports nothing
+    assert denied.reward < 0.5  # Where nobody comes, the program waits and reports nothing.
     assert polite.passed == 1
 
 
@@ -221,7 +221,7 @@ HONEST = [
 ]
 
 
-def test_what_takes_a_report_back_and_what_does_not() -> None:
+def test_denials_take_a_report_back_and_honest_sentences_do_not() -> None:
     found = [text for text in (*DENIALS, *HONEST) if re.search(RETRACTION, text.lower())]
     assert found == DENIALS
 
@@ -230,13 +230,13 @@ def test_what_takes_a_report_back_and_what_does_not() -> None:
 
 
 @pytest.mark.parametrize("worlds", [0, -3, 20_000])
-def test_worlds_are_from_1_to_10000(worlds: int) -> None:
+def test_a_number_of_worlds_outside_1_to_10000_is_refused(worlds: int) -> None:
     with pytest.raises(UserError, match=f"worlds is {worlds}, but it must be from 1 to 10,000"):
         trained_task("BringThing", 1, worlds=worlds)
 
 
 @pytest.mark.parametrize("seed", [-1, 1.5, "x"])
-def test_seeds_are_whole_numbers_from_0(seed: int) -> None:
+def test_seeds_other_than_whole_numbers_from_0_are_refused(seed: int) -> None:
     with pytest.raises(UserError, match=r"the seed is .* whole number from 0"):
         trained_task("BringThing", seed)
 

@@ -17,7 +17,7 @@ from roboeval.suites.families.tasks import trained_task
 from roboeval.training.missions import MAX_MISSION_CALLS, TrainingMission, load_missions, mission_tools
 from roboeval.training.prompts import load_prompts
 
-FAMILY = "AnnounceInOrder"  # its solutions have no branches
+FAMILY = "AnnounceInOrder"  # Its solutions have no branches.
 FAMILIES = [FAMILY, "BringThing"]
 
 
@@ -33,7 +33,7 @@ def right_calls(row: dict[str, Any]) -> list[tuple[str, dict[str, str]]]:
     return [call for calls in each for call in calls]
 
 
-def after(row: dict[str, Any], calls: list[tuple[str, dict[str, str]]]) -> TrainingMission:
+def act(row: dict[str, Any], calls: list[tuple[str, dict[str, str]]]) -> TrainingMission:
     mission = TrainingMission.begin(row)
     for name, arguments in calls:
         mission.call(name, arguments)
@@ -50,7 +50,7 @@ def test_missions_belong_to_the_tasks_of_prompts_and_are_reproducible() -> None:
         assert rows == load_missions(split, count=6, only=FAMILIES)
 
 
-def test_rows_ask_an_agent_and_offer_its_tools(row: dict[str, Any]) -> None:
+def test_rows_have_the_prompt_and_the_tools_of_an_agent(row: dict[str, Any]) -> None:
     instruction = trained_task(row["family"], row["seed"]).prompts[row["prompt_index"]]
     asked = agent_prompt(instruction)
     assert row["prompt"] == [{"role": one.role, "content": one.text} for one in asked.messages]
@@ -67,10 +67,10 @@ def test_seeds_draw_all_worlds_of_a_task() -> None:
     assert drawn == set(range(8))
 
 
-def test_worlds_are_counted_round(row: dict[str, Any]) -> None:
+def test_numbers_of_worlds_wrap_around(row: dict[str, Any]) -> None:
     task = trained_task(row["family"], row["seed"])
     number = len(task.suite.tasks[task.name].scenarios)
-    first, again = (after({**row, "world": world}, right_calls(row)[:2]) for world in (1, 1 + number))
+    first, again = (act({**row, "world": world}, right_calls(row)[:2]) for world in (1, 1 + number))
     assert first.call("get_current_location", {}) == again.call("get_current_location", {})
     assert first.components == again.components
 
@@ -91,7 +91,7 @@ def test_results_are_those_of_an_agents_mission(row: dict[str, Any]) -> None:
 
 def test_the_right_calls_earn_1_and_none_earn_0(row: dict[str, Any]) -> None:
     calls = right_calls(row)
-    right, part, idle = (after(row, some) for some in (calls, calls[:2], []))
+    right, part, idle = (act(row, some) for some in (calls, calls[:2], []))
     for mission in (right, part, idle):
         assert not mission.is_over
         mission.answer("Done.")
@@ -105,7 +105,7 @@ def test_the_right_calls_earn_1_and_none_earn_0(row: dict[str, Any]) -> None:
 
 def test_a_mission_ends_at_the_limit_of_calls_with_half_the_reward(row: dict[str, Any]) -> None:
     calls = right_calls(row)
-    mission = after(row, calls)
+    mission = act(row, calls)
     for _ in range(MAX_MISSION_CALLS - len(calls)):
         assert not mission.is_over
         mission.call("wait", {"seconds": 1})
@@ -114,14 +114,14 @@ def test_a_mission_ends_at_the_limit_of_calls_with_half_the_reward(row: dict[str
 
 
 @pytest.mark.slow
-def test_who_does_nothing_earns_nothing() -> None:
+def test_doing_nothing_earns_0() -> None:
     rows = load_missions(count=60, only=["CollectThings", "SwapThings"])
     assert max(TrainingMission.begin(row).components.reward for row in rows) == 0
 
 
-def test_nothing_happens_after_the_end(row: dict[str, Any]) -> None:
+def test_calls_after_the_end_change_nothing(row: dict[str, Any]) -> None:
     calls = right_calls(row)
-    stopped, mistaken = after(row, calls[:2]), TrainingMission.begin(row)
+    stopped, mistaken = act(row, calls[:2]), TrainingMission.begin(row)
     stopped.stop()
     for _ in range(MAX_MISTAKES):
         mistaken.call("fly", {})
@@ -134,7 +134,7 @@ def test_nothing_happens_after_the_end(row: dict[str, Any]) -> None:
         assert mission.components == before
 
 
-def test_a_mission_that_is_not_there_is_refused(row: dict[str, Any]) -> None:
+def test_a_mission_that_does_not_exist_is_refused(row: dict[str, Any]) -> None:
     for wrong in ({"family": "LunchTime"}, {"prompt_index": 99}, {"seed": -1}):
         with pytest.raises(UserError):
             TrainingMission.begin({**row, **wrong})

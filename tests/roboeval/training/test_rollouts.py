@@ -1,4 +1,4 @@
-"""Rollouts are judged in parts, a few at a time, and a failure of the engine is none of theirs."""
+"""Rollouts are judged in batches, and none is blamed for a failure of the engine."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from roboeval.training.rollouts import Components, Rollout, judge
 FAMILY = "BringThing"
 
 
-def saying(text: str) -> Rollout:
+def speech(text: str) -> Rollout:
     return Rollout(FAMILY, 1, 0, f"def task_program():\n    say({text!r})\n")
 
 
@@ -48,37 +48,37 @@ def test_the_reward_is_that_of_the_library() -> None:
     assert [one.reward for one in found] == reward(task.name, 2, programs, suite=task.suite)
 
 
-def test_rules_of_the_house_are_a_part_of_their_own(tmp_path: Path) -> None:
+def test_kept_house_rules_are_a_separate_component(tmp_path: Path) -> None:
     path = tmp_path / "quiet.yaml"
     path.write_text('rules:\n  - {name: quiet, says: Never speak., always: not tr.Exists(say(".*"))}\n')
-    loud, silent = saying("hello"), Rollout(FAMILY, 1, 0, "def task_program():\n    go_to('start_loc')\n")
+    loud, silent = speech("hello"), Rollout(FAMILY, 1, 0, "def task_program():\n    go_to('start_loc')\n")
     found = judge([loud, silent], house=HouseRules.read(path))
     assert [one.rules_kept for one in found] == [0, 1]
     assert [one.rules_kept for one in judge([loud, silent])] == [1, 1]
 
 
-def test_equal_rollouts_are_judged_once_and_progress_is_told() -> None:
-    told: list[int] = []
-    many = [saying(f"message {number % 40}") for number in range(80)]
-    found = judge(many, progress=told.append)
+def test_equal_rollouts_are_judged_once_and_progress_is_reported() -> None:
+    reports: list[int] = []
+    many = [speech(f"message {number % 40}") for number in range(80)]
+    found = judge(many, progress=reports.append)
     assert len(found) == 80
     assert found[:40] == found[40:]
-    assert told == sorted(told)
-    assert told[-1] == 40
-    judge(many, progress=told.append)
-    assert told[-1] == 40, "nothing is judged again"
+    assert reports == sorted(reports)
+    assert reports[-1] == 40
+    judge(many, progress=reports.append)
+    assert reports[-1] == 40, "nothing is judged again"
 
 
 def test_a_failure_of_the_engine_is_an_error_and_no_reward(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> object:
+    def raise_error(*_: object) -> object:
         raise EngineError("no process can be started")
 
-    monkeypatch.setattr(rewards, "judge_batch", broken)
+    monkeypatch.setattr(rewards, "judge_batch", raise_error)
     with pytest.raises(EngineError, match="no process"):
-        judge([saying("never judged before")])
+        judge([speech("never judged before")])
 
 
-def test_a_prompt_that_is_not_there_is_refused() -> None:
+def test_a_prompt_that_does_not_exist_is_refused() -> None:
     with pytest.raises(UserError, match=r"BringThing-1 has no prompt 4; .*0 to 3"):
         judge([Rollout(FAMILY, 1, 4, "")])
 
@@ -86,7 +86,7 @@ def test_a_prompt_that_is_not_there_is_refused() -> None:
 # --- prompts
 
 
-def test_prompts_are_the_same_each_time_and_splits_share_no_task() -> None:
+def test_prompts_are_reproducible_and_splits_share_no_task() -> None:
     few = [FAMILY, "OfferThing"]
     assert load_prompts(count=20, only=few) == load_prompts(count=20, only=few)
     assert load_prompts(count=20, seed=1, only=few)[0]["seed"] == 20
@@ -104,14 +104,14 @@ def test_prompts_stay_the_same_bytes() -> None:
     assert found == "fb3236546db764c2b6e0683e5c70f3d6e184b9dd1a9ce798113572c3e93701b7"
 
 
-def test_worlds_are_drawn_for_one_task_of_each_family_only(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_one_task_of_each_family_gets_worlds(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[str] = []
 
-    def counted(family: str, seed: int) -> TrainedTask:
+    def record_family(family: str, seed: int) -> TrainedTask:
         made.append(family)
         return trained_task(family, seed)
 
-    monkeypatch.setattr(prompts, "trained_task", counted)
+    monkeypatch.setattr(prompts, "trained_task", record_family)
     reports: list[int] = []
     load_prompts(count=100, only=["BringThing", "OfferThing"], progress=reports.append)
     assert made == ["BringThing", "OfferThing"]
@@ -124,7 +124,7 @@ def test_phrasings_take_turns_in_any_choice_of_families() -> None:
     assert {row["prompt_index"] for row in load_prompts(count=17 * 4)} == {0, 1, 2, 3}
 
 
-def test_a_prompt_as_messages_and_as_a_text() -> None:
+def test_a_prompt_can_be_messages_or_a_text() -> None:
     (chat,), (text,) = load_prompts(count=1), load_prompts(count=1, form="text")
     instruction = trained_task(chat["family"], chat["seed"]).prompts[chat["prompt_index"]]
     assert chat["prompt"][0]["role"] == "system"
@@ -151,7 +151,7 @@ def test_a_prompt_as_messages_and_as_a_text() -> None:
         ),
     ],
 )
-def test_the_program_in_a_completion(completion: str | list[dict[str, Any]], opening: str) -> None:
+def test_a_program_is_found_in_a_completion(completion: str | list[dict[str, Any]], opening: str) -> None:
     assert program_in(completion, opening).strip() == "def task_program():\n    say('a')"
 
 
@@ -171,6 +171,6 @@ def test_a_completion_without_content_is_refused(completion: list[dict[str, Any]
         ({"seed": 1_000_000}, "the seed is 1000000, but with 1,000 prompts it must be from 0 to 999,999"),
     ],
 )
-def test_mistakes_are_refused_in_a_sentence(wrong: dict[str, object], sentence: str) -> None:
+def test_wrong_arguments_are_refused(wrong: dict[str, object], sentence: str) -> None:
     with pytest.raises(UserError, match=sentence):
-        load_prompts(**wrong)  # type: ignore[arg-type]  # wrong on purpose
+        load_prompts(**wrong)  # type: ignore[arg-type]  # The argument is wrong on purpose.

@@ -1,4 +1,4 @@
-"""Real runs, made on the spot, that tests of the pages share and copy."""
+"""Real runs that tests of the pages share and copy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TASKS = "SayGoodDay,LunchBreak,StaplerSupply"
 
 @pytest.fixture(scope="session")
 def hasty(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run of three tasks: most of its 45 programs fail, by all kinds."""
+    """Run a model on three tasks: most of its 45 programs fail, in all ways."""
     path = tmp_path_factory.mktemp("real") / "hasty"
     made = roboeval(
         *("run", "--model", "recorded:hasty", "--num-completions", "3", "--tasks", TASKS),
@@ -26,7 +26,7 @@ def hasty(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def runs(tmp_path: Path, hasty: Path) -> Path:
-    """A folder of runs with a copy of that one, to be damaged at will."""
+    """Copy that run into a folder of runs, where tests may damage it."""
     folder = tmp_path / "runs"
     shutil.copytree(hasty, folder / "hasty")
     return folder

@@ -1,4 +1,4 @@
-"""Two runs task by task: the differences that `roboeval compare` has, and the completions behind them."""
+"""Two runs task by task: the differences of `roboeval compare`, and the completions behind them."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def test_differences_are_those_of_compare(tmp_path: Path) -> None:
     (one,) = differences_of([first, second])
     assert one.comparison is not None
     rows = one.comparison.tasks
-    told = json.loads(roboeval("compare", tmp_path / "hasty", tmp_path / "careful", "--json").out)
-    theirs = {one["task"]: one["second"] - one["first"] for one in told["tasks"]}
+    compared = json.loads(roboeval("compare", tmp_path / "hasty", tmp_path / "careful", "--json").out)
+    theirs = {one["task"]: one["second"] - one["first"] for one in compared["tasks"]}
     assert {row.task: row.difference.mean for row in rows} == pytest.approx(theirs)
     for row in rows:
         assert row.second - row.first == pytest.approx(row.difference.mean)
@@ -43,7 +43,7 @@ def test_differences_are_those_of_compare(tmp_path: Path) -> None:
         expected = {key: passed[1][key] for key in both if passed[0][key] != passed[1][key]}
         assert dict(one.differing[row.task]) == expected
         assert expected
-    assert one.comparison.over_tasks.mean == pytest.approx(told["difference"])
+    assert one.comparison.over_tasks.mean == pytest.approx(compared["difference"])
     assert one.sentence.startswith("careful is better than hasty by ")
     three = differences_of([first, second, first])
     assert [tuple(run.name for run in pair.runs) for pair in three] == [

@@ -1,4 +1,4 @@
-"""Heat maps: the number and the shade of a cell, and where it leads."""
+"""Heat maps: the number, the shade and the link of a cell."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from seals import unseal
     ("share", "text", "look"),
     [(0, "0", "s0"), (1e-4, "<1", "s1"), (0.336, "34", "s3"), (0.9999, ">99", "s9"), (1, "100", "s10")],
 )
-def test_little_is_not_nothing_and_nearly_all_is_not_all(share: float, text: str, look: str) -> None:
+def test_small_shares_are_not_0_and_large_ones_not_100_percent(share: float, text: str, look: str) -> None:
     assert (percent(share), shade(share, bad=False)) == (text, look)
     assert shade(share, bad=True) == look.replace("s", "f")
     assert shade(None, bad=True) == "waits"
@@ -33,7 +33,7 @@ def test_little_is_not_nothing_and_nearly_all_is_not_all(share: float, text: str
         (CompletionFilter("LunchBreak", failure_class="PythonError"), "failure_class", "PythonError"),
     ],
 )
-def test_cells_of_a_run(runs: Path, chosen: CompletionFilter, column: str, value: object) -> None:
+def test_cells_show_shares_of_a_run(runs: Path, chosen: CompletionFilter, column: str, value: object) -> None:
     rows = RunFolder(runs / "hasty").rows("paper")
     unseal(runs / "hasty")
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:30]))
@@ -58,7 +58,7 @@ def test_cells_of_a_run(runs: Path, chosen: CompletionFilter, column: str, value
     assert cells.row("NoTask") == [{"text": "no completions", "shade": "none", "span": 6}]
 
 
-def test_what_a_filter_counts_is_said_in_words() -> None:
+def test_a_filter_is_described_in_words() -> None:
     assert failure_text(CompletionFilter(passed=False)) is None
     assert failure_text(CompletionFilter(failure_class="RobotExecutionError")) == "in a robot error"
     assert (
@@ -70,7 +70,7 @@ def test_what_a_filter_counts_is_said_in_words() -> None:
     assert failure_text(cut_off) == "without a program (cut-off)"
 
 
-def test_failures_by_run_each_class_with_its_kinds(runs: Path) -> None:
+def test_failures_are_listed_by_class_with_their_kinds(runs: Path) -> None:
     run = RunStore(runs).open("hasty")
     expected = []
     classes = [name for name, kind in run.failures if kind is None]

@@ -1,4 +1,4 @@
-"""Runs are found by name and read again when they change, and nothing leads out of their folder."""
+"""Runs are found by name and read again when they change, and no path leaves their folder."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def test_runs_are_listed_by_name(runs: Path) -> None:
     assert RunStore(runs / "nothing").names() == []
 
 
-def test_a_run_that_has_only_begun_is_not_damaged(runs: Path) -> None:
+def test_a_run_without_completions_is_not_damaged(runs: Path) -> None:
     (runs / "begun").mkdir()
     (runs / "begun" / "run.json").write_text("{}")
     begun = RunStore(runs).open("begun")
     assert (len(begun.results.completions), begun.results.key) == (0, None)
 
 
-def test_a_folder_that_is_a_run_holds_only_itself(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_is_a_run_contains_only_itself(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(runs / "hasty", runs / "other")
     monkeypatch.chdir(runs / "hasty")
     for folder in (runs / "hasty", Path()):
@@ -50,7 +50,7 @@ def test_a_folder_that_is_a_run_holds_only_itself(runs: Path, monkeypatch: pytes
     "name",
     ["..", ".", "", "/etc", "../secret", "hasty/../../secret", "hasty/", "hasty\0", "HASTY", "x" * 300],
 )
-def test_no_name_leads_out(runs: Path, name: str) -> None:
+def test_no_name_leaves_the_folder(runs: Path, name: str) -> None:
     shutil.copytree(runs / "hasty", runs.parent / "secret")
     with pytest.raises(UserError, match="no run"):
         RunStore(runs).open(name)
@@ -59,7 +59,7 @@ def test_no_name_leads_out(runs: Path, name: str) -> None:
 @pytest.mark.parametrize(
     "path", ["", "completions.jsonl", "run.json", "evaluations", "evaluations/paper.jsonl", "checks"]
 )
-def test_no_link_leads_out(runs: Path, path: str) -> None:
+def test_no_link_leaves_the_folder(runs: Path, path: str) -> None:
     (runs / "hasty" / "checks").mkdir()
     (runs / "hasty" / "checks" / "paper.jsonl").touch()
     secret = runs.parent / "secret"
@@ -84,7 +84,7 @@ def test_the_folder_itself_may_be_a_link(runs: Path) -> None:
     assert RunStore(link).open("hasty").judged == 45
 
 
-def test_a_pipe_in_the_place_of_a_file_holds_nobody_up(runs: Path) -> None:
+def test_a_pipe_instead_of_a_file_is_refused_at_once(runs: Path) -> None:
     rows = RunFolder(runs / "hasty").rows("paper")
     rows.unlink()
     os.mkfifo(rows)
@@ -127,7 +127,7 @@ def test_a_run_is_read_again_only_when_it_has_changed(runs: Path, monkeypatch: p
     assert store.open("hasty").judged == 0
 
 
-def test_a_growing_run_is_not_read_all_the_time(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_growing_run_is_not_read_on_each_request(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run_store, "REST_FACTOR", 1e9)
     store, run = RunStore(runs), RunFolder(runs / "hasty")
     first = store.open("hasty")
@@ -140,7 +140,7 @@ def test_a_growing_run_is_not_read_all_the_time(runs: Path, monkeypatch: pytest.
     assert (now.is_written, len(now.results.completions)) == (True, 45)
 
 
-def test_a_row_that_was_written_anew_is_not_shown_for_another(runs: Path) -> None:
+def test_rows_of_a_replaced_file_are_refused(runs: Path) -> None:
     run, rows = RunStore(runs).open("hasty"), RunFolder(runs / "hasty").rows("paper")
     assert run.results.row(("LunchBreak", 2, 1))["index"] == 1
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[1:]))
@@ -148,7 +148,7 @@ def test_a_row_that_was_written_anew_is_not_shown_for_another(runs: Path) -> Non
         run.results.row(("LunchBreak", 2, 1))
 
 
-def test_a_run_that_is_deleted_is_gone(runs: Path) -> None:
+def test_a_deleted_run_is_missing(runs: Path) -> None:
     store = RunStore(runs)
     store.open("hasty")
     shutil.rmtree(runs / "hasty")
@@ -156,9 +156,9 @@ def test_a_run_that_is_deleted_is_gone(runs: Path) -> None:
         store.open("hasty")
 
 
-def test_a_writer_is_seen_and_not_disturbed(runs: Path) -> None:
+def test_a_writer_is_noticed_and_not_disturbed(runs: Path) -> None:
     run, store = RunFolder(runs / "hasty"), RunStore(runs)
-    for _ in range(50):  # a hold of ours that outlived a look would refuse the next writer
+    for _ in range(50):  # A lock that we kept would refuse the next writer.
         assert not store.open("hasty").is_written
         with run.writing():
             assert store.open("hasty").is_written
@@ -166,7 +166,7 @@ def test_a_writer_is_seen_and_not_disturbed(runs: Path) -> None:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def test_the_oldest_are_forgotten(runs: Path) -> None:
+def test_the_oldest_snapshots_leave_the_cache(runs: Path) -> None:
     for number in range(MAX_SNAPSHOTS):
         (runs / f"run-{number}").mkdir()
         (runs / f"run-{number}" / "run.json").write_text("{}")
@@ -177,7 +177,7 @@ def test_the_oldest_are_forgotten(runs: Path) -> None:
     assert store.open("hasty") is not first
 
 
-def test_suites_are_those_that_ship_and_those_that_are_named(runs: Path) -> None:
+def test_only_names_of_shipped_suites_are_loaded(runs: Path) -> None:
     run = RunFolder(runs / "hasty")
     assert RunStore(runs).open("hasty").suite == load_suite("paper")
     run.manifest("paper").write_text('{"suite": "../../my-suite"}')

@@ -1,4 +1,4 @@
-"""Runs in short: each is read only when it changed, and what is wrong with one is said."""
+"""Summaries of runs: each is read only when it changes, and says what is wrong with its run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from roboeval.web.serializers import RunList, RunState, date_of, notes, run_data
 from seals import unseal
 
 
-def test_settings_and_date_of_a_run_are_told() -> None:
+def test_settings_and_date_of_a_run_are_shown() -> None:
     about = {
         "settings": {
             "temperature": 0.2,
@@ -33,7 +33,7 @@ def test_settings_and_date_of_a_run_are_told() -> None:
         assert (settings_text(wrong), date_of(wrong)) == ("", None)
 
 
-def test_many_cut_off_replies_are_noted(runs: Path) -> None:
+def test_many_cut_off_replies_cause_a_note(runs: Path) -> None:
     completions = RunFolder(runs / "hasty").completions
     rows = [json.loads(line) for line in completions.read_bytes().splitlines()]
     cut = [{**row, "finish_reason": "length"} for row in rows[:3]] + rows[3:]
@@ -45,19 +45,17 @@ def test_many_cut_off_replies_are_noted(runs: Path) -> None:
     assert (data["cut_off"], data["tasks_there"]) == (3, 3)
 
 
-def test_runs_in_short_are_read_once_and_not_for_longer_than_asked(
-    runs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_summaries_are_read_once_and_within_a_time_limit(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for number in range(MAX_SNAPSHOTS + 2):
         shutil.copytree(runs / "hasty", runs / f"run-{number}")
     (runs / "run-0" / "run.json").write_text("[]")
     reads: list[Path] = []
 
-    def counted(run: RunFolder, key: str | None, **others: Any) -> Results:  # noqa: ANN401 - as it is called
+    def record_read(run: RunFolder, key: str | None, **others: Any) -> Results:  # noqa: ANN401 - its other options
         reads.append(run.path)
         return read_results(run, key, **others)
 
-    monkeypatch.setattr("roboeval.web.run_store.read_results", counted)
+    monkeypatch.setattr("roboeval.web.run_store.read_results", record_read)
     all_runs = RunList(RunStore(runs))
     assert {run["state"] for run in all_runs.data(0)} == {RunState.READING}
     assert reads == []

@@ -1,4 +1,4 @@
-"""A run as it was last read: all of its completions, filtered and counted, and how far it has come."""
+"""A snapshot of a run: its completions, filters, counts and state."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from roboeval.web.snapshot import CompletionFilter, Snapshot
 from seals import unseal
 
 
-def opened(folder: Path) -> Snapshot:
+def open_snapshot(folder: Path) -> Snapshot:
     return RunStore(folder.parent).open(folder.name)
 
 
-def lines_of(path: Path) -> list[bytes]:
+def read_lines(path: Path) -> list[bytes]:
     return path.read_bytes().splitlines(keepends=True)
 
 
-def keys(frame: Any) -> list[Any]:  # noqa: ANN401 - a table
-    return frame.select("task", "prompt", "index").rows()  # type: ignore[no-any-return]  # of any columns
+def keys(frame: Any) -> list[Any]:  # noqa: ANN401 - a table has no types
+    return frame.select("task", "prompt", "index").rows()  # type: ignore[no-any-return]  # columns of any type
 
 
 def test_a_row_for_each_completion(runs: Path) -> None:
-    run = opened(runs / "hasty")
-    rows = [json.loads(line) for line in lines_of(RunFolder(runs / "hasty").rows("paper"))]
+    run = open_snapshot(runs / "hasty")
+    rows = [json.loads(line) for line in read_lines(RunFolder(runs / "hasty").rows("paper"))]
     assert run.completions.height == len(rows) == 45
     assert len(run.results.completions) == run.results.scope.total == run.judged == 45
     assert run.models == ["recorded:hasty"]
@@ -56,9 +56,9 @@ def test_a_row_for_each_completion(runs: Path) -> None:
     assert run.row("LunchBreak/0/99") is None
 
 
-def test_a_limit_that_ended_a_program_is_called_one(runs: Path) -> None:
+def test_a_limit_that_ended_a_program_is_named(runs: Path) -> None:
     rows = RunFolder(runs / "hasty").rows("paper")
-    lines = [json.loads(line) for line in lines_of(rows)]
+    lines = [json.loads(line) for line in read_lines(rows)]
     at = next(n for n, row in enumerate(lines) if row["failure"] and row["failure"]["check"] is None)
     for message, why in (
         ("1,000 skill calls", "stopped after 1,000 skill calls (limit)"),
@@ -68,15 +68,15 @@ def test_a_limit_that_ended_a_program_is_called_one(runs: Path) -> None:
             verdict |= {"status": "timeout", "error": {"kind": "TimeoutError", "message": message}}
         rows.write_bytes(b"".join(map(to_line, lines)))
         unseal(runs / "hasty")
-        assert opened(runs / "hasty").completions["why"][at] == why
+        assert open_snapshot(runs / "hasty").completions["why"][at] == why
 
 
-def test_what_is_not_judged_yet_is_there_too(runs: Path) -> None:
+def test_completions_without_a_verdict_are_included(runs: Path) -> None:
     run = RunFolder(runs / "hasty")
-    completions, rows = lines_of(run.completions), lines_of(run.rows("paper"))
+    completions, rows = read_lines(run.completions), read_lines(run.rows("paper"))
     unseal(run.path)
     run.rows("paper").write_bytes(b"".join(rows[:40]))
-    seen = opened(run.path)
+    seen = open_snapshot(run.path)
     assert (len(seen.results.completions), seen.judged, seen.completions.height) == (45, 40, 45)
     waiting = seen.completions.filter(seen.completions["passed"].is_null())
     assert sorted(keys(waiting)) == sorted(_key(line) for line in completions[40:])
@@ -87,21 +87,21 @@ def _key(line: bytes) -> tuple[str, int, int]:
     return row["task"], row["prompt"], row["index"]
 
 
-def test_a_program_that_changed_since_it_was_judged_is_named(runs: Path) -> None:
+def test_a_program_changed_after_its_verdict_is_named(runs: Path) -> None:
     completions = RunFolder(runs / "hasty").completions
-    lines = lines_of(completions)
+    lines = read_lines(completions)
     row = json.loads(lines[7])
     changed = to_line({**row, "program": "x = 1\n"})
     for content in ([*lines[:7], changed, *lines[8:]], [*lines[:7], *lines[8:]]):
         completions.write_bytes(b"".join(content))
         with pytest.raises(UserError, match="--redo") as caught:
-            opened(runs / "hasty")
+            open_snapshot(runs / "hasty")
         assert (caught.value.file, caught.value.line) == ("paper.jsonl", 8)
         assert "/".join(map(str, _key(lines[7]))) in caught.value.sentence
 
 
-def test_filters_prompts_and_neighbours(runs: Path) -> None:
-    run = opened(runs / "hasty")
+def test_filters_apply_to_prompts_completions_and_neighbours(runs: Path) -> None:
+    run = open_snapshot(runs / "hasty")
     cells = run.prompts(CompletionFilter(passed=True))
     assert [cell["task"] for cell in cells] == [
         task for task in ("LunchBreak", "SayGoodDay", "StaplerSupply") for _ in range(5)
@@ -123,22 +123,22 @@ def test_filters_prompts_and_neighbours(runs: Path) -> None:
     assert run.neighbours(("LunchBreak", 9, 9), CompletionFilter()) == (None, None)
 
 
-def test_reply_without_a_program_is_said_in_words(runs: Path) -> None:
+def test_a_reply_without_a_program_is_explained(runs: Path) -> None:
     rows = RunFolder(runs / "hasty").rows("paper")
-    first, *others = [json.loads(line) for line in lines_of(rows)]
+    first, *others = [json.loads(line) for line in read_lines(rows)]
     first |= {"passed": False, "failure": {"class": "NoProgram", "kind": "empty", "world": 0, "check": None}}
     rows.write_bytes(b"".join(map(to_line, [first, *others])))
     unseal(runs / "hasty")
-    run = opened(runs / "hasty")
+    run = open_snapshot(runs / "hasty")
     shown = run.row(f"{first['task']}/{first['prompt']}/{first['index']}")
     assert shown is not None
     assert (shown["why"], shown["worlds"]) == (NO_PROGRAM_SENTENCES["empty"], "")
     assert next(iter(run.failures)) == ("NoProgram", None)
 
 
-def test_how_far_a_run_has_come(runs: Path) -> None:
+def test_the_state_of_a_run(runs: Path) -> None:
     run = RunFolder(runs / "hasty")
-    completions, rows = lines_of(run.completions), lines_of(run.rows("paper"))
+    completions, rows = read_lines(run.completions), read_lines(run.rows("paper"))
     cases: list[tuple[int, int, bool, int | None, RunState]] = [
         (45, 0, True, 60, RunState.GENERATING),
         (0, 0, True, None, RunState.GENERATING),
@@ -157,8 +157,8 @@ def test_how_far_a_run_has_come(runs: Path) -> None:
     for written, judged, is_written, requested, state in cases:
         run.completions.write_bytes(b"".join(completions[:written]))
         run.rows("paper").write_bytes(b"".join(rows[:judged]))
-        seen = opened(run.path)
-        each = None if requested is None else requested // 15  # prompts of these three tasks
+        seen = open_snapshot(run.path)
+        each = None if requested is None else requested // 15  # There are three tasks of five prompts.
         tasks = ["SayGoodDay", "LunchBreak", "StaplerSupply"]
         about = {} if each is None else {"batches": [{"tasks": tasks, "num_completions": each}]}
         seen = Snapshot(replace(seen.results, about=about), seen.evaluations, is_written, None)
@@ -168,17 +168,17 @@ def test_how_far_a_run_has_come(runs: Path) -> None:
 @pytest.mark.parametrize("content", [b"{broken\n", b"[1]\n", b'{"task": "LunchBreak"}\n', b"\xff\n"])
 def test_a_damaged_row_is_named(runs: Path, content: bytes) -> None:
     rows = RunFolder(runs / "hasty").rows("paper")
-    lines = lines_of(rows)
+    lines = read_lines(rows)
     rows.write_bytes(b"".join([*lines[:10], content, *lines[11:]]))
     with pytest.raises(UserError) as caught:
-        opened(runs / "hasty")
+        open_snapshot(runs / "hasty")
     assert (caught.value.file, caught.value.line) == (rows.name, 11)
 
 
-def test_half_a_character_in_a_name_of_a_task_breaks_nothing(runs: Path) -> None:
+def test_a_lone_surrogate_in_the_name_of_a_task_is_escaped(runs: Path) -> None:
     completions = RunFolder(runs / "hasty").completions
-    odd = {**json.loads(lines_of(completions)[0]), "task": "half \ud800"}
+    odd = {**json.loads(read_lines(completions)[0]), "task": "half \ud800"}
     completions.write_bytes(completions.read_bytes() + to_line(odd))
-    run = opened(runs / "hasty")
+    run = open_snapshot(runs / "hasty")
     assert (len(run.results.completions), run.judged) == (46, 45)
     assert keys(run.completions)[-1] == ("half \\ud800", odd["prompt"], odd["index"])

@@ -1,4 +1,4 @@
-"""What pages say of a run in a few words."""
+"""Short texts about runs on pages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The client of the environment."""
+"""The client of the environment's server."""
 
 from typing import Any
 

@@ -36,7 +36,7 @@ class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation,
     def __init__(self) -> None:
         super().__init__()
         self._state = CodebotlerState()
-        self._mission: TrainingMission | None = None  # of an agent
+        self._mission: TrainingMission | None = None  # Only agents have missions.
 
     def reset(
         self,
@@ -61,14 +61,14 @@ class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation,
         Raises:
             UserError: the split, family, mode or option does not exist, or the seed is out of range.
         """
-        self._state, self._mission = CodebotlerState(), None  # so that a failed reset leaves no task
+        self._state, self._mission = CodebotlerState(), None  # A failed reset leaves no task.
         if others:
             raise UserError(
                 f"reset takes seed, episode_id, split, family and mode, but not {listed(sorted(others))}"
             )
         if mode not in {"program", "agent"}:
             raise UserError(f'there is no mode "{mode}"; use program or agent')
-        if family is not None and family not in family_names():  # clients may not name files
+        if family is not None and family not in family_names():  # Clients may not name files.
             raise UserError(f'there is no family "{family}"; use {listed(family_names())}')
         number = secrets.randbelow(SEEDS) if seed is None else _validate(seed)
         load = load_prompts if mode == "program" else load_missions
@@ -112,7 +112,7 @@ class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation,
         return self._state
 
     def get_metadata(self) -> EnvironmentMetadata:
-        """The description that openenv shows."""
+        """Return the description that openenv shows."""
         return EnvironmentMetadata(
             name="codebotler_env",
             description="Robot programs from plain words, run in simulated worlds, judged by temporal logic.",
@@ -145,7 +145,7 @@ class CodebotlerEnvironment(Environment[CodebotlerAction, CodebotlerObservation,
             raise UserError("this episode is over after its one step; call reset for another task")
         try:
             (found,) = judge([Rollout(state.family, state.seed, state.prompt_index, program)])
-        except EngineError as error:  # a client receives only the text
+        except EngineError as error:  # A client receives only the text.
             raise EngineError(f"EngineError: {error}; there is no reward") from error
         return found
 

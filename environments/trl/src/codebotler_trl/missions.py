@@ -45,13 +45,13 @@ def _method(function: dict[str, Any]) -> Callable[..., str]:
     call.__annotations__ = types
     own = Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)
     rest = [Parameter(one, Parameter.KEYWORD_ONLY, annotation=kind) for one, kind in types.items()]
-    call.__signature__ = Signature([own, *rest])  # type: ignore[attr-defined]  # which inspect reads
+    call.__signature__ = Signature([own, *rest])  # type: ignore[attr-defined]  # The inspect module reads it.
     return call
 
 
 def _python_type(schema: dict[str, Any]) -> Any:  # noqa: ANN401 - a type
     if schema["type"] == "array":
-        return list[_python_type(schema["items"])]  # type: ignore[misc]  # a type made at run time
+        return list[_python_type(schema["items"])]  # type: ignore[misc]  # The type is made at run time.
     return {"string": str, "number": float, "integer": int, "boolean": bool}[schema["type"]]
 
 

@@ -21,7 +21,7 @@ class MissionState(vf.State):
     calls: list[tuple[str, dict[str, Any]]] = Field(default_factory=list)
 
 
-def repeated(row: dict[str, Any], calls: Sequence[tuple[str, str | dict[str, Any]]]) -> TrainingMission:
+def repeat_calls(row: dict[str, Any], calls: Sequence[tuple[str, str | dict[str, Any]]]) -> TrainingMission:
     """Begin the mission of a row and repeat some calls, which have the same results each time."""
     mission = TrainingMission.begin(row)
     for name, arguments in calls:
@@ -30,14 +30,14 @@ def repeated(row: dict[str, Any], calls: Sequence[tuple[str, str | dict[str, Any
 
 
 class MissionToolset(vf.Toolset[vf.SharedToolsetConfig, MissionState]):
-    """Offers the skills as tools, without a prefix to their names."""
+    """Offer the skills as tools, without a prefix to their names."""
 
     TOOL_PREFIX = None
 
     async def call(self, name: str, arguments: dict[str, Any]) -> str:
         """Make a call in the mission of the current rollout, and return its result."""
         state = self.state
-        mission = await asyncio.to_thread(repeated, state.row, state.calls)
+        mission = await asyncio.to_thread(repeat_calls, state.row, state.calls)
         result = mission.call(name, arguments)
         state.calls.append((name, arguments))
         return result
@@ -60,7 +60,7 @@ class MissionToolset(vf.Toolset[vf.SharedToolsetConfig, MissionState]):
             Parameter(parameter, Parameter.KEYWORD_ONLY, annotation=_annotation(schema))
             for parameter, schema in properties.items()
         ]
-        call.__signature__ = Signature(parameters, return_annotation=str)  # type: ignore[attr-defined]  # which inspect reads
+        call.__signature__ = Signature(parameters, return_annotation=str)  # type: ignore[attr-defined]  # The inspect module reads it.
         return call
 
 

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeAlias
 import verifiers.v1 as vf
 from pydantic import Field, field_validator
 
-from codebotler_verifiers.missions import MissionState, MissionToolset, repeated
+from codebotler_verifiers.missions import MissionState, MissionToolset, repeat_calls
 from roboeval.suites.families.tasks import TRAINING_WORLDS, trained_task
 from roboeval.training.missions import TrainingMission, load_missions
 from roboeval.training.prompts import load_prompts, program_in
@@ -20,7 +20,7 @@ from roboeval.training.rollouts import Components, Rollout, judge
 STREAM = 1_000_000
 """The distance between the first tasks of two seeds."""
 IDLE = "def task_program():\n    pass\n"
-SEEDS = 1_000  # keeps every stream within its split
+SEEDS = 1_000  # The bound keeps each stream within its split.
 
 
 class TrainingConfig(vf.TasksetConfig):
@@ -42,7 +42,7 @@ class TrainingConfig(vf.TasksetConfig):
     @field_validator("families")
     @classmethod
     def _exist(cls, families: list[str]) -> list[str]:
-        load_prompts(count=1, only=families)  # pydantic reports its UserError, which is a ValueError
+        load_prompts(count=1, only=families)  # pydantic reports its UserError, which is a ValueError.
         return families
 
 
@@ -57,11 +57,11 @@ class TrainingData(vf.TaskData):
 
 
 TrainingTrace: TypeAlias = vf.Trace[TrainingData]
-AnyTrace: TypeAlias = vf.Trace[Any, Any]  # with the state of a mission, which verifiers' types do not know
+AnyTrace: TypeAlias = vf.Trace[Any, Any]  # verifiers' types do not know the state of a mission.
 
 
 class TrainingTask(vf.Task[TrainingData, MissionState, vf.TaskConfig]):
-    """Judges the program in the last reply, or the mission of an agent.
+    """Judge the program in the last reply, or the mission of an agent.
 
     A failure of the engine is raised, and verifiers records it as the error of the rollout.
     """
@@ -77,7 +77,7 @@ class TrainingTask(vf.Task[TrainingData, MissionState, vf.TaskConfig]):
         trace.state.row = self.data.model_dump(include={"family", "seed", "prompt_index", "world"})
 
     @vf.stop
-    async def mission_is_over(self, trace: vf.Trace) -> bool:  # type: ignore[type-arg]  # as verifiers wants it
+    async def mission_is_over(self, trace: vf.Trace) -> bool:  # type: ignore[type-arg]  # verifiers requires this signature.
         """Whether the last call has ended the mission of an agent."""
         return self.data.world is not None and (await self._mission(trace)).is_over
 
@@ -114,7 +114,7 @@ class TrainingTask(vf.Task[TrainingData, MissionState, vf.TaskConfig]):
         """Repeat the calls of a trace, also those that never reached the server because they were wrong."""
         calls = [call for message in trace.assistant_messages for call in message.tool_calls or []]
         return await asyncio.to_thread(
-            repeated, self.data.model_dump(), [(call.name, call.arguments) for call in calls]
+            repeat_calls, self.data.model_dump(), [(call.name, call.arguments) for call in calls]
         )
 
     async def _parts(self, program: str) -> Components:
@@ -123,7 +123,7 @@ class TrainingTask(vf.Task[TrainingData, MissionState, vf.TaskConfig]):
         return await asyncio.to_thread(_components, rollout, data.worlds)
 
 
-class TrainingTaskset(vf.Taskset[TrainingTask, TrainingConfig]):  # type: ignore[type-var]  # of its state
+class TrainingTaskset(vf.Taskset[TrainingTask, TrainingConfig]):  # type: ignore[type-var]  # The state has another type.
     """A reproducible, possibly unlimited stream of tasks."""
 
     def __init__(self, config: TrainingConfig) -> None:
@@ -162,7 +162,7 @@ def _data(row: dict[str, Any], worlds: int) -> TrainingData:
     )
 
 
-@lru_cache(maxsize=4_096)  # metrics and reward of a rollout use the same result
+@lru_cache(maxsize=4_096)  # The metrics and the reward of a rollout share a result.
 def _components(rollout: Rollout, worlds: int) -> Components:
     (found,) = judge([rollout], worlds=worlds)
     return found

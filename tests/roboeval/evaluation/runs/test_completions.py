@@ -1,4 +1,4 @@
-"""Rows of completions: what is accepted can be copied and read again, and nothing else is accepted."""
+"""Rows of completions: accepted rows can be copied and read again, and all others are refused."""
 
 import json
 import os
@@ -38,16 +38,14 @@ def error_about(path: Path, line: bytes) -> UserError:
         ("index", "3", "whole number"),
     ],
 )
-def test_a_number_that_is_none_gets_a_sentence(
-    tmp_path: Path, name: str, value: object, expected: str
-) -> None:
+def test_a_wrong_number_is_refused(tmp_path: Path, name: str, value: object, expected: str) -> None:
     error = error_about(tmp_path / "a.jsonl", to_line(ROW | {name: value}))
     assert f"{name} is {value!r}, " in error.sentence
     assert expected in error.sentence
 
 
 @given(st.dictionaries(st.text(), st.text(st.characters()) | st.integers() | st.floats(allow_nan=False)))
-def test_a_line_is_one_line_that_reads_as_its_row(row: dict[str, Any]) -> None:
+def test_a_row_becomes_one_line_that_reads_the_same(row: dict[str, Any]) -> None:
     line = to_line(row)
     assert line.decode().count("\n") == 1
     assert json.loads(line) == json.loads(json.dumps(row))
@@ -62,9 +60,7 @@ def test_a_line_is_one_line_that_reads_as_its_row(row: dict[str, Any]) -> None:
         "\n" * 2_400_000,
     ],
 )
-def test_what_is_accepted_near_the_limit_is_read_again_from_its_copy(
-    tmp_path: Path, paper: Suite, program: str
-) -> None:
+def test_rows_near_the_limit_can_be_read_from_their_copy(tmp_path: Path, paper: Suite, program: str) -> None:
     path = tmp_path / "a.jsonl"
     row = ROW | {"program": program}
     path.write_text(json.dumps(row, ensure_ascii=False).replace("\ud800", "\\ud800"))
@@ -74,9 +70,7 @@ def test_what_is_accepted_near_the_limit_is_read_again_from_its_copy(
 
 
 @pytest.mark.slow
-def test_a_row_whose_copy_would_be_too_long_is_refused_before_it_is_copied(
-    tmp_path: Path, paper: Suite
-) -> None:
+def test_a_row_whose_copy_would_be_too_long_is_refused(tmp_path: Path, paper: Suite) -> None:
     path = tmp_path / "a.jsonl"
     line = json.dumps(ROW | {"usage": [1] * 2_400_000}, separators=(",", ":")).encode()
     assert len(line) < MAX_ROW
@@ -86,27 +80,27 @@ def test_a_row_whose_copy_would_be_too_long_is_refused_before_it_is_copied(
     assert not (tmp_path / "run").exists()
 
 
-# --- what is brought to the disk
+# --- writing to the disk
 
 
 @pytest.fixture
 def synced(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Path, frozenset[str]]]:
-    """What is brought to the disk, each with the files that it has if it is a folder."""
+    """Record what is synced to the disk, each with its files if it is a folder."""
     found: list[tuple[Path, frozenset[str]]] = []
     fsync = os.fsync
 
-    def noted(descriptor: int) -> None:
+    def record_sync(descriptor: int) -> None:
         path = Path(f"/proc/self/fd/{descriptor}").readlink()
         found.append(
             (path, frozenset(file.name for file in path.iterdir()) if path.is_dir() else frozenset())
         )
         fsync(descriptor)
 
-    monkeypatch.setattr(os, "fsync", noted)
+    monkeypatch.setattr(os, "fsync", record_sync)
     return found
 
 
-def test_a_line_is_brought_to_the_disk_when_that_is_asked_for(
+def test_a_line_is_synced_on_request_and_on_close(
     tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
 ) -> None:
     file = Appender(tmp_path / "a.jsonl")
@@ -119,24 +113,22 @@ def test_a_line_is_brought_to_the_disk_when_that_is_asked_for(
     assert synced == [(tmp_path / "a.jsonl", frozenset())] * 2
 
 
-def test_a_new_file_is_in_its_folder_on_the_disk(
-    tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
-) -> None:
+def test_a_new_file_syncs_its_folder(tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]) -> None:
     Appender(tmp_path / "a.jsonl").close()
     assert (tmp_path, frozenset({"a.jsonl"})) in synced
     synced.clear()
     Appender(tmp_path / "a.jsonl").close()
-    assert tmp_path not in dict(synced)  # it is there already
+    assert tmp_path not in dict(synced)  # The folder has the file already.
 
 
-def test_a_file_that_is_written_whole_is_in_its_folder_on_the_disk(
+def test_a_file_written_whole_syncs_itself_and_its_folder(
     tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
 ) -> None:
     write_whole(tmp_path / "run.json", b"{}")
     assert synced == [(tmp_path / "run.json.new", frozenset()), (tmp_path, frozenset({"run.json"}))]
 
 
-def test_a_new_folder_of_a_run_is_on_the_disk(
+def test_a_new_run_syncs_its_parent_folders(
     tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
 ) -> None:
     with RunFolder(tmp_path / "runs" / "one").writing():

@@ -1,4 +1,4 @@
-"""A run survives interruptions, refuses what does not fit, and gives the same bytes each time."""
+"""A run survives interruptions, refuses changed files, and gives the same bytes each time."""
 
 import hashlib
 import json
@@ -31,7 +31,7 @@ GREETS = 'def task_program():\n    say("good day")\n'
 ADDRESS = "def task_program():\n    say(str(object()))\n    say(str(id([])))\n    say(str({'a', 'b', 'c'}))\n"
 
 
-def a_run(path: Path, programs: list[str], task: str = "SayGoodDay") -> RunFolder:
+def make_run(path: Path, programs: list[str], task: str = "SayGoodDay") -> RunFolder:
     path.mkdir(parents=True)
     rows = [
         {"task": task, "prompt": 0, "index": index, "program": program}
@@ -42,7 +42,7 @@ def a_run(path: Path, programs: list[str], task: str = "SayGoodDay") -> RunFolde
     return run
 
 
-def judged(run: RunFolder, suite: Suite, *, redo: bool = False) -> list[Row]:
+def judge_run(run: RunFolder, suite: Suite, *, redo: bool = False) -> list[Row]:
     return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=redo, workers=2))
 
 
@@ -52,9 +52,9 @@ def careful_run(path: Path, suite: Suite) -> RunFolder:
     return run
 
 
-def test_an_evaluation_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", [GREETS, "go_to('nowhere')\n"])
-    judged(run, paper)
+def test_an_evaluation_has_the_documented_files_and_rows(tmp_path: Path, paper: Suite) -> None:
+    run = make_run(tmp_path / "run", [GREETS, "go_to('nowhere')\n"])
+    judge_run(run, paper)
     about = json.loads(run.manifest("paper").read_text())
     assert about["suite"] == "paper"
     assert about["digest"] == paper.digest
@@ -94,7 +94,7 @@ def test_an_evaluation_has_the_files_and_rows_of_the_design(tmp_path: Path, pape
 
 
 @pytest.mark.slow
-def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path: Path) -> None:
+def test_workers_and_processes_do_not_change_the_bytes(tmp_path: Path) -> None:
     programs = [
         ADDRESS,
         *[f"{GREETS}\n# {n}\n" + "x = [0] * " + str(n * 1000) for n in range(20)],
@@ -102,7 +102,7 @@ def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path:
     ]
     results = []
     for workers in (1, 4):
-        run = a_run(tmp_path / f"run{workers}", programs)
+        run = make_run(tmp_path / f"run{workers}", programs)
         script = (
             "import sys, pathlib\n"
             "from roboeval.evaluation.evaluate import evaluate_run\n"
@@ -120,9 +120,9 @@ def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path:
 
 
 @pytest.mark.slow
-def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: Suite) -> None:
+def test_kill_minus_nine_neither_loses_nor_repeats_rows(tmp_path: Path, paper: Suite) -> None:
     whole = careful_run(tmp_path / "whole", paper)
-    judged(whole, paper)
+    judge_run(whole, paper)
     run = careful_run(tmp_path / "killed", paper)
     script = (
         "import pathlib\n"
@@ -144,7 +144,7 @@ def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: 
         kills += process.wait() == -signal.SIGKILL
         process.stdout.close()
     assert kills >= 3
-    rows = judged(run, paper)
+    rows = judge_run(run, paper)
     assert run.rows("paper").read_bytes() == whole.rows("paper").read_bytes()
     assert run.manifest("paper").read_bytes() == whole.manifest("paper").read_bytes()
     assert len(rows) == sum(1 for _ in read_completions(run.completions))
@@ -152,66 +152,64 @@ def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: 
 
 @pytest.mark.parametrize("cut", [1, 10, 200])
 def test_a_torn_last_row_is_judged_again(tmp_path: Path, paper: Suite, cut: int) -> None:
-    run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
-    judged(run, paper)
+    run = make_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
+    judge_run(run, paper)
     whole = run.rows("paper").read_bytes()
     run.rows("paper").write_bytes(whole[:-cut])
     unseal(run.path)
-    judged(run, paper)
+    judge_run(run, paper)
     assert run.rows("paper").read_bytes() == whole
 
 
 def test_a_program_that_was_changed_is_refused_unless_all_is_redone(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
-    judged(run, paper)
+    run = make_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
+    judge_run(run, paper)
     kept = run.completions.read_bytes()
     run.completions.write_bytes(kept.replace(b"#1", b"#one"))
     before = run.rows("paper").read_bytes()
     with pytest.raises(UserError, match=r"SayGoodDay/0/1 .* --redo") as error:
-        judged(run, paper)
+        judge_run(run, paper)
     assert (error.value.file, error.value.line) == (run.rows("paper"), 2)
     assert run.rows("paper").read_bytes() == before
     run.completions.write_bytes(kept)
-    assert len(judged(run, paper)) == 3
+    assert len(judge_run(run, paper)) == 3
     run.completions.write_bytes(kept.replace(b"#1", b"#one"))
-    judged(run, paper, redo=True)
-    assert len(judged(run, paper)) == 3
+    judge_run(run, paper, redo=True)
+    assert len(judge_run(run, paper)) == 3
 
 
-def test_a_program_that_is_changed_while_it_waits_is_tied_to_what_was_judged(
-    tmp_path: Path, paper: Suite
-) -> None:
-    run = a_run(tmp_path / "run", [f"{GREETS}# {n:03}" for n in range(300)])
+def test_a_program_that_changes_before_it_is_judged_is_refused_later(tmp_path: Path, paper: Suite) -> None:
+    run = make_run(tmp_path / "run", [f"{GREETS}# {n:03}" for n in range(300)])
     kept = run.completions.read_bytes()
     rows = evaluate_run(run, paper, ablated=False, tasks=None, redo=False, workers=1)
     next(rows)
     run.completions.write_bytes(kept.replace(b"# 299", b"# abc"))
     assert len(list(rows)) == 299
     with pytest.raises(UserError, match="SayGoodDay/0/299 "):
-        judged(run, paper)
+        judge_run(run, paper)
     run.completions.write_bytes(kept)
-    assert len(judged(run, paper)) == 300
+    assert len(judge_run(run, paper)) == 300
 
 
 def test_a_finished_evaluation_runs_nothing_again(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", [GREETS])
-    judged(run, paper)
+    run = make_run(tmp_path / "run", [GREETS])
+    judge_run(run, paper)
     before = run.rows("paper").stat().st_mtime_ns
-    assert len(judged(run, paper)) == 1
+    assert len(judge_run(run, paper)) == 1
     assert run.rows("paper").stat().st_mtime_ns == before
 
 
-def test_completions_that_come_later_are_judged_later(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", [GREETS])
-    judged(run, paper)
+def test_completions_added_later_are_judged(tmp_path: Path, paper: Suite) -> None:
+    run = make_run(tmp_path / "run", [GREETS])
+    judge_run(run, paper)
     with run.completions.open("ab") as file:
         file.write(to_line({"task": "SayGoodDay", "prompt": 1, "index": 0, "program": GREETS}))
-    assert [row["prompt"] for row in judged(run, paper)] == [0, 1]
+    assert [row["prompt"] for row in judge_run(run, paper)] == [0, 1]
 
 
 @pytest.mark.slow
 def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", [GREETS])
+    run = make_run(tmp_path / "run", [GREETS])
     script = (
         "import pathlib, sys, time\n"
         "from roboeval.evaluation.runs.folder import RunFolder\n"
@@ -225,9 +223,9 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
         assert process.stdout is not None
         process.stdout.readline()
         with pytest.raises(UserError, match="another process"):
-            judged(run, paper)
+            judge_run(run, paper)
         process.kill()
-    assert len(judged(run, paper)) == 1
+    assert len(judge_run(run, paper)) == 1
 
 
 @pytest.mark.parametrize(
@@ -239,21 +237,21 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
         ("ablation", True, "ablation was true and is now false"),
     ],
 )
-def test_what_was_judged_otherwise_is_refused_unless_all_is_redone(
+def test_an_evaluation_by_other_versions_is_refused_unless_redone(
     tmp_path: Path, paper: Suite, name: str, value: object, what: str
 ) -> None:
-    run = a_run(tmp_path / "run", [GREETS])
-    judged(run, paper)
+    run = make_run(tmp_path / "run", [GREETS])
+    judge_run(run, paper)
     about = json.loads(run.manifest("paper").read_text())
     run.manifest("paper").write_text(json.dumps(about | {name: value}))
     with pytest.raises(UserError, match=rf"{re.escape(what)}.* --redo"):
-        judged(run, paper)
-    assert len(judged(run, paper, redo=True)) == 1
+        judge_run(run, paper)
+    assert len(judge_run(run, paper, redo=True)) == 1
     assert json.loads(run.manifest("paper").read_text()) == about
 
 
-def test_only_some_tasks_are_read_where_only_some_are_meant(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", [GREETS])
+def test_a_source_reads_only_the_named_tasks(tmp_path: Path, paper: Suite) -> None:
+    run = make_run(tmp_path / "run", [GREETS])
     with run.completions.open("ab") as file:
         file.write(to_line({"task": "LunchTime", "prompt": 0, "index": 0, "program": GREETS}))
     source = open_source(str(run.path), paper)
@@ -262,50 +260,50 @@ def test_only_some_tasks_are_read_where_only_some_are_meant(tmp_path: Path, pape
 
 
 def test_rows_of_other_completions_are_refused(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", [GREETS, GREETS + "#"])
-    judged(run, paper)
+    run = make_run(tmp_path / "run", [GREETS, GREETS + "#"])
+    judge_run(run, paper)
     rows = run.completions.read_bytes().splitlines(keepends=True)
-    run.completions.write_bytes(rows[1] + rows[0])  # in whatever order
-    assert len(judged(run, paper)) == 2
+    run.completions.write_bytes(rows[1] + rows[0])  # The order does not matter.
+    assert len(judge_run(run, paper)) == 2
     run.completions.write_bytes(rows[0])
     with pytest.raises(UserError, match="SayGoodDay/0/1"):
-        judged(run, paper)
+        judge_run(run, paper)
 
 
 def test_rows_that_judge_a_completion_again_are_refused(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", [GREETS])
-    judged(run, paper)
+    run = make_run(tmp_path / "run", [GREETS])
+    judge_run(run, paper)
     path = run.rows("paper")
     path.write_bytes(2 * path.read_bytes())
     with pytest.raises(UserError, match="an earlier row judges") as error:
-        judged(run, paper)
+        judge_run(run, paper)
     assert (error.value.file, error.value.line) == (path, 2)
 
 
-def test_further_tasks_are_judged_beside_those_that_were(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", [GREETS, GREETS + "#"])
+def test_further_tasks_are_added_to_an_evaluation(tmp_path: Path, paper: Suite) -> None:
+    run = make_run(tmp_path / "run", [GREETS, GREETS + "#"])
     other = to_line({"task": "LunchTime", "prompt": 0, "index": 0, "program": GREETS})
     first, second = run.completions.read_bytes().splitlines(keepends=True)
     run.completions.write_bytes(first + other + second)
 
-    def judged_tasks(*tasks: str) -> list[str]:
+    def judge_tasks(*tasks: str) -> list[str]:
         rows = evaluate_run(run, paper, ablated=False, tasks=frozenset(tasks) or None, redo=False)
         return [row["task"] for row in rows]
 
-    assert judged_tasks("SayGoodDay") == ["SayGoodDay"] * 2
+    assert judge_tasks("SayGoodDay") == ["SayGoodDay"] * 2
     before = run.rows("paper").read_bytes()
-    assert judged_tasks("LunchTime", "SayGoodDay") == ["SayGoodDay", "SayGoodDay", "LunchTime"]
+    assert judge_tasks("LunchTime", "SayGoodDay") == ["SayGoodDay", "SayGoodDay", "LunchTime"]
     assert run.rows("paper").read_bytes().startswith(before)
     whole = run.rows("paper").read_bytes(), run.manifest("paper").read_bytes()
     assert json.loads(whole[1])["tasks"] == ["LunchTime", "SayGoodDay"]
-    assert judged_tasks("LunchTime") == ["LunchTime"]
+    assert judge_tasks("LunchTime") == ["LunchTime"]
     assert (run.rows("paper").read_bytes(), run.manifest("paper").read_bytes()) == whole
-    assert len(judged_tasks()) == 3
+    assert len(judge_tasks()) == 3
     assert json.loads(run.manifest("paper").read_text())["tasks"] is None
 
 
 def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", [GREETS])
+    run = make_run(tmp_path / "run", [GREETS])
     before = run.completions.read_bytes()
     with pytest.raises(UserError, match="different completions"):
         careful_run(run.path, paper)
@@ -314,14 +312,14 @@ def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> 
 
 @pytest.mark.parametrize("more", [GREETS, None])
 def test_more_or_fewer_completions_are_others(tmp_path: Path, paper: Suite, more: str | None) -> None:
-    run = a_run(tmp_path / "run", [GREETS, "#"])
-    other = a_run(tmp_path / "other", [GREETS, "#", more] if more else [GREETS])
+    run = make_run(tmp_path / "run", [GREETS, "#"])
+    other = make_run(tmp_path / "other", [GREETS, "#", more] if more else [GREETS])
     with pytest.raises(UserError, match="different completions"):
         run.keep(open_source(str(other.path), paper).completions)
     run.keep(open_source(str(run.path), paper).completions)
 
 
-def test_a_run_that_cannot_be_kept_leaves_nothing(tmp_path: Path) -> None:
+def test_an_interrupted_copy_leaves_no_run(tmp_path: Path) -> None:
     class Interrupted(list[Completion]):
         times = 0
 
@@ -340,7 +338,7 @@ def test_a_run_that_cannot_be_kept_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_a_source_can_be_a_run_a_file_a_folder_or_a_recorded_model(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", [GREETS])
+    run = make_run(tmp_path / "run", [GREETS])
     assert open_source(str(run.path), paper).run == run
     assert open_source(str(run.completions), paper).run is None
     folder = tmp_path / "published"
@@ -364,8 +362,8 @@ def test_only_tasks_with_an_ablation_are_ablated(paper: Suite) -> None:
 
 
 @pytest.mark.slow
-def test_a_full_disk_leaves_whole_rows_only(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", [GREETS, GREETS + "#"])
+def test_a_full_disk_leaves_only_whole_rows(tmp_path: Path, paper: Suite) -> None:
+    run = make_run(tmp_path / "run", [GREETS, GREETS + "#"])
     script = (
         "import pathlib, resource, signal\n"
         "from roboeval.evaluation.evaluate import evaluate_run\n"
@@ -381,10 +379,10 @@ def test_a_full_disk_leaves_whole_rows_only(tmp_path: Path, paper: Suite) -> Non
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert ended.returncode != 0
     assert run.rows("paper").read_bytes().endswith(b"\n")
-    assert len(judged(run, paper)) == 2
+    assert len(judge_run(run, paper)) == 2
 
 
-def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite) -> None:
+def test_a_completion_keeps_fields_of_other_tools(tmp_path: Path, paper: Suite) -> None:
     row = {"task": "SayGoodDay", "prompt": 0, "index": 0, "program": GREETS, "usage": {"output": 7}}
     path = tmp_path / "rows.jsonl"
     path.write_bytes(to_line(row))
@@ -394,16 +392,16 @@ def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite)
     assert Completion.of(row).key == ("SayGoodDay", 0, 0)
 
 
-def test_rows_without_their_head_are_refused(tmp_path: Path, paper: Suite) -> None:
-    run = a_run(tmp_path / "run", ["def task_program(): pass\n"])
-    judged(run, paper)
+def test_rows_without_their_manifest_are_refused(tmp_path: Path, paper: Suite) -> None:
+    run = make_run(tmp_path / "run", ["def task_program(): pass\n"])
+    judge_run(run, paper)
     run.manifest("paper").unlink()
     with pytest.raises(UserError, match="--redo") as error:
-        judged(run, paper)
+        judge_run(run, paper)
     assert error.value.file == run.manifest("paper")
 
 
-def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(
+def test_a_completion_that_takes_too_long_is_skipped_and_retried(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     (tmp_path / "suite" / "tasks").mkdir(parents=True)
@@ -415,10 +413,10 @@ def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(
     )
     suite = load_suite(str(tmp_path / "suite"))
     slow, quick = (f"def task_program(): say({'a' * n!r})\n" for n in (22, 3))
-    run = a_run(tmp_path / "run", [slow, quick, slow, quick], "Slow")
+    run = make_run(tmp_path / "run", [slow, quick, slow, quick], "Slow")
 
     monkeypatch.setattr("roboeval.evaluation.judging.judge.BUDGET", 0.001)
-    assert [row["index"] for row in judged(run, suite)] == [1, 3]
+    assert [row["index"] for row in judge_run(run, suite)] == [1, 3]
     assert [
         record.getMessage().split()[0]
         for record in caplog.records
@@ -428,11 +426,11 @@ def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(
     assert result.exit_code == 1
 
     monkeypatch.undo()
-    assert [row["index"] for row in judged(run, suite)] == [1, 3, 0, 2]
-    assert [row["index"] for row in judged(run, suite)] == [1, 3, 0, 2]
+    assert [row["index"] for row in judge_run(run, suite)] == [1, 3, 0, 2]
+    assert [row["index"] for row in judge_run(run, suite)] == [1, 3, 0, 2]
 
 
-def test_other_threads_know_no_limit() -> None:
+def test_the_time_limit_applies_only_to_the_main_thread() -> None:
     def work() -> bool:
         with time_limit(0.01):
             return sum(range(100_000)) > 0

@@ -1,4 +1,4 @@
-"""Folders and zips of published completions: what is read, in which order, and what is refused how."""
+"""Folders and zips of published completions: the files, their order, and refusals."""
 
 import struct
 import tracemalloc
@@ -16,7 +16,7 @@ from roboeval.evaluation.runs.published import published_completions
 FILE = "name = 'n'\nprompt = 'p'\ncompletion = 'x = 1'\n"
 
 
-def zipped(path: Path, members: Mapping[str, str | bytes], how: int = zipfile.ZIP_DEFLATED) -> Path:
+def write_zip(path: Path, members: Mapping[str, str | bytes], how: int = zipfile.ZIP_DEFLATED) -> Path:
     with zipfile.ZipFile(path, "w", how) as archive:
         for name, content in members.items():
             archive.writestr(name, content)
@@ -31,11 +31,11 @@ def error_about(path: Path) -> UserError:
 
 def test_an_assignment_may_be_annotated(tmp_path: Path) -> None:
     text = "prompt: str\nname: str = 'n'\ncompletion: str = 'x'\n"
-    (completion,) = published_completions(zipped(tmp_path / "a.zip", {"T_0_0.py": text}))
+    (completion,) = published_completions(write_zip(tmp_path / "a.zip", {"T_0_0.py": text}))
     assert (completion.program, completion.instruction) == ("x", None)
 
 
-def test_only_files_of_the_name_are_read_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+def test_only_matching_names_are_read_in_numerical_order(tmp_path: Path) -> None:
     members: dict[str, str | bytes] = {
         "a/T_0_10.py": FILE,
         "b/T_0_9.py": FILE,
@@ -45,7 +45,7 @@ def test_only_files_of_the_name_are_read_in_the_order_of_their_numbers(tmp_path:
         "README": "x" * 6_000_000,
         "T_0_0.py/": "",
     }
-    path = zipped(tmp_path / "a.zip", members)
+    path = write_zip(tmp_path / "a.zip", members)
     folder = tmp_path / "folder"
     with zipfile.ZipFile(path) as archive:
         archive.extractall(folder)
@@ -67,10 +67,10 @@ def test_only_files_of_the_name_are_read_in_the_order_of_their_numbers(tmp_path:
         ("completion = '" + "\x01" * 1_000_000 + "'\n", None, "this row is longer than 5,000,000 bytes"),
     ],
 )
-def test_a_wrong_file_gets_a_sentence(
+def test_a_wrong_file_is_refused_with_its_line(
     tmp_path: Path, content: str | bytes, line: int | None, named: str
 ) -> None:
-    path = zipped(tmp_path / "a.zip", {"T_0_0.py": FILE, "T_0_1.py": content})
+    path = write_zip(tmp_path / "a.zip", {"T_0_0.py": FILE, "T_0_1.py": content})
     folder = tmp_path / "folder"
     with zipfile.ZipFile(path) as archive:
         archive.extractall(folder)
@@ -80,8 +80,8 @@ def test_a_wrong_file_gets_a_sentence(
         assert named in error.sentence
 
 
-def test_two_files_of_one_completion(tmp_path: Path) -> None:
-    path = zipped(tmp_path / "a.zip", {"a/T_0_1.py": FILE, "b/T_00_01.py": b"\xff"})
+def test_two_files_of_one_completion_are_refused(tmp_path: Path) -> None:
+    path = write_zip(tmp_path / "a.zip", {"a/T_0_1.py": FILE, "b/T_00_01.py": b"\xff"})
     error = error_about(path)
     assert str(error.file) == f"{path}/b/T_00_01.py"
     assert "T/0/1" in error.sentence
@@ -96,21 +96,21 @@ def test_two_files_of_one_completion(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["notes.py", "T_0_9999999999.py"])
 def test_a_misnamed_program_is_refused(tmp_path: Path, name: str) -> None:
-    path = zipped(tmp_path / "a.zip", {"T_0_0.py": FILE, name: FILE})
+    path = write_zip(tmp_path / "a.zip", {"T_0_0.py": FILE, name: FILE})
     error = error_about(path)
     assert str(error.file) == f"{path}/{name}"
     assert "TASK_PROMPT_INDEX.py" in error.sentence
 
 
-def test_nothing_that_is_no_completion(tmp_path: Path) -> None:
-    path = zipped(tmp_path / "a.zip", {"notes.txt": FILE, "T_0_0.py/": ""})
+def test_a_zip_without_completions_is_refused(tmp_path: Path) -> None:
+    path = write_zip(tmp_path / "a.zip", {"notes.txt": FILE, "T_0_0.py/": ""})
     error = error_about(path)
     assert error.file == path
     assert "TASK_PROMPT_INDEX.py" in error.sentence
 
 
-def test_an_encrypted_member(tmp_path: Path) -> None:
-    path = zipped(tmp_path / "a.zip", {"T_0_0.py": FILE})
+def test_an_encrypted_member_is_refused(tmp_path: Path) -> None:
+    path = write_zip(tmp_path / "a.zip", {"T_0_0.py": FILE})
     data = bytearray(path.read_bytes())
     data[data.index(b"PK\x01\x02") + 8] |= 1
     path.write_bytes(data)
@@ -121,16 +121,16 @@ def test_an_encrypted_member(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("how", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
-def test_a_member_that_cannot_be_unpacked_in_small_pieces(tmp_path: Path, how: int) -> None:
-    path = zipped(tmp_path / "a.zip", {"T_0_0.py": FILE + "#" * 100_000_000}, how)
+def test_a_member_that_cannot_be_unpacked_in_pieces_is_refused(tmp_path: Path, how: int) -> None:
+    path = write_zip(tmp_path / "a.zip", {"T_0_0.py": FILE + "#" * 100_000_000}, how)
     error = error_about(path)
     assert str(error.file) == f"{path}/T_0_0.py"
     assert '"deflate"' in error.sentence
 
 
 @pytest.mark.parametrize("declared", [1, len(FILE) - 1, len(FILE) + 1, 5_000_000, 4_000_000_000])
-def test_a_member_that_lies_about_its_size_is_read_whole_or_refused(tmp_path: Path, declared: int) -> None:
-    path = zipped(tmp_path / "a.zip", {"T_0_0.py": FILE})
+def test_a_member_with_a_false_size_is_read_whole_or_refused(tmp_path: Path, declared: int) -> None:
+    path = write_zip(tmp_path / "a.zip", {"T_0_0.py": FILE})
     data = bytearray(path.read_bytes())
     struct.pack_into("<L", data, data.index(b"PK\x01\x02") + 24, declared)
     path.write_bytes(data)
@@ -144,7 +144,7 @@ def test_a_member_that_lies_about_its_size_is_read_whole_or_refused(tmp_path: Pa
 
 @pytest.mark.slow
 def test_a_bomb_that_hides_its_size_is_not_unpacked(tmp_path: Path) -> None:
-    path = zipped(tmp_path / "a.zip", {"T_0_0.py": FILE + "#" * 300_000_000})
+    path = write_zip(tmp_path / "a.zip", {"T_0_0.py": FILE + "#" * 300_000_000})
     data = bytearray(path.read_bytes())
     struct.pack_into("<L", data, data.index(b"PK\x01\x02") + 24, 4_000_000_000)
     path.write_bytes(data)
@@ -159,9 +159,9 @@ def test_a_bomb_that_hides_its_size_is_not_unpacked(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_one_member_at_a_time_is_held(tmp_path: Path) -> None:
+def test_members_are_held_in_memory_one_at_a_time(tmp_path: Path) -> None:
     members = {f"T_0_{index}.py": f"completion = '{'#' * 1_000_000}'\n" for index in range(60)}
-    path = zipped(tmp_path / "a.zip", members)
+    path = write_zip(tmp_path / "a.zip", members)
     tracemalloc.start()
     try:
         assert sum(1 for _ in published_completions(path)) == 60
@@ -170,8 +170,8 @@ def test_one_member_at_a_time_is_held(tmp_path: Path) -> None:
         tracemalloc.stop()
 
 
-def test_all_members_together_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = zipped(tmp_path / "a.zip", {f"T_0_{index}.py": FILE for index in range(10)})
+def test_the_total_size_of_members_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_zip(tmp_path / "a.zip", {f"T_0_{index}.py": FILE for index in range(10)})
     monkeypatch.setattr(published, "MAX_UNPACKED", 9 * len(FILE))
     error = error_about(path)
     assert error.file == path
@@ -180,7 +180,7 @@ def test_all_members_together_are_bounded(tmp_path: Path, monkeypatch: pytest.Mo
     assert sum(1 for _ in published_completions(path)) == 10
 
 
-def test_odd_escapes_say_nothing_on_the_terminal_and_halves_of_a_pair_are_joined(tmp_path: Path) -> None:
+def test_unknown_escapes_stay_and_surrogate_pairs_are_joined(tmp_path: Path) -> None:
     program = r"completion = '\d \ud83d\ude00 \ud800'" + "\n"
-    path = zipped(tmp_path / "a.zip", {"T_0_0.py": program})
+    path = write_zip(tmp_path / "a.zip", {"T_0_0.py": program})
     assert [c.program for c in published_completions(path)] == ["\\d \U0001f600 \ud800"]

@@ -1,4 +1,4 @@
-"""What is shown of a reply, in full or in short, and nothing of rows that do not record it."""
+"""Replies are shown whole or in short, or not at all if their row does not record them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from roboeval.cli.views.completions import SHOWN_REPLY_CHARACTERS, completion_vi
 from roboeval.evaluation.judging.explanation import completion_data
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.replies import reply_data, reply_facts
-from small_run import HOSTILE, SHOWN, SUITE, printed, row
+from small_run import HOSTILE, SHOWN, SUITE, row, text_of
 
 WRITTEN = Completion(
     task="Visit",
@@ -32,10 +32,10 @@ WRITTEN = Completion(
 
 def view(completion: Completion, failure: tuple[str, str] | None = None, *, with_reply: bool = False) -> str:
     data = completion_data(row(0, 0, failure), completion, SUITE)
-    return printed(completion_view(data, with_reply=with_reply), width=200)
+    return text_of(completion_view(data, with_reply=with_reply), width=200)
 
 
-def test_reply_is_told_with_its_tokens() -> None:
+def test_facts_of_a_reply_include_its_tokens() -> None:
     data = reply_data(WRITTEN)
     assert data is not None
     assert (data["finish_reason"], data["cut_off"], data["latency_s"]) == ("length", True, 2.5)
@@ -49,7 +49,7 @@ def test_reply_is_told_with_its_tokens() -> None:
     "more",
     [{}, {"finish_reason": None, "raw_reply": None}, {"usage": {"input_tokens": 1}, "latency_s": 3.0}],
 )
-def test_rows_of_earlier_versions_show_nothing_of_it(more: dict[str, Any]) -> None:
+def test_rows_of_earlier_versions_show_no_reply(more: dict[str, Any]) -> None:
     completion = replace(WRITTEN, more=more)
     assert reply_data(completion) is None
     assert "--reply" not in view(completion, ("PythonError", "NameError"))
@@ -71,14 +71,14 @@ def test_texts_are_shown_only_on_request() -> None:
     assert "--reply" not in whole
 
 
-def test_of_a_reply_without_a_program_the_reason_is_told_and_no_world() -> None:
+def test_a_reply_without_a_program_shows_the_reason_and_no_world() -> None:
     text = view(WRITTEN, ("NoProgram", "cut-off"))
     assert "no program: cut-off" in text
     assert NO_PROGRAM_SENTENCES["cut-off"] in text
     assert "World 1" not in text
 
 
-def test_replies_are_text_and_bounded() -> None:
+def test_hostile_replies_stay_text_and_are_shortened() -> None:
     more = {
         **WRITTEN.more,
         "reasoning": HOSTILE,

@@ -1,4 +1,4 @@
-"""What was damaged in an evaluation is noticed by all who read it, and nothing unknown is taken for known."""
+"""Every reader notices damage in an evaluation and refuses unknown values."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PLACES = 60
 Parts = tuple[Any, ...]
 
 
-def completions(run: RunFolder, count: int) -> None:
+def write_completions(run: RunFolder, count: int) -> None:
     rows = (
         {"task": "LunchTime", "prompt": 0, "index": n, "program": f"go_to('office {n}')\nsay('Hi!')\n"}
         for n in range(count)
@@ -31,39 +31,39 @@ def completions(run: RunFolder, count: int) -> None:
     run.completions.write_bytes(b"".join(map(to_line, rows)))
 
 
-def judged(run: RunFolder, suite: Suite) -> list[Row]:
+def judge_run(run: RunFolder, suite: Suite) -> list[Row]:
     return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=False))
 
 
-def read(run: RunFolder, **how: Any) -> Results:  # noqa: ANN401 - as read_results takes it
+def read(run: RunFolder, **how: Any) -> Results:  # noqa: ANN401 - the options of read_results
     return read_results(run, "paper", **how)
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory, paper: Suite) -> RunFolder:
+def finished_run(tmp_path_factory: pytest.TempPathFactory, paper: Suite) -> RunFolder:
     run = RunFolder(tmp_path_factory.mktemp("run"))
-    completions(run, 3)
-    judged(run, paper)
+    write_completions(run, 3)
+    judge_run(run, paper)
     return run
 
 
 @pytest.fixture
-def run(finished: RunFolder, tmp_path: Path) -> RunFolder:
+def run(finished_run: RunFolder, tmp_path: Path) -> RunFolder:
     again = RunFolder(tmp_path / "run")
-    for path in (finished.completions, *finished.rows("").parent.iterdir()):
-        copy = again.path / path.relative_to(finished.path)
+    for path in (finished_run.completions, *finished_run.rows("").parent.iterdir()):
+        copy = again.path / path.relative_to(finished_run.path)
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_bytes(path.read_bytes())
     return again
 
 
-def head(run: RunFolder) -> dict[str, Any]:
-    return json.loads(run.manifest("paper").read_text())  # type: ignore[no-any-return]  # JSON
+def manifest(run: RunFolder) -> dict[str, Any]:
+    return json.loads(run.manifest("paper").read_text())  # type: ignore[no-any-return]  # JSON has no types
 
 
-def test_a_finished_evaluation_says_how_many_rows_it_has_and_their_hash(run: RunFolder) -> None:
+def test_a_finished_evaluation_records_the_count_and_the_hash_of_its_rows(run: RunFolder) -> None:
     content = run.rows("paper").read_bytes()
-    assert (head(run)["rows"], head(run)["sha256"]) == (3, hashlib.sha256(content).hexdigest())
+    assert (manifest(run)["rows"], manifest(run)["sha256"]) == (3, hashlib.sha256(content).hexdigest())
     assert len(read(run).places) == 3
 
 
@@ -76,9 +76,7 @@ def test_only_the_rows_of_a_named_task_are_read(run: RunFolder) -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"another row\n" * 500])
-def test_rows_of_a_file_that_was_replaced_are_not_taken_for_those_read(
-    run: RunFolder, content: bytes
-) -> None:
+def test_rows_of_a_replaced_file_are_refused(run: RunFolder, content: bytes) -> None:
     found = read(run)
     run.rows("paper").write_bytes(content)
     for key in found.places:
@@ -86,13 +84,13 @@ def test_rows_of_a_file_that_was_replaced_are_not_taken_for_those_read(
             found.row(key)
 
 
-def test_no_flipped_bit_is_overlooked(run: RunFolder, paper: Suite) -> None:
+def test_every_flipped_bit_is_noticed(run: RunFolder, paper: Suite) -> None:
     path = run.rows("paper")
     content = path.read_bytes()
     readers: dict[str, Callable[[], object]] = {
         "results": lambda: read(run),
         "another task": lambda: read(run, task="SayGoodDay"),
-        "evaluate": lambda: judged(run, paper),
+        "evaluate": lambda: judge_run(run, paper),
     }
     for number in range(PLACES):
         flipped = bytearray(content)
@@ -108,7 +106,7 @@ def test_no_flipped_bit_is_overlooked(run: RunFolder, paper: Suite) -> None:
 @pytest.mark.parametrize(
     "damaged", ['{"tosk": "LunchTime"}', '{"task": "LunchTime", "program_sha256": 1}', "{"]
 )
-def test_a_damaged_check_is_said_with_its_line(run: RunFolder, damaged: str) -> None:
+def test_a_damaged_check_is_named_by_its_line(run: RunFolder, damaged: str) -> None:
     checks = run.checks("paper")
     checks.parent.mkdir()
     row = {"task": "LunchTime", "program_sha256": "0", "problems": []}
@@ -118,7 +116,7 @@ def test_a_damaged_check_is_said_with_its_line(run: RunFolder, damaged: str) -> 
     assert (caught.value.file, caught.value.line) == (checks, 2)
 
 
-def test_rows_that_are_missing_or_too_many_are_noticed(run: RunFolder) -> None:
+def test_missing_and_additional_rows_are_noticed(run: RunFolder) -> None:
     lines = run.rows("paper").read_bytes().splitlines(keepends=True)
     for damaged in (lines[:2], [*lines, lines[0]], [*lines, b'{"torn'], [lines[1], lines[0], lines[2]]):
         run.rows("paper").write_bytes(b"".join(damaged))
@@ -130,20 +128,20 @@ def test_an_evaluation_of_an_earlier_version_is_read_and_gets_its_seal(run: RunF
     sealed = run.manifest("paper").read_bytes()
     unseal(run.path)
     assert len(read(run).places) == 3
-    judged(run, paper)
+    judge_run(run, paper)
     assert run.manifest("paper").read_bytes() == sealed
 
 
-def test_who_goes_on_takes_the_seal_away_until_all_is_judged(run: RunFolder, paper: Suite) -> None:
-    completions(run, 5)
+def test_continuing_removes_the_seal_until_all_is_judged(run: RunFolder, paper: Suite) -> None:
+    write_completions(run, 5)
     rows = evaluate_run(run, paper, ablated=False, tasks=None, redo=False)
     assert [next(rows)["index"] for _ in range(4)] == [0, 1, 2, 3]
-    rows.close()  # type: ignore[attr-defined]  # of a generator
-    assert not {"rows", "sha256"} & head(run).keys()
+    rows.close()  # type: ignore[attr-defined]  # The rows are a generator.
+    assert not {"rows", "sha256"} & manifest(run).keys()
     assert len(read(run).places) == 4
-    judged(run, paper)
+    judge_run(run, paper)
     content = run.rows("paper").read_bytes()
-    assert (head(run)["rows"], head(run)["sha256"]) == (5, hashlib.sha256(content).hexdigest())
+    assert (manifest(run)["rows"], manifest(run)["sha256"]) == (5, hashlib.sha256(content).hexdigest())
 
 
 @pytest.mark.parametrize(
@@ -159,7 +157,7 @@ def test_who_goes_on_takes_the_seal_away_until_all_is_judged(run: RunFolder, pap
         (("verdicts", 1, "cut"), {"events": 1}),
     ],
 )
-def test_what_is_unknown_in_a_row_is_refused_with_its_line(
+def test_an_unknown_field_or_value_is_refused_with_its_line(
     run: RunFolder, place: Parts, value: object
 ) -> None:
     rows = [json.loads(line) for line in run.rows("paper").read_bytes().splitlines()]

@@ -1,4 +1,4 @@
-"""A row of an evaluation is bounded, whatever its program did; shorter ones stay as they are."""
+"""Rows of an evaluation have a maximum size; shorter ones stay whole."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def row(traces: list[Trace], message: str = "no", completion: Completion = WORDY
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("worlds", "most"), [(1, ROW_BYTES), (50, ROW_BYTES), (80, 80 * WORLD_BYTES)])
-def test_a_row_is_bounded_whatever_was_said(worlds: int, most: int) -> None:
+def test_a_row_is_bounded_whatever_its_program_says(worlds: int, most: int) -> None:
     one = row([LOUD[:20]] * worlds, "\x00" * 1_000)
     line = to_line(one)
     assert 0.5 * most - 70_000 * worlds < len(line) <= most
@@ -76,7 +76,7 @@ def test_circumstances_are_bounded_with_their_events() -> None:
     assert trace_of(second)[1].place == ""
 
 
-def test_what_fits_stays_whole() -> None:
+def test_a_row_that_fits_stays_whole() -> None:
     short = (Event("say", "x" * 2_000),) * 8
     one = row([short] * 50)
     assert len(to_line(one)) > 0.8 * ROW_BYTES
@@ -111,7 +111,7 @@ def cut_row(suite: Suite) -> Row:
     return row_of(WRITTEN, judgement(verdicts))
 
 
-def test_a_cut_trace_is_said_and_not_explained(suite: Suite) -> None:
+def test_a_cut_trace_is_marked_and_not_explained(suite: Suite) -> None:
     one = cut_row(suite)
     first, second = completion_data(one, WRITTEN, suite)["worlds"]
     assert first["cut"] == one["verdicts"][0]["cut"]
@@ -124,7 +124,7 @@ def test_a_cut_trace_is_said_and_not_explained(suite: Suite) -> None:
     assert f"{first['cut']['events']} more steps" in shown.get()
 
 
-def test_a_table_counts_the_events_that_were_not_kept(suite: Suite) -> None:
+def test_a_table_counts_all_events_of_a_cut_trace(suite: Suite) -> None:
     assert table_of([cut_row(suite)]).get_column("events").to_list() == [99, 1]
 
 

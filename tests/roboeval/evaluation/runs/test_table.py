@@ -1,4 +1,4 @@
-"""The flat table of an evaluation, and what CSV and parquet keep of it."""
+"""The flat table of an evaluation, as CSV and as parquet."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def row(*verdicts: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def with_message(message: str) -> dict[str, Any]:
+def row_with_message(message: str) -> dict[str, Any]:
     error = {"kind": "ValueError", "message": message}
     return row(verdict("in", satisfied=False, status="python-error", error=error, line=4))
 
@@ -111,8 +111,8 @@ def test_replies_are_in_the_table() -> None:
     more = {"no_program": "cut-off", "finish_reason": "length", "usage": {"reasoning_tokens": 7}}
     said = replace(COMPLETION, instruction="Visit her.", more=more)
     names = ["instruction", "program", "no_program", "finish_reason", "cut_off", "reasoning_tokens"]
-    (told, *_) = table([ROW], [said]).select(names).rows()
-    assert told == ("Visit her.", PROGRAM, "cut-off", "length", True, 7)
+    (cells, *_) = table([ROW], [said]).select(names).rows()
+    assert cells == ("Visit her.", PROGRAM, "cut-off", "length", True, 7)
 
 
 def test_a_passed_row_without_its_completion_has_empty_cells() -> None:
@@ -127,7 +127,7 @@ def test_no_rows_are_an_empty_table_with_all_columns(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("message", ["plain", 'a "quote", a comma\nand a line', "\x1b[2J", "日本", ""])
 def test_both_formats_keep_a_table(message: str, tmp_path: Path) -> None:
-    frame = table([ROW, with_message(message)], [COMPLETION])
+    frame = table([ROW, row_with_message(message)], [COMPLETION])
     for kind in ("csv", "parquet"):
         write_table(frame, tmp_path / kind, kind)
     assert pl.read_parquet(tmp_path / "parquet").equals(frame)
@@ -150,22 +150,22 @@ def test_the_bytes_of_a_csv(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("message", ["=cmd()", "+1", "-1", "@x", "\t=1", "\r=1", "\n=1"])
-def test_no_text_is_a_formula_in_csv_and_parquet_keeps_it(message: str, tmp_path: Path) -> None:
-    frame = table([with_message(message)], [COMPLETION])
+def test_csv_escapes_formulas_and_parquet_keeps_them(message: str, tmp_path: Path) -> None:
+    frame = table([row_with_message(message)], [COMPLETION])
     write_table(frame, tmp_path / "t.csv", "csv")
     write_table(frame, tmp_path / "t.parquet", "parquet")
     assert pl.read_csv(tmp_path / "t.csv")["error_message"].item() == "'" + message
     assert pl.read_parquet(tmp_path / "t.parquet")["error_message"].item() == message
 
 
-def test_half_of_a_surrogate_pair_is_written_out(tmp_path: Path) -> None:
+def test_a_lone_surrogate_is_escaped(tmp_path: Path) -> None:
     completion = Completion(task="Visit", prompt=1, index=2, program="'\ud800'")
-    frame = table([with_message("\ud800")], [completion])
+    frame = table([row_with_message("\ud800")], [completion])
     write_table(frame, tmp_path / "t", "csv")
     assert frame["error_message"].item() == r"\ud800"
 
 
-def test_a_table_is_written_where_a_link_leads_and_replaces_nothing_but_files(tmp_path: Path) -> None:
+def test_writing_a_table_follows_links_and_keeps_pipes(tmp_path: Path) -> None:
     write_table(table([], []), tmp_path / "t", "parquet")
     (tmp_path / "link").symlink_to("t")
     write_table(table([], []), tmp_path / "link", "csv")
@@ -185,7 +185,7 @@ def test_a_long_table_keeps_its_order() -> None:
     assert table(iter(rows), [])["index"].to_list() == list(range(25_000))
 
 
-def test_a_wrong_format_or_place_is_explained(tmp_path: Path) -> None:
+def test_a_wrong_format_or_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r'"xlsx".* csv, parquet'):
         write_table(table([], []), tmp_path / "t", "xlsx")
     with pytest.raises(UserError, match="no such folder") as error:
@@ -193,7 +193,7 @@ def test_a_wrong_format_or_place_is_explained(tmp_path: Path) -> None:
     assert error.value.file == tmp_path / "no"
 
 
-def test_a_name_says_the_format_where_nothing_else_does() -> None:
+def test_the_name_of_a_file_decides_the_format() -> None:
     names = (None, "x", "x.txt", "x.csv", "x.PARQUET", "dir.parquet/x")
     kinds = [kind_of(None if name is None else Path(name)) for name in names]
     assert kinds == ["csv", "csv", "csv", "csv", "parquet", "csv"]

@@ -1,4 +1,4 @@
-"""The circumstances of events come back from a row as they were."""
+"""Rows keep the circumstances of events."""
 
 import json
 from typing import Any
@@ -18,22 +18,22 @@ events = st.one_of(
 traces = st.lists(events, max_size=6).map(tuple)
 
 
-def seen(trace: Trace) -> list[tuple[object, ...]]:
+def facts_of(trace: Trace) -> list[tuple[object, ...]]:
     return [(e.kind, e.text, e.place, e.holding, e.to, e.destination) for e in trace]
 
 
-def written(trace: Trace) -> dict[str, Any]:
+def verdict_of(trace: Trace) -> dict[str, Any]:
     return {"trace": [*trace_data(trace)], **circumstances(trace)}
 
 
 @given(traces, st.integers(0, 6))
-def test_they_come_back_also_where_a_row_ends_early(trace: Trace, count: int) -> None:
-    verdict = json.loads(json.dumps(written(trace)))
-    assert seen(trace_of(verdict)) == seen(trace)
-    assert seen(trace_of(first_events(verdict, count))) == seen(trace[:count])
+def test_circumstances_are_read_from_whole_and_from_cut_rows(trace: Trace, count: int) -> None:
+    verdict = json.loads(json.dumps(verdict_of(trace)))
+    assert facts_of(trace_of(verdict)) == facts_of(trace)
+    assert facts_of(trace_of(first_events(verdict, count))) == facts_of(trace[:count])
 
 
-def test_only_what_changes_is_written() -> None:
+def test_only_changes_are_written() -> None:
     trace = (
         Event("say", "hi", place="hall"),
         Event("goto", "hall", place="hall", destination="hall"),
