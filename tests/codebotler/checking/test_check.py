@@ -1,4 +1,4 @@
-"""What counts against a program, what does not, and that equal checks give equal data."""
+"""Checks report errors that may do harm, excuse the others, and give equal data for equal programs."""
 
 import json
 import re
@@ -28,7 +28,7 @@ def pool() -> Iterator[WorkerPool]:
 
 
 class Checks:
-    """Checks bodies of `task_program` on pool that stay open."""
+    """Checks bodies of `task_program` on a pool that stays open."""
 
     def __init__(self, pool: WorkerPool) -> None:
         self.pool = pool
@@ -53,7 +53,7 @@ def checks(pool: WorkerPool) -> Checks:
     return Checks(pool)
 
 
-# --- what counts
+# --- errors
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def checks(pool: WorkerPool) -> Checks:
         (["say('a'"], "SyntaxError", 2),
     ],
 )
-def test_what_counts_in_every_world(checks: Checks, lines: list[str], kind: str, line: int) -> None:
+def test_error_in_every_world_is_a_problem(checks: Checks, lines: list[str], kind: str, line: int) -> None:
     assert checks.kinds(*lines) == [(line, kind)]
 
 
@@ -93,7 +93,7 @@ def test_a_program_without_problems_is_accepted(checks: Checks) -> None:
         ["import contextlib", "with contextlib.suppress(Exception):", "    go_to('lab')"],
     ],
 )
-def test_an_error_that_does_no_harm_is_no_problem(checks: Checks, lines: list[str]) -> None:
+def test_harmless_error_is_accepted(checks: Checks, lines: list[str]) -> None:
     assert checks.kinds(*lines) == []
 
 
@@ -110,17 +110,15 @@ def test_an_error_that_does_no_harm_is_no_problem(checks: Checks, lines: list[st
         (["class Guide:", "    def lead(self):", "        go_to('lab')"], "GoToInvalidLocation", 4),
     ],
 )
-def test_an_error_that_may_do_harm_is_a_problem(
-    checks: Checks, lines: list[str], kind: str, line: int
-) -> None:
+def test_possibly_harmful_error_is_a_problem(checks: Checks, lines: list[str], kind: str, line: int) -> None:
     assert checks.kinds(*lines) == [(line, kind)]
 
 
-def test_options_that_are_no_texts_do_not_count(checks: Checks) -> None:
+def test_options_that_are_not_texts_are_accepted(checks: Checks) -> None:
     assert checks.kinds("say(str(ask('alice', 'How many?', [1, 2]) + 1))") == []
 
 
-def test_an_absence_that_it_saw_counts_and_is_told_in_words(checks: Checks) -> None:
+def test_observed_absence_is_a_problem_that_names_the_world(checks: Checks) -> None:
     found = checks("go_to('kitchen')", "is_in_room('person')", "ask('person', 'Tea?', ['Yes', 'No'])")
     (problem,) = found.problems
     assert (problem.kind, problem.line, problem.where) == ("AskNoPerson", 4, 'nobody is in "kitchen"')
@@ -131,17 +129,17 @@ def test_an_absence_that_it_saw_counts_and_is_told_in_words(checks: Checks) -> N
     assert 0 < len(alone) < 5
 
 
-def test_an_absence_that_it_never_looked_for_does_not_count(checks: Checks) -> None:
+def test_unobserved_absence_is_a_problem_only_in_strict_checks(checks: Checks) -> None:
     lines = ("go_to('kitchen')", "answer = ask('alice', 'Tea?', ['Yes', 'No'])", "pick('cup')", "say(answer)")
     assert checks.kinds(*lines) == []
     assert checks.kinds(*lines, strict=True) == [(3, "AskNoPerson"), (4, "PickInvalidObject")]
 
 
-def test_an_error_that_the_program_catches_does_not_count(checks: Checks) -> None:
+def test_caught_error_is_accepted(checks: Checks) -> None:
     assert checks.kinds("try:", "    go_to('lab')", "except Exception:", "    say('no lab')") == []
 
 
-def test_an_error_after_some_answers_only_is_told_with_them(checks: Checks) -> None:
+def test_problem_names_the_answers_that_lead_to_it(checks: Checks) -> None:
     found = checks(
         "look = is_in_room('mug')",
         "if ask('', 'Tea?', ['Yes', 'No']) == 'No':",
@@ -152,7 +150,7 @@ def test_an_error_after_some_answers_only_is_told_with_them(checks: Checks) -> N
     assert re.findall('".+?"', problem.where) == ['"start_loc"', '"Tea?"', '"No"']
 
 
-def test_what_is_so_in_every_world_is_not_told(checks: Checks) -> None:
+def test_problem_omits_facts_that_hold_in_every_world(checks: Checks) -> None:
     always = next(
         name
         for name in map(str, range(10_000))
@@ -169,7 +167,7 @@ def test_what_is_so_in_every_world_is_not_told(checks: Checks) -> None:
     assert re.findall('".+?"', where) == ['"start_loc"', '"Tea?"', '"No"']
 
 
-def test_a_line_is_blamed_once(checks: Checks) -> None:
+def test_each_line_has_at_most_one_problem(checks: Checks) -> None:
     found = checks("say(a, b)", "go_to('lab'); say(c)")
     assert [(p.line, p.kind) for p in found.problems] == [(2, "NameError"), (3, "NameError")]
     assert all(name in found.problems[0].message for name in (" a ", " b "))
@@ -180,12 +178,12 @@ def test_a_program_that_does_not_parse_is_not_run(checks: Checks) -> None:
     assert checks("say(").samples == ()
 
 
-def test_a_program_without_a_task_is_told_so_once(pool: WorkerPool) -> None:
+def test_program_without_a_task_has_one_problem(pool: WorkerPool) -> None:
     (problem,) = check("x = 1\n", rooms=ROOMS, pool=pool).problems
     assert (problem.kind, problem.line) == ("NameError", None)
 
 
-def test_the_closest_room_is_named(checks: Checks) -> None:
+def test_problem_suggests_the_closest_room(checks: Checks) -> None:
     for lines in (["go_to('alices office')"], ["for name in ['Alices']:", "    go_to(name + ' office')"]):
         (problem,) = checks(*lines).problems
         assert '"alice\'s office"' in problem.message
@@ -198,7 +196,7 @@ WAITS = ("go_to('kitchen')", "while not is_in_room('person'):", "    time.sleep(
 
 
 @pytest.mark.slow
-def test_a_robot_that_waits_is_not_wrong(checks: Checks) -> None:
+def test_waiting_for_a_person_is_accepted(checks: Checks) -> None:
     for seed in range(20):
         found = checks(*WAITS, samples=1, seed=seed)
         assert found.problems == ()
@@ -219,7 +217,7 @@ def test_waiting_in_many_places_ends_in_some_world(checks: Checks) -> None:
     assert not any(checks(*lines, seed=seed).problems for seed in range(10))
 
 
-def test_what_waits_for_ever_in_every_world_is_told_once(checks: Checks) -> None:
+def test_endless_waiting_in_every_world_is_one_problem(checks: Checks) -> None:
     found = checks("while is_in_room('mug') or True:", "    time.sleep(1)")
     assert len(found.samples) == 5 + MAX_EXTRA_WORLDS
     (problem,) = found.problems
@@ -228,7 +226,7 @@ def test_what_waits_for_ever_in_every_world_is_told_once(checks: Checks) -> None
 
 
 @pytest.mark.slow
-def test_who_computes_for_ever_does_not_wait(checks: Checks) -> None:
+def test_endless_computation_does_not_count_as_waiting(checks: Checks) -> None:
     found = checks("for room in get_all_rooms():", "    is_in_room(room)", "sum(range(10**12))", samples=2)
     assert [problem.kind for problem in found.problems] == ["TimeoutError"]
     assert len(found.samples) == 2
@@ -245,7 +243,7 @@ def test_waiting_at_several_lines_is_one_problem(checks: Checks) -> None:
     assert len(found.problems) == 1
 
 
-def test_what_waits_for_ever_without_a_look_is_run_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_endless_waiting_without_a_look_runs_once(monkeypatch: pytest.MonkeyPatch) -> None:
     worker = Worker()
     run = Mock(side_effect=worker.run_alone)
     monkeypatch.setattr(worker, "run_alone", run)
@@ -259,7 +257,7 @@ def test_what_waits_for_ever_without_a_look_is_run_once(monkeypatch: pytest.Monk
     assert "imagined worlds" not in found.problems[0].message
 
 
-def test_a_search_takes_for_granted_that_there_is_one(checks: Checks) -> None:
+def test_search_may_assume_that_the_thing_exists(checks: Checks) -> None:
     lines = (
         "for room in get_all_rooms():",
         "    go_to(room)",
@@ -272,7 +270,7 @@ def test_a_search_takes_for_granted_that_there_is_one(checks: Checks) -> None:
         assert checks(*lines, seed=seed, samples=2).problems == ()
 
 
-def test_a_search_that_goes_on_takes_for_granted_that_there_is_only_one(checks: Checks) -> None:
+def test_search_of_all_rooms_may_assume_that_only_one_thing_exists(checks: Checks) -> None:
     lines = (
         "for room in get_all_rooms():",
         "    go_to(room)",
@@ -284,7 +282,7 @@ def test_a_search_that_goes_on_takes_for_granted_that_there_is_only_one(checks: 
         assert checks(*lines, rooms=ROOMS[:3], seed=seed, samples=2).problems == ()
 
 
-def test_one_look_is_no_search(checks: Checks) -> None:
+def test_single_look_does_not_count_as_a_search(checks: Checks) -> None:
     lines = ("go_to('kitchen')", "if is_in_room('mug'):", "    pick('mug')", "place('mug')")
     (problem,) = checks(*lines).problems
     assert (problem.kind, problem.where) == ("PlaceNoObject", '"mug" is not in "kitchen"')
@@ -301,36 +299,36 @@ def test_rooms_are_guessed_from_the_program(checks: Checks) -> None:
     assert not checks("say('a')").rooms_are_guessed
 
 
-def test_a_program_that_visits_every_room_has_some_to_visit(checks: Checks) -> None:
+def test_program_that_visits_every_room_gets_rooms_to_visit(checks: Checks) -> None:
     found = checks("for room in get_all_rooms():", "    go_to(room)", rooms=None)
     assert found.rooms == ("room 1", "room 2", "start_loc")
     found = checks("for room in get_all_rooms():", "    if room != 'lab':", "        go_to(room)", rooms=None)
     assert found.rooms == ("lab", "room 1", "room 2", "start_loc")
 
 
-def test_where_the_robot_starts(pool: WorkerPool) -> None:
+def test_robot_starts_in_the_given_room_or_start_loc_or_the_first_room(pool: WorkerPool) -> None:
     source = START + "say(get_current_location())\n"
 
-    def said(rooms: tuple[str, ...], start: str | None = None) -> str:
+    def start_of(rooms: tuple[str, ...], start: str | None = None) -> str:
         return check(source, rooms=rooms, start=start, pool=pool).samples[0].outcome.trace[0].text
 
-    assert said(ROOMS) == "start_loc"
-    assert said(("lab", "start_loc")) == "start_loc"
-    assert said(("lab", "hall")) == "lab"
-    assert said(("lab", "hall"), "hall") == "hall"
-    assert said(()) == "start_loc"
-    assert said((), "hall") == "hall"
+    assert start_of(ROOMS) == "start_loc"
+    assert start_of(("lab", "start_loc")) == "start_loc"
+    assert start_of(("lab", "hall")) == "lab"
+    assert start_of(("lab", "hall"), "hall") == "hall"
+    assert start_of(()) == "start_loc"
+    assert start_of((), "hall") == "hall"
     assert check(source, start="hall", pool=pool).room_map.start == "hall"
     with pytest.raises(UserError, match=r'"hal".* lab, hall$'):
-        said(("lab", "hall"), "hal")
+        start_of(("lab", "hall"), "hal")
 
 
-def test_a_room_that_is_no_regex_is_refused(pool: WorkerPool) -> None:
+def test_room_with_an_invalid_regex_is_refused(pool: WorkerPool) -> None:
     with pytest.raises(UserError, match=r'"c\+\+ \("'):
         check(START + "pass", rooms=["c++ ("], pool=pool)
 
 
-def test_a_room_that_may_take_too_long_to_find_is_refused(pool: WorkerPool) -> None:
+def test_room_with_a_slow_regex_is_refused(pool: WorkerPool) -> None:
     with pytest.raises(UserError, match=r'"\(a\+\)\+\$", but searching for it may take too long'):
         check(START + f'go_to("{"a" * 40}!")', rooms=["(a+)+$"], pool=pool)
 
@@ -347,7 +345,7 @@ LOOKS = (
 )
 
 
-def test_a_program_is_checked_in_the_same_way_on_a_pool_and_on_a_worker(pool: WorkerPool) -> None:
+def test_pool_and_worker_give_the_same_check(pool: WorkerPool) -> None:
     source = START + "\n    ".join(LOOKS) + "\n"
     written = json.dumps(check(source, rooms=ROOMS, seed=4, pool=pool).data())
     worker = Worker()
@@ -359,7 +357,7 @@ def test_a_program_is_checked_in_the_same_way_on_a_pool_and_on_a_worker(pool: Wo
 
 
 @pytest.mark.parametrize("samples", [3, pytest.param(20, marks=pytest.mark.slow)])
-def test_programs_that_are_checked_together_are_checked_as_each_alone(samples: int) -> None:
+def test_programs_checked_together_and_alone_have_the_same_results(samples: int) -> None:
     looks, rooms = START + "\n    ".join(LOOKS) + "\n", RoomMap(ROOMS, ROOMS[0])
     waits = START + "while not is_in_room('mug'):\n        time.sleep(1)\n"
     broken, nowhere = "def task_program(:", START + "go_to('moon')\n"
@@ -376,13 +374,13 @@ def test_programs_that_are_checked_together_are_checked_as_each_alone(samples: i
     assert together[0].samples == together[3].samples
 
 
-def test_other_seeds_draw_other_worlds_and_the_same_seed_the_same(checks: Checks) -> None:
+def test_seed_determines_the_worlds(checks: Checks) -> None:
     first, again, other = (checks(*LOOKS, seed=seed).data()["samples"] for seed in (1, 1, 2))
     assert first == again
     assert first != other
 
 
-def test_data_is_what_json_can_hold(checks: Checks) -> None:
+def test_data_survives_the_json_round_trip(checks: Checks) -> None:
     data = checks("is_in_room('mug')", "say(a)").data()
     assert json.loads(json.dumps(data)) == data
     assert list(data) == [
@@ -401,7 +399,7 @@ def test_data_is_what_json_can_hold(checks: Checks) -> None:
     assert list(data["samples"][0]) == ["sample", "world", "in_vain", "status", "error", "line", "trace"]
 
 
-def test_a_drive_that_could_mean_several_rooms_lists_them() -> None:
+def test_problem_of_an_ambiguous_drive_lists_its_rooms() -> None:
     result = check(
         'def task_program():\n    go_to("the shelf in the kitchen")\n', rooms=["hall", "kitchen", "shelf"]
     )
@@ -410,7 +408,7 @@ def test_a_drive_that_could_mean_several_rooms_lists_them() -> None:
     assert '"kitchen" or "shelf"' in problem.message
 
 
-def test_a_check_ends_once_nobody_wants_it(pool: WorkerPool) -> None:
+def test_check_stops_when_it_is_no_longer_wanted(pool: WorkerPool) -> None:
     answers = iter([True, True, True, False])
     slow = START + "if is_in_room('cup'):\n        sum(range(10**6))\n    say('hello')\n"
     with pytest.raises(UnwantedCheckError):

@@ -1,4 +1,4 @@
-"""A contract allows all that a program does in any world, and no more than its text and the rooms need."""
+"""A contract allows everything that a program does in any world, and little else."""
 
 import unicodedata
 from collections.abc import Iterator
@@ -62,64 +62,66 @@ class Contracts:
     def __init__(self, pool: WorkerPool) -> None:
         self.pool = pool
 
-    def checked(self, program: str, *rules: Rule) -> CheckResult:
+    def check(self, program: str, *rules: Rule) -> CheckResult:
         return check(program, room_map=ROOMS, pool=self.pool, house_rules=rules, explores=True)
 
     def __call__(self, program: str) -> Contract:
-        contract = self.checked(program).contract
+        contract = self.check(program).contract
         assert contract is not None
         return contract
 
 
-def allowed(contract: Contract, skill: str) -> dict[str, list[str]]:
+def texts_of(contract: Contract, skill: str) -> dict[str, list[str]]:
     """Return the texts that a contract allows for each argument of a skill."""
     texts = contract.skills[skill].texts
     return {name: [*map(str, some)] for name, some in texts}
 
 
-def test_rooms_are_those_that_the_program_may_enter(contracts: Contracts) -> None:
+def test_contract_allows_the_rooms_that_the_program_may_enter(contracts: Contracts) -> None:
     contract = contracts(PRINTERS)
-    assert set(allowed(contract, "go_to")["location"]) == {
+    assert set(texts_of(contract, "go_to")["location"]) == {
         "printer room 1",
         "printer room 2",
         "start_loc",
     }
-    assert allowed(contract, "say") == {"message": ["There is no stapler in {}"]}
-    assert allowed(contract, "is_in_room") == {"entity": ["stapler"]}
+    assert texts_of(contract, "say") == {"message": ["There is no stapler in {}"]}
+    assert texts_of(contract, "is_in_room") == {"entity": ["stapler"]}
     assert contract.skills["go_to"].at_most == 3
     assert set(contract.skills) == {"go_to", "is_in_room", "say"}
     assert not contract.objection(RequestedCall("get_all_rooms", ()))
 
 
-def test_things_are_picked_up_and_put_down_in_known_rooms(contracts: Contracts) -> None:
+def test_contract_limits_where_things_are_picked_up_and_put_down(contracts: Contracts) -> None:
     contract = contracts(BRING)
     assert contract.skills["pick"].places == ("café",)
     assert contract.skills["place"].places == ("lab",)
-    assert allowed(contract, "ask") == {"person": ["Ann"], "question": ["Coffee?"], "options": ["no", "yes"]}
+    assert texts_of(contract, "ask") == {"person": ["Ann"], "question": ["Coffee?"], "options": ["no", "yes"]}
 
 
-def test_what_cannot_be_bounded_is_anything(contracts: Contracts, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_incomplete_exploration_allows_anything(
+    contracts: Contracts, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("codebotler.checking.exploration.MAX_RUNS", 1)
     contract = contracts(PRINTERS)
-    assert allowed(contract, "go_to") == {"location": ["{}"]}
-    assert allowed(contract, "is_in_room") == {"entity": ["stapler"]}
+    assert texts_of(contract, "go_to") == {"location": ["{}"]}
+    assert texts_of(contract, "is_in_room") == {"entity": ["stapler"]}
     assert contract.skills["go_to"].at_most is None
     assert "any room" in contract_sentence(contract, SKILLS)
 
 
-def test_texts_that_depend_on_the_clock_are_anything(contracts: Contracts) -> None:
+def test_texts_that_depend_on_the_clock_are_unbounded(contracts: Contracts) -> None:
     contract = contracts("import datetime\ndef task_program():\n    say(str(datetime.datetime.now()))\n")
-    assert allowed(contract, "say") == {"message": ["{}"]}
+    assert texts_of(contract, "say") == {"message": ["{}"]}
 
 
 @pytest.mark.parametrize("limit", ["MAX_TEXTS", "MAX_CHARACTERS"])
-def test_more_texts_than_a_person_reads_are_any_text(
+def test_more_texts_than_a_person_reads_are_unbounded(
     contracts: Contracts, monkeypatch: pytest.MonkeyPatch, limit: str
 ) -> None:
     program = "def task_program():\n    for number in range(4):\n        say(''.join(['a', str(number)]))\n"
-    assert len(allowed(contracts(program), "say")["message"]) == 4
+    assert len(texts_of(contracts(program), "say")["message"]) == 4
     monkeypatch.setattr(f"codebotler.checking.contracts.of_program.{limit}", 3)
-    assert allowed(contracts(program), "say") == {"message": ["{}"]}
+    assert texts_of(contracts(program), "say") == {"message": ["{}"]}
 
 
 @pytest.mark.parametrize("text", ["a" * 2_001, "{}".join("abcdefghijklmnopqrstuvw")])
@@ -135,7 +137,7 @@ def task_program():
     if is_in_room("mug") != is_in_room("mug"):
         go_to("lab")
 """
-    assert allowed(contracts(program), "go_to") == {"location": ["lab"]}
+    assert texts_of(contracts(program), "go_to") == {"location": ["lab"]}
 
 
 @pytest.mark.parametrize(
@@ -146,7 +148,7 @@ def task_program():
         ("ask", [["Ann"]], ""),
     ],
 )
-def test_calls_within_the_contract(
+def test_call_within_the_contract_is_accepted(
     contracts: Contracts, skill: str, texts: list[list[str]], place: str
 ) -> None:
     contract = contracts(BRING)
@@ -170,32 +172,32 @@ def test_calls_within_the_contract(
         RequestedCall("open_door", ((),)),
     ],
 )
-def test_calls_outside_the_contract(contracts: Contracts, call: RequestedCall) -> None:
+def test_call_outside_the_contract_is_refused(contracts: Contracts, call: RequestedCall) -> None:
     assert contracts(BRING).objection(call)
 
 
-def test_a_program_with_tricks_may_do_anything(contracts: Contracts) -> None:
+def test_program_with_dynamic_attributes_may_do_anything(contracts: Contracts) -> None:
     contract = contracts("def task_program():\n    getattr('a', 'lower')()\n    say('hello')\n")
     assert {"say", "go_to", "pick"} <= set(contract.skills)
-    assert allowed(contract, "go_to") == {"location": ["{}"]}
+    assert texts_of(contract, "go_to") == {"location": ["{}"]}
 
 
-def test_calls_are_counted(contracts: Contracts) -> None:
+def test_more_calls_than_the_contract_allows_are_refused(contracts: Contracts) -> None:
     contract, call = contracts(BRING), RequestedCall("pick", (("coffee",),), "café")
     assert not contract.objection(call, 0)
     assert contract.objection(call, 1)
 
 
-def test_what_a_changed_program_may_do_beyond_the_approved_one(contracts: Contracts) -> None:
+def test_beyond_returns_only_what_the_other_contract_lacks(contracts: Contracts) -> None:
     before, after = contracts(BRING), contracts(BRING.replace('place("coffee")', 'say("Here you are")'))
     assert not before.beyond(before).skills
     assert set(after.beyond(before).skills) == {"say"}
     assert set(before.beyond(after).skills) == {"place"}
     wider = contracts(BRING.replace('["yes", "no"]', '["yes", "no", "later"]')).beyond(before)
-    assert allowed(wider, "ask") == {"person": ["Ann"], "question": ["Coffee?"], "options": ["later"]}
+    assert texts_of(wider, "ask") == {"person": ["Ann"], "question": ["Coffee?"], "options": ["later"]}
 
 
-def test_a_contract_is_read_as_it_was_written(contracts: Contracts, tmp_path: Path) -> None:
+def test_contract_survives_the_round_trip_through_a_file(contracts: Contracts, tmp_path: Path) -> None:
     (file := tmp_path / "contract.yaml").write_text(contract_yaml(contracts(BRING)))
     assert read_contract(file) == contracts(BRING)
     hard = Contract({"say": SkillBound((("message", (TextTemplate(("{a}: ", " %")),)),))})
@@ -218,7 +220,7 @@ def test_a_contract_is_read_as_it_was_written(contracts: Contracts, tmp_path: Pa
         ("version: 1\nskills:\n  pick: {obj: any, in: kitchen}", 3),
     ],
 )
-def test_a_wrong_file_is_refused_with_its_line(tmp_path: Path, text: str, line: int) -> None:
+def test_invalid_file_is_refused_with_its_line(tmp_path: Path, text: str, line: int) -> None:
     (file := tmp_path / "contract.yaml").write_text(text)
     with pytest.raises(UserError) as error:
         read_contract(file)
@@ -226,18 +228,18 @@ def test_a_wrong_file_is_refused_with_its_line(tmp_path: Path, text: str, line: 
 
 
 def test_a_program_beyond_a_contract_has_a_problem(contracts: Contracts) -> None:
-    found = contracts.checked(BRING)
+    found = contracts.check(BRING)
     assert not hold_within(found, contracts(BRING), SKILLS).problems
     problems = hold_within(found, contracts(PRINTERS), SKILLS).problems
     assert {problem.kind for problem in problems} == {"OutsideContract"}
 
 
-def test_rules_are_proved_or_broken_in_a_world_that_is_shown(contracts: Contracts) -> None:
+def test_rule_is_proved_or_has_a_world_that_breaks_it(contracts: Contracts) -> None:
     rules = [
         Rule(name, name, parse(f'not tr.Exists(goto("{room}"))'))
         for name, room in (("cafe", "café"), ("printer", "printer room 1"))
     ]
-    found = contracts.checked(BRING, *rules)
+    found = contracts.check(BRING, *rules)
     assert [proof.verdict for proof in found.proofs] == ["possible", "never"]
     number = found.proofs[0].sample
     assert number is not None
@@ -248,15 +250,15 @@ def test_rules_are_proved_or_broken_in_a_world_that_is_shown(contracts: Contract
 @pytest.mark.parametrize("last", ["try: say('a')\n    finally: say('b')", "say('a')"])
 def test_a_proof_says_whether_it_holds_if_skills_fail(contracts: Contracts, last: str) -> None:
     rule = Rule("cafe", "cafe", parse('not tr.Exists(goto("café"))'))
-    (proof,) = contracts.checked(f"def task_program():\n    {last}\n", rule).proofs
+    (proof,) = contracts.check(f"def task_program():\n    {last}\n", rule).proofs
     assert (proof.verdict, proof.if_skills_fail) == ("never", "finally" not in last)
 
 
 def test_a_program_that_does_not_compile_has_no_contract(contracts: Contracts) -> None:
-    assert contracts.checked("def task_program(:").contract is None
+    assert contracts.check("def task_program(:").contract is None
 
 
-def test_what_a_changing_world_allows_has_no_number_and_no_place(contracts: Contracts) -> None:
+def test_calls_that_depend_on_a_changing_world_have_no_limits(contracts: Contracts) -> None:
     program = """
 def task_program():
     for _ in range(3):
@@ -269,8 +271,8 @@ def task_program():
     assert (pick.places, pick.at_most) == (None, None)
 
 
-def test_a_tighter_number_is_said(contracts: Contracts) -> None:
-    found = contracts.checked(BRING)
+def test_problem_names_the_number_of_calls_beyond_the_contract(contracts: Contracts) -> None:
+    found = contracts.check(BRING)
     bound = contracts(BRING).skills["go_to"]
     tighter = Contract({**contracts(BRING).skills, "go_to": replace(bound, at_most=1)})
     (problem,) = hold_within(found, tighter, SKILLS).problems
@@ -278,13 +280,13 @@ def test_a_tighter_number_is_said(contracts: Contracts) -> None:
 
 
 def test_after_a_problem_a_robot_may_get_further_than_the_check(contracts: Contracts) -> None:
-    found = contracts.checked("def task_program():\n    go_to('cellar')\n    go_to('lab')\n    say('a')\n")
+    found = contracts.check("def task_program():\n    go_to('cellar')\n    go_to('lab')\n    say('a')\n")
     assert found.contract is not None
     assert found.contract.skills["go_to"].at_most is None
-    assert allowed(found.contract, "say") == {"message": ["a"]}
+    assert texts_of(found.contract, "say") == {"message": ["a"]}
 
 
-def test_gaps_are_shown_first_and_never_shortened_away() -> None:
+def test_sentence_always_shows_the_gaps_of_templates() -> None:
     many = [TextTemplate((letter,)) for letter in "abcdefgh"]
     long = TextTemplate(("x" * 200, "y"))
     hidden = Contract({"say": SkillBound((("message", (*many, long)),))})
@@ -303,20 +305,20 @@ def test_an_unknown_room_is_never_allowed_by_name() -> None:
     assert not SkillBound((("obj", (ANY_TEXT,)),)).objection(call)
 
 
-def test_only_an_empty_person_is_anybody() -> None:
+def test_empty_person_is_shown_as_anybody() -> None:
     nothing = (TextTemplate(("",)),)
     asks = SkillBound((("person", nothing), ("question", nothing), ("options", nothing)))
-    ((_, allowed, _),) = contract_rows(Contract({"ask": asks}), SKILLS)
-    assert allowed == 'anybody "" with ""'
+    ((_, words, _),) = contract_rows(Contract({"ask": asks}), SKILLS)
+    assert words == 'anybody "" with ""'
 
 
-def test_a_skill_without_an_event_is_beyond_a_contract_as_well(contracts: Contracts) -> None:
+def test_contract_also_limits_skills_without_events(contracts: Contracts) -> None:
     silent = Skill("take_photo", (), ValueType(None), "Take a photo.", is_idle=True)
-    found = replace(contracts.checked(BRING), contract=Contract({"take_photo": SkillBound()}))
+    found = replace(contracts.check(BRING), contract=Contract({"take_photo": SkillBound()}))
     assert hold_within(found, Contract({}), SKILLS.with_skill(silent)).problems
 
 
-def test_a_computed_text_is_open_if_a_question_is_asked_twice(contracts: Contracts) -> None:
+def test_computed_text_is_unbounded_if_a_question_is_asked_twice(contracts: Contracts) -> None:
     poll = """
 def task_program():
     votes = [ask("", "Hot?", ["yes", "no"]) for _ in range({count})]
@@ -324,7 +326,7 @@ def task_program():
 """
     once, twice = (dict(contracts(poll.format(count=n)).skills["say"].texts)["message"] for n in (1, 2))
     assert {str(one) for one in once} == {"000", "100"}
-    assert twice == (ANY_TEXT,)  # "050", since another person may answer
+    assert twice == (ANY_TEXT,)  # another person may answer, which makes "050" possible
 
 
 def test_quotes_in_a_text_cannot_forge_a_sentence(contracts: Contracts) -> None:

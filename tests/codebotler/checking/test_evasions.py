@@ -1,4 +1,4 @@
-"""How programs could evade rules: by other names of a room, and inside skills of the user's own."""
+"""Rules that programs could evade: by other names of a room, or inside the user's own skills."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def rule(formula: str, name: str = "bob") -> Rule:
         ('not tr.ActAtSome("^accounting$", say(".*"))', BOTH),
     ],
 )
-def test_an_anchor_that_other_words_evade_is_refused(formula: str, room: str) -> None:
+def test_anchor_that_other_names_of_the_room_evade_is_refused(formula: str, room: str) -> None:
     with pytest.raises(UserError) as caught:
         list(find_evasions([rule(formula)], ["hall", room], SKILLS))
     assert '"bob"' in caught.value.sentence
@@ -56,7 +56,7 @@ def test_an_anchor_that_other_words_evade_is_refused(formula: str, room: str) ->
         ('not tr.Exists(say("^accounting$"))', BOTH),
     ],
 )
-def test_what_no_words_evade_is_accepted(formula: str, room: str) -> None:
+def test_formula_that_no_name_evades_is_accepted(formula: str, room: str) -> None:
     assert list(find_evasions([rule(formula)], ["hall", room], SKILLS)) == []
 
 
@@ -72,7 +72,7 @@ def test_what_no_words_evade_is_accepted(formula: str, room: str) -> None:
     ],
 )
 def test_rule_that_names_a_part_of_the_regex_is_refused(formula: str, room: str) -> None:
-    """Events carry the words of the request there, so the rest of the regex would not count."""
+    """The event holds the words of the request, so a part of the regex would miss the other words."""
     with pytest.raises(UserError) as caught:
         list(find_evasions([rule(formula)], ["hall", room], SKILLS))
     assert room in caught.value.sentence
@@ -81,32 +81,32 @@ def test_rule_that_names_a_part_of_the_regex_is_refused(formula: str, room: str)
 # --- skills
 
 HEAD = "from codebotler import Simulation, skill\n"
-DRIVES = 'def tour(sim: Simulation, room: str) -> None:\n    "Tour."\n    sim.drive(room)\n'
-BY_LOT = "def tour(sim: Simulation, room: str) -> None: 'Tour.'\n"
+DRIVING_TOUR = 'def tour(sim: Simulation, room: str) -> None:\n    "Tour."\n    sim.drive(room)\n'
+RANDOM_TOUR = "def tour(sim: Simulation, room: str) -> None: 'Tour.'\n"
 NO_VAULT = 'not tr.Exists(goto("vault"))'
 
 
 @pytest.mark.parametrize(
-    ("code", "formulas", "is_told"),
+    ("code", "formulas", "is_reported"),
     [
-        ("@skill\n" + DRIVES, [NO_VAULT], True),
-        ("@skill\n" + DRIVES, [f'{NO_VAULT} and not tr.Exists(tour("vault"))'], False),
-        ("@skill\n" + DRIVES, [NO_VAULT, 'not tr.AtLeast(tour(".*"), 4)'], False),
-        ("@skill\n" + DRIVES, [], False),
-        ("@skill(event=None)\n" + DRIVES, [NO_VAULT], True),
-        ("@skill\n" + BY_LOT, [NO_VAULT], False),
-        ("@skill(names='room')\n" + BY_LOT, [NO_VAULT], True),
+        ("@skill\n" + DRIVING_TOUR, [NO_VAULT], True),
+        ("@skill\n" + DRIVING_TOUR, [f'{NO_VAULT} and not tr.Exists(tour("vault"))'], False),
+        ("@skill\n" + DRIVING_TOUR, [NO_VAULT, 'not tr.AtLeast(tour(".*"), 4)'], False),
+        ("@skill\n" + DRIVING_TOUR, [], False),
+        ("@skill(event=None)\n" + DRIVING_TOUR, [NO_VAULT], True),
+        ("@skill\n" + RANDOM_TOUR, [NO_VAULT], False),
+        ("@skill(names='room')\n" + RANDOM_TOUR, [NO_VAULT], True),
     ],
 )
-def test_an_own_skill_that_may_do_what_rules_forbid_is_told(
-    tmp_path: Path, code: str, formulas: list[str], *, is_told: bool
+def test_own_skill_that_may_do_what_rules_forbid_is_reported(
+    tmp_path: Path, code: str, formulas: list[str], *, is_reported: bool
 ) -> None:
     (tmp_path / "own.py").write_text(HEAD + code)
     skills = skills_from(tmp_path / "own.py")
     rules = [Rule(f"r{n}", "So it is.", parse(text, skills=skills)) for n, text in enumerate(formulas)]
-    told = list(find_evasions(rules, (), skills))
-    assert len(told) == is_told
-    assert all(" tour " in sentence for sentence in told)
+    warnings = list(find_evasions(rules, (), skills))
+    assert len(warnings) == is_reported
+    assert all(" tour " in sentence for sentence in warnings)
 
 
 def test_room_that_requests_reach_before_one_with_a_regex_may_be_named_with_anchors() -> None:

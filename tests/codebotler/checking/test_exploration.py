@@ -1,4 +1,4 @@
-"""All worlds of some rooms are explored, and what is said of rules holds in each of them."""
+"""Explorations cover all worlds of some rooms, and their verdicts on rules hold in each world."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -29,7 +29,7 @@ def task_program():
     go_to("start")
     say(", ".join(found))
 """
-ALL_ALIKE = """
+NEEDS_EQUAL_FACTS = """
 def task_program():
     count = 0
     for room in ["start", "kitchen"]:
@@ -40,14 +40,14 @@ def task_program():
         go_to("lab")
     go_to("start")
 """
-AFTER_AN_ERROR = """
+DRIVES_AFTER_AN_ERROR = """
 def task_program():
     try:
         pick("mug")
     except Exception:
         go_to("lab")
 """
-NOT_TAME = SEARCH.replace("found = []", "found = type('L', (list,), {})()")
+WILD_SEARCH = SEARCH.replace("found = []", "found = type('L', (list,), {})()")
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def worker() -> Iterator[Worker]:
     started.close()
 
 
-def explored(worker: Worker, program: str, *rules: Rule, room_map: RoomMap = ROOMS) -> Exploration:
+def explore_rooms(worker: Worker, program: str, *rules: Rule, room_map: RoomMap = ROOMS) -> Exploration:
     return explore(worker, program, room_map, CheckSettings(1, house_rules=rules))
 
 
@@ -77,8 +77,8 @@ def facts(**values: int) -> Iterator[tuple[Draw, ...]]:
             yield (*found, asked, elsewhere)
 
 
-def test_each_combination_of_facts_is_one_case(worker: Worker) -> None:
-    found = explored(worker, SEARCH)
+def test_each_combination_of_facts_is_explored_once(worker: Worker) -> None:
+    found = explore_rooms(worker, SEARCH)
     assert found.is_complete
     assert found.cases == 2**3
     said = {call.texts[0][0] for call in found.calls if call.skill == "say"}
@@ -92,9 +92,9 @@ def _subsets(rooms: tuple[str, ...]) -> Iterator[list[str]]:
 
 
 @pytest.mark.slow  # hundreds of runs
-@pytest.mark.parametrize("program", [SEARCH, ALL_ALIKE, AFTER_AN_ERROR])
-def test_a_rule_is_broken_in_an_explored_world_exactly_if_it_is_in_any(worker: Worker, program: str) -> None:
-    found = explored(worker, program, NO_LAB)
+@pytest.mark.parametrize("program", [SEARCH, NEEDS_EQUAL_FACTS, DRIVES_AFTER_AN_ERROR])
+def test_exploration_finds_a_violation_if_and_only_if_a_world_has_one(worker: Worker, program: str) -> None:
+    found = explore_rooms(worker, program, NO_LAB)
     outcomes = [
         run_in(worker, program, FactSampler(strict=strict, forced=forced))
         for forced in facts(answers=3)
@@ -105,52 +105,52 @@ def test_a_rule_is_broken_in_an_explored_world_exactly_if_it_is_in_any(worker: W
     assert ("no-lab" in found.violations) == is_broken
 
 
-def test_a_rule_that_needs_many_facts_alike_is_found_broken_in_a_world_that_shows_it(worker: Worker) -> None:
-    found = explored(worker, ALL_ALIKE, NO_LAB, BACK)
+def test_violation_that_needs_many_equal_facts_is_found_with_its_world(worker: Worker) -> None:
+    found = explore_rooms(worker, NEEDS_EQUAL_FACTS, NO_LAB, BACK)
     assert found.is_complete
     assert set(found.violations) == {"no-lab"}
-    outcome = run_in(worker, ALL_ALIKE, found.violations["no-lab"])
+    outcome = run_in(worker, NEEDS_EQUAL_FACTS, found.violations["no-lab"])
     assert ("goto", "lab") in {(event.kind, event.text) for event in outcome.trace}
 
 
-def test_what_happens_if_an_assumption_is_wrong_is_explored(worker: Worker) -> None:
-    found = explored(worker, AFTER_AN_ERROR, NO_LAB)
+def test_wrong_assumptions_are_explored(worker: Worker) -> None:
+    found = explore_rooms(worker, DRIVES_AFTER_AN_ERROR, NO_LAB)
     assert found.violations["no-lab"].strict
 
 
-def test_rules_are_judged_apart_from_each_other(worker: Worker) -> None:
+def test_rules_are_judged_independently(worker: Worker) -> None:
     program = "def task_program():\n    go_to('lab')\n    go_to('kitchen')\n"
-    assert set(explored(worker, program, NO_LAB, BACK).violations) == {"no-lab", "back"}
+    assert set(explore_rooms(worker, program, NO_LAB, BACK).violations) == {"no-lab", "back"}
 
 
 def test_an_exploration_ends_at_its_budget(worker: Worker, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(exploration, "MAX_RUNS", 5)
-    found = explored(worker, SEARCH)
+    found = explore_rooms(worker, SEARCH)
     assert found.cases == 5
     assert not found.is_complete
 
 
-def test_programs_that_need_their_own_process_are_explored_as_well(worker: Worker) -> None:
-    found = explored(worker, NOT_TAME)
+def test_wild_programs_are_explored(worker: Worker) -> None:
+    found = explore_rooms(worker, WILD_SEARCH)
     assert found.is_complete
-    assert found.calls == explored(worker, SEARCH).calls
+    assert found.calls == explore_rooms(worker, SEARCH).calls
 
 
-def test_an_endless_run_has_no_highest_number_of_calls(worker: Worker) -> None:
+def test_endless_run_has_no_maximum_of_calls(worker: Worker) -> None:
     program = (
         "def task_program():\n    while not is_in_room('mug'):\n        time.sleep(60)\n    say('here')\n"
     )
-    found = explored(worker, program)
+    found = explore_rooms(worker, program)
     assert found.is_complete
     assert not found.most_calls
     assert "say" in {call.skill for call in found.calls}
 
 
-def test_what_a_program_does_after_a_refusal_is_unknown(worker: Worker) -> None:
+def test_refusal_makes_the_exploration_incomplete(worker: Worker) -> None:
     refusing = Rule("no-lab", NO_LAB.says, NO_LAB.formula, refuse=True)
     program = "def task_program():\n    go_to('lab')\n"
-    assert not explored(worker, program, refusing).is_complete
-    assert explored(worker, program.replace("lab", "kitchen"), refusing).is_complete
+    assert not explore_rooms(worker, program, refusing).is_complete
+    assert explore_rooms(worker, program.replace("lab", "kitchen"), refusing).is_complete
 
 
 def test_a_program_that_catches_errors_also_runs_on_a_robot_that_fails_once(worker: Worker) -> None:
@@ -165,12 +165,12 @@ def task_program():
                 go_to(home)
                 say("no way to the " + room)
 """
-    calls = explored(worker, program).calls
+    calls = explore_rooms(worker, program).calls
     assert {call.texts[0] for call in calls if call.skill == "go_to"} == {("lab",), ("start",)}
     assert ("no way to the lab",) in {call.texts[0] for call in calls if call.skill == "say"}
 
 
-LATE = """
+WAITS_FOR_ANN = """
 def task_program():
     tries = 0
     while not is_in_room("Ann") and tries < 3:
@@ -181,13 +181,13 @@ def task_program():
 """
 
 
-def test_facts_that_may_change_meanwhile_leave_rules_and_numbers_open(worker: Worker) -> None:
-    found = explored(worker, LATE, NO_LAB)
+def test_facts_that_may_change_make_the_result_unsteady(worker: Worker) -> None:
+    found = explore_rooms(worker, WAITS_FOR_ANN, NO_LAB)
     assert (found.is_complete, found.is_steady) == (True, False)
-    assert explored(worker, SEARCH).is_steady
+    assert explore_rooms(worker, SEARCH).is_steady
 
 
-def test_failures_with_other_calls_leave_rules_and_numbers_open(worker: Worker) -> None:
+def test_failures_that_lead_to_other_calls_make_the_result_unsteady(worker: Worker) -> None:
     program = """
 def task_program():
     try:
@@ -195,11 +195,11 @@ def task_program():
     except Exception:
         go_to('lab')
 """
-    assert not explored(worker, program, NO_LAB).is_steady
-    assert explored(worker, program.replace("go_to('lab')", "pass"), NO_LAB).is_steady
+    assert not explore_rooms(worker, program, NO_LAB).is_steady
+    assert explore_rooms(worker, program.replace("go_to('lab')", "pass"), NO_LAB).is_steady
 
 
 def test_an_exploration_ends_at_its_budget_of_calls(worker: Worker, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(exploration, "MAX_CALLS", 10)
     monkeypatch.setattr(exploration, "RUNS_AT_ONCE", 1)
-    assert not explored(worker, SEARCH).is_complete
+    assert not explore_rooms(worker, SEARCH).is_complete

@@ -53,7 +53,7 @@ def rooms(*lines: str) -> tuple[str, ...]:
         (['go_to("b")', 'go_to("a")', 'go_to("b")'], ("b", "a")),
     ],
 )
-def test_rooms_are_found_where_a_program_names_them(lines: list[str], named: tuple[str, ...]) -> None:
+def test_rooms_that_a_program_names_are_found(lines: list[str], named: tuple[str, ...]) -> None:
     assert rooms(*lines) == named
 
 
@@ -68,20 +68,20 @@ def test_rooms_are_found_where_a_program_names_them(lines: list[str], named: tup
         ["go_to(", "x"],
     ],
 )
-def test_what_names_no_room_is_left_out(lines: list[str]) -> None:
+def test_texts_that_name_no_room_are_ignored(lines: list[str]) -> None:
     assert rooms(*lines) == ()
 
 
-def test_long_programs_name_a_hundred_rooms_at_most() -> None:
+def test_at_most_a_hundred_rooms_of_a_program_are_found() -> None:
     assert len(rooms(*(f'go_to("room {number}")' for number in range(300)))) == 100
 
 
-def test_deep_programs_name_none() -> None:
+def test_deeply_nested_programs_have_no_rooms() -> None:
     assert named_rooms(parse_leniently(START + "go_to(" + "-" * 5_000 + "1)\n")) == ()
     assert fixed_drives(parse_leniently(START + "x = " + " + ".join(["a"] * 5_000) + "\n")) == []
 
 
-def test_drives_that_are_written_out() -> None:
+def test_drives_to_literal_rooms_are_fixed() -> None:
     source = START + 'go_to("lab")\n    go_to(location="hall")\n    go_to(x)\n'
     assert fixed_drives(parse_leniently(source)) == [(2, "lab"), (3, "hall")]
 
@@ -96,11 +96,11 @@ def test_drives_that_are_written_out() -> None:
         START + 'go_to("lab"\n',
     ],
 )
-def test_drives_that_may_be_saved_or_mean_something_else_are_no_fixed_ones(source: str) -> None:
+def test_conditional_or_redefined_drives_are_not_fixed(source: str) -> None:
     assert fixed_drives(parse_leniently(source)) == []
 
 
-def test_whether_it_asks_for_all_rooms() -> None:
+def test_lists_rooms_if_the_program_uses_get_all_rooms() -> None:
     assert lists_rooms(parse_leniently("rooms = get_all_rooms\n"))
     assert not lists_rooms(parse_leniently("rooms = ['get_all_rooms()']\n"))
     assert not lists_rooms(parse_leniently("get_all_rooms(\n"))

@@ -1,4 +1,4 @@
-"""The review of house rules: examples that are right, and what it warns of."""
+"""Reviews of house rules: correct examples, and warnings of likely mistakes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ NO_OFFICE = 'not tr.Exists(goto("office"))'
 KNOCK = (
     'not tr.Last(goto("office")) or tr.BeforeLast(goto("office")).AfterLast(goto(".*")).Exists(say("knock"))'
 )
-NOTHING = " and ".join(
+FORBIDS_EVERYTHING = " and ".join(
     f'not tr.Exists({kind}(".*"))' for kind in ("goto", "say", "check", "pick", "place", "mention")
 )
 FORMULAS = (
@@ -53,7 +53,7 @@ def rules(*formulas: str, when: str = "always") -> list[Rule]:
 
 @pytest.mark.parametrize("world", [None, WORLD], ids=["anywhere", "in a world"])
 @pytest.mark.parametrize("text", FORMULAS)
-def test_examples_keep_and_break(text: str, world: World | None) -> None:
+def test_examples_keep_and_break_the_rule(text: str, world: World | None) -> None:
     (review,) = review_rules(rules(text), world)
     formula = parse(text)
     assert review.keeps
@@ -64,13 +64,13 @@ def test_examples_keep_and_break(text: str, world: World | None) -> None:
     assert set(review.warnings) <= {DETECTED}
 
 
-def test_an_example_shows_when_a_rule_counts() -> None:
+def test_example_that_keeps_a_conditional_rule_meets_its_condition() -> None:
     (review,) = review_rules(rules(KNOCK), WORLD)
     assert review.keeps is not None
     assert [(event.kind, event.text) for event in review.keeps] == [("say", "knock"), ("goto", "office")]
 
 
-def test_a_robot_picks_up_what_it_holds_in_an_example() -> None:
+def test_robot_of_an_example_picks_up_the_thing_that_it_holds() -> None:
     (review,) = review_rules(
         rules('not tr.Exists(at("kitchen", holding("glass", goto(without("kitchen")))))'), WORLD
     )
@@ -89,7 +89,7 @@ def test_a_robot_picks_up_what_it_holds_in_an_example() -> None:
     assert [event.kind for event in anything.breaks] == ["pick", "goto"]
 
 
-def test_examples_of_a_world_are_of_its_rooms() -> None:
+def test_examples_use_the_rooms_of_the_world() -> None:
     (review,) = review_rules(rules('not tr.Exists(at("kitchen", say("hush")))'), WORLD)
     assert review.breaks is not None
     assert [(event.kind, event.text, event.place) for event in review.breaks] == [
@@ -103,20 +103,20 @@ def test_examples_of_a_world_are_of_its_rooms() -> None:
     [
         ('tr.AtLeast(goto("hall"), 0)', "always", NEVER_BROKEN),
         ('not tr.Exists(goto("hall")) or tr.Exists(goto("hall"))', "always", NEVER_BROKEN),
-        (NOTHING, "always", ALWAYS_BROKEN),
+        (FORBIDS_EVERYTHING, "always", ALWAYS_BROKEN),
         ('tr.Exists(goto("hall")) and not tr.Exists(goto("hall"))', "finally", IMPOSSIBLE),
         ('not tr.Exists(missed("glass"))', "always", DETECTED),
         ('not tr.Exists(answered("yes"))', "always", DETECTED),
         ('not tr.Exists(found("mug")) or not tr.Exists(goto("kitchen"))', "always", DETECTED),
     ],
 )
-def test_an_odd_rule_is_told(text: str, when: str, warning: str) -> None:
+def test_suspicious_rule_has_a_warning(text: str, when: str, warning: str) -> None:
     (review,) = review_rules(rules(text, when=when))
     assert warning in review.warnings
 
 
 @pytest.mark.parametrize("text", ['not tr.Exists(answered(".*"))', NO_OFFICE, 'not tr.Exists(check("mug"))'])
-def test_what_is_prevented_is_not_said_to_be_noticed_only(text: str) -> None:
+def test_preventable_rule_has_no_warning(text: str) -> None:
     (review,) = review_rules(rules(text))
     assert review.warnings == ()
 
@@ -128,7 +128,7 @@ def test_what_is_prevented_is_not_said_to_be_noticed_only(text: str) -> None:
         'not tr.Last(goto("lab 2")) or tr.Exists(at("lab 1", goto(".*")))',
     ],
 )
-def test_examples_tell_from_where_a_drive_starts_if_that_decides(text: str) -> None:
+def test_examples_name_the_start_of_a_drive_that_decides(text: str) -> None:
     (review,) = review_rules(rules(text))
     assert review.keeps
     assert review.breaks
@@ -142,7 +142,7 @@ def steps(trace: Trace) -> str:
     return captured.get()
 
 
-def test_a_name_that_the_world_lacks_is_told() -> None:
+def test_name_that_the_world_lacks_has_a_warning() -> None:
     texts = (
         NO_VAULT,
         'not tr.Exists(at("cellar", say(".*")))',
@@ -162,7 +162,7 @@ def test_a_name_that_the_world_lacks_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "told"),
+    ("one", "other", "warnings"),
     [
         ('not tr.AtLeast(goto("hall"), 2)', 'not tr.AtLeast(goto("hall"), 3)', ["", 'it follows from "r0"']),
         ('not tr.AtLeast(goto("hall"), 3)', 'not tr.AtLeast(goto("hall"), 2)', ['it follows from "r1"', ""]),
@@ -171,12 +171,12 @@ def test_a_name_that_the_world_lacks_is_told() -> None:
         (NO_OFFICE, 'not tr.Exists(say("hush"))', ["", ""]),
     ],
 )
-def test_rules_that_follow_from_others_are_told(one: str, other: str, told: list[str]) -> None:
+def test_redundant_rules_have_a_warning(one: str, other: str, warnings: list[str]) -> None:
     found = review_rules(rules(one, other))
-    assert [next(iter(review.warnings), "") for review in found] == told
+    assert [next(iter(review.warnings), "") for review in found] == warnings
 
 
-def test_rules_that_cannot_be_kept_together_are_told() -> None:
+def test_contradictory_rules_have_a_warning() -> None:
     (always,) = rules(NO_OFFICE)
     (end,) = rules('tr.Exists(goto("office"))', when="finally")
     _, review = review_rules([always, Rule("end", "Go there.", end.formula, "finally")])
@@ -185,15 +185,15 @@ def test_rules_that_cannot_be_kept_together_are_told() -> None:
     assert review_rules(several)[1].warnings == ('it cannot be kept together with "r0"',)
 
 
-def test_steps_are_told_with_all_that_rules_speak_of() -> None:
+def test_step_sentence_shows_everything_that_rules_compare() -> None:
     asked = Event("ask", "x", (Option("tea"),), "tea", place="hall", holding="mug", to="carol")
-    told = 'asks "…" [tea] of "carol" in hall holding "mug" and hears "tea"'
-    assert step_sentence(asked) == told
+    sentence = 'asks "…" [tea] of "carol" in hall holding "mug" and hears "tea"'
+    assert step_sentence(asked) == sentence
     assert step_sentence(Event("check", "mug", found=False)) == 'looks for "mug": not found'
     assert step_sentence(Event("goto", "")) == 'drives to "…"'
 
 
-def leaving(name: str, formula: str) -> Rule:
+def leaving_rule(name: str, formula: str) -> Rule:
     return Rule(name, "Leave it so.", parse(formula), "leaving")
 
 
@@ -201,8 +201,8 @@ LOCKED = 'not tr.AfterLast(place("glass")).Exists(pick("glass"))'
 
 
 @pytest.mark.parametrize("world", [None, WORLD], ids=["anywhere", "in a world"])
-def test_examples_of_a_leaving_rule_are_about_the_end(world: World | None) -> None:
-    (review,) = review_rules([leaving("locked", LOCKED)], world)
+def test_examples_of_a_leaving_rule_show_the_end(world: World | None) -> None:
+    (review,) = review_rules([leaving_rule("locked", LOCKED)], world)
     assert review.keeps is not None
     assert review.breaks is not None
     assert [event.kind for event in review.keeps] == ["pick", "place"]
@@ -220,16 +220,16 @@ def test_examples_of_a_leaving_rule_are_about_the_end(world: World | None) -> No
 )
 def test_leaving_rules_are_compared_with_others(when: str, warnings: list[str]) -> None:
     (other,) = rules(LOCKED, when=when)
-    other = leaving("r0", LOCKED) if when == "leaving" else other
-    found = review_rules([other, leaving("leave", LOCKED)])
+    other = leaving_rule("r0", LOCKED) if when == "leaving" else other
+    found = review_rules([other, leaving_rule("leave", LOCKED)])
     assert [next(iter(review.warnings), "") for review in found] == warnings
 
 
-def test_leaving_rule_that_no_program_can_keep_with_another_is_reported() -> None:
+def test_leaving_rule_that_contradicts_another_has_a_warning() -> None:
     (silent,) = rules('not tr.Exists(say(".*"))')
-    found = review_rules([silent, leaving("bye", 'tr.Exists(say("bye"))')])
+    found = review_rules([silent, leaving_rule("bye", 'tr.Exists(say("bye"))')])
     assert found[1].warnings == ('it cannot be kept together with "r0"',)
-    (review,) = review_rules([leaving("never", 'tr.Exists(say("a")) and not tr.Exists(say("a"))')])
+    (review,) = review_rules([leaving_rule("never", 'tr.Exists(say("a")) and not tr.Exists(say("a"))')])
     assert IMPOSSIBLE in review.warnings
 
 
@@ -248,7 +248,7 @@ def test_the_monitor_agrees_with_every_example() -> None:
         ('not tr.Exists(at("lab 2", goto("hall")))', [("lab 2", "hall"), ("hall", "lab 2")]),
     ],
 )
-def test_a_room_whose_name_is_a_regex_has_examples_in_its_words(
+def test_examples_use_words_that_match_the_regex_of_a_room(
     formula: str, breaks: list[tuple[str, str]]
 ) -> None:
     world = World((Room("hall"), Room("lab [12]"), Room("acme inc.")), "hall")

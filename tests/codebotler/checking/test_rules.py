@@ -1,4 +1,4 @@
-"""Files of house rules, what is wrong with them, and the check of programs by them."""
+"""Files of house rules: how they are read, their mistakes, and checks of programs against them."""
 
 from pathlib import Path
 
@@ -23,18 +23,18 @@ rules:
     finally: tr.AfterLast(goto(without("start_loc"))).Exists(at("start_loc", say(".+")))
 """
 ROOMS = ["start_loc", "kitchen", "server room", "alice's office"]
-HOLDS = 'not tr.Exists(goto("attic"))'
-TWICE = f"  - name: a\n    says: b\n    always: '{HOLDS}'\n"
+ATTIC = 'not tr.Exists(goto("attic"))'
+TWICE = f"  - name: a\n    says: b\n    always: '{ATTIC}'\n"
 
 
-def rules_in(folder: Path, text: str = RULES) -> Path:
+def write_rules(folder: Path, text: str = RULES) -> Path:
     path = folder / "rules.yaml"
     path.write_text(text)
     return path
 
 
 def test_rules_are_read_in_order(tmp_path: Path) -> None:
-    rules = read_rules(rules_in(tmp_path))
+    rules = read_rules(write_rules(tmp_path))
     assert [(rule.name, rule.when, rule.refuse) for rule in rules] == [
         ("server-room", "always", False),
         ("knock", "always", False),
@@ -42,14 +42,14 @@ def test_rules_are_read_in_order(tmp_path: Path) -> None:
     ]
     assert rules[0].says == "Never go into the server room."
     (refusing,) = read_rules(
-        rules_in(tmp_path, f"rules: [{{name: a, says: b, always: '{HOLDS}', refuse: true}}]")
+        write_rules(tmp_path, f"rules: [{{name: a, says: b, always: '{ATTIC}', refuse: true}}]")
     )
     assert refusing.refuse
 
 
-def test_a_sentence_on_several_lines_is_one_line(tmp_path: Path) -> None:
-    text = f"rules:\n  - name: a\n    says: |\n      Stay\n      out.\n    always: '{HOLDS}'\n"
-    assert [rule.says for rule in read_rules(rules_in(tmp_path, text))] == ["Stay out."]
+def test_sentence_on_several_lines_becomes_one_line(tmp_path: Path) -> None:
+    text = f"rules:\n  - name: a\n    says: |\n      Stay\n      out.\n    always: '{ATTIC}'\n"
+    assert [rule.says for rule in read_rules(write_rules(tmp_path, text))] == ["Stay out."]
 
 
 EACH_ROOM = """
@@ -61,19 +61,19 @@ rules:
 """
 
 
-def test_a_rule_for_each_room_is_written_once(tmp_path: Path) -> None:
-    (rule,) = read_rules(rules_in(tmp_path, EACH_ROOM))
+def test_for_each_applies_one_rule_to_each_room(tmp_path: Path) -> None:
+    (rule,) = read_rules(write_rules(tmp_path, EACH_ROOM))
     assert str(rule.formula) == (
         'not tr.AtLeast(at("kitchen", mention(".*")), 3) and '
         'not tr.AtLeast(at("alice\'s office", mention(".*")), 3)'
     )
-    (alone,) = read_rules(rules_in(tmp_path, EACH_ROOM.replace("[kitchen, alice's office]", "[kitchen]")))
+    (alone,) = read_rules(write_rules(tmp_path, EACH_ROOM.replace("[kitchen, alice's office]", "[kitchen]")))
     assert str(alone.formula) == 'not tr.AtLeast(at("kitchen", mention(".*")), 3)'
     program = "def task_program():\n" + "".join(
         f"    go_to({room!r})\n" + "    ask('', 'Tea?', ['yes', 'no'])\n" * number
         for room, number in (("kitchen", 2), ("alice's office", 3))
     )
-    found = check(program, rooms=ROOMS, house_rules=read_rules(rules_in(tmp_path, EACH_ROOM)))
+    found = check(program, rooms=ROOMS, house_rules=read_rules(write_rules(tmp_path, EACH_ROOM)))
     assert [problem.line for problem in found.problems] == [8]
 
 
@@ -98,26 +98,26 @@ rules:
         ('say(words("{metal}", "x{2}"))', r'say(words(r"fork|pan \(old\)", "x{2}"))'),
     ],
 )
-def test_sets_stand_for_any_of_their_names(tmp_path: Path, element: str, expanded: str) -> None:
-    (rule,) = read_rules(rules_in(tmp_path, SETS.replace("{}", element)))
+def test_set_matches_any_of_its_names(tmp_path: Path, element: str, expanded: str) -> None:
+    (rule,) = read_rules(write_rules(tmp_path, SETS.replace("{}", element)))
     assert str(rule.formula) == f"not tr.Exists({expanded})"
 
 
-def test_a_rule_for_each_name_of_a_set(tmp_path: Path) -> None:
+def test_for_each_applies_one_rule_to_each_name_of_a_set(tmp_path: Path) -> None:
     text = SETS.replace("{}", 'at("{each}", pick("{metal}"))')
     text = text.replace("says:", "for_each: wet rooms\n    says:")
-    (rule,) = read_rules(rules_in(tmp_path, text))
+    (rule,) = read_rules(write_rules(tmp_path, text))
     assert str(rule.formula) == " and ".join(
         rf'not tr.Exists(at("{room}", pick(r"fork|pan \(old\)")))' for room in ("bathroom", "alice's shower")
     )
 
 
-OF_NO_SET = SETS.replace("{}", 'pick("{each}")').replace("says:", "for_each: meta\n    says:")
+UNKNOWN_SET = SETS.replace("{}", 'pick("{each}")').replace("says:", "for_each: meta\n    says:")
 LEAVING = "rules:\n  - name: a\n    says: b\n    leaving: last_found('door')\n    refuse: true\n"
 
 
 def test_leaving_rule_may_be_false_at_first_and_refuse(tmp_path: Path) -> None:
-    (rule,) = read_rules(rules_in(tmp_path, LEAVING))
+    (rule,) = read_rules(write_rules(tmp_path, LEAVING))
     assert (rule.when, rule.refuse) == ("leaving", True)
 
 
@@ -131,7 +131,7 @@ def test_leaving_rule_may_be_false_at_first_and_refuse(tmp_path: Path) -> None:
         (SETS.replace('[fork, "pan (old)"]', "[]"), 3, ['"metal"']),
         (SETS.replace('[fork, "pan (old)"]', "fork"), 3, ['"metal"']),
         (SETS.replace("fork", "1"), 3, []),
-        (OF_NO_SET, 7, ["no set meta;", "metal, wet rooms"]),
+        (UNKNOWN_SET, 7, ["no set meta;", "metal, wet rooms"]),
         (EACH_ROOM.replace("{each}", "{metal}"), 6, ['"for_each"']),
         (EACH_ROOM.replace("{each}", "{each}{metal}"), 6, ["no set metal", '"sets"']),
         (LEAVING.replace("refuse: true", "always: 'x'"), 4, ["exactly one"]),
@@ -145,18 +145,18 @@ def test_leaving_rule_may_be_false_at_first_and_refuse(tmp_path: Path) -> None:
         ("rules: []\n", 1, ['"rules"']),
         ("rules:\n  - name: a\n    says: b\n", 2, ['"a"', '"always"', '"finally"']),
         (
-            f"rules:\n  - name: a\n    says: b\n    always: '{HOLDS}'\n    finally: '{HOLDS}'\n",
+            f"rules:\n  - name: a\n    says: b\n    always: '{ATTIC}'\n    finally: '{ATTIC}'\n",
             5,
             ["exactly one"],
         ),
-        (f"rules:\n  - name: Big\n    says: b\n    always: '{HOLDS}'\n", 2, ['"name"', "lower-case letters"]),
+        (f"rules:\n  - name: Big\n    says: b\n    always: '{ATTIC}'\n", 2, ['"name"', "lower-case letters"]),
         (
-            f"rules:\n  - name: a\n    say: b\n    always: '{HOLDS}'\n",
+            f"rules:\n  - name: a\n    say: b\n    always: '{ATTIC}'\n",
             3,
             ['"say" is unknown', "spelling"],
         ),
         (
-            f"rules:\n  name: a\n  says: b\n  always: '{HOLDS}'\n",
+            f"rules:\n  name: a\n  says: b\n  always: '{ATTIC}'\n",
             1,
             ['"rules" is {', 'entries begin with "- "'],
         ),
@@ -171,8 +171,8 @@ def test_leaving_rule_may_be_false_at_first_and_refuse(tmp_path: Path) -> None:
             4,
             ["quotes around it"],
         ),
-        (f"rules:\n  - name: a\n    always: '{HOLDS}'\n", 2, ['"says"', "missing"]),
-        (f"rules:\n  - name: a\n    says: b\n    whenever: '{HOLDS}'\n", 4, ['"whenever"']),
+        (f"rules:\n  - name: a\n    always: '{ATTIC}'\n", 2, ['"says"', "missing"]),
+        (f"rules:\n  - name: a\n    says: b\n    whenever: '{ATTIC}'\n", 4, ['"whenever"']),
         (
             "rules:\n  - name: a\n    says: b\n    always: not tr.Exist(goto('x'))\n",
             4,
@@ -184,7 +184,7 @@ def test_leaving_rule_may_be_false_at_first_and_refuse(tmp_path: Path) -> None:
             4,
             ["before anything", 'not tr.Last(goto(".*")) or ..., or'],
         ),
-        (f"rules:\n  - name: a\n    says: b\n    finally: '{HOLDS}'\n    refuse: true\n", 5, ['"refuse"']),
+        (f"rules:\n  - name: a\n    says: b\n    finally: '{ATTIC}'\n    refuse: true\n", 5, ['"refuse"']),
         (f"rules:\n{TWICE}{TWICE}", 5, ['"a"', "twice"]),
         (
             "rules:\n  - name: a\n    says: b\n    always: not tr.Exists(say('knock.*door'))\n",
@@ -193,10 +193,10 @@ def test_leaving_rule_may_be_false_at_first_and_refuse(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_each_fault_is_one_sentence_with_file_and_line(
+def test_fault_is_a_one_line_error_with_file_and_line(
     tmp_path: Path, text: str, line: int, named: list[str]
 ) -> None:
-    path = rules_in(tmp_path, text)
+    path = write_rules(tmp_path, text)
     with pytest.raises(UserError) as caught:
         read_rules(path)
     assert (caught.value.file, caught.value.line) == (path, line)
@@ -209,7 +209,7 @@ def test_each_fault_is_one_sentence_with_file_and_line(
 
 def problems(tmp_path: Path, *body: str) -> list[str]:
     program = "def task_program():\n" + "".join(f"    {line}\n" for line in body)
-    found = check(program, rooms=ROOMS, house_rules=read_rules(rules_in(tmp_path)))
+    found = check(program, rooms=ROOMS, house_rules=read_rules(write_rules(tmp_path)))
     return [problem.sentence for problem in found.problems]
 
 
@@ -220,7 +220,7 @@ def test_a_program_that_keeps_all_rules_is_accepted(tmp_path: Path) -> None:
     assert problems(tmp_path, "go_to('kitchen')", "say('knock')", 'go_to("alice\'s office")', *RETURNS) == []
 
 
-def test_a_rule_that_is_broken_somewhere_is_a_problem_with_line_rule_and_world(tmp_path: Path) -> None:
+def test_broken_rule_is_a_problem_with_line_rule_and_world(tmp_path: Path) -> None:
     (problem,) = problems(
         tmp_path, "go_to('kitchen')", "if is_in_room('mug'):", "    go_to('server room')", *RETURNS
     )
@@ -230,7 +230,7 @@ def test_a_rule_that_is_broken_somewhere_is_a_problem_with_line_rule_and_world(t
     )
 
 
-def test_two_rules_that_are_broken_at_one_line_are_two_problems(tmp_path: Path) -> None:
+def test_two_rules_broken_at_one_line_are_two_problems(tmp_path: Path) -> None:
     found = problems(
         tmp_path,
         "room = 'server room' if is_in_room('mug') else \"alice's office\"",
@@ -242,7 +242,7 @@ def test_two_rules_that_are_broken_at_one_line_are_two_problems(tmp_path: Path) 
     assert all(problem.startswith("line 4: RuleViolation: ") for problem in found)
 
 
-def test_a_rule_that_is_not_kept_at_the_end_is_a_problem_without_a_line(tmp_path: Path) -> None:
+def test_rule_broken_at_the_end_is_a_problem_without_a_line(tmp_path: Path) -> None:
     (problem,) = problems(tmp_path, "go_to('kitchen')")
     assert problem.startswith('RuleViolation: the rule "report" is not kept at the end: At the end, tell')
 
@@ -250,7 +250,7 @@ def test_a_rule_that_is_not_kept_at_the_end_is_a_problem_without_a_line(tmp_path
 def test_leaving_rule_is_a_problem_at_the_drive_or_at_the_end(tmp_path: Path) -> None:
     locked = 'not tr.AfterLast(say("^closed")).Exists(say("^opened"))'
     text = f"rules: [{{name: locked, says: Lock up., leaving: '{locked}'}}]"
-    house_rules = read_rules(rules_in(tmp_path, text))
+    house_rules = read_rules(write_rules(tmp_path, text))
     program = "def task_program():\n    say('opened')\n    {}\n    go_to('kitchen')\n    {}\n"
     for first, last, line in (
         ("say('hello')", "say('closed')", 4),
@@ -261,8 +261,8 @@ def test_leaving_rule_is_a_problem_at_the_drive_or_at_the_end(tmp_path: Path) ->
         assert [problem.line for problem in found.problems] == ([] if line == 0 else [line])
 
 
-def test_worlds_are_looked_for_that_lead_into_every_branch(tmp_path: Path) -> None:
-    """Nested questions, each of which goes on with the last of four options only."""
+def test_checks_find_worlds_that_lead_into_every_branch(tmp_path: Path) -> None:
+    """Only the last of four options of each nested question leads to the broken rule."""
     options = "['a', 'b', 'c', 'd']"
     (problem,) = problems(
         tmp_path,
@@ -274,7 +274,7 @@ def test_worlds_are_looked_for_that_lead_into_every_branch(tmp_path: Path) -> No
     assert problem.startswith("line 4: RuleViolation")
 
 
-BOB = """rules:
+MISSPELT_ROOM = """rules:
   - name: bob
     says: Leave Bob alone.
     always: >-
@@ -283,14 +283,14 @@ BOB = """rules:
 HOUSE = ["hall", "bob's office", "server room|vault"]
 
 
-def test_a_misspelt_room_is_refused_with_its_line_and_the_closest_name(tmp_path: Path) -> None:
-    path = rules_in(tmp_path, BOB)
+def test_misspelt_room_is_refused_with_its_line_and_the_closest_name(tmp_path: Path) -> None:
+    path = write_rules(tmp_path, MISSPELT_ROOM)
     with pytest.raises(UserError) as caught:
         read_rules(path, rooms=HOUSE)
     assert (caught.value.file, caught.value.line) == (path, 4)
     for named in ('"bobs office"', '"bob\'s office"', '"any: true"'):
         assert named in caught.value.sentence
-    assert len(read_rules(path)) == 1, "where no room is known, none is misspelt"
+    assert len(read_rules(path)) == 1, "without known rooms, no name can be misspelt"
 
 
 @pytest.mark.parametrize(
@@ -303,10 +303,8 @@ def test_a_misspelt_room_is_refused_with_its_line_and_the_closest_name(tmp_path:
         ("says:", "any: true\n    says:"),
     ],
 )
-def test_a_rule_may_name_what_a_house_has_and_any_room_where_it_says_so(
-    tmp_path: Path, old: str, new: str
-) -> None:
-    (rule,) = read_rules(rules_in(tmp_path, BOB.replace(old, new)), rooms=HOUSE)
+def test_rule_may_name_known_rooms_or_allow_any_room(tmp_path: Path, old: str, new: str) -> None:
+    (rule,) = read_rules(write_rules(tmp_path, MISSPELT_ROOM.replace(old, new)), rooms=HOUSE)
     assert rule.any_room is ("any" in new)
 
 
@@ -319,12 +317,12 @@ def test_a_rule_may_name_what_a_house_has_and_any_room_where_it_says_so(
     ],
 )
 def test_a_misspelt_room_is_found_anywhere_in_a_rule(tmp_path: Path, formula: str) -> None:
-    text = BOB.replace('not tr.Exists(goto("bobs office"))', formula)
+    text = MISSPELT_ROOM.replace('not tr.Exists(goto("bobs office"))', formula)
     with pytest.raises(UserError, match="bobs office"):
-        read_rules(rules_in(tmp_path, text), rooms=HOUSE)
+        read_rules(write_rules(tmp_path, text), rooms=HOUSE)
 
 
-def test_a_misspelled_room_in_a_set_is_refused(tmp_path: Path) -> None:
+def test_misspelt_room_in_a_set_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "house.yaml"
     path.write_text(
         "sets: {forbidden: [server room, valt]}\nrules:\n  - name: out\n    says: Stay out.\n"

@@ -1,4 +1,4 @@
-"""What the text of a program gives to its skills, without running it."""
+"""The arguments that a program's text gives to its skills are found without a run."""
 
 import pytest
 
@@ -11,7 +11,7 @@ def read(*lines: str) -> WrittenArguments:
     return read_arguments("def task_program():\n    " + "\n    ".join(lines) + "\n", SKILLS)
 
 
-def said(*lines: str) -> tuple[set[str], bool]:
+def said_texts(*lines: str) -> tuple[set[str], bool]:
     """Return the texts of `say`, and whether there are no others."""
     found = read(*lines).skills["say"]["message"]
     return set(map(str, found)), ANY_TEXT not in found
@@ -36,8 +36,8 @@ def said(*lines: str) -> tuple[set[str], bool]:
         (["rooms = ['a', 'b']", "rooms.append('c')", "for room in rooms:", "    say(room)"], {"a", "b", "c"}),
     ],
 )
-def test_known_texts(lines: list[str], texts: set[str]) -> None:
-    assert said(*lines) == (texts, True)
+def test_texts_are_known_if_the_program_composes_them(lines: list[str], texts: set[str]) -> None:
+    assert said_texts(*lines) == (texts, True)
 
 
 @pytest.mark.parametrize(
@@ -63,8 +63,8 @@ def test_known_texts(lines: list[str], texts: set[str]) -> None:
         ["x = 'a'", "for _ in range(3):", "    x = x + x", "say(x)"],
     ],
 )
-def test_texts_that_may_be_anything(lines: list[str]) -> None:
-    assert not said(*lines)[1]
+def test_texts_that_depend_on_more_than_the_source_are_unbounded(lines: list[str]) -> None:
+    assert not said_texts(*lines)[1]
 
 
 def test_lists_of_options_are_read() -> None:
@@ -72,7 +72,7 @@ def test_lists_of_options_are_read() -> None:
     assert set(map(str, found)) == {"yes", "no"}
 
 
-def test_a_name_that_the_program_binds_is_no_skill() -> None:
+def test_name_that_the_program_binds_is_not_a_skill() -> None:
     assert "say" not in read("def say(x):", "    pass", "say('a')").skills
 
 
@@ -108,10 +108,10 @@ def test_a_name_that_the_program_binds_is_no_skill() -> None:
         ("from collections import Counter; Counter()", False),
     ],
 )
-def test_clocks_and_random_numbers(line: str, *, reads: bool) -> None:
+def test_reads_clock_if_the_program_may_reach_a_clock_or_random_numbers(line: str, *, reads: bool) -> None:
     assert read(line).reads_clock is reads
 
 
-def test_a_text_that_cannot_be_parsed_tells_nothing() -> None:
+def test_unparsable_program_has_unbounded_texts() -> None:
     found = read_arguments("(" * 5_000 + ")" * 5_000, SKILLS)
     assert all(ANY_TEXT in one for texts in found.skills.values() for one in texts.values())

@@ -1,4 +1,4 @@
-"""Properties that are computed once: also in a process that was forked in the middle."""
+"""`cached_property` computes once, and a fork during a computation does not block the child."""
 
 import os
 import signal
@@ -10,7 +10,7 @@ from codebotler.core.cachedproperty import cached_property
 
 
 class Slow:
-    """Computes as long as it is told to."""
+    """Holds its computation until `go_on` is set or `patience` seconds have passed."""
 
     def __init__(self, patience: float) -> None:
         self.patience, self.computed = patience, 0
@@ -25,14 +25,14 @@ class Slow:
         return self.computed
 
 
-def test_it_is_computed_once() -> None:
+def test_property_is_computed_once() -> None:
     slow = Slow(0)
     assert [slow.value, slow.value] == [1, 1]
     assert Slow.value.__doc__ == "How often it was computed."
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
-def test_a_forked_process_does_not_wait_for_a_thread_that_is_not_there() -> None:
+def test_forked_process_does_not_wait_for_a_thread_of_its_parent() -> None:
     slow, quick = Slow(20), Slow(0)
     other = threading.Thread(target=lambda: slow.value)
     other.start()

@@ -1,4 +1,4 @@
-"""Files are read or refused in a sentence; logs and replaced files survive a crash."""
+"""A read returns text or one clear error; logs and replaced files survive a crash."""
 
 import errno
 import os
@@ -23,12 +23,12 @@ from codebotler.core.files import (
 NOBODY = 65534
 
 
-def test_byte_order_mark_is_no_part_of_the_text() -> None:
+def test_byte_order_mark_is_dropped() -> None:
     assert decode_text(b"\xef\xbb\xbfdef f(): ...\r\n", "f.py") == "def f(): ...\n"
 
 
-def test_missing_file_folder_no_utf8_and_too_large_are_told_in_a_sentence(tmp_path: Path) -> None:
-    def refused(path: Path, fault: str, line: int | None = None) -> None:
+def test_unreadable_file_is_an_error_with_file_and_line(tmp_path: Path) -> None:
+    def assert_refused(path: Path, fault: str, line: int | None = None) -> None:
         with pytest.raises(UserError, match=re.escape(fault)) as caught:
             read_text(path)
         assert (caught.value.file, caught.value.line) == (path, line)
@@ -36,19 +36,19 @@ def test_missing_file_folder_no_utf8_and_too_large_are_told_in_a_sentence(tmp_pa
     latin, large = tmp_path / "latin.yaml", tmp_path / "large.yaml"
     latin.write_bytes("a: 1\nb: café\n".encode("latin-1"))
     large.write_bytes(b"a" * (MAX_FILE_BYTES + 1))
-    refused(tmp_path / "no.yaml", "No such file")
-    refused(tmp_path, "Is a directory")
-    refused(latin, "UTF-8", 2)
-    refused(large, "5,000,000 bytes")
-    refused(latin / "inside", "(Not a directory)")
+    assert_refused(tmp_path / "no.yaml", "No such file")
+    assert_refused(tmp_path, "Is a directory")
+    assert_refused(latin, "UTF-8", 2)
+    assert_refused(large, "5,000,000 bytes")
+    assert_refused(latin / "inside", "(Not a directory)")
 
 
-def test_file_without_an_end_is_too_large_instead_of_being_read_for_ever() -> None:
+def test_endless_file_is_refused_as_too_large() -> None:
     with pytest.raises(UserError, match=r"/dev/zero: .*\b10 bytes"):
         read_text(Path("/dev/zero"), limit=10)
 
 
-def test_line_ends_of_every_system_are_read_as_one(tmp_path: Path) -> None:
+def test_line_ends_of_every_system_become_newlines(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     path.write_bytes("ä\r\nb\rc\n".encode())
     assert read_text(path) == "ä\nb\nc\n"
@@ -58,7 +58,7 @@ def test_line_ends_of_every_system_are_read_as_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("torn", [b"", b"{", b"x" * 100_000])
-def test_a_torn_last_line_is_cut_off_before_more_are_added(tmp_path: Path, torn: bytes) -> None:
+def test_torn_last_line_is_removed_before_appending(tmp_path: Path, torn: bytes) -> None:
     path = tmp_path / "a.jsonl"
     path.write_bytes(b"1\n2\n" + torn)
     log = Appender(path)
@@ -67,7 +67,7 @@ def test_a_torn_last_line_is_cut_off_before_more_are_added(tmp_path: Path, torn:
     assert path.read_bytes() == b"1\n2\n3\n"
 
 
-def test_a_log_is_locked_before_it_is_mended(tmp_path: Path) -> None:
+def test_log_is_locked_before_its_torn_line_is_removed(tmp_path: Path) -> None:
     path = tmp_path / "a.jsonl"
     log = Appender(path, exclusive=True)
     path.write_bytes(b"1\n2")
@@ -79,19 +79,19 @@ def test_a_log_is_locked_before_it_is_mended(tmp_path: Path) -> None:
     assert path.read_bytes() == b"1\n"
 
 
-def test_a_line_that_does_not_fit_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_line_is_removed_if_the_disk_is_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.jsonl"
     log = Appender(path)
     log.append(b"1\n")
     real, sizes = os.write, iter([3, None])
 
-    def full(file: int, data: bytes) -> int:
+    def write_until_full(file: int, data: bytes) -> int:
         size = next(sizes)
         if size is None:
             raise OSError(28, "No space left on device")
         return real(file, data[:size])
 
-    monkeypatch.setattr(os, "write", full)
+    monkeypatch.setattr(os, "write", write_until_full)
     with pytest.raises(OSError, match=re.escape(str(path))):
         log.append(b"12345\n")
     monkeypatch.undo()
@@ -99,7 +99,7 @@ def test_a_line_that_does_not_fit_is_taken_back(tmp_path: Path, monkeypatch: pyt
     assert path.read_bytes() == b"1\n"
 
 
-def test_a_file_that_is_not_finished_leaves_the_old_one(tmp_path: Path) -> None:
+def test_unfinished_replacement_keeps_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.write_bytes(b"old")
     with pytest.raises(KeyboardInterrupt), open_replacement(path):
@@ -108,13 +108,13 @@ def test_a_file_that_is_not_finished_leaves_the_old_one(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_folder_is_made_with_those_above_it(tmp_path: Path) -> None:
+def test_make_folder_creates_missing_parents(tmp_path: Path) -> None:
     for _ in range(2):
         make_folder(tmp_path / "state" / "missions")
         assert (tmp_path / "state" / "missions").is_dir()
 
 
-def test_a_folder_that_cannot_be_written_to_is_refused() -> None:
+def test_read_only_folder_is_refused() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         folder.chmod(0o555)
@@ -130,22 +130,22 @@ def test_a_folder_that_cannot_be_written_to_is_refused() -> None:
             folder.chmod(0o755)
 
 
-def test_a_folder_that_cannot_be_synced_is_told_only_where_the_disk_is_broken(
+def test_failed_folder_sync_is_an_error_only_if_the_disk_is_broken(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     numbers = iter([errno.EINVAL, errno.EIO])
 
-    def refused(_descriptor: int) -> None:
+    def fail_to_sync(_descriptor: int) -> None:
         raise OSError(next(numbers), "refused")
 
-    monkeypatch.setattr(os, "fsync", refused)
-    sync_folder(tmp_path)  # many a file system brings no folder to the disk
+    monkeypatch.setattr(os, "fsync", fail_to_sync)
+    sync_folder(tmp_path)  # many file systems cannot sync a folder
     with pytest.raises(OSError, match=str(tmp_path)):
         sync_folder(tmp_path)
 
 
 @pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
-def test_utf_16_is_refused_by_its_name(encoding: str, tmp_path: Path) -> None:
+def test_utf_16_error_names_the_encoding(encoding: str, tmp_path: Path) -> None:
     path = tmp_path / "rows.jsonl"
     path.write_text('\ufeff{"a": 1}\n', encoding=encoding)
     for read in (read_text, lambda path: list(read_lines(path))):

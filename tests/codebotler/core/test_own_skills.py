@@ -1,4 +1,4 @@
-"""Files of own skills: what they declare, and the sentence where something is wrong with them."""
+"""Files of own skills: the declarations that they may hold, and the error for each mistake."""
 
 import pickle
 import subprocess
@@ -31,7 +31,7 @@ from codebotler.simulator.settings import PAPER_SETTINGS
 from codebotler.simulator.worlds.robot import SimulatedRobot
 
 HEAD = "from enum import Enum\nfrom typing import Literal\nfrom codebotler import Simulation, skill\n"
-EVERY = (
+TYPED_SKILLS = (
     HEAD
     + """
 class Colour(Enum):
@@ -75,13 +75,13 @@ def nothing(sim: Simulation) -> None:
 """
 )
 WORLD = World((Room("hall"),), "hall")
-ROADS = {"tame": "", "wild": "import collections\n"}
+FIRST_LINES = {"tame": "", "wild": "import collections\n"}
 
 
-@pytest.fixture(scope="module", name="every")
-def every_(tmp_path_factory: pytest.TempPathFactory) -> SkillTable:
+@pytest.fixture(scope="module", name="typed")
+def typed_(tmp_path_factory: pytest.TempPathFactory) -> SkillTable:
     path = tmp_path_factory.mktemp("skills") / "every.py"
-    path.write_text(EVERY)
+    path.write_text(TYPED_SKILLS)
     return skills_from(path)
 
 
@@ -91,20 +91,20 @@ def pool_() -> WorkerPool:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def closed(pool: WorkerPool) -> object:
+def open_pool(pool: WorkerPool) -> object:
     with pool:
         yield
 
 
-def ran(pool: WorkerPool, skills: SkillTable, lines: Sequence[str], road: str) -> Outcome:
-    program = ROADS[road] + "def task_program():\n" + "".join(f"    {line}\n" for line in lines)
+def run(pool: WorkerPool, skills: SkillTable, lines: Sequence[str], tameness: str) -> Outcome:
+    program = FIRST_LINES[tameness] + "def task_program():\n" + "".join(f"    {line}\n" for line in lines)
     robot = partial(SimulatedRobot, WORLD, PAPER_SETTINGS, skills)
     ((outcome,),) = pool.here().run_all([(program, [robot])])
     return outcome
 
 
-@pytest.mark.parametrize("road", ROADS)
-def test_values_of_every_type_go_there_and_back(pool: WorkerPool, every: SkillTable, road: str) -> None:
+@pytest.mark.parametrize("tameness", FIRST_LINES)
+def test_every_type_survives_the_round_trip(pool: WorkerPool, typed: SkillTable, tameness: str) -> None:
     lines = [
         "assert text('a') == 'a!'",
         "assert whole(-3) == -2",
@@ -114,7 +114,7 @@ def test_values_of_every_type_go_there_and_back(pool: WorkerPool, every: SkillTa
         "assert many([1, 2], ['b']) == ['1', '2', 'b']",
         "assert nothing() is None",
     ]
-    outcome = ran(pool, every, lines, road)
+    outcome = run(pool, typed, lines, tameness)
     assert outcome.error is None
     assert trace_data(outcome.trace) == [
         ["text", "a"],
@@ -128,7 +128,7 @@ def test_values_of_every_type_go_there_and_back(pool: WorkerPool, every: SkillTa
     ]
 
 
-@pytest.mark.parametrize("road", ROADS)
+@pytest.mark.parametrize("tameness", FIRST_LINES)
 @pytest.mark.parametrize(
     ("call", "kind", "message"),
     [
@@ -148,16 +148,16 @@ def test_values_of_every_type_go_there_and_back(pool: WorkerPool, every: SkillTa
         ("nothing(1)", "TypeError", "nothing() takes 0 positional arguments but 1 was given"),
     ],
 )
-def test_what_a_skill_does_not_take_is_an_error_of_the_program_and_no_event(  # noqa: PLR0917 - of a table
-    pool: WorkerPool, every: SkillTable, road: str, call: str, kind: str, message: str
+def test_wrong_argument_is_a_program_error_without_an_event(  # noqa: PLR0917 - a row of a table
+    pool: WorkerPool, typed: SkillTable, tameness: str, call: str, kind: str, message: str
 ) -> None:
-    outcome = ran(pool, every, [call], road)
+    outcome = run(pool, typed, [call], tameness)
     assert outcome.error is not None
     assert (outcome.status, outcome.error.kind, outcome.trace) == (Status.PYTHON_ERROR, kind, ())
     assert outcome.error.message.startswith(message)
 
 
-def test_traces_with_several_arguments_are_read_as_they_were_written() -> None:
+def test_trace_with_several_arguments_survives_the_round_trip() -> None:
     trace = (Event("paint", "red", more=("wall",)), Event("put", "a", found=True, more=("b", "c")))
     assert trace_from(trace_data(trace)) == trace
 
@@ -177,7 +177,7 @@ def test_traces_with_several_arguments_are_read_as_they_were_written() -> None:
         ("tr.Exists(returned(True, truth(True)))", False),
     ],
 )
-def test_formulas_compare_all_arguments_and_results(every: SkillTable, formula: str, expected: bool) -> None:  # noqa: FBT001 - a value of pytest
+def test_formulas_compare_all_arguments_and_results(typed: SkillTable, formula: str, expected: bool) -> None:  # noqa: FBT001 - a row of a table
     trace = (
         Event("paint", "red", more=("wall",)),
         Event("whole", "-3"),
@@ -185,12 +185,12 @@ def test_formulas_compare_all_arguments_and_results(every: SkillTable, formula: 
         Event("truth", "true", found=False),
         Event("nothing", ""),
     )
-    parsed = parse(formula, skills=every)
+    parsed = parse(formula, skills=typed)
     assert holds(parsed, trace) is expected
-    assert parse(str(parsed), skills=every) == parsed
+    assert parse(str(parsed), skills=typed) == parsed
 
 
-def test_names_that_formulas_use_otherwise_are_refused() -> None:
+def test_reserved_names_are_all_words_of_formulas() -> None:
     assert {*WRAPPED_FIELDS, *LOOK_RESULTS, *LAST_LOOKS, *QUESTIONS, *TEXT_WORDS, INSIDE, "tr"} == RTL_WORDS
 
 
@@ -226,7 +226,7 @@ def test_skill_may_not_have_the_name_of_a_state_in_another_file(tmp_path: Path) 
         assert caught.value.file == str(files[1])
 
 
-def test_models_are_shown_types_errors_and_an_example(tmp_path: Path) -> None:
+def test_prompt_shows_types_errors_and_an_example(tmp_path: Path) -> None:
     path = tmp_path / "doors.py"
     path.write_text(
         HEAD + '@skill(fails={"Locked": "it is locked", "Stuck": "it is stuck"}, '
@@ -244,7 +244,7 @@ def test_models_are_shown_types_errors_and_an_example(tmp_path: Path) -> None:
     ) in text
 
 
-BAD = {
+FAULTY_FILES = {
     "@skill\ndef wiggle(): 'Wiggle.'": "must take the simulation first, then the arguments",
     "@skill\ndef wiggle(sim, *who: str) -> None: 'Wiggle.'": "must take the simulation first, then",
     "@skill\ndef wiggle(sim, who) -> None: 'Wiggle.'": "who of wiggle has no type; write who: str",
@@ -285,17 +285,17 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("source", BAD)
-def test_what_is_wrong_with_a_file_is_one_sentence_with_its_line(tmp_path: Path, source: str) -> None:
+@pytest.mark.parametrize("source", FAULTY_FILES)
+def test_faulty_file_is_an_error_with_its_line(tmp_path: Path, source: str) -> None:
     path = tmp_path / "bad.py"
     path.write_text(HEAD + source)
     with pytest.raises(UserError) as caught:
         skills_from(path)
-    assert BAD[source] in str(caught.value)
+    assert FAULTY_FILES[source] in str(caught.value)
     assert caught.value.file is not None
     assert (caught.value.line == 4) is not source.startswith(
         "def wiggle(sim"
-    )  # of no line if none is declared
+    )  # a file without a skill has no line to name
     assert by_name("go_to") is SKILLS["go_to"]
 
 
@@ -306,17 +306,17 @@ def test_what_is_wrong_with_a_file_is_one_sentence_with_its_line(tmp_path: Path,
         ("sim.fail('Other')", 'wiggle declares no error "Other"'),
     ],
 )
-@pytest.mark.parametrize("road", ROADS)
-def test_a_function_that_fails_ends_the_command_with_a_sentence(
-    pool: WorkerPool, tmp_path: Path, body: str, message: str, road: str
+@pytest.mark.parametrize("tameness", FIRST_LINES)
+def test_skill_that_breaks_its_declaration_is_a_user_error(
+    pool: WorkerPool, tmp_path: Path, body: str, message: str, tameness: str
 ) -> None:
     path = tmp_path / "bad.py"
     path.write_text(HEAD + f"@skill\ndef wiggle(sim: Simulation) -> bool:\n    'Wiggle.'\n    {body}\n")
     with pytest.raises(UserError, match=message):
-        ran(pool, skills_from(path), ["wiggle()"], road)
+        run(pool, skills_from(path), ["wiggle()"], tameness)
 
 
-TRUTHS = {
+WRONG_TRUTHS = {
     "reed('a'): 1": "reed is not a skill with an empty body",
     "open_gate('a'): true": "open_gate is not a skill with an empty body",
     "read(3): 1": "its signature is read(what: str) -> int",
@@ -331,19 +331,19 @@ TRUTHS = {
 }
 
 
-@pytest.mark.parametrize("truth", TRUTHS)
-def test_a_truth_that_cannot_be_is_refused_with_its_line(tmp_path: Path, truth: str) -> None:
-    (tmp_path / "lab.py").write_text(READS)
+@pytest.mark.parametrize("truth", WRONG_TRUTHS)
+def test_impossible_truth_is_refused_with_its_line(tmp_path: Path, truth: str) -> None:
+    (tmp_path / "lab.py").write_text(LAB_SKILLS)
     path = tmp_path / "world.yaml"
     path.write_text(f"robot: hall\nrooms: [hall]\ntruths:\n  {truth}\n")
     with pytest.raises(UserError) as caught:
         read_world(path, skills_from(tmp_path / "lab.py"))
-    assert TRUTHS[truth] in str(caught.value)
+    assert WRONG_TRUTHS[truth] in str(caught.value)
     assert caught.value.line == 4
 
 
-def test_truths_say_what_calls_come_to_however_they_are_quoted(tmp_path: Path) -> None:
-    (tmp_path / "lab.py").write_text(READS)
+def test_truths_set_the_results_of_calls_in_any_quotes(tmp_path: Path) -> None:
+    (tmp_path / "lab.py").write_text(LAB_SKILLS)
     path = tmp_path / "world.yaml"
     truths = "read('a'): 7\n  read(\"b\"): Broken\n  gate a is shut: true\n"
     path.write_text(f"robot: hall\nrooms: [hall]\ntruths:\n  {truths}")
@@ -359,7 +359,7 @@ def test_truths_say_what_calls_come_to_however_they_are_quoted(tmp_path: Path) -
     assert read_world(tmp_path / "again.yaml", table) == world
 
 
-READS = (
+LAB_SKILLS = (
     HEAD
     + """
 @skill(fails={"Broken": "it is broken"})
@@ -376,27 +376,27 @@ def open_gate(sim: Simulation, gate: str) -> bool:
 )
 
 
-@pytest.mark.parametrize("road", ROADS)
+@pytest.mark.parametrize("tameness", FIRST_LINES)
 @pytest.mark.parametrize("body", ["return 1 / 0", "raise SystemExit(3)", "return sim.nothing"])
-def test_what_a_function_raises_is_an_error_of_its_skill_and_ends_that_run_only(
-    pool: WorkerPool, tmp_path: Path, body: str, road: str
+def test_exception_in_a_skill_ends_only_that_run(
+    pool: WorkerPool, tmp_path: Path, body: str, tameness: str
 ) -> None:
     path = tmp_path / "bad.py"
     path.write_text(HEAD + f"@skill\ndef wiggle(sim: Simulation) -> bool:\n    'Wiggle.'\n    {body}\n")
-    outcome = ran(pool, skills_from(path), ["say('a')", "wiggle()"], road)
+    outcome = run(pool, skills_from(path), ["say('a')", "wiggle()"], tameness)
     assert outcome.error is not None
     assert (outcome.status, outcome.error.kind, outcome.line) == (
         Status.ROBOT_ERROR,
         "SkillFailed",
-        3 + len(ROADS[road][:1]),
+        3 + len(FIRST_LINES[tameness][:1]),
     )
     assert outcome.error.message.startswith("wiggle failed in bad.py, line 7: ")
     assert "SimulatedRobot" not in outcome.error.message
 
 
-def test_minus_zero_is_zero_to_formulas(pool: WorkerPool, every: SkillTable) -> None:
-    outcome = ran(pool, every, ["share(-0.0)"], "tame")
-    assert holds(parse("tr.Exists(share(0))", skills=every), outcome.trace)
+def test_minus_zero_is_zero_to_formulas(pool: WorkerPool, typed: SkillTable) -> None:
+    outcome = run(pool, typed, ["share(-0.0)"], "tame")
+    assert holds(parse("tr.Exists(share(0))", skills=typed), outcome.trace)
 
 
 @pytest.mark.parametrize(
@@ -411,12 +411,12 @@ def test_minus_zero_is_zero_to_formulas(pool: WorkerPool, every: SkillTable) -> 
         ('tr.Exists(paint("red", "door", "x"))', "paint takes 1 to 2 arguments, not 3"),
     ],
 )
-def test_formulas_that_can_never_match_are_refused(every: SkillTable, formula: str, message: str) -> None:
+def test_formulas_that_can_never_match_are_refused(typed: SkillTable, formula: str, message: str) -> None:
     with pytest.raises(RtlSyntaxError, match=message):
-        parse(formula, skills=every)
+        parse(formula, skills=typed)
 
 
-def test_a_file_may_import_what_lies_beside_it_and_declares_each_name_once(tmp_path: Path) -> None:
+def test_file_may_import_its_neighbours_and_declares_each_name_once(tmp_path: Path) -> None:
     (tmp_path / "my_constants_of_doors.py").write_text("DOOR = 'gate'\n")
     (tmp_path / "lab.py").write_text(
         HEAD
@@ -443,15 +443,15 @@ def test_two_skills_with_one_ros_action_are_refused(tmp_path: Path) -> None:
     [("text(3)", "TypeError"), ("paint('green', 'wall')", "ValueError"), ("whole()", "TypeError")],
 )
 def test_misuse_is_a_problem_even_where_all_errors_are_caught(
-    every: SkillTable, call: str, kind: str
+    typed: SkillTable, call: str, kind: str
 ) -> None:
     program = f"def task_program():\n    try:\n        {call}\n    except {{}}:\n        say('no')\n"
-    (problem,) = check(program.format("Exception"), rooms=["hall"], skills=every).problems
+    (problem,) = check(program.format("Exception"), rooms=["hall"], skills=typed).problems
     assert (problem.kind, problem.line) == (kind, 3)
-    assert check(program.format(kind), rooms=["hall"], skills=every).problems == ()
+    assert check(program.format(kind), rooms=["hall"], skills=typed).problems == ()
 
 
-def test_a_call_of_what_is_not_defined_is_a_problem_even_where_all_errors_are_caught() -> None:
+def test_undefined_call_is_a_problem_even_where_all_errors_are_caught() -> None:
     program = "def task_program():\n    try:\n        {}\n    except Exception:\n        say('no')\n"
     (problem,) = check(program.format("open_hatch('a')"), rooms=["hall"]).problems
     assert (problem.kind, problem.line) == ("NameError", 3)
@@ -459,23 +459,23 @@ def test_a_call_of_what_is_not_defined_is_a_problem_even_where_all_errors_are_ca
     assert check(program.format("say(hatch)"), rooms=["hall"]).problems == ()
 
 
-def test_call_of_a_skill_that_the_robot_lacks_says_so() -> None:
+def test_problem_names_the_skill_that_the_robot_lacks() -> None:
     program = "def task_program():\n    pick('mug')\n"
     (problem,) = check(program, rooms=["hall"], skills=SKILLS.without({"pick"})).problems
     assert (problem.kind, problem.line) == ("NameError", 2)
     assert "this robot has no `pick` skill" in problem.message
 
 
-def test_events_with_fewer_arguments_than_a_formula_names_do_not_match(every: SkillTable) -> None:
-    assert not holds(parse('tr.Exists(paint("red", "wall"))', skills=every), (Event("paint", "red"),))
+def test_events_with_fewer_arguments_than_a_formula_names_do_not_match(typed: SkillTable) -> None:
+    assert not holds(parse('tr.Exists(paint("red", "wall"))', skills=typed), (Event("paint", "red"),))
 
 
-def test_a_question_of_ones_own_is_answered_by_lot(tmp_path: Path, pool: WorkerPool) -> None:
+def test_own_question_records_the_answer_that_it_returns(tmp_path: Path, pool: WorkerPool) -> None:
     (tmp_path / "lab.py").write_text(
         HEAD + "@skill(to='who')\ndef vote(sim, who: str, about: str, options: list[str]) -> str: 'Vote.'\n"
     )
     table = skills_from(tmp_path / "lab.py")
-    outcome = ran(pool, table, ["say(vote('all', 'Tea?', ['yes', 'no']))"], "tame")
+    outcome = run(pool, table, ["say(vote('all', 'Tea?', ['yes', 'no']))"], "tame")
     vote, said = outcome.trace
     assert (vote.text, vote.to, vote.answer) == ("tea?", "all", said.text)
 
@@ -498,7 +498,7 @@ def test_a_skill_may_ask_with_options_of_any_type(tmp_path: Path) -> None:
     ]
 
 
-def test_the_words_of_a_verb_follow_its_event(tmp_path: Path) -> None:
+def test_verb_phrase_uses_the_arguments_of_its_event(tmp_path: Path) -> None:
     (tmp_path / "lab.py").write_text(
         HEAD
         + "@skill(verb='put {item} into {box}', text='box')\n"
@@ -511,9 +511,9 @@ def test_the_words_of_a_verb_follow_its_event(tmp_path: Path) -> None:
     assert phrase(robot.trace[0], "past") == "put pen into drawer"
 
 
-def test_skills_of_a_file_are_found_in_another_process(tmp_path: Path) -> None:
+def test_pickled_skills_load_in_another_process(tmp_path: Path) -> None:
     path = tmp_path / "every.py"
-    path.write_text(EVERY)
+    path.write_text(TYPED_SKILLS)
     table = skills_from(path)
     code = "import pickle, sys; print(*pickle.loads(sys.stdin.buffer.read()))"
     done = subprocess.run(
@@ -535,18 +535,16 @@ def test_skills_of_a_file_are_found_in_another_process(tmp_path: Path) -> None:
         ("tie {knot}", ["knot"], ("tie", "ties", "tied", "tying")),
     ],
 )
-def test_verbs_have_their_forms(
-    template: str, parameters: list[str], forms: tuple[str, str, str, str]
-) -> None:
+def test_verb_is_conjugated(template: str, parameters: list[str], forms: tuple[str, str, str, str]) -> None:
     assert verb_of(template, parameters, ("no", "yes")) == Verb(*forms)
 
 
-def test_what_a_verb_is_done_to_may_stand_anywhere() -> None:
+def test_verb_template_may_hold_arguments_anywhere() -> None:
     verb = verb_of("pour {ml} ml of {liquid} into {target}", ["liquid", "ml", "target"], ("no", "yes"))
     assert verb.with_object(verb.past, ["water", "20", "the cup"]) == "poured 20 ml of water into the cup"
 
 
-GLIDES = (
+GLIDE_SKILL = (
     HEAD
     + """
 @skill(names="room", text="room")
@@ -565,10 +563,10 @@ def glide(sim: Simulation, speed: int, room: str) -> None: "Glide to a room at s
         ("try: glide(2, 'bobs office')\n    except Exception: pass", None),
     ],
 )
-def test_a_room_that_an_own_skill_is_sent_to_is_checked_like_that_of_go_to(
+def test_room_argument_of_an_own_skill_is_checked_like_that_of_go_to(
     tmp_path: Path, call: str, line: int | None
 ) -> None:
-    (tmp_path / "own.py").write_text(GLIDES)
+    (tmp_path / "own.py").write_text(GLIDE_SKILL)
     skills = skills_from(tmp_path / "own.py")
     program = f"def task_program():\n    {call}\n"
     found = check(program, rooms=["hall", "bob's office"], skills=skills).problems
@@ -579,8 +577,8 @@ def test_a_room_that_an_own_skill_is_sent_to_is_checked_like_that_of_go_to(
     assert all('"bob\'s office"' in one.message for one in found) or "+" in call
 
 
-def test_rooms_that_are_guessed_include_those_of_own_skills(tmp_path: Path) -> None:
-    (tmp_path / "own.py").write_text(GLIDES)
+def test_guessed_rooms_include_those_of_own_skills(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(GLIDE_SKILL)
     skills = skills_from(tmp_path / "own.py")
     found = check("def task_program():\n    glide(2, 'lab')\n", skills=skills)
     assert (found.problems, "lab" in found.rooms) == ((), True)

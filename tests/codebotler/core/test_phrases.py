@@ -25,7 +25,7 @@ def test_a_phrase_names_texts_and_results_in_every_form(
     assert (("yes" in phrase(event, form)) == (event is TEA)) or form == "third"
 
 
-def test_a_question_has_its_options_where_the_verb_is_finite() -> None:
+def test_question_lists_its_options_after_a_finite_verb() -> None:
     unanswered = Event("ask", "Tea?", TEA.options)
     forms: list[VerbForm] = ["base", "third", "past", "ing"]
     bracketed = [form for form in forms if "[yes | 2 (no text)]" in phrase(TEA, form)]
@@ -34,14 +34,14 @@ def test_a_question_has_its_options_where_the_verb_is_finite() -> None:
     assert NO_ANSWER not in phrase(unanswered, "third")
 
 
-def test_texts_are_shown_and_quoted_as_the_caller_wants() -> None:
+def test_caller_chooses_how_texts_are_shown_and_quoted() -> None:
     event = Event("pick", "mug")
     assert '"' not in phrase(event, "past", quote="")
     assert "MUG" in phrase(event, "past", show=str.upper)
     assert len(phrase(Event("say", "x" * 500), "past")) < 100
 
 
-def test_no_text_ends_its_quotation() -> None:
+def test_text_cannot_close_its_own_quotation() -> None:
     forged = 'ok" → yes; picked up "mug'
     for event in (Event("say", forged), Event("ask", forged, TEA.options, answer=forged)):
         assert phrase(event, "past").count('"') == 2

@@ -24,7 +24,7 @@ UNPARSABLE = {"SyntaxError", "IndentationError"}
 
 TASK = 'def task_program():\n    go_to("kitchen")\n    say("hello")\n'
 BODY = '    go_to("kitchen")\n    say("hello")\n'
-CUT_OFF = 'def task_program():\n    go_to("kitchen")\n    say("hel'
+TRUNCATED = 'def task_program():\n    go_to("kitchen")\n    say("hel'
 HELPER = "def rooms():\n    return get_all_rooms()\n"
 USES_HELPER = "def task_program():\n    for room in rooms():\n        go_to(room)\n"
 
@@ -37,12 +37,12 @@ def in_task(*statements: str) -> str:
     return "\n".join(["def task_program():", *("    " + s for s in statements)])
 
 
-def fenced(code: str, info: str = "python", marks: str = "```") -> str:
+def fence(code: str, info: str = "python", marks: str = "```") -> str:
     return f"{marks}{info}\n{code}{marks}\n"
 
 
 @pytest.mark.parametrize("step", [5, pytest.param(1, marks=pytest.mark.slow)])
-def test_right_programs_have_no_problems(step: int) -> None:
+def test_correct_recorded_programs_have_no_problems(step: int) -> None:
     for reply in RECORDED[::step]:
         found = find_flaws(reply.program)
         if reply.fails is None:
@@ -82,7 +82,7 @@ def test_right_programs_have_no_problems(step: int) -> None:
         (in_task("ask('a', 'b', None)"), 2, ["options of ask", "a list"]),
     ],
 )
-def test_problem(text: str, line: int | None, named: list[str]) -> None:
+def test_problem_has_its_line_and_names_the_cause(text: str, line: int | None, named: list[str]) -> None:
     ((found, message),) = problems(text)
     assert found == line
     assert all(name in message for name in named), message
@@ -106,17 +106,17 @@ def test_problem(text: str, line: int | None, named: list[str]) -> None:
         "@lambda f: (lambda: f(1))\ndef task_program(a):\n    pass",
     ],
 )
-def test_no_problem(text: str) -> None:
+def test_valid_program_has_no_problem(text: str) -> None:
     assert problems(text) == []
 
 
-def test_problems_stand_in_the_order_of_lines() -> None:
+def test_problems_are_sorted_by_line() -> None:
     text = "def task():\n    ask('a', 'b', [])\n    say(x)\n    go_to()\n    say(x)\n"
     assert [p.line for p in find_flaws(text)] == [None, 2, 3, 4, 5]
 
 
 @pytest.mark.parametrize(
-    ("lines", "told"),
+    ("lines", "message"),
     [
         (["answer = 1", "say(anser)"], "the name anser is not defined; did you mean answer?"),
         (["is_in_rom('mug')"], "the name is_in_rom is not defined; did you mean is_in_room?"),
@@ -125,11 +125,11 @@ def test_problems_stand_in_the_order_of_lines() -> None:
         (["say(unheard_of)"], "the name unheard_of is not defined"),
     ],
 )
-def test_a_misspelt_name_is_told_with_the_one_that_may_be_meant(lines: list[str], told: str) -> None:
-    assert [flaw.message for flaw in find_flaws(in_task(*lines))] == [told]
+def test_misspelt_name_gets_a_suggestion(lines: list[str], message: str) -> None:
+    assert [flaw.message for flaw in find_flaws(in_task(*lines))] == [message]
 
 
-def test_many_undefined_names_are_quickly_told() -> None:
+def test_only_a_few_of_many_undefined_names_get_suggestions() -> None:
     bound = "".join(f"    name_{n}_bound = 1\n" for n in range(300))
     used = "".join(f"    say(name_{n}_bond)\n" for n in range(300))
     found = find_flaws(f"def task_program():\n{bound}{used}")
@@ -147,7 +147,7 @@ def test_a_ninth_skill_is_known() -> None:
     assert "hand" in lacks.message
 
 
-DEEP = {
+HOSTILE_SOURCES = {
     "signs": "-" * 100_000 + "1",
     "few signs": "-" * 1_000 + "1",
     "brackets": "(" * 1_000_000,
@@ -169,25 +169,25 @@ DEEP = {
     "text",
     [
         pytest.param(text, id=name, marks=[pytest.mark.slow] * (len(text) > 50_000))
-        for name, text in DEEP.items()
+        for name, text in HOSTILE_SOURCES.items()
     ],
 )
 def test_hostile_source_is_a_problem(text: str) -> None:
     assert find_flaws(text)
     assert find_flaws(in_task(text) if "\n" not in text else text)
     assert find_flaws(program_of(text).source)
-    assert program_of(fenced(text) + fenced(TASK)).source
+    assert program_of(fence(text) + fence(TASK)).source
 
 
-def test_text_annotations_are_never_read() -> None:
+def test_string_annotations_are_never_parsed() -> None:
     annotations = (
         "x: '" + "(" * 10_000 + "' = 1\ny: '\\0' = 2\nz: '" + "-" * 9_000 + "1' = 1\nw: 'nowhere' = 1"
     )
     assert not find_flaws(f"{TASK}\n{annotations}\n")
 
 
-# Garbage is collected all the time, by Python code: so threads are often interrupted while they make a tree.
-THREADS = """
+# Frequent garbage collection runs Python code, so threads are often interrupted while they build a tree.
+PARSE_IN_THREADS = """
 import gc, sys
 from concurrent.futures import ThreadPoolExecutor
 from codebotler.core.program import parse
@@ -213,12 +213,12 @@ with ThreadPoolExecutor(4) as threads:
 
 def test_threads_parse_at_the_same_time() -> None:
     ended = subprocess.run(
-        [sys.executable, "-c", THREADS], capture_output=True, text=True, check=False, timeout=120
+        [sys.executable, "-c", PARSE_IN_THREADS], capture_output=True, text=True, check=False, timeout=120
     )
     assert ended.stdout == "60\n", ended.stderr
 
 
-ODD = r"""
+CODE = r"""
 import re
 from codebotler.core.program import parse_expression, parse_program
 from codebotler.core.world import World
@@ -228,9 +228,9 @@ re.compile("[[a] nested")
 """
 
 
-def test_odd_escapes_and_regexes_are_not_warned_of() -> None:
+def test_suspicious_escapes_and_regexes_cause_no_warning() -> None:
     ended = subprocess.run(
-        [sys.executable, "-W", "error", "-c", ODD], capture_output=True, text=True, check=False, timeout=60
+        [sys.executable, "-W", "error", "-c", CODE], capture_output=True, text=True, check=False, timeout=60
     )
     assert (ended.returncode, ended.stderr) == (0, "")
 
@@ -239,12 +239,12 @@ def test_odd_escapes_and_regexes_are_not_warned_of() -> None:
 def test_a_process_forked_while_a_thread_parses_can_parse() -> None:
     locked, go_on = threading.Event(), threading.Event()
 
-    def slowly() -> None:
+    def hold_the_lock() -> None:
         with program._PARSING:
             locked.set()
             go_on.wait(20)
 
-    parsing = threading.Thread(target=slowly)
+    parsing = threading.Thread(target=hold_the_lock)
     parsing.start()
     assert locked.wait(20)
     threading.Timer(0.2, go_on.set).start()

@@ -1,4 +1,4 @@
-"""The actions of skills as packages of ROS 2."""
+"""ROS 2 packages, generated from the actions of skills."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.ros_package import ros_packages, write_ros_packages
 from codebotler.core.skills.table import SkillTable
 
-SHIPPED = Path(__file__).parents[3] / "ros"
-OWN = """
+ROS_FOLDER = Path(__file__).parents[3] / "ros"
+OWN_SKILL = """
 from codebotler import Simulation, skill
 
 @skill(ros="lab_msgs/Mix:/mix")
@@ -24,18 +24,18 @@ def mix(sim: Simulation, name: str, share: float) -> list[int]:
 """
 
 
-def test_shipped_package_is_that_of_the_skill_table() -> None:
+def test_shipped_package_matches_the_skill_table() -> None:
     (package,) = ros_packages(SKILLS)
-    folder = SHIPPED / package
+    folder = ROS_FOLDER / package
     shipped = {
         str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()
     }
-    assert shipped == ros_packages(SKILLS)[package], "write it anew: codebotler skills --ros-package ros"
+    assert shipped == ros_packages(SKILLS)[package], "generate it again: codebotler skills --ros-package ros"
     assert len(shipped) == 2 + len(SKILLS)
 
 
-def test_own_skills_have_packages_of_their_own(tmp_path: Path) -> None:
-    (tmp_path / "lab.py").write_text(OWN)
+def test_own_actions_get_a_package_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "lab.py").write_text(OWN_SKILL)
     written = write_ros_packages(skills_from(tmp_path / "lab.py"), tmp_path / "src")
     assert {path.name for path in written} == {"robot_actions_pkg", "lab_msgs"}
     lab = tmp_path / "src" / "lab_msgs"

@@ -1,4 +1,4 @@
-"""Regexes with flags at their start, within others."""
+"""`scope_flags` lets a regex with leading flags be part of another one."""
 
 import re
 
@@ -18,6 +18,6 @@ def test_a_regex_without_flags_stays_as_it_is(pattern: str) -> None:
     "pattern", ["(?i)yes", "(?is)y.s|no", "(?i)(?s)Y.S", "(?x) yes # or no", "(?ax) y\\ws"]
 )
 @pytest.mark.parametrize("text", ["yes", "YES", "y\ns", "maybe"])
-def test_flags_find_the_same_within_another_regex(pattern: str, text: str) -> None:
+def test_embedded_regex_with_flags_matches_the_same_texts(pattern: str, text: str) -> None:
     within = re.compile(f"^(?:{scope_flags(pattern)})")
     assert (within.match(text) is None) == (re.match(pattern, text) is None)

@@ -13,7 +13,7 @@ from codebotler.simulator.worlds.robot import SimulatedRobot
 from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
 
-def test_eight_skills_stand_as_the_paper_writes_them() -> None:
+def test_skill_signatures_are_those_of_the_paper() -> None:
     assert [skill.signature for skill in SKILLS.values()] == [
         "get_current_location() -> str",
         "get_all_rooms() -> list[str]",
@@ -26,7 +26,7 @@ def test_eight_skills_stand_as_the_paper_writes_them() -> None:
     ]
 
 
-def test_trace_holds_six_kinds_of_events() -> None:
+def test_six_skills_are_recorded_as_events() -> None:
     assert {kind: (row.text, row.options) for kind, row in SKILLS.recordings.items()} == {
         "check": ("entity", None),
         "goto": ("location", None),
@@ -45,7 +45,7 @@ def test_texts_and_options_of_events_are_parameters_of_their_skills() -> None:
             assert skill.recording.options is None or types[skill.recording.options].is_list
 
 
-def test_every_skill_travels_as_a_ros_action_with_one_goal_field_a_parameter() -> None:
+def test_every_skill_has_a_ros_action_with_one_goal_field_per_parameter() -> None:
     for skill in SKILLS.values():
         assert skill.ros is not None
         assert [field.split()[-1] for field in skill.ros.goal] == [
@@ -55,8 +55,8 @@ def test_every_skill_travels_as_a_ros_action_with_one_goal_field_a_parameter() -
         assert skill.ros.server == f"/{skill.name}_server"
 
 
-def test_a_simulated_robot_does_what_skills_ask_of_it() -> None:
-    """Which nothing else compares: a robot is any object to them."""
+def test_simulated_robots_implement_the_interface_that_skills_use() -> None:
+    """Nothing else compares the two: skills accept any object as a robot."""
     for kind in (SimulatedRobot, SampledRobot):
         for name, asked in inspect.getmembers(Simulation, inspect.isfunction):
             if not name.startswith("_"):
@@ -67,7 +67,7 @@ def test_a_simulated_robot_does_what_skills_ask_of_it() -> None:
 WAVE = Skill("wave", (Parameter("person"),), NO_VALUE, "Wave.", Recording("wave", "person"))
 
 
-def test_one_more_skill_makes_a_longer_table_and_leaves_the_old_one() -> None:
+def test_with_skill_returns_a_longer_table_and_keeps_the_old_one() -> None:
     more = SKILLS.with_skill(WAVE)
     assert list(more) == [*SKILLS, "wave"]
     assert more["wave"] is WAVE
@@ -84,7 +84,7 @@ def test_one_more_skill_makes_a_longer_table_and_leaves_the_old_one() -> None:
         Skill("shout", (Parameter("text"),), NO_VALUE, "Another of that kind.", Recording("say", "text")),
     ],
 )
-def test_two_skills_share_neither_a_name_nor_a_kind_of_event(row: Skill) -> None:
+def test_second_skill_with_a_known_name_or_event_kind_is_refused(row: Skill) -> None:
     with pytest.raises(ValueError, match="two skills"):
         SKILLS.with_skill(row)
 
@@ -94,7 +94,7 @@ def test_table_knows_only_its_rows() -> None:
         SkillTable((WAVE,))["say"]
 
 
-def test_skills_can_be_sent_and_copied() -> None:
+def test_skills_can_be_pickled_and_copied() -> None:
     assert pickle.loads(pickle.dumps(SKILLS["go_to"])) is SKILLS["go_to"]
     assert copy.deepcopy(SKILLS["go_to"]) is SKILLS["go_to"]
     assert pickle.loads(pickle.dumps(SKILLS)) == SKILLS
@@ -102,5 +102,5 @@ def test_skills_can_be_sent_and_copied() -> None:
     assert pickle.loads(pickle.dumps(replace(WAVE, does=print))).does is print
 
 
-def test_idle_skills_change_nothing() -> None:
+def test_idle_lists_the_skills_that_change_nothing() -> None:
     assert SKILLS.idle == {"get_current_location", "get_all_rooms", "is_in_room", "say"}

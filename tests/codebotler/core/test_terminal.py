@@ -1,4 +1,4 @@
-"""What others wrote reaches a terminal as text alone, whatever prints it."""
+"""No way of printing lets foreign text send control characters to the terminal."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from codebotler.core import terminal
 from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError
 
-EVIL = "a\x1b]0;owned\x07\x1b[2J\x9b31m\u202eb\tc\x7f"
-SHOWN = ("a\\x1b]0;owned", "\\x1b[2J\\x9b31m\\u202eb")
+HOSTILE_TEXT = "a\x1b]0;owned\x07\x1b[2J\x9b31m\u202eb\tc\x7f"
+ESCAPED = ("a\\x1b]0;owned", "\\x1b[2J\\x9b31m\\u202eb")
 
 LIBRARIES = {"click", "logging", "rich", "typer"}
 PRINTS = {"print", "echo", "secho", "confirm", "prompt", "StreamHandler", "basicConfig"} | {
@@ -44,25 +44,25 @@ STREAMS = {"stdout", "stderr", "__stdout__", "__stderr__"}
 MAY_WRITE = re.compile(
     rf"\b(?:print|input)\(|^\s*(?:from|import) (?:{'|'.join(LIBRARIES)})\b|std(?:out|err)", re.MULTILINE
 )
-"""What stands in the text of each module that writes; the others are not parsed."""
+"""Every module that writes matches this; the other modules are not parsed."""
 SOURCE = [Path(package.__file__ or "").parent for package in (codebotler, roboeval)]
 WRITER = Path(terminal.__file__ or "")
 CHILDREN = {"environment.py", "channel.py"}
-"""Programs of their own, whose output we read."""
+"""Scripts that run in child processes, whose output the parent reads."""
 
 
-def refuse(error: Exception) -> None:
+def raise_in_command(error: Exception) -> None:
     commands = typer.Typer()
 
     @commands.command()
-    def refused() -> None:
+    def raise_error() -> None:
         raise error
 
     with pytest.raises(SystemExit):
         obey(commands, "codebotler")
 
 
-def busy(text: str) -> None:
+def print_while_busy(text: str) -> None:
     with terminal.busy(text):
         terminal.note(text)
 
@@ -77,17 +77,17 @@ def fail_in_a_thread(text: str) -> None:
     thread.join()
 
 
-WAYS: dict[str, Callable[[str], object]] = {
+WAYS_TO_PRINT: dict[str, Callable[[str], object]] = {
     "a string": terminal.print_text,
     "a program": terminal.print_source,
     "a note": terminal.note,
     "a question": terminal.confirm,
     "a drawing": lambda text: terminal.print_rich(Text(text)),
     "a line": lambda text: terminal.console(highlight=False).print(text, markup=False),
-    "what goes on": busy,
-    "a refusal": lambda text: refuse(UserError(text)),
-    "a model's error": lambda text: refuse(ModelError(text, may_pass=False)),
-    "a file's name": lambda text: refuse(FileNotFoundError(2, "No such file", text)),
+    "what goes on": print_while_busy,
+    "a refusal": lambda text: raise_in_command(UserError(text)),
+    "a model's error": lambda text: raise_in_command(ModelError(text, may_pass=False)),
+    "a file's name": lambda text: raise_in_command(FileNotFoundError(2, "No such file", text)),
     "a log": lambda text: logging.getLogger("anybody").warning(text),
     "a warning": lambda text: warnings.warn(text, stacklevel=1),
     "a bug": fail,
@@ -96,8 +96,8 @@ WAYS: dict[str, Callable[[str], object]] = {
 
 
 @pytest.mark.parametrize("is_terminal", [True, False])
-@pytest.mark.parametrize("way", WAYS)
-def test_a_terminal_obeys_nothing_that_others_wrote(
+@pytest.mark.parametrize("way", WAYS_TO_PRINT)
+def test_foreign_text_cannot_control_the_terminal(
     way: str, *, is_terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(logging.root, "handlers", [])
@@ -111,16 +111,16 @@ def test_a_terminal_obeys_nothing_that_others_wrote(
     with warnings.catch_warnings(), ends:
         warnings.simplefilter("always")
         with terminal.report_problems():
-            WAYS[way](EVIL)
+            WAYS_TO_PRINT[way](HOSTILE_TEXT)
     out = "".join(capsys.readouterr())
     if way == "a program" and not is_terminal:
-        assert out == EVIL + "\n"
+        assert out == HOSTILE_TEXT + "\n"
         return
-    assert all(piece in out for piece in SHOWN)
+    assert all(piece in out for piece in ESCAPED)
     assert not any(obeyed in out for obeyed in ("\x07", "\x9b", "\u202e", "\x7f", "\x1b]", "\x1b[2J"))
 
 
-def test_a_room_of_a_world_is_named_as_text(
+def test_room_name_is_printed_without_control_characters(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     world, program = tmp_path / "world.yaml", tmp_path / "program.py"
@@ -133,8 +133,8 @@ def test_a_room_of_a_world_is_named_as_text(
     assert "lob\\x1b]0;owned\\x07by" in capsys.readouterr().err
 
 
-def passed_by(path: Path) -> list[str]:
-    """Where a module prints, draws, or takes the standard output or error for itself."""
+def find_direct_writes(path: Path) -> list[str]:
+    """List where a module prints, draws, or uses the standard output or error directly."""
     text = path.read_text()
     if not MAY_WRITE.search(text):
         return []
@@ -166,20 +166,20 @@ def passed_by(path: Path) -> list[str]:
     return found
 
 
-def test_one_module_alone_writes_to_the_terminal() -> None:
+def test_only_one_module_writes_to_the_terminal() -> None:
     modules = [path for source in SOURCE for path in source.rglob("*.py")]
     ours = [path for path in modules if path != WRITER and path.name not in CHILDREN]
     assert len(ours) > 200
-    assert [place for path in ours for place in passed_by(path)] == []
-    assert passed_by(WRITER)
+    assert [place for path in ours for place in find_direct_writes(path)] == []
+    assert find_direct_writes(WRITER)
 
 
-def test_what_was_typed_before_a_question_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_input_typed_before_a_question_is_discarded(monkeypatch: pytest.MonkeyPatch) -> None:
     ours, person = os.openpty()
     with os.fdopen(person) as stdin:
         monkeypatch.setattr(sys, "stdin", stdin)
         os.write(ours, b"y\n")
-        assert select.select([stdin], [], [], 10)[0], "the early answer has arrived"
+        assert select.select([stdin], [], [], 10)[0], "the early answer did not arrive"
         timer = threading.Timer(0.05, os.write, (ours, b"no\n"))
         timer.start()
         assert terminal.read_line("Run it? ") == "no\n"

@@ -1,4 +1,4 @@
-"""Which texts match a template, which templates cover another, and how both are written."""
+"""Templates: the texts that they match, the templates that they cover, and how they are written."""
 
 import random
 
@@ -59,7 +59,7 @@ def _random_text(rng: random.Random, letters: str, longest: int) -> str:
     return "".join(rng.choices(letters, k=rng.randint(0, longest)))
 
 
-def test_each_filled_template_matches_what_covers_it() -> None:
+def test_covering_template_matches_every_text_of_the_covered_one() -> None:
     rng = random.Random(1)
     covered = 0
     for _ in range(400):
@@ -74,7 +74,7 @@ def test_each_filled_template_matches_what_covers_it() -> None:
     assert covered > 50
 
 
-def test_adjacent_holes_are_one_and_long_templates_are_any_text() -> None:
+def test_adjacent_holes_merge_and_long_templates_match_any_text() -> None:
     assert TextTemplate(("a", "", "", "b")) == TextTemplate(("a", "b"))
     assert TextTemplate(("", "", "")) == ANY
     assert TextTemplate(("x",) * 21) == ANY
@@ -93,12 +93,12 @@ def test_a_template_without_parts_is_an_error() -> None:
         TextTemplate(())
 
 
-def test_a_text_with_the_character_of_a_hole_is_any_text() -> None:
-    assert TextTemplate(("\ud800",)).is_any, "so that a person sees what it allows"
+def test_text_with_the_hole_character_matches_any_text() -> None:
+    assert TextTemplate(("\ud800",)).is_any, "the hole character would hide what the text allows"
     assert not TextTemplate(("\udfff",)).matches("kitchen")
 
 
-def test_what_is_beyond_others_is_what_none_of_them_covers() -> None:
+def test_beyond_returns_the_templates_that_none_covers() -> None:
     texts = [*map(TextTemplate.parse, ("mug", "Mug", "cup", "{} cup", "a {}", "a cup", "", "{}"))]
     for number in range(1 << 6):
         allowed = [one for bit, one in enumerate(texts[:6]) if number >> bit & 1]

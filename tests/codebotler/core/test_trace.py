@@ -5,7 +5,7 @@ import pytest
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status
 
 
-def test_events_are_equal_by_what_was_done_whenever_and_wherever() -> None:
+def test_equality_of_events_ignores_time_and_place() -> None:
     event = Event("goto", "lab", place="hall", time=1.0)
     assert event == Event("goto", "lab", place="lab", time=2.0)
     assert hash(event) == hash(Event("goto", "lab"))
@@ -28,12 +28,12 @@ def test_events_differ_in_options_answer_look_and_kind(other: Event) -> None:
 
 def test_events_and_outcomes_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
-        Event("say", "a").text = "b"  # type: ignore[misc]  # that it fails is the point
+        Event("say", "a").text = "b"  # type: ignore[misc]  # the test needs this error
     with pytest.raises(FrozenInstanceError):
-        Outcome(Status.FINISHED, ()).line = 3  # type: ignore[misc]  # the same
+        Outcome(Status.FINISHED, ()).line = 3  # type: ignore[misc]  # the test needs this error
 
 
-def test_outcomes_are_equal_by_all_that_they_hold() -> None:
+def test_equality_of_outcomes_compares_every_field() -> None:
     outcome = Outcome(Status.PYTHON_ERROR, (Event("say", "a"),), RunError("NameError", "no x"), 3)
     assert outcome == replace(outcome)
     changed = ({"status": Status.KILLED}, {"trace": ()}, {"error": None}, {"line": None})
@@ -41,7 +41,7 @@ def test_outcomes_are_equal_by_all_that_they_hold() -> None:
     assert len({outcome, replace(outcome)}) == 1
 
 
-def test_statuses_are_spelt_as_the_rows_of_an_evaluation_spell_them() -> None:
+def test_statuses_have_the_names_of_evaluation_rows() -> None:
     assert [str(status) for status in Status] == [
         "finished", "timeout", "python-error", "robot-error", "agent-error", "killed",
     ]  # fmt: skip

@@ -36,11 +36,11 @@ traces = st.lists(events, max_size=5).map(tuple)
 
 
 @given(traces)
-def test_a_trace_comes_back_from_json(trace: Trace) -> None:
+def test_trace_survives_the_json_round_trip(trace: Trace) -> None:
     assert trace_from(json.loads(json.dumps(trace_data(trace)))) == trace
 
 
-def test_the_data_of_an_outcome_are_those_of_a_row() -> None:
+def test_outcome_data_has_the_fields_of_a_row() -> None:
     question = Event("ask", "Tea?", (Option("yes"), Option("1", is_text=False)), answer="yes")
     trace = (Event("goto", "lab"), Event("check", "kim", found=True), question)
     assert outcome_data(Outcome(Status.ROBOT_ERROR, trace, RunError("AskNoPerson", "nobody"), 4)) == {
@@ -62,12 +62,12 @@ def test_the_data_of_an_outcome_are_those_of_a_row() -> None:
         ("say hi", "'say hi'"),
     ],
 )
-def test_what_is_no_event_gets_a_sentence(element: object, named: str) -> None:
+def test_invalid_event_is_an_error_that_names_it(element: object, named: str) -> None:
     with pytest.raises(UserError) as caught:
         trace_from([element])
     assert named in caught.value.sentence
 
 
-def test_events_of_further_skills_are_read() -> None:
+def test_events_of_own_skills_are_read() -> None:
     data = [["wave", "kim"], ["smell", "tea", True], ["vote", "q", ["a"], "a"], ["say", "hi"]]
     assert trace_data(trace_from(data)) == data

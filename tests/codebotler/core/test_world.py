@@ -32,7 +32,7 @@ def read(text: str) -> World:
     return file.validate(WorldFile).world(file)
 
 
-def test_world_file_holds_all_that_a_world_is(tmp_path: Path) -> None:
+def test_world_file_sets_every_field(tmp_path: Path) -> None:
     path = tmp_path / "w.yaml"
     path.write_text(FULL, encoding="utf-8")
     assert read_world(path) == World(
@@ -56,7 +56,7 @@ def test_only_the_rooms_and_the_start_are_needed() -> None:
     assert read("robot: a\nrooms: [a]\n") == World((Room("a"),), "a", about="", may_wait_forever=False)
 
 
-def truth(name: str, value: str) -> list[str]:
+def quoting_hint(name: str, value: str) -> list[str]:
     return [name, f"is {value}", "a string in quotes"]
 
 
@@ -70,19 +70,19 @@ def truth(name: str, value: str) -> list[str]:
         ("robot:\nrooms: [hall]\n", 1, ['"robot"', "empty"]),
         ("rooms: [hall]\nrobot: [hall]\n", 2, ['"robot"', "is [", "a string"]),
         ("robot: ''\nrooms: [hall]\n", 1, ['"robot"', "at least 1 character"]),
-        (GOOD + "about: no\n", 5, truth('"about"', "False")),
-        ("robot: yes\nrooms: [hall]\n", 1, truth('"robot"', "True")),
+        (GOOD + "about: no\n", 5, quoting_hint('"about"', "False")),
+        ("robot: yes\nrooms: [hall]\n", 1, quoting_hint('"robot"', "True")),
         ("robot: hall\nrooms: hall\n", 2, ['"rooms"', 'is "', "a list"]),
         ("robot: hall\nrooms: {hall: 1}\n", 2, ['"rooms"', "is {", "a list"]),
         ("robot: hall\nrooms: []\n", 2, ['"rooms"', "at least 1"]),
-        (GOOD + "  - on\n", 5, truth("this entry", "True")),
+        (GOOD + "  - on\n", 5, quoting_hint("this entry", "True")),
         (GOOD + "  - 12\n", 5, ["this entry", "is 12", "a string in quotes"]),
         (GOOD + "  -\n", 5, ["this entry", "empty"]),
         (GOOD + "  - ''\n", 5, ["this entry", "at least 1 character"]),
         (GOOD + "  - [a, b]\n", 5, ["this entry", "is [", "a string"]),
         (GOOD + "  - {name: a, colour: red}\n", 5, ['"colour"']),
         (GOOD + "  - {stand_at: [1, 2]}\n", 5, ['"name"', "missing"]),
-        (GOOD + "  - {name: no}\n", 5, truth('"name"', "False")),
+        (GOOD + "  - {name: no}\n", 5, quoting_hint('"name"', "False")),
         (
             GOOD + "  - name: a\n    footprint: [[0, 0], [1, 0]]\n",
             6,
@@ -121,7 +121,7 @@ def truth(name: str, value: str) -> list[str]:
         (GOOD + "objects: [mug]\n", 5, ['"objects"', "is [", "a mapping"]),
         (GOOD + "objects:\n", 5, ['"objects"', "empty"]),
         (GOOD + "objects:\n  lab: mug\n", 6, ['"lab"', 'is "', "a list"]),
-        (GOOD + "objects:\n  lab:\n    - mug\n    - no\n", 8, truth("this entry", "False")),
+        (GOOD + "objects:\n  lab:\n    - mug\n    - no\n", 8, quoting_hint("this entry", "False")),
         (GOOD + "objects:\n  lab:\n    - mug\n    - ''\n", 8, ["this entry", "at least 1 character"]),
         (GOOD + "objects:\n  lab: [mug]\n  attic: [mug]\n", 7, ['"attic"', "hall, lab"]),
         (
@@ -136,7 +136,7 @@ def truth(name: str, value: str) -> list[str]:
         (
             GOOD + "people:\n  lab:\n    - name: a\n      answers:\n        - tea\n        - yes\n",
             10,
-            truth("this entry", "True"),
+            quoting_hint("this entry", "True"),
         ),
         (
             GOOD + "people:\n  lab:\n    - name: a\n      answers: tea\n",
@@ -159,7 +159,7 @@ def truth(name: str, value: str) -> list[str]:
         (GOOD + "objects:\n  lab: [a]\n  lab: [b]\n", 7, ['"lab"', "repeated"]),
     ],
 )
-def test_each_fault_of_a_world_file_is_one_sentence_with_file_line_and_mend(
+def test_fault_in_a_world_file_is_an_error_with_its_line(
     text: str, line: int | None, named: list[str]
 ) -> None:
     with pytest.raises(UserError) as caught:
@@ -176,7 +176,7 @@ def test_many_rooms_are_not_compared_with_each_other() -> None:
     assert time.process_time() - start < 1.5  # comparing them takes more than two seconds
 
 
-def test_reading_names_the_file_by_its_path(tmp_path: Path) -> None:
+def test_error_names_the_path_of_the_world_file(tmp_path: Path) -> None:
     path = tmp_path / "w.yaml"
     path.write_text("robot: attic\nrooms: [hall]\n", encoding="utf-8")
     with pytest.raises(UserError, match='"attic"') as error:
@@ -238,7 +238,7 @@ def extent(room: Room) -> tuple[float, float, float, float]:
     return min(xs), max(xs), min(ys), max(ys)
 
 
-def overlap(one: Room, other: Room) -> bool:
+def is_overlapping(one: Room, other: Room) -> bool:
     (a, b, c, d), (e, f, g, h) = extent(one), extent(other)
     return a < f and e < b and c < h and g < d
 
@@ -250,7 +250,7 @@ RECTANGLES = st.tuples(CORNERS, CORNERS).map(
 
 
 @given(st.lists(st.none() | RECTANGLES, min_size=1, max_size=9))
-def test_layout_gives_every_room_a_place_of_its_own_and_keeps_those_that_are_given(
+def test_layout_places_rooms_apart_and_keeps_given_footprints(
     footprints: list[tuple[tuple[float, float], ...] | None],
 ) -> None:
     world = World(tuple(Room(f"room {i}", footprint=given) for i, given in enumerate(footprints)), "room 0")
@@ -258,8 +258,8 @@ def test_layout_gives_every_room_a_place_of_its_own_and_keeps_those_that_are_giv
     new = [room for room, given in zip(rooms, footprints, strict=True) if given is None]
     old = [room for room, given in zip(rooms, footprints, strict=True) if given is not None]
     assert [room.footprint for room in old] == [given for given in footprints if given is not None]
-    assert not any(overlap(one, other) for one, other in combinations(new, 2))
-    assert not any(overlap(one, other) for one in new for other in old)
+    assert not any(is_overlapping(one, other) for one, other in combinations(new, 2))
+    assert not any(is_overlapping(one, other) for one in new for other in old)
     for room in rooms:
         left, right, low, high = extent(room)
         assert room.stand_at is not None
@@ -276,20 +276,20 @@ def test_layout_is_a_hallway_with_rooms_on_both_sides() -> None:
     assert laid_out(laid_out(world)) == laid_out(world)
 
 
-def test_rooms_without_a_place_stand_a_hallway_to_the_right_of_those_with_one() -> None:
+def test_unplaced_rooms_lie_a_hallway_to_the_right_of_placed_ones() -> None:
     given = ((-1.0, 0.0), (7.0, 0.0), (7.0, 5.0))
     world = World((Room("new"), Room("given", footprint=given)), "new")
     assert extent(laid_out(world).rooms[0])[0] == 7 + HALLWAY
 
 
-def test_room_with_a_standing_point_alone_is_a_square_of_a_metre_around_it() -> None:
+def test_room_with_only_a_standing_point_is_a_square_metre_around_it() -> None:
     world = laid_out(World((Room("new"), Room("b", stand_at=(9.0, 4.0))), "new"))
     assert extent(world.rooms[1]) == (8.5, 9.5, 3.5, 4.5)
     assert world.rooms[1].stand_at == (9.0, 4.0)
     assert extent(world.rooms[0])[0] == 9.5 + HALLWAY
 
 
-def test_world_file_is_written_for_people_to_read() -> None:
+def test_world_file_is_written_in_readable_yaml() -> None:
     world = World((Room("café", ("Ölkanne",), (Person("Łucja", ("tak",)),)), Room("hall")), "café", "früh")
     assert world.to_yaml() == (
         "about: früh\nrobot: café\nrooms:\n- café\n- hall\nobjects:\n  café:\n  - Ölkanne\n"
@@ -324,7 +324,7 @@ def test_a_point_on_a_slanted_edge_is_within(shift: float) -> None:
         ((2, 6.1), False),
     ],
 )
-def test_the_robot_stands_within_a_room_of_any_shape(point: tuple[float, float], *, is_within: bool) -> None:
+def test_standing_point_must_lie_within_the_footprint(point: tuple[float, float], *, is_within: bool) -> None:
     corner = "[[0, 0], [6, 0], [6, 2], [2, 2], [2, 6], [0, 6]]"  # 2 m wide, around a corner
     text = f"robot: a\nrooms: [{{name: a, footprint: {corner}, stand_at: [{point[0]}, {point[1]}]}}]\n"
     if is_within:

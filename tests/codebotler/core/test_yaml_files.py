@@ -31,7 +31,7 @@ def error_about(text: str) -> UserError:
     return caught.value
 
 
-def test_error_names_the_file_and_the_line_where_there_are_any() -> None:
+def test_error_names_the_file_and_the_line_if_known() -> None:
     assert str(UserError("is wrong")) == "is wrong"
     assert str(UserError("is wrong", file="a.yaml")) == "a.yaml: is wrong"
     assert str(UserError("is wrong", file=Path("a.yaml"), line=3)) == "a.yaml, line 3: is wrong"
@@ -68,7 +68,7 @@ TWICE = "repeated"
         ("words:\n  a: x\n  b: y\n  a: z\n", 4, ['"a"', TWICE]),
     ],
 )
-def test_what_is_no_yaml_is_told_in_a_sentence_with_the_line(text: str, line: int, named: list[str]) -> None:
+def test_invalid_yaml_is_an_error_with_its_line(text: str, line: int, named: list[str]) -> None:
     error = error_about(text)
     assert error.line == line
     assert all(name in error.sentence for name in named), error
@@ -99,9 +99,7 @@ def test_what_is_no_yaml_is_told_in_a_sentence_with_the_line(text: str, line: in
         ("inner: {name: a}\nwords:\n  b: x\n  4: y\n", 4, ["this key", "is 4", "a string in quotes"]),
     ],
 )
-def test_what_has_another_form_is_told_in_a_sentence_with_line_and_mend(
-    text: str, line: int | None, named: list[str]
-) -> None:
+def test_wrong_structure_is_an_error_with_its_line(text: str, line: int | None, named: list[str]) -> None:
     error = error_about(text)
     assert error.line == line
     assert all(name in error.sentence for name in named), error
@@ -123,7 +121,7 @@ DEEP = "more than 50 levels deep"
         pytest.param("".join(" " * depth + "a:\n" for depth in range(60)), 50, id="indented"),
     ],
 )
-def test_yaml_that_is_nested_too_deeply_is_refused_in_a_sentence(text: str, line: int) -> None:
+def test_too_deeply_nested_yaml_is_refused_with_its_line(text: str, line: int) -> None:
     error = error_about(text)
     assert error.line == line
     assert DEEP in error.sentence
@@ -132,7 +130,7 @@ def test_yaml_that_is_nested_too_deeply_is_refused_in_a_sentence(text: str, line
 @pytest.mark.parametrize(
     ("text", "line"), [(f"a: 1\n{BOMB}", 2), ("a: 1\ninner: &a [*a]\n", 2), ("&a\ninner: *a\n", 1)]
 )
-def test_anchors_that_explode_are_refused_in_a_sentence(text: str, line: int) -> None:
+def test_exploding_anchors_are_refused_with_their_line(text: str, line: int) -> None:
     error = error_about(text)
     assert error.line == line
     assert "anchors" in error.sentence
@@ -142,7 +140,7 @@ def test_an_error_is_one_line() -> None:
     assert str(UserError("a\nb", file="a.yaml", line=1)) == "a.yaml, line 1: a b"
 
 
-def test_yaml_so_deep_that_the_c_stack_would_overflow_does_not_crash_the_interpreter() -> None:
+def test_extremely_deep_yaml_does_not_crash_the_interpreter() -> None:
     code = (
         "from codebotler.core.errors import UserError\nfrom codebotler.core.yaml_files import YamlFile\n"
         "try:\n"
@@ -156,12 +154,12 @@ def test_yaml_so_deep_that_the_c_stack_would_overflow_does_not_crash_the_interpr
     assert DEEP in ended.stdout
 
 
-def test_anchors_that_repeat_a_little_are_fine() -> None:
+def test_harmless_anchors_are_accepted() -> None:
     file = YamlFile("inner: &a {name: b}\nmany: [*a, *a]\n", "w.yaml")
     assert file.validate(Outer).many == [Inner(name="b"), Inner(name="b")]
 
 
-def test_every_place_has_its_line_and_an_unknown_one_that_of_what_is_around_it() -> None:
+def test_line_of_an_unknown_place_is_that_of_its_parent() -> None:
     file = YamlFile("inner:\n  name: a\nmany:\n  - name: b\n\n  - name: c\n", "w.yaml")
     assert [file.line(place) for place in ((), ("inner",), ("inner", "name"), ("many", 1, "name"))] == [
         1, 1, 2, 6,
@@ -172,7 +170,7 @@ def test_every_place_has_its_line_and_an_unknown_one_that_of_what_is_around_it()
     assert str(file.wrong("is odd", "many", 0)) == "w.yaml, line 4: is odd"
 
 
-def test_part_of_a_file_is_validated_where_it_stands() -> None:
+def test_part_of_a_file_is_validated_with_its_own_lines() -> None:
     file = YamlFile("- {name: a}\n- {name: 3}\n", "w.yaml")
     assert isinstance(file.data, list)
     assert file.validate(Inner, file.data[0], at=(0,)) == Inner(name="a")

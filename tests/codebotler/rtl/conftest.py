@@ -1,4 +1,4 @@
-"""Random traces and formulas, small enough to meet each other."""
+"""Random traces and formulas from so few words that they often match each other."""
 
 from dataclasses import replace
 from typing import get_args
@@ -111,22 +111,22 @@ def single_tests() -> SearchStrategy[rtl.Test]:
 
 @pytest.fixture(scope="session")
 def strange_formulas() -> SearchStrategy[rtl.Formula]:
-    """Formulas whose regexes hold anything a string may hold."""
-    return formulas_from(st.text(max_size=6).map(compose).map(_escaped))
+    """Return formulas whose regexes hold any characters."""
+    return formulas_from(st.text(max_size=6).map(compose).map(_escape))
 
 
 @pytest.fixture(scope="session")
 def traces() -> SearchStrategy[Trace]:
-    """Traces in which every option is text."""
+    """Return traces in which every option is text."""
     return traces_from(st.builds(Option, NAMES, st.just(value=True)))
 
 
 @pytest.fixture(scope="session")
-def odd_traces() -> SearchStrategy[Trace]:
-    """Traces in which some options are no text."""
+def mixed_traces() -> SearchStrategy[Trace]:
+    """Return traces in which some options are not text."""
     return traces_from(st.builds(Option, NAMES, st.booleans()))
 
 
-def _escaped(text: str) -> str:
-    # A bare backspace is refused on purpose; everything else is escaped only where a regex needs it.
+def _escape(text: str) -> str:
+    # The parser refuses a bare backspace; only characters with a meaning in regexes need an escape.
     return "".join(f"\\{c}" if c in r"\.^$*+?{}[]()#" else c for c in text if c != "\b")

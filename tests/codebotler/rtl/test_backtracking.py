@@ -1,4 +1,4 @@
-"""No text that a program can say makes the judge slow: its regexes and functions take linear time."""
+"""No text of a program makes the judge slow: its regexes and functions take linear time."""
 
 import ast
 import importlib
@@ -39,8 +39,8 @@ MODULES = [
 ]
 
 
-def uses() -> Iterator[tuple[str, str, Read]]:
-    """Every regex of the judge's modules with every way in which it is used there."""
+def judge_regexes() -> Iterator[tuple[str, str, Read]]:
+    """Yield every regex of the judge's modules, once for each method that they call on it."""
     for module in MODULES:
         tree = ast.parse(Path(str(module.__file__)).read_text())
         used: dict[str, set[str]] = {}
@@ -51,10 +51,10 @@ def uses() -> Iterator[tuple[str, str, Read]]:
         for name, value in vars(module).items():
             if isinstance(value, re.Pattern):
                 for method in sorted(used.get(name, {"search"})):
-                    yield f"{module.__name__}.{name}.{method}", value.pattern, reading(value, method)
+                    yield f"{module.__name__}.{name}.{method}", value.pattern, bind_method(value, method)
 
 
-def reading(pattern: re.Pattern[str], method: str) -> Read:
+def bind_method(pattern: re.Pattern[str], method: str) -> Read:
     match method:
         case "finditer":
             return pattern.findall
@@ -64,13 +64,13 @@ def reading(pattern: re.Pattern[str], method: str) -> Read:
     return read
 
 
-def slow(read: Read, texts: list[RepeatedText], *most: Any) -> RepeatedText | None:  # noqa: ANN401 - any limits
+def find_slow(read: Read, texts: list[RepeatedText], *most: Any) -> RepeatedText | None:  # noqa: ANN401 - any limits
     return next((text for text in texts if is_slow(read, text, *most)), None)
 
 
 @pytest.mark.slow
-def test_the_regexes_of_the_judge_take_linear_time() -> None:
-    found = {name: slow(read, texts_to_try(pattern)[:10]) for name, pattern, read in uses()}
+def test_regexes_of_the_judge_take_linear_time() -> None:
+    found = {name: find_slow(read, texts_to_try(pattern)[:10]) for name, pattern, read in judge_regexes()}
     assert len(found) > 20
     assert not {name: text for name, text in found.items() if text is not None}
 
@@ -102,25 +102,25 @@ WORDS = (
 )
 
 
-DEAR = {"claim", "clauses", "gathered clauses", "number", "numerals", "polarity", "time", "times_in"}
+SLOW = {"claim", "clauses", "gathered clauses", "number", "numerals", "polarity", "time", "times_in"}
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in DEAR)) for name in FUNCTIONS]
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in FUNCTIONS]
 )
-def test_the_functions_that_read_texts_take_linear_time(name: str) -> None:
+def test_functions_that_read_texts_take_linear_time(name: str) -> None:
     texts = [
         RepeatedText(unit, prefix, suffix)
         for prefix in ("", "a has b, 1")
         for unit in WORDS
         for suffix in ("", "x 2")
     ]
-    assert slow(FUNCTIONS[name], texts, [3_000], 0.25) is None  # linear ones take up to 0.05
+    assert find_slow(FUNCTIONS[name], texts, [3_000], 0.25) is None  # linear functions take at most 0.05
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("suite", ["paper", "plus"])
-def test_the_regexes_of_a_suite_take_linear_time(suite: str) -> None:
+def test_regexes_of_a_suite_take_linear_time(suite: str) -> None:
     tasks = load_suite(suite).tasks.values()
     found = {pattern for task in tasks for pattern in searched_regexes(task)}
     assert len(found) > 50
@@ -154,7 +154,7 @@ def test_a_slow_regex_is_found(pattern: str) -> None:
         ),
     ],
 )
-def test_a_regex_that_is_slow_although_bounded_is_found_at_once(pattern: str) -> None:
+def test_slow_regex_with_bounded_repeats_is_found(pattern: str) -> None:
     assert slow_text(pattern) is not None
 
 
@@ -169,5 +169,5 @@ def test_a_regex_that_is_slow_although_bounded_is_found_at_once(pattern: str) ->
         ),
     ],
 )
-def test_what_people_write_is_not_found_slow(pattern: str) -> None:
+def test_ordinary_regex_is_not_called_slow(pattern: str) -> None:
     assert slow_text(pattern) is None

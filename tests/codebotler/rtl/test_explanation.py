@@ -1,4 +1,4 @@
-"""Explanations: the sentence for each kind of failure, true, short and found in linear time."""
+"""Explanations of failures: right for each kind, true, short and found in linear time."""
 
 import re
 import time
@@ -37,12 +37,12 @@ TWICE: Trace = (
     Event("wave", "tom"),
 )
 
-# Of each explanation on LUNCH: the formula, words of the sentence in their order, and the step to blame.
+# Each row holds a formula, the words of its explanation on LUNCH in order, and the step to blame.
 SENTENCES = Path(__file__).with_name("sentences.txt").read_text(encoding="utf-8").strip().split("\n\n")
 
 
 @pytest.mark.parametrize("row", SENTENCES)
-def test_sentence(row: str) -> None:
+def test_explanation_has_the_expected_words_and_step(row: str) -> None:
     text, words, step = row.splitlines()
     why = explain(parse(text), LUNCH)
     assert why is not None
@@ -71,7 +71,7 @@ def test_sentence(row: str) -> None:
         ('tr.Exists(wave("bob"))', 'never did wave "bob": it only did wave "tom" \\(step 7\\)'),
     ],
 )
-def test_what_happened_on_other_visits_and_by_further_skills(text: str, sentence: str) -> None:
+def test_explanation_mentions_other_visits_and_own_skills(text: str, sentence: str) -> None:
     why = explain(parse(text, skills=SKILLS.with_skill(WAVE)), TWICE)
     assert why is not None
     assert re.search(sentence, why.sentence)
@@ -95,20 +95,20 @@ def test_what_happened_on_other_visits_and_by_further_skills(text: str, sentence
         ('tr.Exists(pick("x")) and tr.Exists(say(".*"))', "a greeting", 'never picked up "x"$'),
     ],
 )
-def test_a_task_says_what_texts_mean(text: str, means: str, words: str) -> None:
+def test_explanation_uses_the_meaning_that_the_task_gives_to_texts(text: str, means: str, words: str) -> None:
     why = explain(parse(text, means={"say": means}), LUNCH)
     assert why is not None
     assert re.search(words, why.sentence), why.sentence
 
 
-def test_facts_that_read_alike_are_one() -> None:
+def test_equal_facts_are_explained_once() -> None:
     either = r'tr.Exists(say(denies("\d+"))) or tr.Exists(say(affirms("\d+")))'
     why = explain(parse(either, means={"say": "that nobody is in"}), LUNCH)
     assert why is not None
     assert why.sentence.count("nobody is in") == 1
 
 
-def test_a_robot_that_did_nothing() -> None:
+def test_explanation_of_an_idle_robot_says_that_it_did_nothing() -> None:
     why = explain(parse('tr.ActAtSome("lobby", say("x"))'), ())
     assert why is not None
     assert why.sentence.endswith(
@@ -119,7 +119,7 @@ def test_a_robot_that_did_nothing() -> None:
     assert stayed.sentence.endswith("there: it did nothing there")
 
 
-def test_an_option_that_is_no_text() -> None:
+def test_option_that_is_not_text_is_the_explanation() -> None:
     trace = (Event("ask", "how many?", (Option("one"), Option("[2,\n 3]", is_text=False))),)
     why = explain(parse('tr.Exists(ask("many", "x"))'), trace)
     assert why is not None
@@ -127,7 +127,7 @@ def test_an_option_that_is_no_text() -> None:
     assert why.event == 0
 
 
-def test_what_holds_needs_no_explanation() -> None:
+def test_formula_that_holds_has_no_explanation() -> None:
     assert explain(parse('tr.Exists(say("hi"))'), TWICE) is None
 
 
@@ -144,7 +144,7 @@ VERBS = {
 STEP = re.compile(rf"\b({'|'.join(VERBS)})\b(?:(?!\b(?:{'|'.join(VERBS)})\b)[^:;])*? (?:at |\()step (\d+)")
 
 
-def judged(formula: Formula, trace: Trace) -> bool:
+def is_judged_true(formula: Formula, trace: Trace) -> bool:
     try:
         return holds(formula, trace)
     except Inconclusive:
@@ -153,11 +153,11 @@ def judged(formula: Formula, trace: Trace) -> bool:
 
 @given(st.data())
 def test_explanations_are_true(
-    formulas: SearchStrategy[Formula], odd_traces: SearchStrategy[Trace], data: DataObject
+    formulas: SearchStrategy[Formula], mixed_traces: SearchStrategy[Trace], data: DataObject
 ) -> None:
-    formula, trace = data.draw(formulas), data.draw(odd_traces)
+    formula, trace = data.draw(formulas), data.draw(mixed_traces)
     why = explain(formula, trace)
-    assert (why is None) == judged(formula, trace)
+    assert (why is None) == is_judged_true(formula, trace)
     if why is None:
         return
     assert why.event is None or 0 <= why.event < len(trace)
@@ -170,7 +170,7 @@ def test_explanations_are_true(
 
 
 @given(st.data())
-def test_whatever_is_quoted_was_said(
+def test_quoted_texts_are_those_of_their_steps(
     single_tests: SearchStrategy[Formula], traces: SearchStrategy[Trace], data: DataObject
 ) -> None:
     formula, trace = data.draw(single_tests), data.draw(traces)
@@ -209,7 +209,7 @@ def test_a_long_text_is_shortened(text: str) -> None:
 @pytest.mark.parametrize(
     "text", ['tr.Exists(say("bye"))', 'tr.Exists(mention("bye"))', 'tr.Exists(goto("bye"))']
 )
-def test_of_a_megabyte_little_is_told(text: str) -> None:
+def test_explanation_of_a_megabyte_is_short(text: str) -> None:
     options = tuple(Option(f"{number} {LONG}") for number in range(9))
     events = [Event("say", LONG), Event("ask", LONG, options), Event("goto", LONG), Event("say", "hi")]
     why = explain(parse(text), tuple(events * 20))
@@ -227,11 +227,11 @@ DAY = (
     Event("pick", "mug"),
     Event("place", "mug"),
 )
-STAYING = DAY[:5]
+IN_THE_LOBBY = DAY[:5]
 MANY_ROOMS = tuple(Event("goto", f"room {number}") for number in range(8))
 
 
-def seconds(formula: Formula, trace: Trace) -> float:
+def measure_seconds(formula: Formula, trace: Trace) -> float:
     taken = []
     for _ in range(3):
         start = time.process_time()
@@ -258,15 +258,15 @@ def seconds(formula: Formula, trace: Trace) -> float:
         'not (tr.ActAtSome("lobby", say("hello")) and not tr.Exists(say("x")))',
     ],
 )
-def test_the_time_grows_with_the_trace_and_no_faster(text: str) -> None:
+def test_explanation_takes_linear_time(text: str) -> None:
     formula, times = parse(text), 8
-    days = [day + day[-1:] * (8 - len(day)) for day in (DAY, STAYING, STAYING[:3], MANY_ROOMS)]
-    short = sum(seconds(formula, day * 30) for day in days)
-    long = sum(seconds(formula, day * 30 * times) for day in days)
-    assert long < 4 * times * short  # were it quadratic, it would be 8 * times
+    days = [day + day[-1:] * (8 - len(day)) for day in (DAY, IN_THE_LOBBY, IN_THE_LOBBY[:3], MANY_ROOMS)]
+    short = sum(measure_seconds(formula, day * 30) for day in days)
+    long = sum(measure_seconds(formula, day * 30 * times) for day in days)
+    assert long < 4 * times * short  # quadratic time would make it 8 * times
 
 
-def test_where_the_robot_was_is_explained_by_the_room() -> None:
+def test_explanation_of_a_pose_names_the_room() -> None:
     formula = parse('not tr.Exists(inside("server room"))', skills=SKILLS.with_skill(POSE_IN_ROOM))
     found = explain(formula, (Event("goto", "hall"), Event("inside", "server room")))
     assert found is not None

@@ -1,4 +1,4 @@
-"""The monitor, against `holds` on every prefix, and against all that can follow."""
+"""The monitor agrees with `holds` on every prefix and on everything that can follow."""
 
 import pickle
 from itertools import product
@@ -18,7 +18,7 @@ KNOCK = parse(
 
 
 @given(st.data())
-def test_it_says_of_every_prefix_what_the_formula_does(
+def test_monitor_agrees_with_the_formula_on_every_prefix(
     formulas: SearchStrategy[Formula], traces: SearchStrategy[Trace], data: DataObject
 ) -> None:
     formula, trace = data.draw(formulas), data.draw(traces)
@@ -46,7 +46,7 @@ TEXTS = (
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_what_is_final_is_so_whatever_follows(text: str) -> None:
+def test_verdict_is_final_exactly_if_no_future_changes_it(text: str) -> None:
     formula, length = parse(text), 3
     for word in product(ROOMS, repeat=length):
         monitor = Monitor(formula, ROOMS)
@@ -59,7 +59,7 @@ def test_what_is_final_is_so_whatever_follows(text: str) -> None:
 
 
 @given(st.data())
-def test_what_is_final_stays_so_for_any_formula(
+def test_final_verdict_never_changes(
     formulas: SearchStrategy[Formula], traces: SearchStrategy[Trace], data: DataObject
 ) -> None:
     formula, trace = data.draw(formulas), data.draw(traces)
@@ -70,13 +70,13 @@ def test_what_is_final_stays_so_for_any_formula(
         final = now if monitor.is_final else final
 
 
-def test_what_cannot_happen_is_refused_and_does_not_count() -> None:
+def test_impossible_event_is_refused_and_ignored() -> None:
     monitor = Monitor(parse('tr.Exists(say("attic"))'), ROOMS)
     assert monitor.is_final
     with pytest.raises(ValueError, match="list of possible events"):
         monitor.feed(Event("say", "attic"))
     assert not monitor.holds
-    assert not monitor.feed(Event("goto", "another room"))  # as the others, by what the formula compares
+    assert not monitor.feed(Event("goto", "another room"))  # to the formula, it equals the others
 
 
 def test_a_formula_too_large_to_look_ahead_is_inconclusive() -> None:
@@ -86,16 +86,16 @@ def test_a_formula_too_large_to_look_ahead_is_inconclusive() -> None:
     assert not monitor.feed(Event("say", "a"))
 
 
-def test_an_option_that_is_no_text_is_never_judged() -> None:
+def test_option_that_is_not_text_is_inconclusive() -> None:
     monitor = Monitor(parse('not tr.Exists(ask("tea", "yes"))'))
-    odd = Event("ask", "tea?", (Option("1", is_text=False),))
+    mixed = Event("ask", "tea?", (Option("1", is_text=False),))
     for judge in (monitor.feed, monitor.would_hold):
         with pytest.raises(Inconclusive):
-            judge(odd)
+            judge(mixed)
     assert monitor.holds
 
 
-def test_what_it_remembers_does_not_grow_with_the_trace() -> None:
+def test_state_does_not_grow_with_the_trace() -> None:
     monitor, sizes = Monitor(KNOCK), set()
     for round_ in range(1_000):
         for event in ROOMS:

@@ -1,4 +1,4 @@
-"""Matchers remember short texts, and not too many of them."""
+"""Matchers cache the results for short texts, up to a limit."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from codebotler.rtl.pattern import MAX_CACHED_LENGTH, MAX_CACHED_TEXTS, Matcher
 
 
 class Longer(Matcher):
-    """A string of more than three characters; keeps what it had to look at."""
+    """Match texts of more than three characters, and list the texts that were not cached."""
 
     def __init__(self) -> None:
         self.seen: list[str] = []
@@ -16,14 +16,14 @@ class Longer(Matcher):
         return len(text) > 3
 
 
-def test_a_short_text_is_looked_at_once_and_a_long_one_each_time() -> None:
+def test_only_short_texts_are_cached() -> None:
     matcher, long = Longer(), "x" * (MAX_CACHED_LENGTH + 1)
     for _ in range(2):
         assert [matcher.matches(text) for text in ("abc", "abcd", long)] == [False, True, True]
     assert matcher.seen == ["abc", "abcd", long, long]
 
 
-def test_what_is_remembered_has_an_end() -> None:
+def test_cache_is_bounded() -> None:
     matcher = Longer()
     for number in range(2 * MAX_CACHED_TEXTS):
         matcher.matches(str(number))

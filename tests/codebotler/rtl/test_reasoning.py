@@ -1,4 +1,4 @@
-"""Reasoning about formulas: what can hold, what follows, and which traces tell formulas apart."""
+"""Reasoning about formulas: satisfiability, implication, conflicts, and traces that tell them apart."""
 
 from collections.abc import Callable
 from itertools import product
@@ -52,7 +52,7 @@ A, B = Regex("a"), Regex("b")
     ],
     ids=str,
 )
-def test_an_element_matches_where_each_of_its_aspects_does(element: EventPattern) -> None:
+def test_element_matches_if_each_of_its_aspects_does(element: EventPattern) -> None:
     options, more = [(), (Option("a"),), (Option("b"), Option("a"))], [(), ("a", "b"), ("b",)]
     found: set[bool] = set()
     for text, offered, answer, is_found, place, holding, to, further in product(
@@ -68,7 +68,7 @@ def test_an_element_matches_where_each_of_its_aspects_does(element: EventPattern
 # --- the questions
 
 
-def test_what_can_hold_and_by_which_shortest_trace() -> None:
+def test_satisfiable_formulas_have_a_shortest_trace() -> None:
     assert is_satisfiable(GREETS_THERE)
     assert satisfying_trace(GREETS_THERE) == (Event("goto", "kitchen"), Event("say", "hello"))
     both = satisfying_trace(parse('tr.Exists(say("tea"))'), parse('tr.Exists(say("ready"))'))
@@ -77,11 +77,11 @@ def test_what_can_hold_and_by_which_shortest_trace() -> None:
     assert satisfying_trace(STAYS) == satisfying_trace() == ()
 
 
-def test_what_cannot_hold() -> None:
-    odd = parse('tr.Exists(say("a")) and not tr.Exists(say("a|b"))')
-    assert not is_satisfiable(odd)
+def test_contradictory_formulas_are_not_satisfiable() -> None:
+    impossible = parse('tr.Exists(say("a")) and not tr.Exists(say("a|b"))')
+    assert not is_satisfiable(impossible)
     assert not is_satisfiable(SPEAKS, GOES, STAYS)
-    assert satisfying_trace(odd) is None
+    assert satisfying_trace(impossible) is None
 
 
 X_ALONE = 'say(words("x", without("y")))'
@@ -101,7 +101,7 @@ X_ALONE = 'say(words("x", without("y")))'
         ),
     ],
 )
-def test_a_shortest_trace_is_found_where_a_longer_one_is_nearer(texts: list[str], length: int) -> None:
+def test_shortest_trace_is_found_even_if_a_longer_one_comes_first(texts: list[str], length: int) -> None:
     formulas = [*map(parse, texts)]
     shortest, any_trace = satisfying_trace(*formulas), Reasoner(formulas).trace(formulas)
     assert shortest is not None
@@ -111,12 +111,12 @@ def test_a_shortest_trace_is_found_where_a_longer_one_is_nearer(texts: list[str]
     assert distinguishing_trace(one, And((one, rest))) == shortest
 
 
-def test_which_formulas_contradict_each_other() -> None:
+def test_conflict_names_the_formulas_that_contradict_each_other() -> None:
     assert conflict(SPEAKS, GOES, STAYS) == [GOES, STAYS]
     assert conflict(SPEAKS, GOES) is None
 
 
-def test_what_follows() -> None:
+def test_implied_formulas_are_recognized() -> None:
     assert is_implied(GOES, GREETS_THERE)
     assert not is_implied(GREETS_THERE, GOES, SPEAKS)
     asks_first = parse('tr.AfterFirst(goto("kitchen")).BeforeFirst(say("hello")).Exists(ask("tea", ".*"))')
@@ -138,9 +138,7 @@ def test_what_follows() -> None:
         ('tr.Exists(say("no"))', r'tr.Exists(say(r"\bno\b"))', 1),
     ],
 )
-def test_whether_formulas_mean_the_same_and_what_tells_them_apart(
-    one: str, other: str, length: int | None
-) -> None:
+def test_shortest_trace_distinguishes_formulas_that_differ(one: str, other: str, length: int | None) -> None:
     first, second = parse(one), parse(other)
     trace = distinguishing_trace(first, second)
     assert (None if trace is None else len(trace)) == length
@@ -154,23 +152,23 @@ def test_whether_formulas_mean_the_same_and_what_tells_them_apart(
         lambda formula: distinguishing_trace(SPEAKS, formula),
     ],
 )
-def test_what_would_take_too_long_is_undecided(ask: Callable[[Formula], object]) -> None:
+def test_too_large_formula_is_undecided(ask: Callable[[Formula], object]) -> None:
     with pytest.raises(Undecided):
         ask(TOO_LARGE)
 
 
 def test_a_large_product_is_undecided() -> None:
     many = [parse(f'tr.Count(say("^{letter}$"), 30)') for letter in "abc"]
-    odd = parse('tr.Count(say("d"), 1) or tr.Count(say("d"), 3)')
-    assert is_satisfiable(*many, odd)
+    one_or_three = parse('tr.Count(say("d"), 1) or tr.Count(say("d"), 3)')
+    assert is_satisfiable(*many, one_or_three)
     with pytest.raises(Undecided):
-        is_satisfiable(*many, odd, parse('tr.Count(say("d"), 0) or tr.Count(say("d"), 2)'))
+        is_satisfiable(*many, one_or_three, parse('tr.Count(say("d"), 0) or tr.Count(say("d"), 2)'))
 
 
-# --- in the rooms of one world
+# --- the rooms of one world
 
 
-def test_moves_lead_to_the_rooms_that_there_are() -> None:
+def test_moves_lead_only_to_rooms_of_the_world() -> None:
     lobby, there = parse('tr.Exists(goto("lobby"))'), parse('tr.Exists(at("office", say("x")))')
     moves = {"the kitchen": "kitchen", "office": "office"}
     at_home = Reasoner([lobby, there], moves, "kitchen")
@@ -276,7 +274,7 @@ def formulas() -> st.SearchStrategy[Formula]:
 FORMULAS = formulas()
 
 
-def test_options_may_match_what_no_single_one_can() -> None:
+def test_several_options_may_match_where_one_text_cannot() -> None:
     both = parse(
         'tr.Exists(ask("a", "^yes$")) and tr.Exists(ask("a", "^no$")) and tr.Count(ask("a", ".*"), 1)'
     )
@@ -287,7 +285,7 @@ def test_options_may_match_what_no_single_one_can() -> None:
     assert not is_satisfiable(none)
 
 
-def test_a_conflict_holds_no_more_than_it_must() -> None:
+def test_conflict_is_minimal() -> None:
     reasoner = Reasoner([GOES, STAYS, SPEAKS])
     assert reasoner.conflict([SPEAKS, GOES, STAYS]) == [GOES, STAYS]
     assert reasoner.conflict([SPEAKS, GOES], GOES) == [GOES]

@@ -1,4 +1,4 @@
-"""The words of regexes: plain texts where they are certain, and nothing where they are not."""
+"""The words of a regex: all its texts if they can be listed, otherwise nothing."""
 
 import pytest
 
@@ -23,7 +23,7 @@ from codebotler.rtl.regex_words import choices, first_choice, one_of
         ("bo+b", ("bob",)),
     ],
 )
-def test_words_that_are_certain(pattern: str, texts: tuple[str, ...]) -> None:
+def test_simple_regex_has_words(pattern: str, texts: tuple[str, ...]) -> None:
     assert choices(pattern) == texts
 
 
@@ -40,7 +40,7 @@ def test_words_that_are_certain(pattern: str, texts: tuple[str, ...]) -> None:
         r"no(?!.*\d)y",
     ],
 )
-def test_what_is_not_certain_has_no_words(pattern: str) -> None:
+def test_open_ended_regex_has_no_words(pattern: str) -> None:
     assert choices(pattern) is None
 
 
@@ -52,6 +52,6 @@ def test_the_first_choice_is_short(pattern: str, word: str) -> None:
     assert first_choice(pattern) == word
 
 
-def test_of_many_texts_some_are_shown() -> None:
+def test_one_of_shows_only_some_of_many_texts() -> None:
     assert one_of(("a", "b")) == '"a" or "b"'
     assert one_of(tuple("abcdefgh")) == '"a", "b", "c", "d", "e" or 3 more'

@@ -1,4 +1,4 @@
-"""What formulas mean, against the definitions of RTL.md written out literally."""
+"""Formulas mean their definitions in RTL.md, which are written out literally here."""
 
 import pickle
 import re
@@ -40,7 +40,7 @@ from codebotler.rtl import (
 from codebotler.rtl.semantics import compared_fields, positions_in_scopes
 
 Placed = list[tuple[int, Event]]
-"""A copied part of a trace, each event with its position in the whole."""
+"""A copy of a part of a trace, each event with its position in the whole trace."""
 
 YES = Option("yes")
 THREE = Option("3", is_text=False)
@@ -58,35 +58,35 @@ def ask(question: str, *options: Option) -> Event:
     return Event("ask", question, options)
 
 
-def pattern(text: TextPattern) -> str:
+def regex_of(text: TextPattern) -> str:
     match text:
         case Regex(regex):
             return regex
         case Without(regex):
             return rf"^(?!.*\b(?:{regex})\b).*$"
         case Words(parts):
-            return "^" + "".join(f"(?=.*(?:{pattern(part)}))" for part in parts) + ".*$"
+            return "^" + "".join(f"(?=.*(?:{regex_of(part)}))" for part in parts) + ".*$"
         case Number() | Time() | Claim():
-            raise AssertionError("what a string claims is no regex; test_claims.py is about it")
+            raise AssertionError("a claim is not a regex; test_claims.py tests claims")
 
 
-def found(text: TextPattern, actual: str) -> bool:
+def is_found(text: TextPattern, actual: str) -> bool:
     if isinstance(text, Number | Time | Claim):
         return text.matches(actual)
     if isinstance(text, Words):
-        return all(found(part, actual) for part in text.parts)
-    return re.search(pattern(text), actual, re.IGNORECASE | re.DOTALL) is not None
+        return all(is_found(part, actual) for part in text.parts)
+    return re.search(regex_of(text), actual, re.IGNORECASE | re.DOTALL) is not None
 
 
-def same(element: EventPattern, placed: tuple[int, Event]) -> bool:
+def is_same(element: EventPattern, placed: tuple[int, Event]) -> bool:
     at, event = placed
     if event.kind != element.kind:
         return False
-    if element.place is not None and not found(Regex(rf"\b(?:{element.place})\b"), event.place):
+    if element.place is not None and not is_found(Regex(rf"\b(?:{element.place})\b"), event.place):
         return False
     held, to, answer = event.holding or None, event.to, event.answer
     for wanted, actual in ((element.holding, held), (element.to, to), (element.answer, answer)):
-        if wanted is not None and (actual is None or not found(wanted, actual)):
+        if wanted is not None and (actual is None or not is_found(wanted, actual)):
             return False
     if element.found is not None and event.found is not element.found:
         return False
@@ -95,38 +95,38 @@ def same(element: EventPattern, placed: tuple[int, Event]) -> bool:
 
 def matches_text(element: EventPattern, event: Event, at: int) -> bool:
     if element.mention:
-        return any(found(element.text, text) for text in (event.text, *(o.text for o in event.options)))
+        return any(is_found(element.text, text) for text in (event.text, *(o.text for o in event.options)))
     if element.options is None:
-        return found(element.text, event.text)
+        return is_found(element.text, event.text)
     offered = False
     for number, option in enumerate(event.options):
         if not option.is_text:
             raise Inconclusive(at, number, option)
-        if found(element.options, option.text):
+        if is_found(element.options, option.text):
             offered = True
             break
-    return found(element.text, event.text) and offered
+    return is_found(element.text, event.text) and offered
 
 
 def exists(tr: Placed, e: EventPattern) -> bool:
-    return any(same(e, event) for event in tr)
+    return any(is_same(e, event) for event in tr)
 
 
 def after_first(tr: Placed, e: EventPattern) -> Placed:
-    return next((tr[i + 1 :] for i, event in enumerate(tr) if same(e, event)), tr)
+    return next((tr[i + 1 :] for i, event in enumerate(tr) if is_same(e, event)), tr)
 
 
 def before_first(tr: Placed, e: EventPattern) -> Placed:
-    return next((tr[:i] for i, event in enumerate(tr) if same(e, event)), tr)
+    return next((tr[:i] for i, event in enumerate(tr) if is_same(e, event)), tr)
 
 
 def after_last(tr: Placed, e: EventPattern) -> Placed:
-    hits = [i for i, event in enumerate(tr) if same(e, event)]
+    hits = [i for i, event in enumerate(tr) if is_same(e, event)]
     return tr[hits[-1] + 1 :] if hits else tr
 
 
 def before_last(tr: Placed, e: EventPattern) -> Placed:
-    hits = [i for i, event in enumerate(tr) if same(e, event)]
+    hits = [i for i, event in enumerate(tr) if is_same(e, event)]
     return tr[: hits[-1]] if hits else tr
 
 
@@ -164,27 +164,27 @@ SCOPES: dict[str, Callable[[Placed, EventPattern], Placed]] = {
 }
 
 
-def defined(formula: Formula, trace: Trace) -> bool:
+def holds_by_definition(formula: Formula, trace: Trace) -> bool:
     match formula:
         case And(parts):
-            return all(defined(part, trace) for part in parts)
+            return all(holds_by_definition(part, trace) for part in parts)
         case Or(parts):
-            return any(defined(part, trace) for part in parts)
+            return any(holds_by_definition(part, trace) for part in parts)
         case Not(part):
-            return not defined(part, trace)
+            return not holds_by_definition(part, trace)
         case _:
             tr = list(enumerate(trace))
             for one in formula.scopes:
                 tr = SCOPES[one.name](tr, one.element)
-            return defined_test(formula, tr)
+            return single_test_holds(formula, tr)
 
 
-def defined_test(test: Test, tr: Placed) -> bool:
+def single_test_holds(test: Test, tr: Placed) -> bool:
     match test:
         case Exists(e):
             return exists(tr, e)
         case Last(e):
-            return bool(tr) and same(e, tr[-1])
+            return bool(tr) and is_same(e, tr[-1])
         case ActAtFirst(p, e):
             return act_at_first(tr, p, e)
         case ActAtSome(p, e):
@@ -207,36 +207,36 @@ def verdict(judge: Callable[[Formula, Trace], bool], formula: Formula, trace: Tr
 
 @given(st.data())
 def test_tests_mean_their_definitions(
-    single_tests: SearchStrategy[Test], odd_traces: SearchStrategy[Trace], data: DataObject
+    single_tests: SearchStrategy[Test], mixed_traces: SearchStrategy[Trace], data: DataObject
 ) -> None:
-    test, trace = data.draw(single_tests), data.draw(odd_traces)
-    assert verdict(holds, test, trace) == verdict(defined, test, trace)
+    test, trace = data.draw(single_tests), data.draw(mixed_traces)
+    assert verdict(holds, test, trace) == verdict(holds_by_definition, test, trace)
 
 
 @given(st.data())
 def test_formulas_mean_their_definitions(
-    formulas: SearchStrategy[Formula], odd_traces: SearchStrategy[Trace], data: DataObject
+    formulas: SearchStrategy[Formula], mixed_traces: SearchStrategy[Trace], data: DataObject
 ) -> None:
-    formula, trace = data.draw(formulas), data.draw(odd_traces)
-    assert verdict(holds, formula, trace) == verdict(defined, formula, trace)
+    formula, trace = data.draw(formulas), data.draw(mixed_traces)
+    assert verdict(holds, formula, trace) == verdict(holds_by_definition, formula, trace)
 
 
 @given(st.data())
 def test_stays_mean_their_definition(data: DataObject) -> None:
-    """Rooms whose names contain each other, where a stay may begin within a stay."""
+    """Some room names contain others, so a stay may begin within a stay."""
     moves = st.sampled_from(["a", "ab", "a b", "b"]).map(goto)
     trace = tuple(data.draw(st.lists(moves | st.just(say("x")), max_size=9)))
     for test in (ActAtSome, ActAtFirst):
         for kind in ("say", "goto"):
             formula = test(data.draw(st.sampled_from(["a", "b"])), EventPattern(kind, Regex("x|b")))
-            assert holds(formula, trace) == defined(formula, trace)
+            assert holds(formula, trace) == holds_by_definition(formula, trace)
 
 
 @given(st.data())
-def test_negation(
-    formulas: SearchStrategy[Formula], odd_traces: SearchStrategy[Trace], data: DataObject
+def test_negation_inverts_every_verdict(
+    formulas: SearchStrategy[Formula], mixed_traces: SearchStrategy[Trace], data: DataObject
 ) -> None:
-    formula, trace = data.draw(formulas), data.draw(odd_traces)
+    formula, trace = data.draw(formulas), data.draw(mixed_traces)
     plain, negated = verdict(holds, formula, trace), verdict(holds, Not(formula), trace)
     assert negated == (not plain if isinstance(plain, bool) else plain)
 
@@ -251,11 +251,11 @@ def test_count_is_the_largest_at_least(
 
 
 @given(st.data())
-def test_the_parts_before_and_after_make_up_the_trace(
+def test_parts_before_and_after_an_event_make_up_the_trace(
     elements: SearchStrategy[EventPattern], traces: SearchStrategy[Trace], data: DataObject
 ) -> None:
     element, trace = data.draw(elements), data.draw(traces)
-    hits = [at for at in range(len(trace)) if same(element, (at, trace[at]))]
+    hits = [at for at in range(len(trace)) if is_same(element, (at, trace[at]))]
     for which, at in (("First", hits[:1]), ("Last", hits[-1:])):
         before, after = (
             positions_in_scopes(parse_scope(side + which, element), trace) for side in ("Before", "After")
@@ -274,16 +274,15 @@ def parse_scope(name: str, element: EventPattern) -> tuple[Scope, ...]:
 
 
 @given(st.data())
-def test_a_trace_is_judged_by_what_is_compared_only(
+def test_events_that_a_formula_does_not_name_change_nothing(
     formulas: SearchStrategy[Formula], traces: SearchStrategy[Trace], data: DataObject
 ) -> None:
-    """Events of a kind that a formula does not name change nothing."""
     formula, trace = data.draw(formulas), data.draw(traces)
     padded = tuple(event for one in trace for event in (Event("wave", "a"), one))
     assert holds(formula, padded) == holds(formula, trace)
 
 
-def test_all_that_formulas_compare_of_an_event_is_visible() -> None:
+def test_every_field_that_formulas_compare_is_visible() -> None:
     event = Event("say", "a")
     other = Event(
         *("ask", "b", (Option("1"),), "c"),
@@ -303,7 +302,7 @@ def test_all_that_formulas_compare_of_an_event_is_visible() -> None:
 
 
 @given(st.data())
-def test_a_formula_holds_of_all_traces_in_which_the_same_is_visible(
+def test_equally_visible_traces_have_the_same_verdict(
     formulas: SearchStrategy[Formula], traces: SearchStrategy[Trace], data: DataObject
 ) -> None:
     formula, trace = data.draw(formulas), data.draw(traces)
@@ -315,8 +314,8 @@ def test_a_formula_holds_of_all_traces_in_which_the_same_is_visible(
 AnySlice: TypeAlias = "slice[SupportsIndex | None, SupportsIndex | None, SupportsIndex | None]"
 
 
-class Reads(tuple[Event, ...]):  # noqa: SLOT001 - it counts
-    """A trace that counts how often an event of it is looked at."""
+class CountingTrace(tuple[Event, ...]):  # noqa: SLOT001 - it needs a counter
+    """Count how often an event of the trace is read."""
 
     number = 0
 
@@ -344,15 +343,15 @@ class Reads(tuple[Event, ...]):  # noqa: SLOT001 - it counts
 @pytest.mark.parametrize(
     "turn", [[goto("a"), say("x"), goto("b")], [goto("a"), say("x")], [say("x"), goto("a")]], ids=str
 )
-def test_work_grows_with_the_trace(text: str, turn: list[Event]) -> None:
+def test_judging_takes_linear_time(text: str, turn: list[Event]) -> None:
     formula = parse(text)
     for turns in (10, 1000):
-        trace = Reads(turn * turns)
+        trace = CountingTrace(turn * turns)
         holds(formula, trace)
         assert trace.number <= 5 * len(trace)
 
 
-def test_an_option_that_is_no_text_cannot_be_judged_whether_or_not_the_question_matches() -> None:
+def test_option_that_is_not_text_is_inconclusive_for_any_question() -> None:
     trace = (ask("lunch", YES, THREE),)
     for text in (
         'tr.Exists(ask("lunch", "no"))',
@@ -369,7 +368,7 @@ def test_options_are_compared_until_one_matches() -> None:
     assert not holds(parse('tr.Exists(ask("dinner", "yes"))'), (ask("lunch", YES, THREE),))
 
 
-def test_counting_stops_at_the_event_that_settles_it() -> None:
+def test_counting_stops_at_the_event_that_decides() -> None:
     good, bad = ask("lunch", YES), ask("lunch", THREE)
     assert not holds(parse('tr.Count(ask(".*", "yes"), 0)'), (good, bad))
     assert not holds(parse('tr.Count(ask(".*", "yes"), 1)'), (good, good, bad))
@@ -379,12 +378,12 @@ def test_counting_stops_at_the_event_that_settles_it() -> None:
 
 @pytest.mark.parametrize("scope", ["AfterFirst", "AfterLast", "BeforeFirst", "BeforeLast"])
 @pytest.mark.parametrize("times", [1, 2])
-def test_no_part_holds_the_event_that_bounds_it(scope: str, times: int) -> None:
+def test_part_excludes_the_event_that_bounds_it(scope: str, times: int) -> None:
     formula = parse(f'tr.{scope}(say("a")).Exists(say("a"))')
     assert holds(formula, (say("a"),) * times) is (times == 2 and scope in {"AfterFirst", "BeforeLast"})
 
 
-def test_only_elements_that_ask_look_at_options() -> None:
+def test_only_ask_elements_read_options() -> None:
     assert not holds(parse('tr.Exists(say("x"))'), (ask("x", THREE),))
     assert holds(parse('tr.Exists(goto("x")) or tr.Exists(ask("x", ".*"))'), (goto("x"), ask("x", THREE)))
     assert holds(parse('tr.AtLeast(ask("x", ".*"), 0)'), (ask("x", THREE),))
@@ -410,7 +409,7 @@ def test_a_question_without_options_matches_no_options() -> None:
         ('words(r"(x)\\1", r"(y)\\1")', "yyxx", True),
     ],
 )
-def test_texts(text: str, actual: str, matches: bool) -> None:  # noqa: FBT001 - a row of a table
+def test_text_patterns_match_as_defined(text: str, actual: str, matches: bool) -> None:  # noqa: FBT001 - a row of a table
     assert holds(parse(f"tr.Exists(say({text}))"), (say(actual),)) is matches
 
 
@@ -429,16 +428,16 @@ NO_FORMULA = (
         ([goto("alice's office"), say("to the lobby"), ask("lunch?", YES)], False, True),
         ([ask("lunch?", YES), goto("alice's office")], False, False),
         ([], False, False),
-        # The two pitfalls of scopes: one whose event is not found is the whole trace.
+        # A scope whose event is missing is the whole trace, which is easy to overlook.
         ([say("to the lobby")], True, False),
     ],
 )
-def test_the_example_of_the_paper(events: list[Event], when_yes: bool, when_no: bool) -> None:  # noqa: FBT001 - a row of a table
+def test_example_of_the_paper_has_its_verdicts(events: list[Event], when_yes: bool, when_no: bool) -> None:  # noqa: FBT001 - a row of a table
     assert holds(parse(YES_FORMULA), tuple(events)) is when_yes
     assert holds(parse(NO_FORMULA), tuple(events)) is when_no
 
 
-def test_what_cannot_be_judged_travels_between_processes() -> None:
+def test_inconclusive_error_can_be_pickled() -> None:
     error = pickle.loads(pickle.dumps(Inconclusive(4, 1, THREE)))
     assert (error.event, error.number, error.option) == (4, 1, THREE)
     assert str(error) == "option 2 of the question at step 5 is not a string: 3"

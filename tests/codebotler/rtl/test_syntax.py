@@ -1,4 +1,4 @@
-"""Text to formulas and back."""
+"""Formulas are parsed from text and printed again."""
 
 import pickle
 import re
@@ -59,7 +59,7 @@ ASK = EventPattern("ask", Regex("lunch"), Regex(".*"))
         ),
     ],
 )
-def test_reads(text: str, formula: Formula) -> None:
+def test_text_is_parsed(text: str, formula: Formula) -> None:
     assert parse(text) == formula
 
 
@@ -81,7 +81,7 @@ def test_and_binds_closer_than_or_and_not_closest() -> None:
         r'tr.Exists(say(r"a\\"))',
     ],
 )
-def test_prints_readably(text: str) -> None:
+def test_formula_is_printed_as_written(text: str) -> None:
     assert str(parse(text)) == text
 
 
@@ -92,21 +92,21 @@ def test_mixed_chains_print_with_brackets() -> None:
 
 
 @given(st.data())
-def test_round_trip(formulas: SearchStrategy[Formula], data: DataObject) -> None:
+def test_formula_survives_the_round_trip(formulas: SearchStrategy[Formula], data: DataObject) -> None:
     formula = data.draw(formulas)
     assert parse(str(formula)) == formula
     assert hash(parse(str(formula))) == hash(formula)
 
 
 @given(st.data())
-def test_round_trip_of_strange_texts(strange_formulas: SearchStrategy[Formula], data: DataObject) -> None:
+def test_strange_texts_survive_printing(strange_formulas: SearchStrategy[Formula], data: DataObject) -> None:
     formula = data.draw(strange_formulas)
     assert parse(str(formula)) == formula
 
 
 @pytest.mark.filterwarnings("ignore::FutureWarning")
 @given(st.text(max_size=8).map(lambda text: text.replace("\b", "")))
-def test_round_trip_of_raw_patterns(pattern: str) -> None:
+def test_raw_patterns_survive_printing(pattern: str) -> None:
     try:
         re.compile(pattern)
     except re.error:
@@ -152,7 +152,7 @@ def test_round_trip_of_raw_patterns(pattern: str) -> None:
         ("\0", 1, "null"),
     ],
 )
-def test_says_what_is_wrong_and_where(text: str, column: int, named: str) -> None:
+def test_error_names_the_mistake_and_its_column(text: str, column: int, named: str) -> None:
     with pytest.raises(RtlSyntaxError, match=named) as caught:
         parse(text)
     assert caught.value.column == column
@@ -173,12 +173,12 @@ def test_says_what_is_wrong_and_where(text: str, column: int, named: str) -> Non
     ],
     ids=lambda text: text[:12],
 )
-def test_deep_nesting_is_an_error_and_no_crash(text: str) -> None:
+def test_deep_nesting_is_an_error_instead_of_a_crash(text: str) -> None:
     with pytest.raises(RtlSyntaxError):
         parse(text)
 
 
-def test_50_are_deep_enough_and_51_too_deep() -> None:
+def test_50_levels_are_accepted_and_51_refused() -> None:
     text = "not " * MAX_FORMULA_DEPTH + 'tr.Exists(say("a"))'
     assert str(parse(text)) == text
     with pytest.raises(RtlSyntaxError, match="more than 50 levels deep") as caught:
@@ -186,7 +186,7 @@ def test_50_are_deep_enough_and_51_too_deep() -> None:
     assert caught.value.column == 205
 
 
-def test_each_part_of_a_constraint_may_be_deep() -> None:
+def test_each_part_of_a_formula_may_be_deep() -> None:
     deep = "not " * (MAX_FORMULA_DEPTH - 1) + 'tr.Exists(say("a"))'
     assert str(parse(f"{deep} and {deep}")) == f"{deep} and {deep}"
     with pytest.raises(RtlSyntaxError, match="nested"):
@@ -200,16 +200,16 @@ def test_a_number_may_be_larger_than_any_trace(test: str) -> None:
     assert not holds(parse(text), (Event("say", "a"),))
 
 
-def test_nothing_is_evaluated() -> None:
+def test_python_code_is_never_evaluated() -> None:
     with pytest.raises(RtlSyntaxError):
         parse('__import__("os").system("true")')
 
 
-def test_escapes_that_python_does_not_know_mean_what_they_look_like() -> None:
+def test_unknown_escapes_are_read_literally() -> None:
     assert parse(r'tr.Exists(say("\d"))') == parse(r'tr.Exists(say(r"\d"))')
 
 
-def test_a_further_skill_is_a_further_element() -> None:
+def test_own_skill_adds_an_element() -> None:
     wave = Skill("wave", (Parameter("person"),), NO_VALUE, "Wave at a person.", Recording("wave", "person"))
     formula = parse('tr.Exists(wave("alice"))', skills=SKILLS.with_skill(wave))
     assert formula == Exists(EventPattern("wave", Regex("alice")))
@@ -236,14 +236,14 @@ OTHER_LOOK = Event("check", "mug", found=True)
         ((LOOK, NO_LOOK, LOOK), True, False),
     ],
 )
-def test_last_look_decides(trace: tuple[Event, ...], found: bool, missed: bool) -> None:  # noqa: FBT001 - of a table
+def test_last_look_decides(trace: tuple[Event, ...], found: bool, missed: bool) -> None:  # noqa: FBT001 - a row of a table
     for text, expected in (("last_found", found), ("last_missed", missed)):
         formula = parse(f'{text}("person")')
         assert holds(formula, trace) is expected
         assert parse(str(formula)) == formula
 
 
-def stateful(name: str, sets: str = "", clears: str = "") -> Skill:
+def switch(name: str, sets: str = "", clears: str = "") -> Skill:
     recording = Recording(name, "device", sets=sets, clears=clears)
     return Skill(name, (Parameter("device"),), NO_VALUE, "Switch.", recording)
 
@@ -251,13 +251,13 @@ def stateful(name: str, sets: str = "", clears: str = "") -> Skill:
 SWITCHES = SkillTable(
     (
         *SKILLS.rows,
-        *(stateful("turn_on", "on"), stateful("light", "on")),
-        *(stateful("turn_off", "", "on"), stateful("unplug", "", "on"), stateful("shut", "closed", "open")),
+        *(switch("turn_on", "on"), switch("light", "on")),
+        *(switch("turn_off", "", "on"), switch("unplug", "", "on"), switch("shut", "closed", "open")),
     )
 )
 
 
-def switched(*calls: str) -> tuple[Event, ...]:
+def switch_events(*calls: str) -> tuple[Event, ...]:
     parts = [call.partition(" ") for call in calls]
     return tuple(Event(kind, thing) for kind, _, thing in parts)
 
@@ -276,18 +276,18 @@ def switched(*calls: str) -> tuple[Event, ...]:
         (["unplug stove", "turn_on stove", "turn_off stove"], False),
     ],
 )
-def test_state_is_that_of_the_last_skill_that_changes_it(calls: list[str], expected: bool) -> None:  # noqa: FBT001 - of a table
+def test_last_skill_that_changes_a_state_decides(calls: list[str], expected: bool) -> None:  # noqa: FBT001 - a row of a table
     formula = parse('on("stove")', skills=SWITCHES)
-    assert holds(formula, switched(*calls)) is expected
-    assert holds(parse('not on("stove")', skills=SWITCHES), switched(*calls)) is not expected
+    assert holds(formula, switch_events(*calls)) is expected
+    assert holds(parse('not on("stove")', skills=SWITCHES), switch_events(*calls)) is not expected
     assert parse(str(formula), skills=SWITCHES) == formula
 
 
-def test_state_of_a_set_is_that_of_any_of_its_names() -> None:
+def test_state_of_a_set_holds_if_it_holds_for_any_name() -> None:
     formula = parse('on("{hot}")', skills=SWITCHES, sets={"hot": ["stove", "oven (big)"]})
-    assert holds(formula, switched("turn_on stove", "turn_on oven (big)", "turn_off oven (big)"))
-    assert holds(formula, switched("turn_on oven (big)", "turn_off stove"))
-    assert not holds(formula, switched("turn_on stove", "turn_off stove", "turn_on oven"))
+    assert holds(formula, switch_events("turn_on stove", "turn_on oven (big)", "turn_off oven (big)"))
+    assert holds(formula, switch_events("turn_on oven (big)", "turn_off stove"))
+    assert not holds(formula, switch_events("turn_on stove", "turn_off stove", "turn_on oven"))
 
 
 @pytest.mark.parametrize(
@@ -311,7 +311,7 @@ def test_wrong_states_and_looks_are_errors(text: str, column: int, named: str) -
     assert named in caught.value.problem
 
 
-def test_errors_and_formulas_travel_between_processes() -> None:
+def test_errors_and_formulas_can_be_pickled() -> None:
     with pytest.raises(RtlSyntaxError) as caught:
         parse("tr")
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
@@ -328,7 +328,7 @@ def test_errors_and_formulas_travel_between_processes() -> None:
         'not tr.Exists(holding("glass", inside("lab")))',
     ],
 )
-def test_house_rules_may_be_about_where_the_robot_is(text: str) -> None:
+def test_only_house_rules_may_use_the_pose_of_the_robot(text: str) -> None:
     formula = parse(text, skills=SKILLS.with_skill(POSE_IN_ROOM))
     assert str(formula) == text
     assert parse(str(formula), skills=SKILLS.with_skill(POSE_IN_ROOM)) == formula
@@ -337,6 +337,6 @@ def test_house_rules_may_be_about_where_the_robot_is(text: str) -> None:
 
 
 @pytest.mark.parametrize("wrong", ['returned(True, inside("a"))', 'to("a", inside("b"))', 'inside("a", "b")'])
-def test_what_a_pose_cannot_have_is_refused(wrong: str) -> None:
+def test_pose_with_a_result_an_addressee_or_two_rooms_is_refused(wrong: str) -> None:
     with pytest.raises(RtlSyntaxError):
         parse(f"tr.Exists({wrong})", skills=SKILLS.with_skill(POSE_IN_ROOM))

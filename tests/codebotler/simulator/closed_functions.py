@@ -10,31 +10,31 @@ from codebotler.simulator.process.isolated_call import isolated
 
 @isolated("hello")
 def echo(text: str, times: int = 1) -> list[str]:
-    """The text, some times."""
+    """Return the text several times."""
     return [text] * times
 
 
 @isolated("")
 def process_number(_text: str) -> int:
-    """The number of the process that answers."""
+    """Return the number of the process that runs this."""
     return os.getpid()
 
 
 @isolated("1")
 def compute(text: str) -> int:
-    """Something that takes as long as the text says."""
+    """Take as long as the text says."""
     return sum(range(int(text)))
 
 
 @isolated("1")
 def fill(text: str) -> int:
-    """Something that takes as many bytes as the text says."""
+    """Take as much memory as the text says."""
     return len(bytearray(int(text)))
 
 
 @isolated("")
 def end(text: str) -> str:
-    """What ends the process, if it is not a rehearsal."""
+    """End the process, unless the call is a rehearsal with an empty text."""
     if text:
         os._exit(3)
     return text
@@ -42,7 +42,7 @@ def end(text: str) -> str:
 
 @isolated("")
 def fail(text: str) -> str:
-    """What raises an error, if it is not a rehearsal."""
+    """Raise an error, unless the call is a rehearsal with an empty text."""
     if text:
         raise KeyError(text)
     return text
@@ -50,7 +50,7 @@ def fail(text: str) -> str:
 
 @isolated("")
 def reach(text: str) -> list[str]:
-    """What of a file, a socket and the environment can be reached."""
+    """Return the file, the socket and the secret variables that the process can reach."""
     found = [f"{name}={value}" for name, value in os.environ.items() if "KEY" in name]
     for name, reach_for in (("file", Path(text).read_bytes), ("socket", socket.socketpair)):
         with suppress(OSError):

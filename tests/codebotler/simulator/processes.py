@@ -1,4 +1,4 @@
-"""The processes of this machine, as tests of the engine look at them."""
+"""Queries about the processes of this machine, for tests of the engine."""
 
 import contextlib
 import os
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def parents() -> dict[int, int]:
-    """The parent of each process, at one moment."""
+    """Return the parent of each process."""
     found = {}
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
@@ -17,7 +17,7 @@ def parents() -> dict[int, int]:
 
 
 def children_of(pid: int) -> set[int]:
-    """All processes below one."""
+    """Return all descendants of a process."""
     above = parents()
     found: set[int] = set()
     while more := {one for one, parent in above.items() if parent in {pid, *found}} - found:
@@ -25,8 +25,8 @@ def children_of(pid: int) -> set[int]:
     return found
 
 
-def lives(pid: int) -> bool:
-    """Whether a process has not ended; one that waits to be buried has."""
+def is_alive(pid: int) -> bool:
+    """Return whether a process runs; a zombie does not."""
     try:
         return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -34,16 +34,16 @@ def lives(pid: int) -> bool:
 
 
 def are_gone(pids: set[int]) -> bool:
-    """Whether processes end within a few seconds; one that waits to be buried counts as ended."""
+    """Return whether processes end within a few seconds; a zombie has ended."""
     for _ in range(200):
-        if not any(map(lives, pids)):
+        if not any(map(is_alive, pids)):
             return True
         time.sleep(0.02)
     return False
 
 
 def fork_servers() -> set[int]:
-    """The isolated processes directly below this one; not what else tests have started."""
+    """Return the isolated children of this process, without other processes that tests started."""
     return {pid for pid, parent in parents().items() if parent == os.getpid() and _is_isolated(pid)}
 
 
@@ -56,5 +56,5 @@ def _is_isolated(pid: int) -> bool:
 
 
 def engine_processes() -> set[int]:
-    """All processes of the engine below this one."""
+    """Return all processes of the engine below this process."""
     return {pid for server in fork_servers() for pid in {server, *children_of(server)}}

@@ -1,4 +1,4 @@
-"""The child that is forked ahead, and what becomes of it in trouble."""
+"""The child that is forked ahead of the next batch survives interrupts and dead servers."""
 
 import marshal
 import os
@@ -36,7 +36,7 @@ def server_of(worker: Worker) -> BatchServer:
     return server
 
 
-def test_all_worlds_of_a_check_are_run_by_the_child_that_was_there(
+def test_child_forked_ahead_runs_all_worlds_of_a_check(
     own_worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ready = server_of(own_worker)._next
@@ -44,21 +44,21 @@ def test_all_worlds_of_a_check_are_run_by_the_child_that_was_there(
     forked: list[int] = []
     fork = ForkServer.fork
 
-    def noted(server: ForkServer, *, is_live: bool = False) -> IsolatedProcess:
+    def note_and_fork(server: ForkServer, *, is_live: bool = False) -> IsolatedProcess:
         child = fork(server, is_live=is_live)
         forked.append(child.pid)
         return child
 
-    monkeypatch.setattr(ForkServer, "fork", noted)
+    monkeypatch.setattr(ForkServer, "fork", note_and_fork)
     check_on(own_worker, "def task_program():\n    if is_in_room('mug'): pick('mug')\n")
     after = server_of(own_worker)._next
     assert after is not None
-    assert forked == [after.pid], "one fork, for the next check"
+    assert forked == [after.pid], "exactly one child must be forked, for the next check"
     assert are_gone({ready.pid})
 
 
 @pytest.mark.slow
-def test_no_child_of_a_dead_server_is_signalled_since_its_number_may_be_anothers(
+def test_child_of_a_dead_server_is_never_signalled(
     own_worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     server = server_of(own_worker)
@@ -66,21 +66,21 @@ def test_no_child_of_a_dead_server_is_signalled_since_its_number_may_be_anothers
     ready = server._next.pid
     os.kill(server.pid, signal.SIGKILL)
     assert are_gone({server.pid, ready})
-    told: list[int] = []
+    signalled: list[int] = []
     kill = os.kill
 
-    def noted(pid: int, number: int) -> None:
-        told.append(pid)
+    def note_and_kill(pid: int, number: int) -> None:
+        signalled.append(pid)
         kill(pid, number)
 
-    monkeypatch.setattr(os, "kill", noted)
-    for _ in range(2):  # the first one without a batch
+    monkeypatch.setattr(os, "kill", note_and_kill)
+    for _ in range(2):  # the first check finds no batch server
         assert check_on(own_worker, PROGRAM).problems == ()
-    assert ready not in told
+    assert ready not in signalled
     assert server_of(own_worker) is not server
 
 
-def test_what_was_compiled_before_is_no_other_programs(own_worker: Worker) -> None:
+def test_code_compiled_ahead_is_never_used_for_another_program(own_worker: Worker) -> None:
     for text in (
         "def task_program(",
         PROGRAM,
@@ -95,21 +95,21 @@ def test_what_was_compiled_before_is_no_other_programs(own_worker: Worker) -> No
         assert said == ({"bye"} if "bye" in text else {"hello"} if "hello" in text else set())
 
 
-def test_a_check_in_a_thread_of_the_pool_waits_for_no_other_thread() -> None:
+def test_check_in_a_thread_of_the_pool_does_not_deadlock() -> None:
     with WorkerPool(1) as pool:
         assert pool.submit(check, PROGRAM, pool=pool).result(30).problems == ()
         assert pool.submit(check, PROGRAM, pool=pool, samples=20).result(30).problems == ()
 
 
-def test_an_interrupt_ends_the_pool_of_the_process_and_the_next_check_has_another(
+def test_interrupt_ends_the_shared_pool_and_the_next_check_gets_a_new_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def interrupted(*_: object) -> None:
+    def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
     before = shared_pool()
     with monkeypatch.context() as patch:
-        patch.setattr(WorkerPool, "call", interrupted)
+        patch.setattr(WorkerPool, "call", interrupt)
         with pytest.raises(KeyboardInterrupt):
             check(PROGRAM)
     assert SHARED_POOL.pool is None
@@ -117,22 +117,22 @@ def test_an_interrupt_ends_the_pool_of_the_process_and_the_next_check_has_anothe
     assert shared_pool() is not before
 
 
-def test_bytecode_without_columns_is_not_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bytecode_without_columns_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "module.py"
     file.write_text('"""A module."""\n\nx = 1 + len("a")\n', encoding="utf-8")
     wanted = spawn.compiled_source(file.read_text(encoding="utf-8"), "module")
     assert spawn.code_of(str(file), "module") == wanted
     get_code = SourceFileLoader.get_code
 
-    def without_columns(self: SourceFileLoader, name: str) -> CodeType | None:
+    def remove_columns(self: SourceFileLoader, name: str) -> CodeType | None:
         code = get_code(self, name)
         return code and code.replace(co_linetable=b"")
 
-    monkeypatch.setattr(SourceFileLoader, "get_code", without_columns)
+    monkeypatch.setattr(SourceFileLoader, "get_code", remove_columns)
     assert spawn.code_of(str(file), "module") == wanted
 
 
-def test_bytecode_that_is_damaged_is_not_taken(tmp_path: Path) -> None:
+def test_damaged_bytecode_is_not_used(tmp_path: Path) -> None:
     file = tmp_path / "module.py"
     file.write_text('"""A module."""\n\nx = 1 + len("a")\n', encoding="utf-8")
     wanted = spawn.compiled_source(file.read_text(encoding="utf-8"), "module")

@@ -1,4 +1,4 @@
-"""Tame programs that share a child end as each of them ends in a process of its own."""
+"""Tame programs that share a child have the same outcomes as in processes of their own."""
 
 import json
 import os
@@ -43,7 +43,7 @@ WORLDS = (
     World((Room("hall", (), (Person("eve"),)),), "hall"),
 )
 WORLD = WORLDS[0]
-RULES = SimulationSettings(limits=Limits(seconds=600, calls=60, ticks=2_000, text=200, trace=2_000))
+SETTINGS = SimulationSettings(limits=Limits(seconds=600, calls=60, ticks=2_000, text=200, trace=2_000))
 TABLE = SKILLS.with_skill(
     Skill("wave", (Parameter("person"),), TEXT_TYPE, "Wave at a person.", Recording("wave", "person"))
 )
@@ -51,21 +51,21 @@ TABLE = SKILLS.with_skill(
 
 @pytest.fixture(scope="module")
 def worker() -> Iterator[Worker]:
-    yield from started(Worker())
+    yield from close_after(Worker())
 
 
 @pytest.fixture(scope="module")
 def other_worker() -> Iterator[Worker]:
-    """One that gives each run a process of its own."""
-    yield from started(Worker(one_process_per_run=True))
+    """Yield a worker that gives each run a process of its own."""
+    yield from close_after(Worker(one_process_per_run=True))
 
 
-def started(worker: Worker) -> Iterator[Worker]:
+def close_after(worker: Worker) -> Iterator[Worker]:
     yield worker
     worker.close()
 
 
-def robot(world: World = WORLD, settings: SimulationSettings = RULES) -> SimulatedRobot:
+def robot(world: World = WORLD, settings: SimulationSettings = SETTINGS) -> SimulatedRobot:
     return SimulatedRobot(world, settings)
 
 
@@ -83,8 +83,8 @@ def saying(text: str) -> str:
 
 # --- outcomes
 
-# Programs that a child can decide, and how they end in the first world.
-DECIDED: dict[str, tuple[Status, str | None]] = {
+# A shared child can run these programs; the values are their ends in the first world.
+RUN_TOGETHER: dict[str, tuple[Status, str | None]] = {
     task("rooms = get_all_rooms()", "for room in rooms: go_to(room)", "say(', '.join(rooms))"): (
         Status.FINISHED,
         None,
@@ -177,9 +177,9 @@ DECIDED: dict[str, tuple[Status, str | None]] = {
     ),
     task("try: time.sleep(1000)", "except BaseException: pass", "say('a')"): (Status.TIMEOUT, "TimeoutError"),
 }
-# Programs whose end depends on the process: on what its memory holds, and on how deep the stack already is.
+# The end of these programs depends on the memory and the stack of the process, so each needs its own.
 DEEP = "def f(n):\n    say(str(n)) if n % 100 == 0 else None\n    return f(n + 1)\n"
-UNDECIDED: dict[str, tuple[Status, str | None]] = {
+RUN_ALONE: dict[str, tuple[Status, str | None]] = {
     DEEP + task("f(1)"): (Status.PYTHON_ERROR, "RecursionError"),
     DEEP + task("try: f(1)", "except RecursionError as error: say(str(error))"): (Status.FINISHED, None),
     DEEP + task("try: f(1)", "except Exception: say('a')"): (Status.FINISHED, None),
@@ -196,8 +196,8 @@ def id_of(program: str) -> str:
     return program.removeprefix("def task_program():\n")[:60]
 
 
-@pytest.mark.parametrize(("program", "end"), DECIDED.items(), ids=map(id_of, DECIDED))
-def test_outcomes_are_those_of_processes_of_their_own(
+@pytest.mark.parametrize(("program", "end"), RUN_TOGETHER.items(), ids=map(id_of, RUN_TOGETHER))
+def test_shared_child_gives_the_outcomes_of_separate_processes(
     worker: Worker, other_worker: Worker, program: str, end: tuple[Status, str | None]
 ) -> None:
     known = worker.run_tame([job(program)])
@@ -207,8 +207,8 @@ def test_outcomes_are_those_of_processes_of_their_own(
     assert (known[0, 0].status, known[0, 0].error and known[0, 0].error.kind) == end
 
 
-@pytest.mark.parametrize(("program", "end"), UNDECIDED.items(), ids=map(id_of, UNDECIDED))
-def test_what_depends_on_the_process_is_decided_in_one_of_its_own(
+@pytest.mark.parametrize(("program", "end"), RUN_ALONE.items(), ids=map(id_of, RUN_ALONE))
+def test_program_that_depends_on_its_process_runs_alone(
     worker: Worker, other_worker: Worker, program: str, end: tuple[Status, str | None]
 ) -> None:
     assert worker.run_tame([job(program), job(saying("next"))]).keys() == {(1, 0), (1, 1), (1, 2)}
@@ -220,12 +220,12 @@ def test_what_depends_on_the_process_is_decided_in_one_of_its_own(
 @pytest.mark.parametrize(
     "shows", ["say(str(len(str(x))))", "say(str(x == y))", "ask('', 'Tea?', [x, 'yes'])"]
 )
-def test_how_deep_data_may_be_nested_is_decided_alone(
+def test_shared_child_nests_data_as_deep_or_leaves_the_program(
     worker: Worker, other_worker: Worker, shows: str
 ) -> None:
-    """Python limits that by the depth of its own stack, which is not the same in both kinds of process."""
+    """Python limits nesting by the depth of its stack, which differs between the two kinds of process."""
 
-    def nested(depth: int) -> str:
+    def nest(depth: int) -> str:
         return task("go_to('lab')", "x, y = [], []", f"for _ in range({depth}): x, y = [x], [y]", shows)
 
     def new_robot() -> SimulatedRobot:
@@ -234,34 +234,34 @@ def test_how_deep_data_may_be_nested_is_decided_alone(
     fits, fails = 1, 50_000
     while fails - fits > 1:
         depth = (fits + fails) // 2
-        error = other_worker.run(nested(depth), new_robot).error
+        error = other_worker.run(nest(depth), new_robot).error
         fits, fails = (fits, depth) if error and error.kind == "RecursionError" else (depth, fails)
     assert fails < 50_000
     for depth in range(fits - 10, fits + 10):
-        for outcome in worker.run_tame([(nested(depth), [new_robot])]).values():
-            assert (depth, all_of(outcome)) == (depth, all_of(other_worker.run(nested(depth), new_robot)))
+        for outcome in worker.run_tame([(nest(depth), [new_robot])]).values():
+            assert (depth, all_of(outcome)) == (depth, all_of(other_worker.run(nest(depth), new_robot)))
 
 
 @pytest.mark.parametrize("character", ["a", "\x7f", "é", "\U0001f600"])
-def test_a_long_transcript_ends_as_in_a_process_of_its_own(
+def test_long_transcript_has_the_same_outcome_alone(
     worker: Worker, other_worker: Worker, character: str
 ) -> None:
-    """Alone, each call is written as ASCII, where some characters take twelve bytes."""
+    """A process of its own writes calls in ASCII, where some characters take twelve bytes."""
     program = task(f"x = {character!r} * 9000", "ask('', 'q', [x for n in range(30)])")
     alone = other_worker.run(program, lambda: robot(WORLD, SimulationSettings()))
     assert worker.run(program, lambda: robot(WORLD, SimulationSettings())) == alone
 
 
 @pytest.mark.slow
-def test_what_computes_too_long_in_a_batch_costs_those_after_it_nothing(worker: Worker) -> None:
+def test_program_that_computes_too_long_loses_only_its_own_outcome(worker: Worker) -> None:
     computes = task("say('a')", "pow(3, 10 ** 9)")
     jobs = [job(saying("first"), [WORLD]), job(computes, [WORLD]), job(saying("next"), [WORLD])]
     assert worker.run_tame(jobs).keys() == {(0, 0), (2, 0)}
 
 
 @pytest.mark.slow
-def test_programs_of_a_batch_end_as_if_each_were_alone(worker: Worker, other_worker: Worker) -> None:
-    programs = [*DECIDED, *UNDECIDED, "class A: pass\ntask_program = A", "def task_program(:"]
+def test_programs_of_a_batch_have_the_same_outcomes_alone(worker: Worker, other_worker: Worker) -> None:
+    programs = [*RUN_TOGETHER, *RUN_ALONE, "class A: pass\ntask_program = A", "def task_program(:"]
     for jobs in ([job(program) for program in programs], [job(program) for program in reversed(programs)]):
         alone = [[other_worker.run(program, new_robot) for new_robot in robots] for program, robots in jobs]
         for (program, _), outcomes, expected in zip(jobs, worker.run_all(jobs), alone, strict=True):
@@ -270,50 +270,48 @@ def test_programs_of_a_batch_end_as_if_each_were_alone(worker: Worker, other_wor
 
 @pytest.fixture
 def replays(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The rooms in which robots stood at first whose runs were replayed, and nothing remembered."""
+    """Forget all replays, and return the start rooms of the runs that are replayed from now on."""
     rooms: list[str] = []
     follow = Replay.follow
 
-    def noted(replay: Replay, transcript: Transcript) -> SkillAnswer:
+    def note_and_follow(replay: Replay, transcript: Transcript) -> SkillAnswer:
         rooms.append(replay.robot.room)
         return follow(replay, transcript)
 
-    monkeypatch.setattr(Replay, "follow", noted)
+    monkeypatch.setattr(Replay, "follow", note_and_follow)
     monkeypatch.setattr("codebotler.simulator.batches.replay.REPLAYED", {})
     return rooms
 
 
-def test_programs_that_do_the_same_in_a_world_are_replayed_once(
+def test_equal_transcripts_in_a_world_are_replayed_once(
     worker: Worker, other_worker: Worker, replays: list[str]
 ) -> None:
     looks = task("for room in get_all_rooms():", "    go_to(room)", "    say(str(is_in_room('mug')))")
     jobs = [job(f"# {number}\n{looks}") for number in range(3)]
-    told = worker.run_all(jobs)
+    results = worker.run_all(jobs)
     assert len(replays) == len(WORLDS)
     expected = [other_worker.run(looks, new_robot) for new_robot in jobs[0][1]]
-    assert [list(map(all_of, outcomes)) for outcomes in told] == [list(map(all_of, expected))] * 3
+    assert [list(map(all_of, outcomes)) for outcomes in results] == [list(map(all_of, expected))] * 3
 
 
-def test_runs_that_say_the_same_elsewhere_or_by_other_rules_are_replayed(
+def test_equal_transcripts_in_other_worlds_or_settings_are_replayed_again(
     worker: Worker, other_worker: Worker, replays: list[str]
 ) -> None:
     says = saying("hello, everybody")
     short = SimulationSettings(limits=Limits(calls=1))
     new_robots = [partial(robot, WORLDS[0]), partial(robot, WORLDS[1]), partial(robot, WORLDS[0], short)]
-    (told,) = worker.run_all([(says, new_robots)])
+    (results,) = worker.run_all([(says, new_robots)])
     assert len(replays) == len(new_robots)
-    assert list(map(all_of, told)) == [all_of(other_worker.run(says, new)) for new in new_robots]
+    assert list(map(all_of, results)) == [all_of(other_worker.run(says, new)) for new in new_robots]
 
 
-def test_what_one_robot_can_do_is_not_taken_for_granted_of_another() -> None:
+def test_robots_with_other_skills_share_no_replay() -> None:
     cannot_say = SkillTable(tuple(skill for skill in SKILLS.rows if skill.name != "say"))
-    robots = robot(), SimulatedRobot(WORLD, RULES, cannot_say)
+    robots = robot(), SimulatedRobot(WORLD, SETTINGS, cannot_say)
     assert len({key_of(b"[]", each) for each in robots}) == 2
 
 
-def test_few_outcomes_are_remembered_and_no_long_ones(
-    worker: Worker, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_a_few_short_outcomes_are_cached(worker: Worker, monkeypatch: pytest.MonkeyPatch) -> None:
     known: dict[object, object] = {}
     monkeypatch.setattr("codebotler.simulator.batches.replay.REPLAYED", known)
     monkeypatch.setattr("codebotler.simulator.batches.replay.MAX_REPLAYS", 5)
@@ -324,7 +322,7 @@ def test_few_outcomes_are_remembered_and_no_long_ones(
     assert len(known) == 23 % 5
 
 
-def test_nothing_is_left_of_one_program_for_the_next(worker: Worker) -> None:
+def test_next_program_finds_no_trace_of_the_one_before(worker: Worker) -> None:
     leaves = "left = 1\ndef other(): pass\n" + task("say('a')", "time.sleep(9)", "go_to('moon')")
     finds = task(
         "say(str(time.monotonic()))",
@@ -338,11 +336,11 @@ def test_nothing_is_left_of_one_program_for_the_next(worker: Worker) -> None:
     assert texts == ["0.0", "name 'left' is not defined", "name 'other' is not defined"]
 
 
-# --- skills of somebody's own
+# --- own skills
 
 
 class Waves:
-    """Makes robots with one skill more, and knows who did that skill when and where."""
+    """Make robots with the skill `wave`, and list the processes and people of its calls."""
 
     def __init__(self, wave: Callable[..., Result], **others: Callable[..., Result]) -> None:
         self.processes: list[int] = []
@@ -350,16 +348,16 @@ class Waves:
         self.wave, self.others = wave, others
 
     def robot(self) -> SimulatedRobot:
-        return SimulatedRobot(WORLD, RULES, with_functions(TABLE, wave=self._waved, **self.others))
+        return SimulatedRobot(WORLD, SETTINGS, with_functions(TABLE, wave=self._wave, **self.others))
 
-    def _waved(self, robot: SimulatedRobot, person: str) -> Result:
+    def _wave(self, robot: SimulatedRobot, person: str) -> Result:
         self.processes.append(os.getpid())
         self.people.append(person)
         robot.record("wave", person)
         return self.wave(robot, person)
 
 
-def answering(robot: SimulatedRobot, person: str) -> str:
+def answer_wave(robot: SimulatedRobot, person: str) -> str:
     if person == "nobody":
         raise RobotError("WaveNoPerson", f"nobody waves back in {robot.room} after {robot.now}")
     if person == "slow":
@@ -367,7 +365,7 @@ def answering(robot: SimulatedRobot, person: str) -> str:
     return f"{person} in {robot.room} at {robot.now}"
 
 
-WAVING = {
+WAVING_PROGRAMS = {
     "once": task("say('a')", "say(wave('amy'))", "go_to('lab')"),
     "often": task(
         "for n in range(5):", "    say(wave('amy'))", "    time.sleep(n)", "go_to('lab')", "say(wave('amy'))"
@@ -400,11 +398,11 @@ WAVING = {
 }
 
 
-@pytest.mark.parametrize("program", WAVING.values(), ids=WAVING)
-def test_a_skill_of_somebodys_own_is_asked_for_here_once_a_call(
+@pytest.mark.parametrize("program", WAVING_PROGRAMS.values(), ids=WAVING_PROGRAMS)
+def test_own_skill_runs_in_this_process_once_per_call(
     worker: Worker, other_worker: Worker, program: str
 ) -> None:
-    together, alone = Waves(answering), Waves(answering)
+    together, alone = Waves(answer_wave), Waves(answer_wave)
     known = worker.run_tame([(program, [together.robot, together.robot])])
     assert list(known) == [(0, 0), (0, 1)]
     outcome = other_worker.run(program, alone.robot)
@@ -413,7 +411,7 @@ def test_a_skill_of_somebodys_own_is_asked_for_here_once_a_call(
     assert {*together.processes} <= {os.getpid()}
 
 
-def test_a_robot_that_moves_in_its_own_way_has_the_outcomes_of_a_process_of_its_own(
+def test_robot_with_its_own_way_to_drive_has_the_same_outcome_alone(
     worker: Worker, other_worker: Worker
 ) -> None:
     def drive(robot: SimulatedRobot, location: str) -> None:
@@ -421,24 +419,24 @@ def test_a_robot_that_moves_in_its_own_way_has_the_outcomes_of_a_process_of_its_
         robot.room = "lab"
 
     program = task("say('a')", "go_to('moon')", "say(get_current_location() + str(is_in_room('apple')))")
-    outcomes = [each.run(program, Waves(answering, go_to=drive).robot) for each in (worker, other_worker)]
+    outcomes = [each.run(program, Waves(answer_wave, go_to=drive).robot) for each in (worker, other_worker)]
     assert all_of(outcomes[0]) == all_of(outcomes[1])
     assert [event.text for event in outcomes[0].trace] == ["a", "moon", "apple", "labTrue"]
 
 
-def test_what_a_behaviour_raises_is_raised_here(worker: Worker) -> None:
-    def broken(_robot: SimulatedRobot, _person: str) -> None:
+def test_exception_of_an_own_skill_reaches_the_caller(worker: Worker) -> None:
+    def raise_a_bug(_robot: SimulatedRobot, _person: str) -> None:
         raise LookupError("a bug")
 
     with pytest.raises(LookupError, match="a bug"):
-        worker.run_tame([(WAVING["once"], [Waves(broken).robot])])
+        worker.run_tame([(WAVING_PROGRAMS["once"], [Waves(raise_a_bug).robot])])
     assert worker.run_tame([job(saying("next"))])
 
 
-# --- children that break off
+# --- children that fail
 
 
-def test_a_child_that_is_killed_costs_only_the_program_that_it_ran(worker: Worker) -> None:
+def test_killed_child_loses_only_the_program_that_it_ran(worker: Worker) -> None:
     fork_server = worker._fork_server(BatchServer).pid
     killed: list[int] = []
 
@@ -462,7 +460,7 @@ def test_a_child_that_is_killed_costs_only_the_program_that_it_ran(worker: Worke
     assert said == [["first"] * 2, ["done"] * 2, ["done"] * 2, ["next"] * 2, ["done"] * 2]
 
 
-def test_a_fork_server_that_is_killed_costs_all_of_them_nothing_but_time() -> None:
+def test_killed_fork_server_loses_no_outcome() -> None:
     def kill_the_server(_robot: SimulatedRobot, _person: str) -> str:
         if not killed:
             killed.append(worker._fork_server(BatchServer).pid)
@@ -473,14 +471,14 @@ def test_a_fork_server_that_is_killed_costs_all_of_them_nothing_but_time() -> No
     waves = Waves(kill_the_server)
     worker = Worker()
     try:
-        programs = [saying("first"), WAVING["once"], saying("next")]
+        programs = [saying("first"), WAVING_PROGRAMS["once"], saying("next")]
         outcomes = worker.run_all([(program, [waves.robot]) for program in programs])
     finally:
         worker.close()
     assert [outcome.status for each in outcomes for outcome in each] == [Status.FINISHED] * 3
 
 
-FORGED = {
+FORGED_FRAMES = {
     "no JSON": b"nonsense",
     "nothing": b"",
     "no transcript": b"[]",
@@ -496,8 +494,8 @@ FORGED = {
 }
 
 
-@pytest.mark.parametrize("forged", FORGED.values(), ids=FORGED)
-def test_a_child_that_speaks_nonsense_costs_only_the_program_that_it_ran(
+@pytest.mark.parametrize("forged", FORGED_FRAMES.values(), ids=FORGED_FRAMES)
+def test_forged_frame_loses_only_the_program_of_its_child(
     worker: Worker, monkeypatch: pytest.MonkeyPatch, forged: bytes
 ) -> None:
     honest = IsolatedProcess.receive_bytes
@@ -522,7 +520,7 @@ def test_a_child_that_speaks_nonsense_costs_only_the_program_that_it_ran(
 
 
 @pytest.mark.parametrize("error", [TimeoutError, LostProcessError, None])
-def test_a_child_that_says_no_more_costs_only_the_program_that_it_ran(
+def test_silent_child_loses_only_the_program_that_it_ran(
     worker: Worker, monkeypatch: pytest.MonkeyPatch, error: type[Exception] | None
 ) -> None:
     honest = IsolatedProcess.receive_bytes
@@ -540,21 +538,21 @@ def test_a_child_that_says_no_more_costs_only_the_program_that_it_ran(
     assert worker.run_tame([job(saying(text), [WORLD]) for text in "abc"]).keys() == {(0, 0), (2, 0)}
 
 
-def test_a_child_that_is_not_believed_ends_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_child_that_breaks_the_protocol_is_ended_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = IsolatedProcess.receive_bytes
 
     def receive(child: IsolatedProcess, most: int) -> bytes | None:
         frame = honest(child, most)
-        if most != MAX_FRAME:  # from a process that compiles
+        if most != MAX_FRAME:  # the frame comes from a compiler
             return frame
-        begun.append(child.pid)  # which waits for an answer
-        os.kill(child.pid, signal.SIGSTOP)  # so that it does not come to an end by itself
+        begun.append(child.pid)  # the child waits for an answer
+        os.kill(child.pid, signal.SIGSTOP)  # a stopped child cannot end by itself
         raise ProtocolError("nonsense")
 
     begun: list[int] = []
     monkeypatch.setattr(IsolatedProcess, "receive_bytes", receive)
     with closing(Worker()) as worker:
-        assert not worker.run_tame([(WAVING["once"], [Waves(lambda *_: "done").robot])])
+        assert not worker.run_tame([(WAVING_PROGRAMS["once"], [Waves(lambda *_: "done").robot])])
         assert len(begun) == 1
         assert are_gone(set(begun))
 
@@ -566,7 +564,7 @@ def follow(
     calls: Sequence[list[Any]],
     order: Sequence[int],
     moments: Mapping[int, float] = MappingProxyType({}),
-    settings: SimulationSettings = RULES,
+    settings: SimulationSettings = SETTINGS,
 ) -> Replay:
     now, made = 0.0, []
     for place, number in enumerate(order):
@@ -584,7 +582,7 @@ def follow(
 A: list[Any] = ["say", ["a"], "ok", None]
 TIGHT = SimulationSettings(limits=Limits(seconds=10, calls=2, text=5, trace=20))
 LONG: list[Any] = ["say", ["x" * 6], "stop", None]
-REFUSED: dict[str, Callable[[], object]] = {
+IMPOSSIBLE_TRANSCRIPTS: dict[str, Callable[[], object]] = {
     "an answer that is none": lambda: follow([["get_current_location", [], "ok", None]], [0]),
     "another answer": lambda: follow([["get_current_location", [], "ok", "lab"]], [0]),
     "another list": lambda: follow([["get_all_rooms", [], "ok", ["hall"]]], [0]),
@@ -628,13 +626,13 @@ REFUSED: dict[str, Callable[[], object]] = {
 }
 
 
-@pytest.mark.parametrize("attempt", REFUSED.values(), ids=REFUSED)
-def test_replay_refuses_what_cannot_have_been(attempt: Callable[[], object]) -> None:
+@pytest.mark.parametrize("attempt", IMPOSSIBLE_TRANSCRIPTS.values(), ids=IMPOSSIBLE_TRANSCRIPTS)
+def test_replay_refuses_impossible_transcripts(attempt: Callable[[], object]) -> None:
     with pytest.raises(ProtocolError):
         attempt()
 
 
-def test_replay_does_what_was_done() -> None:
+def test_replay_repeats_every_call() -> None:
     calls = [
         A,
         ["go_to", ["lab"], "ok", None],
@@ -644,11 +642,11 @@ def test_replay_does_what_was_done() -> None:
         ["is_in_room", ["apple"], "ok", True],
     ]
     replay = follow(calls, [0, 1, 0, 3, 2, 4, 5], {2: 1.5, 4: 3.0, 7: 9.0})
-    told = [
+    events = [
         (event.kind, event.text, event.answer, event.found, event.place, event.time)
         for event in replay.robot.trace
     ]
-    assert told == [
+    assert events == [
         ("say", "a", None, None, "hall", 0.0),
         ("goto", "lab", None, None, "hall", 0.0),
         ("say", "a", None, None, "lab", 1.5),
@@ -668,7 +666,7 @@ def test_replay_does_what_was_done() -> None:
         ([A], [0], {1: 11.0}),
     ],
 )
-def test_replay_reaches_the_limits_that_were_reached(
+def test_replay_reaches_the_same_limits(
     calls: Sequence[list[Any]], order: Sequence[int], moments: Mapping[int, float]
 ) -> None:
     ledger = follow(calls, order, moments, TIGHT).ledger
@@ -677,49 +675,47 @@ def test_replay_reaches_the_limits_that_were_reached(
     assert (outcome.status, outcome.error) == (Status.TIMEOUT, RunError("TimeoutError", ledger.limit))
 
 
-def test_a_robot_of_ones_own_kind_performs_every_call(
-    worker: Worker, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_robot_of_an_own_class_performs_every_call(worker: Worker, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("codebotler.simulator.ledger.UNREMEMBERED_CALLS", 0)
     performed: list[str] = []
 
-    class Noting(SimulatedRobot):
-        """A robot that notes what it performs."""
+    class NotingRobot(SimulatedRobot):
+        """List the skills that the robot performs."""
 
         def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
             performed.append(skill)
             return super().perform(skill, arguments)
 
-    known = worker.run_tame([(task("say('a')", "say('a')", "say('a')"), [partial(Noting, WORLD)])])
+    known = worker.run_tame([(task("say('a')", "say('a')", "say('a')"), [partial(NotingRobot, WORLD)])])
     assert known[0, 0].status is Status.FINISHED
     assert performed == ["say"] * 3
 
 
-class Greeting(SimulatedRobot):
-    """A robot that has greeted before any program runs."""
+class GreetingRobot(SimulatedRobot):
+    """Start every trace with a greeting."""
 
     @property
     def trace(self) -> Trace:
-        """What it has done, the greeting included."""
+        """Return the greeting and the events of the program."""
         return (Event("say", "hello"), *super().trace)
 
 
-def test_a_robot_of_ones_own_kind_shares_no_outcome(worker: Worker) -> None:
+def test_robot_of_an_own_class_shares_no_outcome(worker: Worker) -> None:
     idle = task("pass")
-    for kind in (SimulatedRobot, Greeting, SimulatedRobot, Greeting):
+    for kind in (SimulatedRobot, GreetingRobot, SimulatedRobot, GreetingRobot):
         (outcome,) = worker.run_tame([(idle, [partial(kind, WORLD)])]).values()
-        assert len(outcome.trace) == (kind is Greeting)
+        assert len(outcome.trace) == (kind is GreetingRobot)
 
 
 @pytest.mark.parametrize(("question", "options"), [(200, []), (201, []), (190, [11]), (5, [200]), (5, [201])])
-def test_a_text_may_be_so_long_whatever_else_is_given(question: int, options: list[int]) -> None:
+def test_limit_of_characters_applies_to_each_text_of_a_call(question: int, options: list[int]) -> None:
     ledger = Ledger(SimulatedRobot(WORLD, SimulationSettings(limits=Limits(text=200))))
     ledger.perform("ask", ("", "q" * question, tuple(Option("o" * size) for size in options)))
     is_too_long = max(question, *options, 0) > 200
     assert (ledger.limit == "a text of more than 200 characters") == is_too_long
 
 
-# --- looking often
+# --- frequent looks
 
 
 Call = tuple[float, str, tuple[Any, ...]]
@@ -754,24 +750,24 @@ HISTORIES: dict[str, list[Call]] = {
 
 
 @pytest.mark.parametrize("history", HISTORIES.values(), ids=HISTORIES)
-def test_what_was_done_before_is_done_again_in_the_same_way(
+def test_remembered_calls_have_the_same_effects_as_performed_ones(
     history: list[Call], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("codebotler.simulator.ledger.UNREMEMBERED_CALLS", 0)
     settings = SimulationSettings(limits=Limits(trace=250_000))
-    told = []
+    results = []
     for kind in (Ledger, RememberingLedger):
         ledger = kind(SimulatedRobot(WORLD, settings))
         answers = []
         for now, skill, arguments in history:
             ledger.let_time_pass(now)
             answers.append(ledger.perform(skill, arguments))
-        told.append((answers, repr(ledger.robot.trace), ledger.calls, ledger.text, ledger.limit))
-    assert told[0] == told[1]
+        results.append((answers, repr(ledger.robot.trace), ledger.calls, ledger.text, ledger.limit))
+    assert results[0] == results[1]
 
 
 @pytest.mark.parametrize(("few", "performed"), [(0, 1), (50, 51)])
-def test_a_thousand_looks_cost_one(monkeypatch: pytest.MonkeyPatch, few: int, performed: int) -> None:
+def test_repeated_looks_are_performed_once(monkeypatch: pytest.MonkeyPatch, few: int, performed: int) -> None:
     monkeypatch.setattr("codebotler.simulator.ledger.UNREMEMBERED_CALLS", few)
     perform = Mock(return_value=False)
     monkeypatch.setattr(SimulatedRobot, "perform", perform)
@@ -784,7 +780,7 @@ def test_a_thousand_looks_cost_one(monkeypatch: pytest.MonkeyPatch, few: int, pe
 
 
 @pytest.mark.parametrize("seconds", [0, 1])
-def test_a_program_that_looks_a_thousand_times_ends_as_in_a_process_of_its_own(
+def test_program_that_looks_a_thousand_times_has_the_same_outcome_alone(
     worker: Worker, other_worker: Worker, seconds: int
 ) -> None:
     program = task("while not is_in_room('unicorn'):", f"    time.sleep({seconds})", "    say('not here')")
@@ -820,7 +816,7 @@ def test_events_of_batches_are_logged(worker: Worker, caplog: pytest.LogCaptureF
     assert len(caplog.records) == 24
 
 
-def test_one_process_per_run_shares_no_process(other_worker: Worker) -> None:
+def test_one_process_per_run_starts_no_batch_server(other_worker: Worker) -> None:
     jobs = [job(saying(text)) for text in "abc"]
     assert other_worker.run_tame(jobs) == {}
     outcomes = other_worker.run_all(jobs)
@@ -834,25 +830,25 @@ def test_one_process_per_run_shares_no_process(other_worker: Worker) -> None:
 
 
 @pytest.mark.slow
-def test_a_pool_hands_on_that_each_run_has_a_process() -> None:
+def test_pool_passes_one_process_per_run_to_its_workers() -> None:
     for alone, role in ((False, BatchServer), (True, ForkServer)):
         with WorkerPool(1, one_process_per_run=alone) as pool:
             assert list(pool.here()._fork_servers) == [role]
 
 
-def test_a_pool_that_cannot_start_takes_no_calls(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pool_that_cannot_start_accepts_no_calls(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("codebotler.simulator.pool.Worker", Mock(side_effect=EngineError("no processes")))
     pool = WorkerPool(1)
     with pytest.raises(EngineError, match="no processes"), pool:
-        pytest.fail("it has started")
+        pytest.fail("the pool has started")
     with pytest.raises(RuntimeError, match="after shutdown"):
         pool.submit(print)
 
 
-def test_a_worker_that_starts_while_its_pool_ends_runs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_worker_that_starts_while_its_pool_ends_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
     first, starts, ends = Mock(), threading.Event(), threading.Event()
 
-    def late(**_: bool) -> Mock:
+    def start_late(**_: bool) -> Mock:
         starts.set()
         assert ends.wait(60)
         return Mock()
@@ -862,7 +858,7 @@ def test_a_worker_that_starts_while_its_pool_ends_runs_nothing(monkeypatch: pyte
     with pool:
         first.stop.side_effect = ends.set
         assert pool.submit(pool.here).result() is first
-        monkeypatch.setattr(pool, "_new_worker", late)
+        monkeypatch.setattr(pool, "_new_worker", start_late)
         pool._idle.clear()
         pool._local = threading.local()
         second: Future[Any] = pool.submit(pool.here)
@@ -870,7 +866,7 @@ def test_a_worker_that_starts_while_its_pool_ends_runs_nothing(monkeypatch: pyte
     assert second.result().stop.called
 
 
-def test_calls_are_given_more_and_more_keys_and_equal_ones_once() -> None:
+def test_calls_get_growing_batches_of_distinct_keys() -> None:
     calls: list[list[int]] = []
 
     def work(numbers: Sequence[int]) -> list[int]:
@@ -887,7 +883,7 @@ def test_calls_are_given_more_and_more_keys_and_equal_ones_once() -> None:
     assert (sizes[0], max(sizes)) == (MIN_BATCH_KEYS, MAX_BATCH_KEYS)
 
 
-def test_a_result_that_cannot_be_used_takes_the_place_of_no_other() -> None:
+def test_failing_result_leaves_the_results_before_it_in_place() -> None:
     def use(number: int) -> int:
         if number == 77:
             raise ValueError("not this one")
@@ -900,13 +896,13 @@ def test_a_result_that_cannot_be_used_takes_the_place_of_no_other() -> None:
             next(results)
 
 
-def in_two_bytes(number: int) -> bytes:
+def to_two_bytes(number: int) -> bytes:
     return number.to_bytes(2)
 
 
 @pytest.mark.parametrize("width", [2, 8, 32])
-def test_batches_grow_at_first_and_shrink_at_the_end(width: int) -> None:
-    keys = DistinctKeys(iter(range(3_000)), in_two_bytes)
+def test_batches_grow_first_and_shrink_at_the_end(width: int) -> None:
+    keys = DistinctKeys(iter(range(3_000)), to_two_bytes)
     sizes = []
     while batch := keys.batch(width):
         sizes.append(len(batch))
@@ -919,13 +915,13 @@ def test_batches_grow_at_first_and_shrink_at_the_end(width: int) -> None:
 
 
 def test_few_keys_are_spread_over_all_calls() -> None:
-    keys = DistinctKeys(iter(range(12)), in_two_bytes)
+    keys = DistinctKeys(iter(range(12)), to_two_bytes)
     sizes = [len(keys.batch(8)) for _ in range(10)]
     assert (sum(sizes), max(sizes)) == (12, 2)
 
 
-def test_keys_are_read_a_little_ahead_and_no_further_than_somebody_takes_them() -> None:
-    keys = DistinctKeys(iter([1, 1, 2, 1, 3, 2, *range(4, 10_000)]), in_two_bytes)
+def test_keys_are_read_only_a_little_ahead_of_their_consumer() -> None:
+    keys = DistinctKeys(iter([1, 1, 2, 1, 3, 2, *range(4, 10_000)]), to_two_bytes)
     assert list(keys.batch(1).values()) == list(range(1, 1 + MIN_BATCH_KEYS))
     assert [int.from_bytes(name) for name in keys.waiting] == [
         1,

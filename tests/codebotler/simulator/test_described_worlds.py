@@ -1,4 +1,4 @@
-"""Worlds whose things and people have properties, with places in rooms; and skills that read them."""
+"""Worlds with properties of things and people and with places in rooms, and skills that read them."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -49,11 +49,11 @@ def robot(world: World) -> SimulatedRobot:
     return SimulatedRobot(world, SIMULATION)
 
 
-def sampled(world: World, sample: int = 0) -> SampledRobot:
+def robot_in(world: World, sample: int = 0) -> SampledRobot:
     return SampledRobot(RoomMap.of(world), FactSampler(sample=sample))
 
 
-def test_a_world_file_keeps_places_and_properties(world: World, tmp_path: Path) -> None:
+def test_world_file_keeps_places_and_properties(world: World, tmp_path: Path) -> None:
     path = tmp_path / "again.yaml"
     path.write_text(world.to_yaml())
     assert read_world(path) == world
@@ -69,7 +69,7 @@ def test_a_world_file_keeps_places_and_properties(world: World, tmp_path: Path) 
         ("Number of cups: 3", "Number of cups: [3]", 15),
     ],
 )
-def test_mistakes_name_the_line(tmp_path: Path, old: str, new: str, line: int) -> None:
+def test_mistake_is_an_error_with_its_line(tmp_path: Path, old: str, new: str, line: int) -> None:
     path = tmp_path / "wrong.yaml"
     path.write_text(FLAT.replace(old, new))
     with pytest.raises(UserError) as raised:
@@ -77,7 +77,7 @@ def test_mistakes_name_the_line(tmp_path: Path, old: str, new: str, line: int) -
     assert raised.value.line == line
 
 
-def test_a_place_is_a_goal_inside_its_room_but_no_room(world: World, robot: SimulatedRobot) -> None:
+def test_place_is_a_destination_but_not_a_room(world: World, robot: SimulatedRobot) -> None:
     assert robot.perform("get_all_rooms", []) == ["hall", "kitchen", "bathroom"]
     robot.perform("go_to", ["the kitchen table"])
     assert (robot.room, robot.trace[-1].destination) == ("kitchen table", "kitchen table in kitchen")
@@ -96,11 +96,11 @@ def test_things_at_places_are_found_in_the_room_and_only_there(robot: SimulatedR
     assert finds("kitchen", "apple")
     assert finds("kitchen table", "apple")
     assert not finds("sink", "apple")
-    assert finds("sink", "Angel")  # people are in the room
+    assert finds("sink", "Angel")  # people at a place are in its room
     assert not finds("bathroom", "apple")
 
 
-def test_what_is_put_down_at_a_place_lies_there(robot: SimulatedRobot) -> None:
+def test_thing_put_down_at_a_place_lies_there(robot: SimulatedRobot) -> None:
     robot.perform("go_to", ["kitchen"])
     robot.perform("pick", ["apple"])
     robot.perform("go_to", ["sink"])
@@ -126,12 +126,12 @@ def test_what_is_put_down_at_a_place_lies_there(robot: SimulatedRobot) -> None:
         ("sitting Angel", False),
     ],
 )
-def test_requests_may_describe(robot: SimulatedRobot, request_: str, is_there: bool) -> None:  # noqa: FBT001 - a case
+def test_description_finds_things_and_people(robot: SimulatedRobot, request_: str, is_there: bool) -> None:  # noqa: FBT001 - a case
     robot.perform("go_to", ["kitchen"])
     assert robot.perform("is_in_room", [request_]) is is_there
 
 
-def test_a_description_means_the_first_that_fits(robot: SimulatedRobot) -> None:
+def test_description_means_the_first_match(robot: SimulatedRobot) -> None:
     robot.perform("go_to", ["kitchen"])
     robot.perform("pick", ["green fruit"])
     assert robot.taken is not None
@@ -142,7 +142,7 @@ def test_skills_read_the_world(robot: SimulatedRobot) -> None:
     assert robot.things("kitchen", is_="fruit") == ["apple", "pear"]
     assert robot.things("hall") == []
     assert robot.people("kitchen", wears="red coat") == ["Angel"]
-    assert robot.people("sink", is_="waving person") == ["Angel"]  # people are in the room around a place
+    assert robot.people("sink", is_="waving person") == ["Angel"]  # a place has the people of its room
     assert robot.people(is_="person") == ["Cy", "Angel", "Bo"]
     assert robot.traits("apple")["size"] == 2
     assert robot.value("number of cups", 0, 1) == 3
@@ -162,17 +162,17 @@ def test_people_can_be_moved(robot: SimulatedRobot) -> None:
 
 
 def test_sampled_worlds_draw_known_things_and_people(world: World) -> None:
-    counts = {len(sampled(world, number).things("kitchen", is_="fruit")) for number in range(30)}
+    counts = {len(robot_in(world, number).things("kitchen", is_="fruit")) for number in range(30)}
     assert {0, 1, 2} <= counts
-    names = {name for number in range(30) for name in sampled(world, number).people("hall", pose="waving")}
+    names = {name for number in range(30) for name in robot_in(world, number).people("hall", pose="waving")}
     assert names == {"Angel"}
-    unknown = {name for number in range(30) for name in sampled(world, number).things("hall", is_="toy")}
+    unknown = {name for number in range(30) for name in robot_in(world, number).things("hall", is_="toy")}
     assert unknown == {"toy", "another toy"}
 
 
-def test_people_who_were_found_in_a_room_can_be_asked_there(world: World) -> None:
+def test_people_found_in_a_room_can_be_asked_there(world: World) -> None:
     for number in range(20):
-        robot = sampled(world, number)
+        robot = robot_in(world, number)
         robot.perform("go_to", ["kitchen"])
         for name in robot.people("kitchen", is_="waving person"):
             assert isinstance(robot.perform("ask", [name, "Tea?", (Option("yes"), Option("no"))]), int)
@@ -181,9 +181,9 @@ def test_people_who_were_found_in_a_room_can_be_asked_there(world: World) -> Non
 @pytest.mark.parametrize(
     ("request_", "finds"), [("waving person", "people"), ("person", "people"), ("fruit", "things")]
 )
-def test_a_skill_finds_what_a_look_has_found(world: World, request_: str, finds: str) -> None:
+def test_skills_and_looks_find_the_same(world: World, request_: str, finds: str) -> None:
     for number in range(30):
-        robot = sampled(world, number)
+        robot = robot_in(world, number)
         robot.perform("go_to", ["bathroom"])
         is_there = robot.perform("is_in_room", [request_])
         assert bool(getattr(robot, finds)("bathroom", is_=request_)) is is_there
@@ -192,9 +192,9 @@ def test_a_skill_finds_what_a_look_has_found(world: World, request_: str, finds:
             assert not robot.perform("is_in_room", [request_])
 
 
-def test_a_sampled_world_keeps_what_it_has_drawn(world: World) -> None:
+def test_sampled_world_keeps_its_facts(world: World) -> None:
     for number in range(20):
-        robot = sampled(world, number)
+        robot = robot_in(world, number)
         there = robot.things("hall", is_="fruit")
         assert robot.things("hall", is_="fruit") == there
         assert robot.perform("is_in_room", ["apple"]) is ("apple" in there)
@@ -209,9 +209,9 @@ def test_skills_read_rooms_of_a_guessed_map() -> None:
     assert counts == {0, 1, 2}
 
 
-def test_a_person_who_was_moved_is_there(world: World) -> None:
+def test_moved_person_is_in_the_new_room(world: World) -> None:
     for number in range(10):
-        robot = sampled(world, number)
+        robot = robot_in(world, number)
         robot.move_person("Angel", "bathroom")
         robot.perform("go_to", ["bathroom"])
         assert robot.perform("is_in_room", ["Angel"])
@@ -220,39 +220,39 @@ def test_a_person_who_was_moved_is_there(world: World) -> None:
 # --- places and house rules
 
 
-def guarded(world: World, *rules: Rule) -> list[SimulatedRobot]:
+def robots_with_rules(world: World, *rules: Rule) -> list[SimulatedRobot]:
     room_map = RoomMap.of(world)
     simulated = SimulatedRobot(world, SIMULATION, guard=RuleGuard(rules, room_map))
     return [simulated, SampledRobot(room_map, FactSampler(), guard=RuleGuard(rules, room_map))]
 
 
-def test_who_is_at_a_place_is_in_its_room(world: World) -> None:
+def test_rules_about_a_room_apply_at_its_places(world: World) -> None:
     stay_out = Rule("kitchen", "Stay out.", parse('not tr.Exists(goto("kitchen$"))'))
     be_silent = Rule("silent", "Be silent there.", parse('not tr.Exists(at("kitchen", say(".")))'))
-    for robot in guarded(world, stay_out):
+    for robot in robots_with_rules(world, stay_out):
         with pytest.raises(RuleViolationError):
             robot.perform("go_to", ["sink"])
-    for robot in guarded(world, be_silent):
+    for robot in robots_with_rules(world, be_silent):
         robot.perform("go_to", ["sink"])
         with pytest.raises(RuleViolationError):
             robot.perform("say", ["hello"])
 
 
-def test_a_drive_to_a_place_in_the_room_does_not_leave_it(world: World) -> None:
+def test_drive_to_a_place_in_the_room_does_not_leave_it(world: World) -> None:
     said = Rule("said", "Speak before you leave.", parse('tr.Exists(say("."))'), "leaving")
     start = replace(world, robot="kitchen")
-    for robot in guarded(start, said):
+    for robot in robots_with_rules(start, said):
         robot.perform("go_to", ["sink"])
         robot.perform("go_to", ["the kitchen table"])
         with pytest.raises(RuleViolationError):
             robot.perform("go_to", ["hall"])
 
 
-# --- what is said of rooms, and where things are
+# --- names of places, and positions of things
 
 
-def test_a_place_is_meant_where_its_room_is_named_as_well(world: World) -> None:
-    for robot in (SimulatedRobot(world, SIMULATION), sampled(world)):
+def test_request_with_place_and_room_means_the_place(world: World) -> None:
+    for robot in (SimulatedRobot(world, SIMULATION), robot_in(world)):
         robot.perform("go_to", ["the sink in the kitchen"])
         assert robot.room == "sink"
 
@@ -267,19 +267,19 @@ def test_a_place_is_meant_where_its_room_is_named_as_well(world: World) -> None:
         ("the sofa and the living room", "living room"),
     ],
 )
-def test_a_place_with_its_room_means_the_place_however_long_the_names_are(request_: str, goal: str) -> None:
+def test_place_wins_over_its_room_for_any_length_of_names(request_: str, goal: str) -> None:
     home = World((Room("hall"), Room("living room"), Room("sofa", within="living room")), "hall")
-    robots = (SimulatedRobot(home, SIMULATION), sampled(home))
+    robots = (SimulatedRobot(home, SIMULATION), robot_in(home))
     assert [robot.room_for(request_) for robot in robots] == [goal, goal]
     assert replace(RoomMap.of(home), plain=True).room(request_) == goal
 
 
 @pytest.mark.parametrize("request_", ["kitchen-hall", "the sink's owner", "hall.2", "hall-"])
-def test_parts_of_compound_words_are_no_names(robot: SimulatedRobot, request_: str) -> None:
+def test_part_of_a_compound_word_is_not_a_name(robot: SimulatedRobot, request_: str) -> None:
     assert (robot.room_for(request_) is not None) == (request_ == "hall-")
 
 
-def test_what_was_picked_up_by_a_property_keeps_its_name(robot: SimulatedRobot) -> None:
+def test_thing_picked_up_by_a_property_keeps_its_name(robot: SimulatedRobot) -> None:
     robot.perform("go_to", ["kitchen table"])
     robot.perform("pick", ["red fruit"])
     robot.perform("go_to", ["sink"])
@@ -287,9 +287,9 @@ def test_what_was_picked_up_by_a_property_keeps_its_name(robot: SimulatedRobot) 
     assert robot.perform("is_in_room", ["apple"])
 
 
-def test_imagined_looks_agree_with_what_lies_at_places(world: World) -> None:
+def test_sampled_looks_agree_between_a_place_and_its_room(world: World) -> None:
     for number in range(20):
-        robot = sampled(world, number)
+        robot = robot_in(world, number)
         robot.perform("go_to", ["kitchen table"])
         found = robot.perform("is_in_room", ["apple"])
         robot.perform("go_to", ["kitchen"])
@@ -301,15 +301,15 @@ def test_imagined_looks_agree_with_what_lies_at_places(world: World) -> None:
             assert not robot.perform("is_in_room", ["apple"])
 
 
-def test_a_person_who_was_moved_is_no_longer_where_they_were(world: World) -> None:
+def test_moved_person_has_left_the_old_room(world: World) -> None:
     for number in range(20):
-        robot = sampled(world, number)
+        robot = robot_in(world, number)
         if robot.perform("is_in_room", ["Angel"]):
             robot.move_person("Angel", "bathroom")
             assert not robot.perform("is_in_room", ["Angel"])
 
 
-def test_the_map_of_a_mission_knows_which_room_a_place_is_in(world: World) -> None:
+def test_map_of_a_mission_keeps_the_room_of_each_place(world: World) -> None:
     rooms = map_from(map_data(world)).rooms
     assert {room.name: room.within for room in rooms if room.within} == {
         "kitchen table": "kitchen",
@@ -317,10 +317,10 @@ def test_the_map_of_a_mission_knows_which_room_a_place_is_in(world: World) -> No
     }
 
 
-def test_people_are_at_all_places_of_an_imagined_room(world: World) -> None:
+def test_people_of_a_sampled_room_are_at_all_its_places(world: World) -> None:
     answers = set()
     for number in range(20):
-        robot = sampled(world, number)
+        robot = robot_in(world, number)
         robot.perform("go_to", ["kitchen"])
         seen = robot.perform("is_in_room", ["Angel"])
         answers.add(seen)
@@ -334,8 +334,8 @@ def test_people_are_at_all_places_of_an_imagined_room(world: World) -> None:
     assert answers == {True, False}
 
 
-def test_there_is_another_unknown_thing_only_where_there_is_one(world: World) -> None:
-    found = [sampled(world, number).things("kitchen table", "banana") for number in range(40)]
+def test_second_unknown_thing_exists_only_with_the_first(world: World) -> None:
+    found = [robot_in(world, number).things("kitchen table", "banana") for number in range(40)]
     assert {*map(tuple, found)} == {(), ("banana",), ("banana", "another banana")}
 
 
@@ -345,10 +345,10 @@ def test_words_for_things_mean_all_things(robot: SimulatedRobot, words: str) -> 
 
 
 @pytest.mark.parametrize("words", ["pieces of fruit", "piece of red fruit"])
-def test_pieces_are_things(robot: SimulatedRobot, words: str) -> None:
+def test_words_for_pieces_mean_things(robot: SimulatedRobot, words: str) -> None:
     assert "apple" in robot.things("kitchen table", words)
 
 
-def test_people_are_meant_by_their_names_however_they_are_introduced(robot: SimulatedRobot) -> None:
+def test_phrases_that_introduce_a_name_mean_that_person(robot: SimulatedRobot) -> None:
     assert robot.people("kitchen", "the person named Angel") == ["Angel"]
     assert robot.people("kitchen", "someone called Bo") == ["Bo"]

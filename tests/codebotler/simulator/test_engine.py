@@ -1,4 +1,4 @@
-"""Runs of many programs: in order, once, the same everywhere, and nothing is left behind."""
+"""Runs of many programs: ordered, once each, reproducible, and without leftovers."""
 
 import gc
 import os
@@ -49,36 +49,36 @@ def saying(text: str) -> str:
     return f"def task_program():\n    say({text!r})\n"
 
 
-def said(outcome: Outcome) -> list[str]:
+def texts_of(outcome: Outcome) -> list[str]:
     assert outcome.status == Status.FINISHED, outcome
     return [event.text for event in outcome.trace]
 
 
-def doing(say: Callable[..., None]) -> SkillTable:
-    """The eight skills, of which one does something else."""
+def with_say(say: Callable[..., None]) -> SkillTable:
+    """Return the eight skills with another function for `say`."""
     return with_functions(SKILLS, say=say)
 
 
 def links_in(folder: Path) -> list[Path]:
-    """The links of a folder, without the one by which it was read."""
+    """Return the links of a folder, without the one of the listing itself."""
     return [link for link in list(folder.iterdir()) if link.is_symlink()]
 
 
-def held() -> tuple[set[object], ...]:
-    """What this process holds: file descriptors, children and threads."""
+def held_resources() -> tuple[set[object], ...]:
+    """Return the file descriptors, children and threads of this process."""
     descriptors = {f"{link.name} {link.readlink()}" for link in links_in(Path("/proc/self/fd"))}
     return {*descriptors}, {*engine_processes()}, {thread.name for thread in threading.enumerate()}
 
 
 @pytest.fixture
-def nothing_is_left() -> Iterator[None]:
-    """Compares what this process holds after the test with what it held before."""
-    compiled_file()  # a file that stays
+def check_leftovers() -> Iterator[None]:
+    """Fail if this process holds more resources after the test than before."""
+    compiled_file()  # this file stays open
     end_all()
-    before = held()
+    before = held_resources()
     yield
-    end_all()  # processes that wait for the next program
-    assert [after - earlier for after, earlier in zip(held(), before, strict=True)] == [set()] * 3
+    end_all()  # idle processes are not leftovers
+    assert [after - earlier for after, earlier in zip(held_resources(), before, strict=True)] == [set()] * 3
 
 
 # --- order
@@ -90,7 +90,7 @@ def test_outcomes_come_in_the_order_of_the_pairs() -> None:
     slow = "def task_program():\n    for i in range(150_000): pass\n    say('{}')\n"
     programs = [slow.format(text) if int(text) % 7 == 0 else saying(text) for text in texts]
     outcomes = run(((program, WORLD) for program in programs), workers=3)
-    assert [said(outcome) for outcome in outcomes] == [[text] for text in texts]
+    assert [texts_of(outcome) for outcome in outcomes] == [[text] for text in texts]
 
 
 @pytest.mark.shared_engine
@@ -103,12 +103,12 @@ def test_equal_pairs_are_run_once_and_have_equal_outcomes() -> None:
 
     same_world = World((Room("start_loc"), Room("lab")), "start_loc")
     pairs = [(saying("a"), WORLD), (saying("b"), WORLD), (saying("a"), OTHER), (saying("a"), same_world)]
-    outcomes = list(run(pairs * 30, workers=2, skills=doing(say)))
-    assert [said(outcome) for outcome in outcomes] == [["a"], ["b"], ["a"], ["a"]] * 30
+    outcomes = list(run(pairs * 30, workers=2, skills=with_say(say)))
+    assert [texts_of(outcome) for outcome in outcomes] == [["a"], ["b"], ["a"], ["a"]] * 30
     assert sorted(ran) == ["elsewhere a", "start_loc a", "start_loc b"]
 
 
-def test_pairs_are_told_apart_wherever_one_text_ends_and_the_next_begins() -> None:
+def test_digest_depends_on_where_one_text_ends_and_the_next_begins() -> None:
     assert (
         len({digest("say(1)", "23"), digest("say(1)2", "3"), digest("say(1)23"), digest("", "say(1)23")}) == 4
     )
@@ -119,37 +119,37 @@ def test_no_pairs_give_no_outcomes() -> None:
     assert list(run([], workers=1)) == []
 
 
-def test_a_pool_starts_beside_its_caller_and_outlives_the_thread_that_made_it() -> None:
+def test_pool_survives_the_thread_that_made_it() -> None:
     made: list[WorkerPool] = []
     maker = threading.Thread(target=lambda: made.append(WorkerPool(1)))
     maker.start()
     maker.join()
     with made[0] as pool:
         started = fork_servers()
-        assert said(pool.here().run(saying("hi"), lambda: SimulatedRobot(WORLD))) == ["hi"]
+        assert texts_of(pool.here().run(saying("hi"), lambda: SimulatedRobot(WORLD))) == ["hi"]
         assert len(pool._workers) == 1
         assert fork_servers() == started
 
 
-def test_the_pool_of_the_process_is_tried_again_where_it_could_not_start(
+def test_shared_pool_that_could_not_start_is_tried_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def fails(_: BatchServer) -> None:
+    def fail_to_start(_: BatchServer) -> None:
         raise LostProcessError("no memory")
 
     monkeypatch.setattr(pool, "SHARED_POOL", shared := pool.SharedPool())
     with monkeypatch.context() as broken:
-        broken.setattr(BatchServer, "_set_up", fails)
+        broken.setattr(BatchServer, "_set_up", fail_to_start)
         with pytest.raises(EngineError, match="cannot start"):
             pool.shared_pool()
     try:
-        assert said(pool.shared_pool().here().run(saying("hi"), lambda: SimulatedRobot(WORLD))) == ["hi"]
+        assert texts_of(pool.shared_pool().here().run(saying("hi"), lambda: SimulatedRobot(WORLD))) == ["hi"]
     finally:
         shared.end()
 
 
 @pytest.mark.slow
-def test_a_pool_that_nobody_enters_ends_with_the_process() -> None:
+def test_pool_that_is_never_entered_ends_with_the_process() -> None:
     script = "from codebotler.simulator.pool import WorkerPool; WorkerPool(1)"
     began = fork_servers()
     subprocess.run([sys.executable, "-c", script], check=True, timeout=60)
@@ -159,7 +159,7 @@ def test_a_pool_that_nobody_enters_ends_with_the_process() -> None:
 @pytest.mark.shared_engine
 @pytest.mark.parametrize(("batches", "most"), [(2, 100), (10_000, MAX_KEYS_AHEAD + 30)])
 def test_pairs_are_read_only_a_little_ahead(batches: int, most: int) -> None:
-    """Results of the first batches come at once, and others never."""
+    """Only the first batches get results."""
     read, sent = count(), count(1)
 
     def submit(some: Sequence[int]) -> Future[Sequence[int]]:
@@ -175,7 +175,7 @@ def test_pairs_are_read_only_a_little_ahead(batches: int, most: int) -> None:
 
 
 @pytest.mark.shared_engine
-def test_work_goes_on_while_the_first_result_is_long_in_coming() -> None:
+def test_work_continues_while_the_first_result_is_late() -> None:
     others_done = threading.Semaphore(0)
 
     def work(number: int) -> int:
@@ -191,7 +191,7 @@ def test_work_goes_on_while_the_first_result_is_long_in_coming() -> None:
         assert list(results) == [500, *range(1, 600)]
 
 
-WAITS = """
+SENDS_SIGNAL = """
 import os, signal, threading, time
 from concurrent.futures import Future
 import polars  # after which a signal ends no wait
@@ -209,13 +209,13 @@ except KeyboardInterrupt:
 """
 
 
-def test_a_signal_is_heard_while_a_result_is_waited_for() -> None:
-    told = subprocess.run([sys.executable, "-c", WAITS], check=True, capture_output=True, text=True)
-    assert told.stdout == "True\n"
+def test_signal_interrupts_the_wait_for_a_result() -> None:
+    ended = subprocess.run([sys.executable, "-c", SENDS_SIGNAL], check=True, capture_output=True, text=True)
+    assert ended.stdout == "True\n"
 
 
 @pytest.mark.shared_engine
-def test_what_was_read_before_the_keys_failed_has_results() -> None:
+def test_keys_read_before_a_failure_have_results() -> None:
     def keys() -> Iterator[int]:
         yield from range(20)
         raise ValueError("no more")
@@ -229,7 +229,7 @@ def test_what_was_read_before_the_keys_failed_has_results() -> None:
             next(results)
 
 
-TELLS_WHAT_IS_THE_SAME = """
+COMPARES_IDENTITIES = """
 def task_program():
     go_to('kitchen')
     here = get_current_location()
@@ -238,32 +238,32 @@ def task_program():
 
 
 @pytest.mark.slow
-def test_identities_do_not_depend_on_what_the_engine_holds() -> None:
+def test_identities_do_not_depend_on_strings_of_the_engine() -> None:
     hall, kitchen = str(b"hall", "ascii"), str(b"kitchen", "ascii")
     worlds = [World((Room("hall"), Room("kitchen")), "hall"), World((Room(hall), Room(kitchen)), hall)]
     worker = Worker()
-    outcomes = [worker.run(TELLS_WHAT_IS_THE_SAME, partial(SimulatedRobot, world)) for world in worlds]
+    outcomes = [worker.run(COMPARES_IDENTITIES, partial(SimulatedRobot, world)) for world in worlds]
     worker.close()
     assert outcomes[0] == outcomes[1]
 
 
 @pytest.mark.shared_engine
-def test_a_room_that_is_no_regex_harms_no_program_that_drives_nowhere() -> None:
+def test_room_with_an_invalid_regex_does_not_affect_programs_without_drives() -> None:
     world = World((Room("hall"), Room("[")), "hall")
-    assert said(next(run([(saying("a"), world)], workers=1))) == ["a"]
+    assert texts_of(next(run([(saying("a"), world)], workers=1))) == ["a"]
 
 
 @pytest.mark.shared_engine
-def test_a_smaller_table_of_skills_leaves_no_other_skill() -> None:
+def test_program_has_only_the_skills_of_the_table() -> None:
     table = SkillTable(tuple(skill for skill in SKILLS.values() if skill.name != "pick"))
     (outcome,) = run([("def task_program(): pick('x')", WORLD)], workers=1, skills=table)
     assert outcome.error is not None
     assert outcome.error.kind == "NameError"
 
 
-# --- the same everywhere
+# --- reproducibility
 
-UNSTEADY = """
+NONDETERMINISTIC = """
 import random, datetime, uuid, os, secrets, tempfile, logging, threading
 class A: pass
 def task_program():
@@ -289,15 +289,15 @@ def task_program():
 
 
 @pytest.mark.slow
-def test_outcome_depends_neither_on_workers_nor_on_the_start_nor_on_what_ran_before() -> None:
-    programs = [UNSTEADY.replace("NUMBER", f"unseen_{number}") for number in range(10, 22)]
+def test_outcome_depends_neither_on_workers_nor_on_earlier_runs() -> None:
+    programs = [NONDETERMINISTIC.replace("NUMBER", f"unseen_{number}") for number in range(10, 22)]
     pairs = [(program, WORLD) for program in programs]
     first = list(run(pairs, workers=1, settings=AS_WRITTEN))
     assert list(run(pairs, workers=4, settings=AS_WRITTEN)) == first
     before = [(saying("x" * number), WORLD) for number in range(5)]
     assert list(run([*before, *reversed(pairs)], workers=1, settings=AS_WRITTEN))[5:] == first[::-1]
-    assert len({tuple(said(outcome)[:-1]) for outcome in first}) == 1
-    assert len(said(first[0])) == 14
+    assert len({tuple(texts_of(outcome)[:-1]) for outcome in first}) == 1
+    assert len(texts_of(first[0])) == 14
 
 
 ADDRESSES = """
@@ -310,23 +310,23 @@ def task_program():  # NUMBER
 
 @pytest.mark.slow
 @pytest.mark.parametrize("imports", ["", "import json\n"])
-def test_addresses_are_the_same_in_the_first_run_and_long_after(imports: str) -> None:
+def test_addresses_are_the_same_in_every_run(imports: str) -> None:
     programs = [(imports + ADDRESSES.replace("NUMBER", str(number)), WORLD) for number in range(150)]
     outcomes = run(programs, workers=1)
-    assert len({tuple(said(outcome)) for outcome in outcomes}) == 1
+    assert len({tuple(texts_of(outcome)) for outcome in outcomes}) == 1
 
 
-# --- nothing is left
+# --- leftovers
 
 
-@pytest.mark.usefixtures("nothing_is_left")
-def test_nothing_is_left_after_all_outcomes_were_read() -> None:
+@pytest.mark.usefixtures("check_leftovers")
+def test_reading_all_outcomes_leaves_nothing() -> None:
     assert len(list(run(((saying(str(number)), WORLD) for number in range(20)), workers=2))) == 20
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("nothing_is_left")
-def test_nothing_is_left_after_the_consumer_stopped_early() -> None:
+@pytest.mark.usefixtures("check_leftovers")
+def test_consumer_that_stops_early_leaves_nothing() -> None:
     outcomes = run(((saying(str(number)), WORLD) for number in count()), workers=2)
     next(outcomes)
     assert engine_processes()
@@ -334,9 +334,7 @@ def test_nothing_is_left_after_the_consumer_stopped_early() -> None:
 
 
 LONG_RUNS = [
-    *(
-        (saying(str(number)), WORLD) for number in range(MIN_BATCH_KEYS)
-    ),  # the first batch, whose results come at once
+    *((saying(str(number)), WORLD) for number in range(MIN_BATCH_KEYS)),  # the first batch is quick
     *(
         (f"def task_program():\n    sum(range(10**12))\n    say('{number}')\n", WORLD)
         for number in range(2 * MIN_BATCH_KEYS)
@@ -345,8 +343,8 @@ LONG_RUNS = [
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("nothing_is_left")
-def test_nothing_is_waited_for_when_the_consumer_stops_during_long_runs() -> None:
+@pytest.mark.usefixtures("check_leftovers")
+def test_consumer_that_stops_does_not_wait_for_long_runs() -> None:
     outcomes = run(LONG_RUNS, workers=2)
     next(outcomes)
     while sum(bool(children_of(fork_server)) for fork_server in fork_servers()) < 2:
@@ -358,8 +356,8 @@ def test_nothing_is_waited_for_when_the_consumer_stops_during_long_runs() -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("nothing_is_left")
-def test_nothing_is_waited_for_when_the_consumer_stops_while_a_fork_server_is_starting() -> None:
+@pytest.mark.usefixtures("check_leftovers")
+def test_consumer_that_stops_does_not_wait_for_a_starting_fork_server() -> None:
     outcomes = run(LONG_RUNS, workers=2)
     next(outcomes)
     start = time.monotonic()
@@ -368,8 +366,8 @@ def test_nothing_is_waited_for_when_the_consumer_stops_while_a_fork_server_is_st
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("nothing_is_left")
-def test_nothing_is_left_after_the_pairs_failed() -> None:
+@pytest.mark.usefixtures("check_leftovers")
+def test_failing_pairs_leave_nothing() -> None:
     def pairs() -> Iterator[tuple[str, World]]:
         for number in range(20):
             yield saying(str(number)), WORLD
@@ -379,17 +377,17 @@ def test_nothing_is_left_after_the_pairs_failed() -> None:
         list(run(pairs(), workers=2))
 
 
-@pytest.mark.usefixtures("nothing_is_left")
-def test_nothing_is_left_after_a_behaviour_failed() -> None:
+@pytest.mark.usefixtures("check_leftovers")
+def test_failing_skill_leaves_nothing() -> None:
     def say(robot: SimulatedRobot, message: str) -> None:
         raise LookupError(message + robot.room)
 
     with pytest.raises(LookupError, match="astart_loc"):
-        list(run([(saying("a"), WORLD), (saying("b"), WORLD)], workers=1, skills=doing(say)))
+        list(run([(saying("a"), WORLD), (saying("b"), WORLD)], workers=1, skills=with_say(say)))
 
 
-def script_with_the_engine() -> tuple[subprocess.Popen[str], set[int]]:
-    """A script that runs programs without end, and the processes below it."""
+def start_script() -> tuple[subprocess.Popen[str], set[int]]:
+    """Start a script that runs programs endlessly; return it and the processes below it."""
     code = (
         "from itertools import count\n"
         "from codebotler.simulator.engine import run\n"
@@ -409,30 +407,30 @@ def script_with_the_engine() -> tuple[subprocess.Popen[str], set[int]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
-def test_script_that_is_stopped_leaves_no_process_behind(number: signal.Signals) -> None:
-    script, below = script_with_the_engine()
+def test_stopped_script_leaves_no_process(number: signal.Signals) -> None:
+    script, below = start_script()
     assert len(below) >= 2
     script.send_signal(number)
     script.communicate(timeout=10)
     assert are_gone(below)
 
 
-# --- what the engine survives
+# --- crashes
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("nothing_is_left")
-def test_engine_survives_a_fork_server_that_was_killed_between_runs() -> None:
+@pytest.mark.usefixtures("check_leftovers")
+def test_fork_server_killed_between_runs_loses_no_outcome() -> None:
     outcomes = run(((saying(str(number)), WORLD) for number in range(60)), workers=1)
-    assert said(next(outcomes)) == ["0"]
+    assert texts_of(next(outcomes)) == ["0"]
     for pid in fork_servers():
         os.kill(pid, signal.SIGKILL)
-    assert [said(outcome) for outcome in outcomes] == [[str(number)] for number in range(1, 60)]
+    assert [texts_of(outcome) for outcome in outcomes] == [[str(number)] for number in range(1, 60)]
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("nothing_is_left")
-def test_fork_server_that_was_killed_while_idle_is_replaced_and_no_socket_is_lost() -> None:
+@pytest.mark.usefixtures("check_leftovers")
+def test_fork_server_killed_while_idle_is_replaced_without_an_open_socket() -> None:
     def pairs() -> Iterator[tuple[str, World]]:
         yield saying("a"), WORLD
         time.sleep(0.5)
@@ -442,12 +440,12 @@ def test_fork_server_that_was_killed_while_idle_is_replaced_and_no_socket_is_los
         assert are_gone(idle)
         yield saying("b"), WORLD
 
-    assert [said(outcome) for outcome in run(pairs(), workers=1)] == [["a"], ["b"]]
-    gc.collect()  # a socket that nobody closed would be told of here, as an error
+    assert [texts_of(outcome) for outcome in run(pairs(), workers=1)] == [["a"], ["b"]]
+    gc.collect()  # an open socket would cause a warning here, which is an error
 
 
-def killing(times: int) -> Callable[..., None]:
-    """A way to speak that kills the fork server in the middle of a run, the first few times."""
+def say_and_kill(times: int) -> Callable[..., None]:
+    """Return a `say` that kills the fork server during the run, in its first few calls."""
     left = iter(range(times))
 
     def say(robot: SimulatedRobot, message: str) -> None:
@@ -462,57 +460,61 @@ def killing(times: int) -> Callable[..., None]:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("nothing_is_left")
-def test_run_whose_fork_server_is_killed_is_run_again() -> None:
+@pytest.mark.usefixtures("check_leftovers")
+def test_run_whose_fork_server_is_killed_is_repeated() -> None:
     program = "def task_program():\n    say('a')\n    say('b')\n"
-    outcomes = list(run([(program, WORLD), (saying("c"), WORLD)], workers=1, skills=doing(killing(1))))
-    assert [said(outcome) for outcome in outcomes] == [["a", "b"], ["c"]]
+    outcomes = list(
+        run([(program, WORLD), (saying("c"), WORLD)], workers=1, skills=with_say(say_and_kill(1)))
+    )
+    assert [texts_of(outcome) for outcome in outcomes] == [["a", "b"], ["c"]]
 
 
-@pytest.mark.usefixtures("nothing_is_left")
-def test_a_robot_that_has_acted_is_not_given_to_a_second_run() -> None:
+@pytest.mark.usefixtures("check_leftovers")
+def test_run_on_a_robot_that_has_acted_is_not_repeated() -> None:
     program = "def task_program():\n    say('a')\n    say('b')\n"
     with WorkerPool(1) as workers:
 
         def run_on(robot: SimulatedRobot) -> Outcome:
             return workers.submit(lambda: workers.here().run_on(program, robot)).result()
 
-        assert said(run_on(SimulatedRobot(WORLD))) == ["a", "b"]
+        assert texts_of(run_on(SimulatedRobot(WORLD))) == ["a", "b"]
         with pytest.raises(EngineError, match="start the command again"):
-            run_on(SimulatedRobot(WORLD, skills=doing(killing(1))))
+            run_on(SimulatedRobot(WORLD, skills=with_say(say_and_kill(1))))
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("nothing_is_left")
-def test_fork_server_that_is_killed_again_and_again_is_an_error_of_the_engine_and_no_verdict() -> None:
+@pytest.mark.usefixtures("check_leftovers")
+def test_fork_server_that_is_killed_repeatedly_is_an_engine_error() -> None:
     with pytest.raises(EngineError, match="lost twice"):
-        list(run([(saying("a"), WORLD)], workers=1, skills=doing(killing(99))))
+        list(run([(saying("a"), WORLD)], workers=1, skills=with_say(say_and_kill(99))))
 
 
 @pytest.mark.shared_engine
-def test_a_skill_may_take_longer_than_a_child_may_be_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_skill_may_take_longer_than_the_wait_for_a_child(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("codebotler.simulator.process.isolated_process.PROCESS_WAIT_SECONDS", 1.0)
 
-    def slow(robot: SimulatedRobot, message: str) -> None:
+    def say_slowly(robot: SimulatedRobot, message: str) -> None:
         time.sleep(2.5)
         robot.record("say", message)
 
-    (outcome,) = run([(saying("a"), WORLD)], workers=1, skills=doing(slow))
-    assert said(outcome) == ["a"]
+    (outcome,) = run([(saying("a"), WORLD)], workers=1, skills=with_say(say_slowly))
+    assert texts_of(outcome) == ["a"]
 
 
-def test_a_stop_ends_the_child_at_once_while_its_robot_is_still_busy() -> None:
+def test_stop_ends_the_child_while_its_robot_is_busy() -> None:
     is_busy, may_go_on = threading.Event(), threading.Event()
 
-    def busy(robot: SimulatedRobot, message: str) -> None:
+    def say_later(robot: SimulatedRobot, message: str) -> None:
         is_busy.set()
         assert may_go_on.wait(30)
         robot.record("say", message)
 
-    others = engine_processes()  # which other tests keep open
+    others = engine_processes()  # other tests keep these open
     worker = Worker()
     with ThreadPoolExecutor(1) as thread:
-        running = thread.submit(worker.run, saying("a"), lambda: SimulatedRobot(WORLD, skills=doing(busy)))
+        running = thread.submit(
+            worker.run, saying("a"), lambda: SimulatedRobot(WORLD, skills=with_say(say_later))
+        )
         assert is_busy.wait(30)
         family = engine_processes() - others
         worker.stop()
@@ -522,7 +524,7 @@ def test_a_stop_ends_the_child_at_once_while_its_robot_is_still_busy() -> None:
     worker.close()
 
 
-WAITING_A_LITTLE = """
+SHORT_WAITS = """
 def task_program():  # NUMBER
     lock = sys.modules["_thread"].allocate_lock()
     lock.acquire()
@@ -539,8 +541,8 @@ def task_program():  # NUMBER
 
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in FUTEX, reason="the number of futex is not known here")
-def test_program_that_waits_a_little_at_a_time_ends_the_same_way_in_each_of_many_runs() -> None:
-    source = WAITING_A_LITTLE.replace("FUTEX", str(FUTEX[platform.machine()]))
+def test_program_with_short_waits_has_the_same_outcome_in_many_runs() -> None:
+    source = SHORT_WAITS.replace("FUTEX", str(FUTEX[platform.machine()]))
     pairs = [(source.replace("NUMBER", str(number)), WORLD) for number in range(100)]
     ends = {(one.status, *(event.text for event in one.trace)) for one in run(pairs, workers=4)}
     assert ends == {(Status.FINISHED, "2.00", "-1")}
@@ -548,15 +550,15 @@ def test_program_that_waits_a_little_at_a_time_ends_the_same_way_in_each_of_many
 
 @pytest.mark.slow
 @pytest.mark.shared_engine
-def test_requests_beyond_a_limit_are_not_read_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_requests_beyond_a_limit_are_soon_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
     answered: list[list[object]] = []
     answer = SkillProtocol._answer
 
-    def counted(self: SkillProtocol, name: str, values: list[object], now: float) -> SkillAnswer:
+    def count_and_answer(self: SkillProtocol, name: str, values: list[object], now: float) -> SkillAnswer:
         answered.append(values)
         return answer(self, name, values, now)
 
-    monkeypatch.setattr(SkillProtocol, "_answer", counted)
+    monkeypatch.setattr(SkillProtocol, "_answer", count_and_answer)
     frame = b'["say",["!"],0.0]'
     program = (
         "import os\n"
@@ -569,7 +571,7 @@ def test_requests_beyond_a_limit_are_not_read_for_ever(monkeypatch: pytest.Monke
     assert answered.count(["!"]) == 1_000 + OVERRUN + 1
 
 
-def test_child_that_is_killed_from_outside_is_told_so() -> None:
+def test_child_killed_from_outside_has_the_status_killed() -> None:
     def say(robot: SimulatedRobot, message: str) -> None:
         robot.record("say", message)
         for pid in fork_servers():
@@ -577,7 +579,7 @@ def test_child_that_is_killed_from_outside_is_told_so() -> None:
                 os.kill(child, signal.SIGKILL)
 
     first, second = run(
-        [(saying("a"), WORLD), ("def task_program(): pass", WORLD)], workers=1, skills=doing(say)
+        [(saying("a"), WORLD), ("def task_program(): pass", WORLD)], workers=1, skills=with_say(say)
     )
     assert (first.status, second.status) == (Status.KILLED, Status.FINISHED)
     assert [event.text for event in first.trace] == ["a"]
@@ -602,7 +604,7 @@ def test_suite_sets_the_limits() -> None:
 
 
 @pytest.mark.shared_engine
-def test_program_of_enormous_length_is_refused_without_being_read() -> None:
+def test_enormous_program_is_refused_unread() -> None:
     (outcome,) = run([("#" * 6_000_000, WORLD)], workers=1)
     assert (outcome.status, outcome.trace) == (Status.PYTHON_ERROR, ())
     assert outcome.error is not None
@@ -622,10 +624,10 @@ def test_events_of_runs_are_logged_and_off_by_default(caplog: pytest.LogCaptureF
     assert not caplog.records
     with caplog.at_level("DEBUG", logger="codebotler.engine.events"):
         list(run(pairs, workers=1))
-    told = [record.getMessage().partition(": ")[::2] for record in caplog.records]
-    says, drives, ends = dict.fromkeys(program for program, _ in told)
-    assert told == [
-        (says, "started"),  # in a batch with the next
+    messages = [record.getMessage().partition(": ")[::2] for record in caplog.records]
+    says, drives, ends = dict.fromkeys(program for program, _ in messages)
+    assert messages == [
+        (says, "started"),  # the first two share a batch
         (drives, "started"),
         (says, "finished"),
         (drives, "robot-error (GoToInvalidLocation: 'there is no room \"x\"')"),
@@ -640,12 +642,12 @@ def test_windows_is_refused_with_the_platform_patched(monkeypatch: pytest.Monkey
         list(run([(saying("a"), WORLD)], workers=1))
 
 
-def test_macos_is_less_isolated_and_says_so_with_the_platform_patched(
+def test_macos_warns_of_less_isolation_with_the_platform_patched(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(Worker, "has_seccomp", property(lambda _: False, lambda *_: None), raising=False)
     monkeypatch.setattr(sys, "platform", "darwin")
-    assert said(next(run([(saying("a"), WORLD)], workers=1))) == ["a"]
+    assert texts_of(next(run([(saying("a"), WORLD)], workers=1))) == ["a"]
     (record,) = caplog.records
     assert "seccomp" in record.getMessage()
     with pytest.raises(EngineError, match="seccomp"):
@@ -671,29 +673,29 @@ resource.setrlimit = with_fewer
 
 
 @pytest.mark.slow
-def test_processes_do_with_what_macos_has_with_linux_patched_to_lack_the_rest(
+def test_processes_need_only_the_features_of_macos_with_linux_patched(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def compiled(file: str, shown: str) -> bytes:
+    def compile_like_macos(file: str, shown: str) -> bytes:
         prelude = LIKE_MACOS if shown == "<codebotler.simulator.sandbox>" else ""
         source = Path(file).read_text(encoding="utf-8")
         return spawn.compiled_source(source.replace('"""The isolated', prelude + '"""The isolated', 1), shown)
 
     with TemporaryFile() as file:
         monkeypatch.setattr(spawn, "compiled_file", lambda *_: file)
-        file.write(spawn.compiled_modules(compiled))
+        file.write(spawn.compiled_modules(compile_like_macos))
         file.flush()
         programs = [saying("a"), "import json\n" + saying("b"), "import os\n\ndef task_program(): os.abort()"]
         outcomes = list(run([(program, WORLD) for program in programs], workers=1))
-    assert [said(outcome) for outcome in outcomes[:2]] == [["a"], ["b"]]
+    assert [texts_of(outcome) for outcome in outcomes[:2]] == [["a"], ["b"]]
     assert outcomes[2].error == RunError("Crash", "the process ended by itself (signal 6)")
 
 
-# --- what an attack found
+# --- attacks
 
 
 def large_program(number: int) -> str:
-    """A program whose code does not fit into the buffer of a socket."""
+    """Return a program whose code does not fit into the buffer of a socket."""
     functions = "".join(f"say_{i} = lambda a, b: (a + b) * {i}\n" for i in range(2600))
     return f"{functions}# {number}\ndef task_program(): say(str([id(bytes(60_000 + i)) for i in range(9)]))\n"
 
@@ -701,11 +703,11 @@ def large_program(number: int) -> str:
 @pytest.mark.slow
 def test_large_programs_say_the_same_addresses_every_time() -> None:
     outcomes = run(((large_program(number), WORLD) for number in range(12)), workers=2)
-    assert len({tuple(said(outcome)) for outcome in outcomes}) == 1
+    assert len({tuple(texts_of(outcome)) for outcome in outcomes}) == 1
 
 
 @pytest.mark.slow
-def test_few_characters_of_much_code_are_refused() -> None:
+def test_short_program_with_enormous_code_is_refused() -> None:
     methods = "".join(f" def f{j}(): 0\n" for j in range(1500))
     worker = Worker()
     for number in range(3):
@@ -716,11 +718,11 @@ def test_few_characters_of_much_code_are_refused() -> None:
     worker.close()
 
 
-SIZES = 15_000, 20_000, 20_800  # which fit into a fresh process only; under Python 3.11, the last at most
+SIZES = 15_000, 20_000, 20_800  # these fit only into a fresh process; under Python 3.11, at most the last
 
 
 @pytest.mark.slow
-def test_what_was_prepared_before_changes_no_outcome() -> None:
+def test_programs_compiled_before_change_no_outcome() -> None:
     greedy = [f"import {'.'.join(['a'] * parts)}\ndef task_program(): pass\n" for parts in SIZES]
     filling = [
         f"class {'q' * 59_992}{i:08}:\n" + "".join(f" __f{j}\n" for j in range(1500)) + "break\n"
@@ -731,15 +733,15 @@ def test_what_was_prepared_before_changes_no_outcome() -> None:
     assert after == alone
 
 
-def test_a_compiler_that_is_killed_from_outside_is_no_verdict() -> None:
+def test_compiler_killed_from_outside_is_replaced() -> None:
     worker = Worker()
 
     def robot() -> SimulatedRobot:
         return SimulatedRobot(WORLD)
 
-    assert said(worker.run(saying("a"), robot)) == ["a"]
+    assert texts_of(worker.run(saying("a"), robot)) == ["a"]
     os.kill(IDLE_PROCESSES["codebotler.simulator.process.compiler"][-1]._process.pid, signal.SIGKILL)
-    assert said(worker.run(saying("b"), robot)) == ["b"]
+    assert texts_of(worker.run(saying("b"), robot)) == ["b"]
     worker.close()
 
 
@@ -761,8 +763,8 @@ print(outcome, outcome.trace)
 
 
 @pytest.mark.slow
-def test_what_a_shell_has_set_changes_no_outcome() -> None:
-    def told(setting: str, end: str) -> str:
+def test_settings_of_the_shell_change_no_outcome() -> None:
+    def run_in_shell(setting: str, end: str) -> str:
         ended = subprocess.run(
             ["bash", "-c", f'{setting}; exec "$0" -c "$1"', sys.executable, FROM_A_SHELL.format(end=end)],
             capture_output=True,
@@ -771,13 +773,13 @@ def test_what_a_shell_has_set_changes_no_outcome() -> None:
         )
         return ended.stdout
 
-    plain = told("true", "pass")
+    plain = run_in_shell("true", "pass")
     assert "maximum recursion depth exceeded" in plain
-    assert {told(f"ulimit -s {size}", "pass") for size in ("1000000", "unlimited")} == {plain}
-    assert "5 seconds of processor time" in told("trap '' XCPU INT", "sum(range(10**12))")
+    assert {run_in_shell(f"ulimit -s {size}", "pass") for size in ("1000000", "unlimited")} == {plain}
+    assert "5 seconds of processor time" in run_in_shell("trap '' XCPU INT", "sum(range(10**12))")
 
 
-HANDED_OVER = """
+PRINT_DIGEST = """
 from hashlib import sha256
 from codebotler.simulator.process.spawn import code_of, compiled_modules
 print(sha256(compiled_modules(code_of)).hexdigest())
@@ -785,19 +787,19 @@ print(sha256(compiled_modules(code_of)).hexdigest())
 
 
 @pytest.mark.slow
-def test_what_a_fork_server_is_handed_does_not_depend_on_how_python_was_started() -> None:
-    def told(*flags: str, **variables: str) -> str:
-        command = [sys.executable, *flags, "-c", HANDED_OVER]
+def test_code_for_fork_servers_does_not_depend_on_flags_of_python() -> None:
+    def digest_with(*flags: str, **variables: str) -> str:
+        command = [sys.executable, *flags, "-c", PRINT_DIGEST]
         environment = {**os.environ, **variables}
         return subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout
 
-    plain = told(PYTHONHASHSEED="1")
+    plain = digest_with(PYTHONHASHSEED="1")
     assert len(plain.strip()) == 64
-    assert told("-X", "frozen_modules=off", PYTHONHASHSEED="2") == plain
-    assert told("-O", PYTHONDONTWRITEBYTECODE="1") == plain
+    assert digest_with("-X", "frozen_modules=off", PYTHONHASHSEED="2") == plain
+    assert digest_with("-O", PYTHONDONTWRITEBYTECODE="1") == plain
 
 
-MODULES_TOLD = """
+SAY_MODULES = """
 import sys
 
 def task_program():
@@ -809,32 +811,32 @@ def task_program():
 """
 
 
-def test_a_fork_server_compiles_next_to_nothing_and_modules_name_no_folder() -> None:
-    """Compiling the standard library would take most of its start; a path would differ between machines."""
+def test_fork_server_compiles_almost_nothing_and_modules_name_no_folder() -> None:
+    """Compiling the standard library would slow the start; paths would differ between machines."""
     worker = Worker(one_process_per_run=True)
     outcome = worker.run(
-        MODULES_TOLD, lambda: SimulatedRobot(WORLD, SimulationSettings(literals="as-written"))
+        SAY_MODULES, lambda: SimulatedRobot(WORLD, SimulationSettings(literals="as-written"))
     )
     worker.close()
-    number, compiled, *told = said(outcome)
+    number, compiled, *modules = texts_of(outcome)
     assert int(number) > 200
     assert len(compiled.split(",")) < 30
-    assert [text for text in told if str(Path(os.__file__).parent) in text] == []
+    assert [text for text in modules if str(Path(os.__file__).parent) in text] == []
 
 
-def test_an_interrupt_while_code_is_compiled_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: object) -> bytes:
+def test_interrupt_during_compilation_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object) -> bytes:
         raise KeyboardInterrupt
 
     before = set(Path("/proc/self/fd").iterdir())
-    monkeypatch.setattr(spawn, "compiled_modules", interrupted)
+    monkeypatch.setattr(spawn, "compiled_modules", interrupt)
     monkeypatch.setattr(spawn, "_written_file", spawn._written_file.__wrapped__)
     with pytest.raises(KeyboardInterrupt):
         compiled_file()
     assert set(Path("/proc/self/fd").iterdir()) == before
 
 
-def test_a_limit_on_the_size_of_files_ends_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_limit_on_the_size_of_files_is_an_engine_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spawn, "_written_file", spawn._written_file.__wrapped__)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
@@ -845,7 +847,7 @@ def test_a_limit_on_the_size_of_files_ends_in_a_sentence(monkeypatch: pytest.Mon
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def test_a_forked_process_holds_no_channel_of_its_parents_workers() -> None:
+def test_forked_process_holds_no_channel_of_its_parents_workers() -> None:
     before = set(links_in(Path("/proc/self/fd")))
     with WorkerPool(1):
         pid = os.fork()
@@ -855,12 +857,12 @@ def test_a_forked_process_holds_no_channel_of_its_parents_workers() -> None:
         assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
 
 
-def test_an_interrupted_start_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(_: BatchServer) -> None:
+def test_interrupted_start_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(_: BatchServer) -> None:
         raise KeyboardInterrupt
 
     before, processes = set(Path("/proc/self/fd").iterdir()), fork_servers()
-    monkeypatch.setattr(BatchServer, "_set_up", interrupted)
+    monkeypatch.setattr(BatchServer, "_set_up", interrupt)
     with pytest.raises(KeyboardInterrupt), WorkerPool(1):
         pass
     assert fork_servers() <= processes

@@ -1,7 +1,7 @@
-"""Random programs end alike in every run, with and without isolation, alone and after others in one child.
+"""Random programs have the same outcome in every run, isolated or not, alone or in a shared child.
 
-`make test` runs the same 20 each time. `make fuzz` runs thousands of others: FUZZ_EXAMPLES says how many,
-and FUZZ_SEED in which order they share children, and which programs of the corpus do.
+`make test` runs the same 20 each time. `make fuzz` runs thousands of others. FUZZ_EXAMPLES is their number,
+and FUZZ_SEED chooses the order in which they share children and the programs of the corpus.
 """
 
 import ast
@@ -42,11 +42,11 @@ FUZZ = settings(
     max_examples=EXAMPLES,
     database=None,
     deadline=None,
-    # Programs are long, and the machine may be busy.
+    # Programs are long and the machine may be busy, so these checks of Hypothesis would fail at random.
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example],
 )
 Check = TypeVar("Check", bound=Callable[..., None])
-RULES = SimulationSettings(limits=Limits(ticks=2_000, calls=60))
+SETTINGS = SimulationSettings(limits=Limits(ticks=2_000, calls=60))
 
 CLOSED_BY_AN_ERROR = """
 def spoken():
@@ -116,13 +116,13 @@ WORLDS = (
 )
 
 
-def seeded(check: Check) -> Check:
-    """With a seed of our own, where a nightly run gives none: Hypothesis derives one from the test's text."""
+def use_fixed_seed(check: Check) -> Check:
+    """Fix the seed outside nightly runs, since Hypothesis derives one from the text of the test."""
     return check if NIGHTLY else seed(SEED)(check)
 
 
 @pytest.fixture(autouse=True)
-def no_constants_of_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+def ignore_constants_of_modules(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw the same programs in each process, since Hypothesis also draws constants of loaded modules."""
     monkeypatch.setattr(providers, "_get_local_constants", Constants)
     monkeypatch.setattr(providers, "CONSTANTS_CACHE", type(providers.CONSTANTS_CACHE)(1024))
@@ -142,23 +142,23 @@ def other_pool() -> Iterator[WorkerPool]:
 
 @pytest.fixture(scope="module")
 def pool_of_processes() -> Iterator[WorkerPool]:
-    """One that gives each run a process of its own."""
+    """Yield a pool that gives each run a process of its own."""
     with WorkerPool(1, one_process_per_run=True) as pool:
         yield pool
 
 
 @pytest.fixture(scope="module")
 def ordinary() -> Iterator[OrdinaryProcess]:
-    with OrdinaryProcess(RULES) as process:
+    with OrdinaryProcess(SETTINGS) as process:
         yield process
 
 
 def outcome_of(pool: WorkerPool, source: str, world: World) -> Outcome:
-    return pool.here().run(source, lambda: SimulatedRobot(world, RULES))
+    return pool.here().run(source, lambda: SimulatedRobot(world, SETTINGS))
 
 
-def names_bound(source: str) -> set[str]:
-    """The names that a program gives a meaning anywhere, or declares global, which is taken for it."""
+def bound_names(source: str) -> set[str]:
+    """Return the names that a program binds anywhere or declares global."""
     with warnings.catch_warnings(action="ignore"):
         nodes = list(ast.walk(ast.parse(source)))
     names = {node.id for node in nodes if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)}
@@ -167,30 +167,30 @@ def names_bound(source: str) -> set[str]:
     return names.union(*(node.names for node in nodes if isinstance(node, ast.Global)))
 
 
-def check_problems(source: str, problems: tuple[Flaw, ...], outcome: Outcome) -> None:
-    """What is said of a program before it runs is true.
+def assert_problems_are_true(source: str, problems: tuple[Flaw, ...], outcome: Outcome) -> None:
+    """Fail if a problem that was found before the run contradicts the outcome.
 
-    A name may be bound in a branch that is not taken, or deleted, and a name in a program of a program is not
-    looked at; but a name that is bound nowhere at all is found.
+    A name may be deleted, or bound only in a branch that does not run, and code in strings is not checked.
+    The check must still find a name that is bound nowhere.
     """
     if outcome.error is None:
         assert not any(problem.line is None for problem in problems)
         return
     said = re.fullmatch(r"(?:cannot access free variable|name) '(\w+)' .*", outcome.error.message)
     if outcome.error.kind == "NameError" and said and outcome.line:
-        told = f"the name {said[1]} is not defined"
-        told_of = {(flaw.line, flaw.message.partition(";")[0]) for flaw in problems}
-        assert (outcome.line, told) in told_of or said[1] in names_bound(source)
+        message = f"the name {said[1]} is not defined"
+        messages = {(flaw.line, flaw.message.partition(";")[0]) for flaw in problems}
+        assert (outcome.line, message) in messages or said[1] in bound_names(source)
 
 
 @pytest.mark.slow
-def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
+def test_random_programs_have_one_outcome_isolated_or_not(
     pool: WorkerPool, other_pool: WorkerPool, ordinary: OrdinaryProcess
 ) -> None:
     seen: dict[tuple[str, World], Outcome] = {}
 
     @FUZZ
-    @seeded
+    @use_fixed_seed
     @given(programs(deep=False), st.sampled_from(WORLDS))
     @example("def task_program():\n    say(undefined_name)\n", WORLDS[0])
     @example(DEEP, WORLDS[0])
@@ -202,10 +202,10 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
         assert outcome.status is not Status.KILLED
         assert all_of(outcome_of(other_pool, source, world)) == all_of(outcome)
         assert without_addresses(ordinary.outcome(source, world)) == without_addresses(outcome)
-        check_problems(source, find_flaws(source), outcome)
+        assert_problems_are_true(source, find_flaws(source), outcome)
 
     check()
-    assert list(map(all_of, run(seen, workers=3, settings=RULES))) == list(map(all_of, seen.values()))
+    assert list(map(all_of, run(seen, workers=3, settings=SETTINGS))) == list(map(all_of, seen.values()))
     count = Counter(outcome.status for outcome in seen.values())
     assert count[Status.FINISHED] >= len(seen) / (3 if NIGHTLY else 5)  # twenty programs scatter widely
     for status in (Status.PYTHON_ERROR, Status.ROBOT_ERROR, Status.TIMEOUT):
@@ -213,11 +213,11 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
     assert sum(map(len, (outcome.trace for outcome in seen.values()))) >= 2 * len(seen)
 
 
-def test_recursion_through_anything_ends_alike_in_every_run(pool: WorkerPool, other_pool: WorkerPool) -> None:
-    """How deep it goes is Python's own, and differs by where the interpreter has started."""
+def test_deep_recursion_has_the_same_outcome_in_every_run(pool: WorkerPool, other_pool: WorkerPool) -> None:
+    """Only isolated runs agree: the possible depth differs between interpreters."""
 
     @settings(FUZZ, max_examples=EXAMPLES // 4)
-    @seeded
+    @use_fixed_seed
     @given(programs(), st.sampled_from(WORLDS))
     def check(source: str, world: World) -> None:
         note(source)
@@ -229,11 +229,9 @@ def test_recursion_through_anything_ends_alike_in_every_run(pool: WorkerPool, ot
 
 
 @pytest.mark.slow
-def test_broken_texts_end_alike_in_every_run_and_break_nothing(
-    pool: WorkerPool, other_pool: WorkerPool
-) -> None:
+def test_broken_programs_have_the_same_outcome_in_every_run(pool: WorkerPool, other_pool: WorkerPool) -> None:
     @FUZZ
-    @seeded
+    @use_fixed_seed
     @given(broken_programs(), st.sampled_from(WORLDS))
     @example("def task_program():\n    \0\n", WORLDS[0])
     def check(source: str, world: World) -> None:
@@ -242,7 +240,7 @@ def test_broken_texts_end_alike_in_every_run_and_break_nothing(
         assert outcome.status is not Status.KILLED
         assert all_of(outcome_of(other_pool, source, world)) == all_of(outcome)
         problems = find_flaws(source)
-        check_problems(source, problems, outcome)
+        assert_problems_are_true(source, problems, outcome)
         if len(problems) == 1 and problems[0].kind in {"SyntaxError", "IndentationError", "TabError"}:
             assert outcome.trace == ()
             assert outcome.error is not None
@@ -253,15 +251,15 @@ def test_broken_texts_end_alike_in_every_run_and_break_nothing(
 
 # --- programs that share a child
 
-MOST = 16  # programs of a batch
+SIZE = 16  # programs of a batch
 Batch = Sequence[tuple[str, Sequence[World]]]
 Runs = dict[tuple[str, World], Outcome]
 
 
-def differences(
+def find_differences(
     worker: Worker, batch: Batch, alone: Runs, settings: SimulationSettings
 ) -> Iterator[tuple[str, World, Outcome]]:
-    """The runs of a batch that end otherwise than alone; those that nobody decided there are none."""
+    """Yield the runs of a batch whose outcome differs from that alone."""
     jobs = [
         (source, [partial(SimulatedRobot, world, settings) for world in worlds]) for source, worlds in batch
     ]
@@ -273,36 +271,36 @@ def differences(
 
 def assert_alike(worker: Worker, batch: Batch, alone: Runs, settings: SimulationSettings) -> None:
     """Fail with the fewest programs that show a difference, if there is one."""
-    if not any(differences(worker, batch, alone, settings)):
+    if not any(find_differences(worker, batch, alone, settings)):
         return
     fewest = list(batch)
     for program in batch:
         fewer = [each for each in fewest if each is not program]
-        if any(differences(worker, fewer, alone, settings)):
+        if any(find_differences(worker, fewer, alone, settings)):
             fewest = fewer
-    for source, world, outcome in differences(worker, fewest, alone, settings):
+    for source, world, outcome in find_differences(worker, fewest, alone, settings):
         programs = "\n# --- and then\n".join(each for each, _ in fewest)
         pytest.fail(f"{programs}\n{world}\n{all_of(outcome)}\n{all_of(alone[source, world])}")
     pytest.fail("a difference comes and goes:\n" + "\n# --- and then\n".join(source for source, _ in batch))
 
 
 def batches(random: Random, sources: Sequence[str], worlds: Sequence[World]) -> Iterator[Batch]:
-    """All programs in some order, in batches, each in a few worlds, perhaps in one of them twice."""
+    """Yield all programs in random batches, each with a few worlds, which may repeat."""
     waiting = random.sample(sources, len(sources))
     while waiting:
-        size = random.randint(1, MOST)
+        size = random.randint(1, SIZE)
         yield [(source, random.choices(worlds, k=random.randint(1, 4))) for source in waiting[:size]]
         del waiting[:size]
 
 
 @pytest.mark.slow
-def test_random_programs_that_share_a_child_end_as_each_does_alone(
+def test_random_programs_in_a_shared_child_have_the_same_outcomes_alone(
     pool: WorkerPool, pool_of_processes: WorkerPool
 ) -> None:
     drawn: dict[str, None] = {}
 
     @FUZZ
-    @seeded
+    @use_fixed_seed
     @given(tame_programs())
     @example(DEEP)
     def draw(source: str) -> None:
@@ -311,15 +309,15 @@ def test_random_programs_that_share_a_child_end_as_each_does_alone(
     draw()
     sources, random = list(drawn), Random(SEED)
     alone: Runs = {}
-    jobs = [(source, [lambda: SimulatedRobot(WORLDS[0], RULES)]) for source in sources]
-    decided = sum(len(pool.here().run_tame(jobs[at : at + MOST])) for at in range(0, len(jobs), MOST))
+    jobs = [(source, [lambda: SimulatedRobot(WORLDS[0], SETTINGS)]) for source in sources]
+    decided = sum(len(pool.here().run_tame(jobs[at : at + SIZE])) for at in range(0, len(jobs), SIZE))
     assert decided >= (0.6 if NIGHTLY else 0.4) * len(sources)
     for _ in range(2):
         for batch in batches(random, sources, WORLDS):
             for pair in ((source, world) for source, worlds in batch for world in worlds):
                 if pair not in alone:
                     alone[pair] = outcome_of(pool_of_processes, *pair)
-            assert_alike(pool.here(), batch, alone, RULES)
+            assert_alike(pool.here(), batch, alone, SETTINGS)
     count = Counter(outcome.status for outcome in alone.values())
     assert count[Status.FINISHED] >= len(alone) / (4 if NIGHTLY else 8)
     for status in (Status.PYTHON_ERROR, Status.ROBOT_ERROR, Status.TIMEOUT):
@@ -327,7 +325,7 @@ def test_random_programs_that_share_a_child_end_as_each_does_alone(
 
 
 @pytest.mark.slow
-def test_real_programs_that_share_a_child_end_as_each_does_alone(
+def test_real_programs_in_a_shared_child_have_the_same_outcomes_alone(
     pool: WorkerPool, pool_of_processes: WorkerPool, corpus: Path, paper: Suite
 ) -> None:
     lines = (corpus / "corpus" / "programs.jsonl").read_text(encoding="utf-8").splitlines()
@@ -343,4 +341,4 @@ def test_real_programs_that_share_a_child_end_as_each_does_alone(
             alone[source, world] = worker.run(source, partial(SimulatedRobot, world, PAPER_SETTINGS))
         decided += len(pool.here().run_tame([(source, [lambda: SimulatedRobot(WORLDS[0])])]))
     assert decided >= len(whole) / 2
-    assert_alike(pool.here(), whole[:MOST], alone, PAPER_SETTINGS)
+    assert_alike(pool.here(), whole[:SIZE], alone, PAPER_SETTINGS)

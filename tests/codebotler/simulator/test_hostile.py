@@ -1,8 +1,8 @@
-"""Programs that try to break out, to do harm or to cheat; each file of tests/hostile is one, and fails.
+"""Programs that try to break out, to do harm or to cheat fail; each file of tests/hostile is one.
 
 A program's first line says what it tries. Comments below say how its run must end (`# ends: STATUS KIND`),
-what its robot must have done by then (`# does: KIND TEXT`, one line an event; nothing by default) and whether
-that is what was asked of it (`# earns: yes`; no by default). `@NAME@` stands for something real that it could
+what its robot must have done (`# does: KIND TEXT`, one line per event; nothing by default) and whether it
+solves the task (`# earns: yes`; no by default). `@NAME@` is replaced by something real that it could
 reach if a layer of isolation were missing.
 """
 
@@ -58,7 +58,7 @@ WORLD = World(
 )
 SAYS_IT_THERE = parse(f'tr.ActAtFirst("vault", say("{PHRASE}"))')
 ASKED = Scenario(WORLD, (Requirement("says it there", "says it there", SAYS_IT_THERE, "SayAtLocation"),))
-LONGEST = 25.0  # seconds; the watchdog's five, on a busy machine
+MAX_SECONDS = 25.0  # the watchdog's limit is five, but the machine may be busy
 HONEST = """
 import builtins, collections, fractions, json, os, random, statistics, string, sys, textwrap, timeit
 
@@ -79,49 +79,49 @@ TAME = "def task_program():\n    pass\n"
 
 
 @dataclass(frozen=True)
-class Declared:
-    """What a program's comments say of it."""
+class Expectation:
+    """The outcome that a program's comments announce."""
 
     ends: tuple[str, ...]
     does: tuple[str, ...]
     earns: bool
 
 
-def declared(source: str) -> Declared:
+def read_expectation(source: str) -> Expectation:
     lines = [line[2:].partition(": ") for line in source.splitlines() if line.startswith("# ")]
     ends = next(value for name, _, value in lines if name == "ends")
     does = tuple(value for name, _, value in lines if name == "does")
-    return Declared(tuple(ends.split(" | ")), does, ("earns", ": ", "yes") in lines)
+    return Expectation(tuple(ends.split(" | ")), does, ("earns", ": ", "yes") in lines)
 
 
-def rendered(event: Event) -> str:
-    """An event as comments write it: `*` marks an option that was no text."""
-    offered = [shortened(option.text) + "*" * (not option.is_text) for option in event.options]
-    options = ", ".join(counted(offered))
+def render(event: Event) -> str:
+    """Write an event as in the comments, with `*` after an option that is not text."""
+    offered = [shorten(option.text) + "*" * (not option.is_text) for option in event.options]
+    options = ", ".join(count_repeats(offered))
     asked = f": {options}" if event.kind == "ask" else ""
     answered = "" if event.answer is None else f" -> {event.answer}"
-    return f"{event.kind} {shortened(event.text)}{asked}{answered}"
+    return f"{event.kind} {shorten(event.text)}{asked}{answered}"
 
 
-def shortened(text: str) -> str:
+def shorten(text: str) -> str:
     return (text if len(text) < 100 else text[:3] + "...").encode("unicode_escape").decode()
 
 
-def counted(texts: Iterable[str]) -> tuple[str, ...]:
-    """Texts, but those that follow each other and are equal only once."""
+def count_repeats(texts: Iterable[str]) -> tuple[str, ...]:
+    """Replace equal texts in a row by their number and the text."""
     groups = [(text, len(list(group))) for text, group in groupby(texts)]
     return tuple(text if count == 1 else f"{count} times {text}" for text, count in groups)
 
 
-def done(outcome: Outcome) -> tuple[str, ...]:
-    return counted(map(rendered, outcome.trace))
+def render_trace(outcome: Outcome) -> tuple[str, ...]:
+    return count_repeats(map(render, outcome.trace))
 
 
-# --- what a program could reach if a layer of isolation were missing
+# --- things within reach if a layer of isolation were missing
 
 
-def processes() -> dict[int, tuple[int, str]]:
-    """The parent and the state of each process, at one moment."""
+def process_table() -> dict[int, tuple[int, str]]:
+    """Return the parent and the state of each process."""
     found = {}
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
@@ -132,16 +132,16 @@ def processes() -> dict[int, tuple[int, str]]:
 
 
 def living_below(*pids: int) -> set[int]:
-    """The processes below some that are neither dead nor stopped by a signal."""
-    table = processes()
+    """Return the processes below some that are neither dead nor stopped by a signal."""
+    table = process_table()
     found: set[int] = set()
     while more := {one for one, (parent, _) in table.items() if parent in {*pids, *found}} - found:
         found |= more
     return {one for one in found if table[one][1] not in "ZTt"}
 
 
-def carry_the_marker() -> set[int]:
-    """The processes anywhere whose command line carries the marker."""
+def processes_with_marker() -> set[int]:
+    """Return all processes whose command line has the marker."""
     found = set()
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
@@ -150,9 +150,9 @@ def carry_the_marker() -> set[int]:
     return found
 
 
-def descriptors(pid: int, besides: Container[int] = ()) -> dict[str, str]:
+def descriptors(pid: int, excluding: Container[int] = ()) -> dict[str, str]:
     found = {}
-    for link in [link for link in Path(f"/proc/{pid}/fd").iterdir() if int(link.name) not in besides]:
+    for link in [link for link in Path(f"/proc/{pid}/fd").iterdir() if int(link.name) not in excluding]:
         with contextlib.suppress(OSError):
             found[link.name] = str(link.readlink())
     return found
@@ -169,7 +169,7 @@ os.write(1, b"ready")
 while True:
     os.write(1, b"%d " % signal.sigwait(signal.valid_signals()))
 """
-COUNTED = (
+WATCHED_SIGNALS = (
     *(signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGTERM),
     *(signal.SIGCONT, signal.SIGVTALRM, signal.SIGPROF, signal.SIGIO, signal.SIGURG, signal.SIGXFSZ),
 )
@@ -178,7 +178,7 @@ PR_SET_CHILD_SUBREAPER = 36
 
 @dataclass
 class Reach:
-    """Real things around the engine, and how to see whether one of them was touched."""
+    """Real targets around the engine, with checks whether a program touched them."""
 
     folder: Path
     worker: Worker
@@ -187,13 +187,13 @@ class Reach:
     signals: list[int] = field(default_factory=list)
 
     @property
-    def told(self) -> IO[bytes]:
-        """Where the bystander tells of signals."""
+    def signal_log(self) -> IO[bytes]:
+        """Return the pipe to which the bystander writes each signal."""
         assert self.bystander.stdout is not None
         return self.bystander.stdout
 
-    def facts(self) -> dict[str, str]:
-        """What stands for each `@NAME@`."""
+    def placeholders(self) -> dict[str, str]:
+        """Return the value of each `@NAME@`."""
         return {
             "SECRET_FOLDER": str(self.folder / "secret"),
             "SECRET_FILE": str(self.folder / "secret" / "secret"),
@@ -208,33 +208,33 @@ class Reach:
             "BYSTANDER_PID": str(self.bystander.pid),
         }
 
-    def filled(self, source: str) -> str:
-        for name, value in self.facts().items():
+    def fill(self, source: str) -> str:
+        for name, value in self.placeholders().items():
             source = source.replace(f"@{name}@", value)
         return source
 
     def fork_servers(self) -> list[int]:
-        """The processes that fork those of the runs."""
+        """Return the fork servers of the worker."""
         return [fork_server._process.pid for fork_server in self.worker._fork_servers.values()]
 
     def run(self, source: str) -> Outcome:
         outcome = self.worker.run(source, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
-        until = time.monotonic() + 1  # the child was killed, which takes the kernel a moment
+        until = time.monotonic() + 1  # the kernel takes a moment to end the child
         while time.monotonic() < until and self.living_below(*self.fork_servers()):
             select.select([], [], [], 0.001)
         return outcome
 
     def living_below(self, *parents: int) -> set[int]:
-        """All processes below some but the one that was forked, after the run, for the next."""
+        """Return the processes below some, without the child that is forked ahead for the next run."""
         return living_below(*parents) - {ahead.pid for ahead in self.ahead()}
 
     def ahead(self) -> list[IsolatedProcess]:
-        """The child that was forked, after the run, for the next, if there is one."""
+        """Return the child that is forked ahead for the next run, if there is one."""
         server = self.worker._fork_servers.get(BatchServer)
         return [server._next] if isinstance(server, BatchServer) and server._next else []
 
     def files(self) -> dict[str, object]:
-        """All that is below the folder, with contents, rights and times."""
+        """Return the folder and all files below it, with contents, rights and times."""
         found: dict[str, object] = {}
         for path in [self.folder, *self.folder.rglob("*")]:
             about = path.lstat()
@@ -243,25 +243,25 @@ class Reach:
         return found
 
     def state(self) -> dict[str, object]:
-        """All that must be the same after a run."""
+        """Return everything that a run must leave unchanged."""
         spoken_to = {name: listener.fileno() for name, listener in self.listeners.items()}
-        spoken_to["bystander"] = self.told.fileno()
+        spoken_to["bystander"] = self.signal_log.fileno()
         ready = select.select(spoken_to.values(), [], [], 0)[0]
         return {
             "files": self.files(),
             "who was spoken to": {name for name, number in spoken_to.items() if number in ready},
             "signals": list(self.signals),
             "living processes": self.living_below(os.getpid()),
-            "processes with the marker": carry_the_marker(),
+            "processes with the marker": processes_with_marker(),
             "fork_servers": self.fork_servers(),
-            "descriptors": descriptors(os.getpid(), besides={a._channel.fileno() for a in self.ahead()}),
+            "descriptors": descriptors(os.getpid(), excluding={a._channel.fileno() for a in self.ahead()}),
             "descriptors of the fork servers": list(map(descriptors, self.fork_servers())),
         }
 
 
 @pytest.fixture(scope="module")
 def folder() -> Iterator[Path]:
-    """A folder that everybody may read, with a secret, and a part that everybody may write to."""
+    """Yield a folder that everybody may read, with a secret and a part that everybody may write to."""
     path = Path(tempfile.mkdtemp(prefix="hostile-"))
     path.chmod(0o755)
     for name, rights in (("secret", 0o755), ("canary", 0o777)):
@@ -299,7 +299,7 @@ def listeners(folder: Path) -> Iterator[dict[str, socket.socket]]:
 
 @pytest.fixture(scope="module")
 def bystander() -> Iterator[subprocess.Popen[bytes]]:
-    """A process of the user that programs run as, which tells of every signal."""
+    """Yield a process of the same user as programs, which writes every signal to its output."""
     with subprocess.Popen([sys.executable, "-c", BYSTANDER], stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         assert process.stdout.read(5) == b"ready"
@@ -311,16 +311,18 @@ def bystander() -> Iterator[subprocess.Popen[bytes]]:
 def reach(
     folder: Path, bystander: subprocess.Popen[bytes], listeners: dict[str, socket.socket]
 ) -> Iterator[Reach]:
-    """All of it; orphans below this process become its children, so that none can hide."""
+    """Yield all targets; orphans become children of this process, so that none can hide."""
     libc = ctypes.CDLL(None)
     os.environ["SECRET_OF_THE_ENGINE"] = SECRET
     reach = Reach(folder, Worker(), bystander, listeners)
     for program in (TAME, f"class A: pass\n{TAME}", HONEST):
-        reach.run(program)  # by now all processes are there
-    before = {number: signal.signal(number, lambda n, _: reach.signals.append(n)) for number in COUNTED}
+        reach.run(program)  # these runs start all processes
+    before = {
+        number: signal.signal(number, lambda n, _: reach.signals.append(n)) for number in WATCHED_SIGNALS
+    }
     assert libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
     yield reach
-    for pid in carry_the_marker():  # a test has failed; nothing of it stays
+    for pid in processes_with_marker():  # a failed test may have left processes
         os.kill(pid, signal.SIGKILL)
     assert libc.prctl(PR_SET_CHILD_SUBREAPER, 0, 0, 0, 0) == 0
     for number, handler in before.items():
@@ -331,14 +333,14 @@ def reach(
 
 @pytest.fixture(scope="module")
 def honest(reach: Reach) -> Outcome:
-    """What an honest program does before any hostile one has run, in a worker of its own."""
+    """Return the outcome of an honest program in a separate worker, before any hostile run."""
     worker = Worker()
     try:
         outcome = worker.run(HONEST, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
     finally:
         worker.close()
     assert outcome.status is Status.FINISHED, outcome
-    assert done(outcome)[:2] == ("goto vault", f"say {PHRASE}")
+    assert render_trace(outcome)[:2] == ("goto vault", f"say {PHRASE}")
     assert judge(outcome, ASKED).satisfied
     assert reach.run(HONEST) == outcome
     return outcome
@@ -353,12 +355,12 @@ def honest(reach: Reach) -> Outcome:
     ids=lambda path: path.stem,
 )
 def test_hostile_program_gets_nothing(path: Path, reach: Reach, honest: Outcome) -> None:
-    source = reach.filled(path.read_text(encoding="utf-8"))
-    wanted = declared(source)
+    source = reach.fill(path.read_text(encoding="utf-8"))
+    wanted = read_expectation(source)
     before = reach.state()
     start = time.monotonic()
     outcome = reach.run(source)
-    assert time.monotonic() - start < LONGEST
+    assert time.monotonic() - start < MAX_SECONDS
     after = reach.state()
     for name, value in before.items():
         assert after[name] == value, name
@@ -366,19 +368,19 @@ def test_hostile_program_gets_nothing(path: Path, reach: Reach, honest: Outcome)
 
     kind = "" if outcome.error is None else f" {outcome.error.kind}"
     assert f"{outcome.status}{kind}" in wanted.ends, outcome
-    assert done(outcome) == wanted.does
+    assert render_trace(outcome) == wanted.does
     assert SECRET not in f"{outcome!r} {outcome.trace!r}"
 
     verdict = judge(outcome, ASKED)
     was_there = any((e.kind, e.text, e.place) == ("say", PHRASE, "vault") for e in outcome.trace)
     assert verdict.satisfied is wanted.earns is (was_there and outcome.status is Status.FINISHED)
-    check_record(outcome)
+    assert_record_is_valid(outcome)
 
     assert reach.run(HONEST) == honest
 
 
-def check_record(outcome: Outcome) -> None:
-    """Whether an outcome, whatever it holds, is one row of a file, of bounded size and with a sane clock."""
+def assert_record_is_valid(outcome: Outcome) -> None:
+    """Fail unless an outcome fits into one row of a file, with bounded errors and an increasing clock."""
     data = outcome_data(outcome)
     line = to_line(data)
     assert line.count(b"\n") == 1
@@ -390,7 +392,7 @@ def check_record(outcome: Outcome) -> None:
     assert all(one <= other for one, other in pairwise(times))
 
 
-def test_every_program_says_in_one_sentence_what_it_tries() -> None:
+def test_every_program_starts_with_a_sentence_about_its_attack() -> None:
     assert len(PROGRAMS) >= 90
     for path in PROGRAMS:
         first = path.read_text(encoding="utf-8").splitlines()[0]
@@ -399,7 +401,7 @@ def test_every_program_says_in_one_sentence_what_it_tries() -> None:
 
 
 @pytest.mark.slow
-def test_program_that_is_silent_for_too_long_is_ended_though_it_computes(
+def test_silent_program_is_ended_even_while_it_computes(
     reach: Reach, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("codebotler.simulator.process.isolated_process.PROCESS_WAIT_SECONDS", 0.1)
@@ -409,64 +411,64 @@ def test_program_that_is_silent_for_too_long_is_ended_though_it_computes(
     assert not outcome.error.message.endswith(PROCESSOR_TIME)
 
 
-# --- that the checks see what they are for
+# --- the checks notice each kind of damage
 
 
 @pytest.fixture
-def changed(reach: Reach) -> Callable[[], set[str]]:
-    """Names what has changed since the test began."""
+def name_changes(reach: Reach) -> Callable[[], set[str]]:
+    """Return a function that names the changes since the test began."""
     before = reach.state()
     return lambda: {name for name, value in reach.state().items() if value != before[name]}
 
 
-def test_a_written_file_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -> None:
+def test_written_file_is_noticed(reach: Reach, name_changes: Callable[[], set[str]]) -> None:
     about = (reach.folder / "canary").stat()
     (reach.folder / "canary" / "new").touch()
-    assert changed() == {"files"}
+    assert name_changes() == {"files"}
     (reach.folder / "canary" / "new").unlink()
     os.utime(reach.folder / "canary", ns=(about.st_atime_ns, about.st_mtime_ns))
-    assert changed() == set()
+    assert name_changes() == set()
 
 
 @pytest.mark.parametrize("name", ["tcp", "udp", "unix", "abstract"])
-def test_a_connection_would_be_seen(reach: Reach, changed: Callable[[], set[str]], name: str) -> None:
+def test_connection_is_noticed(reach: Reach, name_changes: Callable[[], set[str]], name: str) -> None:
     listener = reach.listeners[name]
     with socket.socket(listener.family, listener.type) as caller:
         caller.connect(listener.getsockname())
         if name == "udp":
             caller.send(b"x")
-            assert changed() >= {"who was spoken to"}
+            assert name_changes() >= {"who was spoken to"}
             listener.recv(1)
         else:
-            assert changed() >= {"who was spoken to"}
+            assert name_changes() >= {"who was spoken to"}
             listener.accept()[0].close()
-    assert changed() == set()
+    assert name_changes() == set()
 
 
-def test_a_signal_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -> None:
+def test_signal_is_noticed(reach: Reach, name_changes: Callable[[], set[str]]) -> None:
     os.kill(os.getpid(), signal.SIGUSR1)
     os.kill(reach.bystander.pid, signal.SIGTERM)
-    select.select([reach.told], [], [], 10)
-    assert changed() == {"signals", "who was spoken to"}
-    assert os.read(reach.told.fileno(), 10) == b"15 "
+    select.select([reach.signal_log], [], [], 10)
+    assert name_changes() == {"signals", "who was spoken to"}
+    assert os.read(reach.signal_log.fileno(), 10) == b"15 "
     reach.signals.clear()
-    assert changed() == set()
+    assert name_changes() == set()
 
 
-def test_a_stopped_fork_server_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -> None:
+def test_stopped_fork_server_is_noticed(reach: Reach, name_changes: Callable[[], set[str]]) -> None:
     os.kill(reach.fork_servers()[-1], signal.SIGSTOP)
     os.waitid(os.P_PID, reach.fork_servers()[-1], os.WSTOPPED | os.WNOWAIT)
-    assert changed() == {"living processes"}
+    assert name_changes() == {"living processes"}
     os.kill(reach.fork_servers()[-1], signal.SIGCONT)
-    while changed():
+    while name_changes():
         select.select([], [], [], 0.01)
 
 
-def test_an_orphan_would_be_seen(changed: Callable[[], set[str]]) -> None:
+def test_orphan_is_noticed(name_changes: Callable[[], set[str]]) -> None:
     orphaning = f"import os, time; os.fork() or (os.setsid(), time.sleep(60), '{MARKER}')"
     subprocess.run([sys.executable, "-c", orphaning], check=True)
-    assert changed() == {"living processes", "processes with the marker"}
-    (orphan,) = carry_the_marker()
+    assert name_changes() == {"living processes", "processes with the marker"}
+    (orphan,) = processes_with_marker()
     os.kill(orphan, signal.SIGKILL)
     os.waitpid(orphan, 0)
-    assert changed() == set()
+    assert name_changes() == set()

@@ -1,4 +1,4 @@
-"""The guard of house rules: what it forbids, and that no program gets past it."""
+"""The guard of house rules stops every forbidden action, and no program gets past it."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def robot(*rules: Rule) -> SimulatedRobot:
     return SimulatedRobot(WORLD, AS_WRITTEN, guard=RuleGuard(rules))
 
 
-def refused(guarded: SimulatedRobot, skill: str, *arguments: str | tuple[Option, ...]) -> RuleViolationError:
+def violate(guarded: SimulatedRobot, skill: str, *arguments: str | tuple[Option, ...]) -> RuleViolationError:
     before = guarded.trace
     with pytest.raises(RuleViolationError) as caught:
         guarded.perform(skill, arguments)
@@ -60,83 +60,83 @@ def refused(guarded: SimulatedRobot, skill: str, *arguments: str | tuple[Option,
     return caught.value
 
 
-# --- what is judged
+# --- judgements
 
 
-def test_what_a_rule_forbids_is_not_done() -> None:
+def test_forbidden_action_is_not_done() -> None:
     one = robot(VAULT)
     one.perform("go_to", ["office"])
-    error = refused(one, "go_to", "the vault")
+    error = violate(one, "go_to", "the vault")
     assert (one.room, error.kind, error.ends_run) == ("office", "RuleViolation", True)
     assert str(error) == 'the rule "vault" forbids going to "the vault": Do as the house wants'
 
 
-def test_every_room_that_a_request_may_mean_counts() -> None:
+def test_rule_applies_to_every_room_that_a_request_may_mean() -> None:
     one = robot(rule('not tr.Exists(goto("room 2"))'))
     one.perform("go_to", ["vault"])
-    refused(one, "go_to", "the vault room 2")  # though the simulated robot would go to the first of both
-    refused(robot(VAULT), "go_to", "the office, not the vault")
+    violate(one, "go_to", "the vault room 2")  # although the robot would drive to "vault"
+    violate(robot(VAULT), "go_to", "the office, not the vault")
 
 
-def test_a_thing_counts_by_the_name_that_is_recorded() -> None:
+def test_rule_applies_to_the_recorded_name_of_a_thing() -> None:
     world = World((Room("hall", ("cup|mug",)),), "hall")
     as_happened = SimulationSettings(literals="as-written", events="as-happened")
     for formula in ('not tr.Exists(pick("cup"))', 'not tr.Exists(place("cup"))'):
         one = SimulatedRobot(world, as_happened, guard=RuleGuard([rule(formula)]))
         if "place" in formula:
             one.perform("pick", ["mug"])
-        error = refused(one, "place" if "place" in formula else "pick", "mug")
+        error = violate(one, "place" if "place" in formula else "pick", "mug")
         assert not error.is_late
 
 
-def test_an_attempt_that_would_fail_is_judged_before() -> None:
+def test_rule_stops_an_attempt_that_would_fail() -> None:
     one = robot(rule('not tr.Exists(pick("crown"))'))
-    refused(one, "pick", "crown")
+    violate(one, "pick", "crown")
     with pytest.raises(RobotError, match='no "cup"'):
         one.perform("pick", ["cup"])
 
 
-def test_whenever_something_happens_something_else_came_before() -> None:
+def test_rule_may_require_an_earlier_action_each_time() -> None:
     one = robot(KNOCK)
-    refused(one, "go_to", "office")
+    violate(one, "go_to", "office")
     one.perform("say", ["knock knock"])
     one.perform("go_to", ["office"])
     one.perform("go_to", ["hall"])
-    refused(one, "go_to", "office")
+    violate(one, "go_to", "office")
 
 
-def test_what_is_held_and_who_is_asked() -> None:
+def test_rule_may_depend_on_the_held_thing_and_the_addressee() -> None:
     one = robot(rule('not tr.Exists(holding("glass", goto(without("hall"))))'))
     one.perform("go_to", ["hall"])
     one.perform("pick", ["glass"])
-    refused(one, "go_to", "office")
+    violate(one, "go_to", "office")
     one.perform("place", ["glass"])
     one.perform("go_to", ["office"])
     other = robot(rule('not tr.Exists(to("carol", ask(".*", ".*")))'))
     other.perform("ask", ["ann", "Tea?", (Option("yes"),)])
-    refused(other, "ask", "Carol", "Tea?", (Option("yes"),))
+    violate(other, "ask", "Carol", "Tea?", (Option("yes"),))
 
 
-def test_what_depends_on_a_result_is_noticed_when_it_is_known() -> None:
+def test_rule_about_results_is_late_unless_every_result_breaks_it() -> None:
     one = robot(rule('not tr.Exists(missed("mug"))'))
     assert one.perform("is_in_room", ["mug"]) is True
     one.perform("go_to", ["vault"])
-    error = refused(one, "is_in_room", "mug")
+    error = violate(one, "is_in_room", "mug")
     assert error.is_late
     assert error.ends_run
     both = rule('not tr.Exists(missed("mug")) and not tr.Exists(found("mug"))')
-    assert not refused(robot(both), "is_in_room", "mug").is_late  # whichever it is
+    assert not violate(robot(both), "is_in_room", "mug").is_late  # every result breaks this rule
     answered = robot(rule('not tr.Exists(answered("yes"))'))
-    assert refused(answered, "ask", "ann", "Tea?", (Option("yes"), Option("no"))).is_late
-    assert not refused(
+    assert violate(answered, "ask", "ann", "Tea?", (Option("yes"), Option("no"))).is_late
+    assert not violate(
         robot(rule('not tr.Exists(answered("yes"))')), "ask", "ann", "?", (Option("yes"),)
     ).is_late
 
 
-def test_a_room_whose_name_is_a_regex_counts_by_the_words_of_the_request() -> None:
+def test_rule_about_a_regex_room_compares_the_words_of_the_request() -> None:
     world = World((Room("hall"), Room("lab [0-9]", ("knife",))), "hall")
 
-    def guarded(formula: str) -> SimulatedRobot:
+    def guard_with(formula: str) -> SimulatedRobot:
         return SimulatedRobot(world, AS_WRITTEN, guard=RuleGuard([rule(formula)]))
 
     for formula in (
@@ -145,21 +145,21 @@ def test_a_room_whose_name_is_a_regex_counts_by_the_words_of_the_request() -> No
         'not tr.OnlyAfterLast(goto("lab 3")).Exists(pick(".*"))',
         'not tr.OnlyAfterLast(goto("^lab 3$")).Exists(pick(".*"))',
     ):
-        three, four = guarded(formula), guarded(formula)
+        three, four = guard_with(formula), guard_with(formula)
         three.perform("go_to", ["lab 3"])
-        assert not refused(three, "pick", "knife").is_late
+        assert not violate(three, "pick", "knife").is_late
         four.perform("go_to", ["lab 4"])
         four.perform("pick", ["knife"])
 
 
-def test_room_counts_by_its_own_name_whatever_else_the_request_says() -> None:
+def test_rule_compares_the_own_name_of_a_room() -> None:
     for formula in (
         'not tr.OnlyAfterLast(goto("^vault$")).Exists(say(".*"))',
         'not tr.Exists(at("^vault$", say(".*")))',
     ):
         one = robot(rule(formula))
         one.perform("go_to", ["the vault, please"])
-        refused(one, "say", "hello")
+        violate(one, "say", "hello")
 
 
 @pytest.mark.parametrize(
@@ -171,20 +171,18 @@ def test_room_counts_by_its_own_name_whatever_else_the_request_says() -> None:
         ('not tr.Exists(place("^mug$"))', "place", "the mug"),
     ],
 )
-def test_thing_counts_by_its_own_name_whatever_else_the_request_says(
-    formula: str, skill: str, request_: str
-) -> None:
+def test_rule_compares_the_own_name_of_a_thing(formula: str, skill: str, request_: str) -> None:
     one = robot(rule(formula))
     one.perform("pick", ["the mug"])
     one.perform("say", ["I have it"])
-    assert not refused(one, skill, request_).is_late
+    assert not violate(one, skill, request_).is_late
 
 
-def test_drive_that_led_nowhere_counts_by_the_words_of_the_request() -> None:
+def test_rule_compares_the_request_of_a_failed_drive() -> None:
     one = robot(rule('not tr.OnlyAfterFirst(goto("^the attic$")).Exists(say(".*"))'))
     with pytest.raises(RobotError, match="attic"):
         one.perform("go_to", ["the attic"])
-    refused(one, "say", "hello")
+    violate(one, "say", "hello")
 
 
 @pytest.mark.parametrize(
@@ -198,7 +196,7 @@ def test_drive_that_led_nowhere_counts_by_the_words_of_the_request() -> None:
         ("lab [0-9]", "", "lab [0-9]"),
     ],
 )
-def test_name_is_the_own_one_unless_that_is_a_regex(label: str, request_: str, name: str) -> None:
+def test_name_is_that_of_the_label_unless_it_is_a_regex(label: str, request_: str, name: str) -> None:
     assert name_of(label, request_) == name
 
 
@@ -210,41 +208,39 @@ AS_HAPPENED = SimulationSettings(literals="as-written", events="as-happened")
     [(AS_WRITTEN, "^mug$"), (AS_HAPPENED, "^cup[|]mug$")],
     ids=["as-requested", "as-happened"],
 )
-def test_a_thing_whose_name_is_a_regex_counts_as_it_is_recorded(
-    settings: SimulationSettings, name: str
-) -> None:
+def test_rule_about_a_regex_thing_compares_the_recorded_name(settings: SimulationSettings, name: str) -> None:
     world = World((Room("hall", ("cup|mug",)), Room("office")), "hall")
 
-    def guarded(formula: str) -> SimulatedRobot:
+    def guard_with(formula: str) -> SimulatedRobot:
         return SimulatedRobot(world, settings, guard=RuleGuard([rule(formula)]))
 
-    assert not refused(guarded(f'not tr.Exists(pick("{name}"))'), "pick", "mug").is_late
+    assert not violate(guard_with(f'not tr.Exists(pick("{name}"))'), "pick", "mug").is_late
     for formula, skill, request in (
         (f'not tr.OnlyAfterFirst(pick("{name}")).Exists(say(".*"))', "say", "I have it"),
         (f'not tr.Exists(holding("{name}", goto(".*")))', "go_to", "office"),
         (f'not tr.Exists(place("{name}"))', "place", "mug"),
     ):
-        one = guarded(formula)
+        one = guard_with(formula)
         one.perform("pick", ["mug"])
-        assert not refused(one, skill, request).is_late
+        assert not violate(one, skill, request).is_late
 
 
-def test_a_room_is_without_a_word_if_none_of_its_names_has_it() -> None:
+def test_without_matches_a_room_if_none_of_its_names_has_the_word() -> None:
     world = World((Room("hall"), Room("lab [0-9]")), "hall")
     one = SimulatedRobot(world, AS_WRITTEN, guard=RuleGuard([rule('not tr.Exists(goto(without("lab 3")))')]))
     one.perform("go_to", ["lab 3"])
-    refused(one, "go_to", "lab 4")
+    violate(one, "go_to", "lab 4")
 
 
 @pytest.mark.parametrize("settings", [AS_WRITTEN, AS_HAPPENED], ids=["as-requested", "as-happened"])
-def test_a_drive_that_fails_has_happened(settings: SimulationSettings) -> None:
+def test_failed_drive_counts_for_rules(settings: SimulationSettings) -> None:
     one = SimulatedRobot(WORLD, settings, guard=RuleGuard([rule('not tr.AtLeast(goto(".*"), 2)')]))
     with pytest.raises(RobotError, match="attic"):
         one.perform("go_to", ["attic"])
-    refused(one, "go_to", "office")
+    violate(one, "go_to", "office")
 
 
-OWN = """
+OWN_SKILLS = """
 from codebotler import Simulation, skill
 
 @skill(verb="go to {room} by the vault", names="room")
@@ -286,10 +282,10 @@ def swap_for(sim: Simulation, what: str) -> None:
         (["swap_for mug", "go_to office"], 'not tr.Exists(holding("mug", goto(".*")))', True),
     ],
 )
-def test_what_a_skill_of_a_user_does_inside_counts(
+def test_rules_apply_inside_own_skills(
     tmp_path: Path, settings: SimulationSettings, calls: list[str], formula: str, *, breaks: bool
 ) -> None:
-    (tmp_path / "own.py").write_text(OWN)
+    (tmp_path / "own.py").write_text(OWN_SKILLS)
     skills = skills_from(tmp_path / "own.py")
     guard = RuleGuard([Rule("own", "So it is.", parse(formula, skills=skills))])
     one = SimulatedRobot(WORLD, settings, skills, guard=guard)
@@ -337,7 +333,7 @@ def switches(tmp_path_factory: pytest.TempPathFactory) -> SkillTable:
     return skills_from(path)
 
 
-def leaves_off(skills: SkillTable, *, refuse: bool = False) -> Rule:
+def stove_off_rule(skills: SkillTable, *, refuse: bool = False) -> Rule:
     formula = parse('not on("stove")', skills=skills)
     return Rule("off", "Turn off the stove before you leave.", formula, "leaving", refuse)
 
@@ -363,29 +359,29 @@ def leaves_off(skills: SkillTable, *, refuse: bool = False) -> Rule:
 def test_leaving_rule_stops_each_drive_out_of_a_room(
     switches: SkillTable, calls: list[tuple[str, ...]], *, breaks: bool
 ) -> None:
-    one = SimulatedRobot(WORLD, AS_WRITTEN, switches, guard=RuleGuard([leaves_off(switches)]))
+    one = SimulatedRobot(WORLD, AS_WRITTEN, switches, guard=RuleGuard([stove_off_rule(switches)]))
     *first, (skill, *arguments) = calls
     for name, *given_ in first:
         with suppress(RobotError):
             one.perform(name, given_)
     if breaks:
-        assert not refused(one, skill, *arguments).is_late
+        assert not violate(one, skill, *arguments).is_late
     else:
         one.perform(skill, arguments)
 
 
-def test_leaving_rule_that_cannot_be_judged_is_not_kept() -> None:
+def test_inconclusive_leaving_rule_is_broken() -> None:
     kept = Rule("tea", "No tea.", parse('not tr.Exists(ask("tea", "^no$"))'), "leaving")
     guard = RuleGuard([kept])
     one = SimulatedRobot(WORLD, AS_WRITTEN, guard=guard)
     one.perform("ask", ["ann", "tea?", (Option("1", is_text=False), Option("yes"))])
-    refused(one, "go_to", "office")
+    violate(one, "go_to", "office")
     assert guard.at_end() is not None
 
 
 @pytest.mark.parametrize("calls", [[ON], [ON, OFF]])
 def test_leaving_rule_must_hold_at_the_end(switches: SkillTable, calls: list[tuple[str, str]]) -> None:
-    guard = RuleGuard([leaves_off(switches)])
+    guard = RuleGuard([stove_off_rule(switches)])
     one = SimulatedRobot(WORLD, AS_WRITTEN, switches, guard=guard)
     for name, argument in calls:
         one.perform(name, [argument])
@@ -397,7 +393,7 @@ def test_program_may_catch_the_refusal_of_a_leaving_rule(worker: Worker, switche
         "def task_program():\n    turn_on('stove')\n    try: go_to('office')\n"
         "    except Exception: turn_off('stove')\n    go_to('office')\n"
     )
-    guard = RuleGuard([leaves_off(switches, refuse=True)])
+    guard = RuleGuard([stove_off_rule(switches, refuse=True)])
     assert guard.may_refuse
     new_robot = partial(SimulatedRobot, WORLD, AS_WRITTEN, switches, guard=guard)
     outcome = worker.run_alone(program, new_robot)
@@ -413,7 +409,7 @@ FORMULAS = (
     'not tr.Last(goto("office")) or tr.BeforeLast(goto("office")).AfterLast(goto(".*")).Exists(say("knock"))',
     'tr.OnlyAfterFirst(pick("mug")).Exists(say("done")) or not tr.Last(goto("office"))',
 )
-INSIDE = """
+WORK_SKILL = """
 from codebotler import Simulation, skill
 
 @skill(when_tried={tried})
@@ -431,7 +427,7 @@ def work(sim: Simulation, steps: list[str], stubborn: bool) -> None:
                 raise
 """
 STEPS = ("drive office", "drive vault", "drive attic", "take mug", "put mug", "look glass", "ask Tea?")
-WITHIN = (
+WORK_FORMULAS = (
     *FORMULAS,
     'not tr.Exists(at("office", ask(".*", ".*")))',
     'not tr.Exists(holding("mug", goto("office")))',
@@ -444,10 +440,10 @@ WITHIN = (
 @pytest.mark.parametrize("tried", [False, True])
 @given(
     steps=st.lists(st.sampled_from(STEPS), max_size=7),
-    formula=st.sampled_from(WITHIN),
+    formula=st.sampled_from(WORK_FORMULAS),
     stubborn=st.booleans(),
 )
-def test_a_rule_stops_a_skill_of_a_user_before_the_event_that_breaks_it(
+def test_rule_stops_an_own_skill_before_the_event_that_breaks_it(
     own_work: dict[bool, SkillTable], steps: list[str], formula: str, *, stubborn: bool, tried: bool
 ) -> None:
     skills = own_work[tried]
@@ -457,21 +453,21 @@ def test_a_rule_stops_a_skill_of_a_user_before_the_event_that_breaks_it(
     for robot_ in (free, one):
         with suppress(RobotError):
             robot_.perform("work", [tuple(steps), stubborn])
-    broken = first_broken(kept, free.trace)
+    broken = find_violation(kept, free.trace)
     if broken is None:
         assert one.trace == free.trace
         return
     assert one.trace[: broken - 1] == free.trace[: broken - 1]
     inside = [event for event in one.trace if event.kind != "work" or tried]
-    if "missed" in formula:  # which only the result breaks
+    if "missed" in formula:  # only the result breaks this rule
         assert len(inside) == broken
     else:
         assert stubborn or len(one.trace) == broken - 1
-        assert first_broken(kept, one.trace) in {None, len(inside)}
+        assert find_violation(kept, one.trace) in {None, len(inside)}
 
 
-def first_broken(kept: Formula, trace: Trace) -> int | None:
-    """After how many events a rule is broken, with answers as rules see them."""
+def find_violation(kept: Formula, trace: Trace) -> int | None:
+    """Return the number of events after which a rule is broken, if it is, with stripped answers."""
     seen = tuple(replace(event, answer=event.answer and event.answer.strip()) for event in trace)
     return next((n for n in range(len(seen) + 1) if not holds(kept, seen[:n])), None)
 
@@ -480,11 +476,11 @@ def first_broken(kept: Formula, trace: Trace) -> int | None:
 def own_work(tmp_path_factory: pytest.TempPathFactory) -> dict[bool, SkillTable]:
     folder = tmp_path_factory.mktemp("work")
     for tried in (False, True):
-        (folder / f"work_{tried}.py").write_text(INSIDE.format(tried=tried))
+        (folder / f"work_{tried}.py").write_text(WORK_SKILL.format(tried=tried))
     return {tried: skills_from(folder / f"work_{tried}.py") for tried in (False, True)}
 
 
-def test_a_rule_ends_the_run_even_if_the_skill_goes_on(own_work: dict[bool, SkillTable]) -> None:
+def test_rule_ends_the_run_even_if_the_skill_continues(own_work: dict[bool, SkillTable]) -> None:
     guard = RuleGuard([VAULT])
     one = SimulatedRobot(WORLD, AS_WRITTEN, own_work[False], guard=guard)
     with pytest.raises(RuleViolationError) as caught:
@@ -493,25 +489,25 @@ def test_a_rule_ends_the_run_even_if_the_skill_goes_on(own_work: dict[bool, Skil
     assert "vault" not in {event.text for event in one.trace}
 
 
-def test_a_rule_that_ends_the_run_comes_before_one_that_refuses() -> None:
+def test_rule_that_ends_the_run_precedes_one_that_refuses() -> None:
     soft = rule('not tr.Exists(goto("vault"))', refuse=True)
     hard = rule('not tr.Exists(goto("vault"))')
     for rules in ((soft, hard), (hard, soft)):
-        assert refused(robot(*rules), "go_to", "vault").rule is hard
+        assert violate(robot(*rules), "go_to", "vault").rule is hard
 
 
-def test_no_program_forges_a_violation(worker: Worker) -> None:
+def test_program_cannot_forge_a_violation(worker: Worker) -> None:
     program = "class RuleViolation(Exception): pass\ndef task_program(): raise RuleViolation('the vault')\n"
-    outcome = ran(worker, program, [VAULT])
+    outcome = run(worker, program, [VAULT])
     assert outcome.error is not None
     assert (outcome.status, outcome.error.kind) == (Status.PYTHON_ERROR, "Exception")
 
 
-def test_an_option_that_is_no_text_is_refused() -> None:
+def test_option_that_is_not_text_is_refused() -> None:
     one = robot(rule('not tr.Exists(ask("tea", "^no$"))'))
-    error = refused(one, "ask", "ann", "tea?", (Option("1", is_text=False),))
-    told = 'the rule "vault" cannot judge asking "tea?", which offers an option that is not text: '
-    assert str(error).startswith(told.replace("vault", error.rule.name))
+    error = violate(one, "ask", "ann", "tea?", (Option("1", is_text=False),))
+    message = 'the rule "vault" cannot judge asking "tea?", which offers an option that is not text: '
+    assert str(error).startswith(message.replace("vault", error.rule.name))
 
 
 @pytest.mark.parametrize(
@@ -526,29 +522,29 @@ def test_an_option_that_is_no_text_is_refused() -> None:
         *((r"^\W*no\b", option, False) for option in ("yes", "Yes, no sugar", "Nobody", "not today", "Noah")),
     ],
 )
-def test_a_no_is_a_no_however_it_is_written(pattern: str, option: str, *, means_no: bool) -> None:
+def test_pattern_for_no_matches_every_spelling(pattern: str, option: str, *, means_no: bool) -> None:
     world = World((Room("hall", (), (Person("ann", (1,)),)),), "hall")
     formula = f'not tr.OnlyAfterFirst(answered(r"{pattern}")).Exists(mention(".*"))'
     one = SimulatedRobot(world, AS_WRITTEN, guard=RuleGuard([rule(formula)]))
     one.perform("ask", ["ann", "Tea?", (Option(option), Option("maybe"))])
     if means_no:
-        refused(one, "ask", "ann", "Really?", (Option("yes"),))
+        violate(one, "ask", "ann", "Really?", (Option("yes"),))
     else:
         one.perform("ask", ["ann", "Really?", (Option("yes"),)])
 
 
-def test_the_guide_has_the_pattern_for_a_no() -> None:
+def test_guide_shows_the_pattern_for_no() -> None:
     guide = Path(__file__).parents[3] / "docs" / "house-rules.md"
     assert r'answered(r"^\W*no\b")' in guide.read_text(encoding="utf-8")
 
 
-def test_blanks_around_options_and_names_hide_nothing() -> None:
+def test_rules_ignore_blanks_around_options_and_names() -> None:
     for formula in ('ask(".*", "^no$")', 'mention("^no$")', 'to("^ann$", mention(".*"))'):
         one = robot(rule(f"not tr.Exists({formula})"))
-        assert not refused(one, "ask", " Ann ", "Tea?", (Option("yes"), Option("no "))).is_late
+        assert not violate(one, "ask", " Ann ", "Tea?", (Option("yes"), Option("no "))).is_late
 
 
-def test_rules_of_the_end() -> None:
+def test_rule_about_the_end_is_judged_at_the_end() -> None:
     report = Rule("report", "Report.", parse('tr.Exists(say("done"))'), "finally")
     guard = RuleGuard([report])
     assert str(guard.at_end()) == 'the rule "report" is not kept at the end: Report'
@@ -573,13 +569,13 @@ def fork_worker() -> Iterator[Worker]:
     worker.close()
 
 
-def ran(worker: Worker, program: str, rules: Sequence[Rule]) -> Outcome:
+def run(worker: Worker, program: str, rules: Sequence[Rule]) -> Outcome:
     return worker.run(program, partial(robot, *rules))
 
 
-def test_a_rule_ends_a_run(worker: Worker) -> None:
+def test_broken_rule_ends_the_run(worker: Worker) -> None:
     program = "def task_program():\n    go_to('office')\n    go_to('vault')\n    say('there')\n"
-    outcome = ran(worker, program, [VAULT])
+    outcome = run(worker, program, [VAULT])
     assert outcome.error is not None
     assert (outcome.status, outcome.error.kind, outcome.line) == (Status.ROBOT_ERROR, "RuleViolation", 3)
     assert [event.text for event in outcome.trace] == ["office"]
@@ -593,32 +589,32 @@ def test_a_rule_ends_a_run(worker: Worker) -> None:
         "    finally:\n      for n in range(9): pass",
     ],
 )
-def test_the_line_is_that_of_the_call_whatever_a_program_does_afterwards(worker: Worker, rest: str) -> None:
+def test_line_is_that_of_the_call_even_if_the_program_continues(worker: Worker, rest: str) -> None:
     program = f"def task_program():\n    try:\n        go_to('vault')\n{rest}\n    say('done')\n"
-    outcome = ran(worker, program, [VAULT])
+    outcome = run(worker, program, [VAULT])
     assert outcome.error is not None
     assert (outcome.error.kind, outcome.line, outcome.trace) == ("RuleViolation", 3, ())
 
 
-def test_a_refusal_may_be_caught(worker: Worker) -> None:
+def test_program_may_catch_a_refusal(worker: Worker) -> None:
     program = "def task_program():\n    try: go_to('vault')\n    except Exception as e: say(str(e))\n"
-    outcome = ran(worker, program, [rule('not tr.Exists(goto("vault"))', refuse=True)])
+    outcome = run(worker, program, [rule('not tr.Exists(goto("vault"))', refuse=True)])
     assert outcome.status is Status.FINISHED
     assert [event.kind for event in outcome.trace] == ["say"]
     assert 'forbids going to "vault"' in outcome.trace[0].text
 
 
-def test_a_rule_of_the_end_is_reported(worker: Worker) -> None:
+def test_broken_rule_about_the_end_is_reported(worker: Worker) -> None:
     report = Rule("report", "Report.", parse('tr.Exists(say("done"))'), "finally")
     for said, kind in (("done", None), ("hello", "RuleViolation")):
-        outcome = ran(worker, f"def task_program():\n    say('{said}')\n", [report])
+        outcome = run(worker, f"def task_program():\n    say('{said}')\n", [report])
         assert (outcome.error and outcome.error.kind) == kind
         assert len(outcome.trace) == 1
 
 
-def test_what_is_remembered_of_idle_calls_is_judged_all_the_same(worker: Worker) -> None:
+def test_remembered_calls_are_judged_by_rules(worker: Worker) -> None:
     program = "def task_program():\n    for _ in range(300): say('a')\n"
-    outcome = ran(worker, program, [rule('not tr.AtLeast(say("a"), 200)')])
+    outcome = run(worker, program, [rule('not tr.AtLeast(say("a"), 200)')])
     assert len(outcome.trace) == 199
 
 
@@ -636,7 +632,7 @@ SKILLS = {
     formula=st.sampled_from(FORMULAS),
     caught=st.booleans(),
 )
-def test_a_run_is_cut_exactly_where_a_prefix_breaks_the_rule(
+def test_run_ends_exactly_where_a_prefix_breaks_the_rule(
     worker: Worker, calls: list[str], formula: str, *, caught: bool
 ) -> None:
     body = [f"try: {call}\n    except Exception: pass" if caught else call for call in calls] or ["pass"]
@@ -644,35 +640,35 @@ def test_a_run_is_cut_exactly_where_a_prefix_breaks_the_rule(
     free = worker.run(program, partial(SimulatedRobot, WORLD, AS_WRITTEN))
     kept = parse(formula)
     broken = next((n for n in range(len(free.trace) + 1) if not holds(kept, free.trace[:n])), None)
-    outcome = ran(worker, program, [rule(formula)])
+    outcome = run(worker, program, [rule(formula)])
     if broken is None and not (outcome.error and outcome.error.kind == "RuleViolation"):
         assert (outcome, outcome.trace) == (free, free.trace)
-    else:  # an attempt that leaves no event counts, too
+    else:  # an attempt without an event may also break the rule
         assert outcome.error is not None
         assert outcome.error.kind == "RuleViolation"
         assert outcome.trace == free.trace[: len(outcome.trace)]
         assert broken is None or len(outcome.trace) < broken
 
 
-# --- programs that want to go on all the same
+# --- programs that try to continue
 
-HOSTILE: dict[str, str] = yaml.safe_load(Path(__file__).with_name("rule_breakers.yaml").read_text())
+RULE_BREAKERS: dict[str, str] = yaml.safe_load(Path(__file__).with_name("rule_breakers.yaml").read_text())
 
 
-@pytest.mark.parametrize("body", HOSTILE.values(), ids=HOSTILE)
+@pytest.mark.parametrize("body", RULE_BREAKERS.values(), ids=RULE_BREAKERS)
 @pytest.mark.parametrize("refuse", [False, True], ids=["ends", "refuses"])
 def test_no_program_breaks_a_rule(worker: Worker, body: str, *, refuse: bool) -> None:
     lines = "".join(f"    {line}\n" for line in body.splitlines())
     forbidden = rule('not tr.Exists(goto("vault"))', refuse=refuse)
-    outcome = ran(worker, f"def task_program():\n{lines}", [forbidden, QUIET])
+    outcome = run(worker, f"def task_program():\n{lines}", [forbidden, QUIET])
     assert not [event for event in outcome.trace if event.kind == "goto" and "vault" in event.text.lower()]
-    assert refuse or outcome.error is not None or "atexit" in body  # which nothing runs
+    assert refuse or outcome.error is not None or "atexit" in body  # nothing runs that function
 
 
 @pytest.mark.parametrize(
     "path", sorted((Path(__file__).parents[2] / "hostile").glob("backdoors_*.py")), ids=lambda path: path.stem
 )
-def test_no_backdoor_gets_past_a_rule(fork_worker: Worker, path: Path) -> None:
+def test_no_backdoor_bypasses_a_rule(fork_worker: Worker, path: Path) -> None:
     program = path.read_text().replace("@", "x")
-    outcome = ran(fork_worker, program, [rule('not tr.Exists(goto(".*")) and not tr.Exists(say(".*"))')])
+    outcome = run(fork_worker, program, [rule('not tr.Exists(goto(".*")) and not tr.Exists(say(".*"))')])
     assert not [event for event in outcome.trace if event.kind in {"goto", "say"}]

@@ -1,4 +1,4 @@
-"""Functions called in closed processes: what comes back, what is out of reach, and how a call fails."""
+"""Calls in closed processes return plain data, reach nothing outside, and fail on their own."""
 
 import ast
 import builtins
@@ -29,13 +29,13 @@ def test_function_gets_its_arguments_and_returns_plain_data() -> None:
     assert closed.echo("half \ud800 a character\0", times=2) == ["half \ud800 a character\0"] * 2
 
 
-def test_process_is_used_again_and_is_another_one() -> None:
+def test_calls_share_one_process_that_is_not_this_one() -> None:
     first = closed.process_number("")
     assert first == closed.process_number("") != os.getpid()
 
 
 def test_function_reaches_no_file_no_socket_and_no_key(monkeypatch: pytest.MonkeyPatch) -> None:
-    end_all()  # so that a new process is started, with this environment
+    end_all()  # the next call starts a process with this environment
     monkeypatch.setenv("SOME_API_KEY", "secret")
     assert closed.reach(__file__) == []
 
@@ -49,7 +49,7 @@ def test_function_reaches_no_file_no_socket_and_no_key(monkeypatch: pytest.Monke
         (lambda: closed.end("a"), "Crash"),
     ],
 )
-def test_failure_is_one_of_the_call_and_the_next_one_succeeds(call: Callable[[], Any], kind: str) -> None:
+def test_failed_call_does_not_affect_the_next_one(call: Callable[[], Any], kind: str) -> None:
     with pytest.raises(IsolatedCallError) as error:
         call()
     assert error.value.kind == kind
@@ -63,14 +63,14 @@ def test_call_that_computes_for_too_long_ends() -> None:
     assert error.value.kind == "TimeoutError"
 
 
-def test_used_process_that_was_killed_is_replaced() -> None:
+def test_killed_process_is_replaced() -> None:
     number = closed.process_number("")
     os.kill(number, signal.SIGKILL)
     assert closed.process_number("") != number
 
 
 @pytest.mark.slow
-def test_answer_to_an_interrupted_call_reaches_no_other() -> None:
+def test_next_call_does_not_get_the_answer_of_an_interrupted_one() -> None:
     closed.echo("warm")
 
     def call() -> None:
@@ -82,7 +82,7 @@ def test_answer_to_an_interrupted_call_reaches_no_other() -> None:
     assert closed.echo("a") == ["a"]
 
 
-def test_process_that_cannot_start_is_no_fault_of_the_text(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_process_that_cannot_start_is_an_engine_error(monkeypatch: pytest.MonkeyPatch) -> None:
     end_all()
     monkeypatch.setattr("codebotler.simulator.process.isolated_call.SERVE_CODE", "raise SystemExit(1)")
     with pytest.raises(EngineError):
@@ -112,16 +112,16 @@ def test_forked_process_has_processes_of_its_own() -> None:
     assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
 
 
-# --- text that others wrote
+# --- foreign programs
 
 
 @pytest.fixture(name="no_compiler")
 def no_compiler_(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A process in which nobody may compile a program, or look for its names."""
+    """Fail if this process compiles a program or looks for its names."""
     real = builtins.compile
 
     def parse_only(source: Any, filename: str, mode: str, flags: int = 0, *args: Any, **more: Any) -> Any:  # noqa: ANN401 - as the builtin
-        assert filename != SOURCE_NAME or flags & ast.PyCF_ONLY_AST, "a program is compiled in this process"
+        assert filename != SOURCE_NAME or flags & ast.PyCF_ONLY_AST, "this process compiles a program"
         return real(source, filename, mode, flags, *args, **more)
 
     def refuse(*_: object) -> None:
@@ -134,7 +134,7 @@ def no_compiler_(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_compiler")
-def test_programs_of_others_are_never_compiled_in_this_process() -> None:
+def test_this_process_never_compiles_foreign_programs() -> None:
     assert not check(TASK).problems
     assert [problem.line for problem in check(TASK + "return\n").problems] == [3]
     assert program_of(f"Here:\n```\n{TASK}```\n").source == TASK
@@ -147,13 +147,13 @@ def test_programs_of_others_are_never_compiled_in_this_process() -> None:
 
 
 @pytest.mark.slow
-def test_program_that_is_too_long_is_not_read() -> None:
+def test_too_long_program_is_not_read() -> None:
     long = TASK + "# " + "x" * MAX_PROGRAM_LENGTH
     assert [problem.kind for problem in check(long).problems] == ["MemoryError"]
 
 
 def nested_returns(depth: int = 4, returns: int = 30) -> str:
-    """A short program whose compiled code is enormous, since each `return` has a copy of each `finally`."""
+    """Return a short program with enormous code, since each `return` copies each `finally`."""
     lines, pad = ["def task_program():"], "    "
     for _ in range(depth):
         lines += [f"{pad}try:", *[f"{pad}    if x: return 1"] * returns, f"{pad}finally:"]
@@ -162,14 +162,14 @@ def nested_returns(depth: int = 4, returns: int = 30) -> str:
 
 
 def redefinitions(count: int = 1_050) -> str:
-    """A program that pyflakes reads in quadratic time."""
+    """Return a program that pyflakes reads in quadratic time."""
     return "if 1:\n" + "    def f(): pass\n" * count
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("program", [nested_returns(), redefinitions()], ids=["returns", "definitions"])
-def test_program_that_takes_long_to_compile_or_to_read_is_a_problem(program: str) -> None:
+def test_program_that_is_slow_to_compile_or_to_read_is_a_problem(program: str) -> None:
     before = time.process_time()
     assert check(program).problems
     assert program_of(f"```\n{program}```\n").source
-    assert time.process_time() - before < 2  # here; the closed processes take their five seconds each
+    assert time.process_time() - before < 2  # the closed processes take five seconds each, this one does not

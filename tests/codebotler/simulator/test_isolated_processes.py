@@ -1,4 +1,4 @@
-"""The isolation of the engine's processes, as the kernel shows it while a program runs."""
+"""The kernel shows the isolation of the engine's processes while a program runs."""
 
 from __future__ import annotations
 
@@ -18,27 +18,32 @@ from codebotler.simulator.sandbox.isolation import NOBODY
 from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.robot import SimulatedRobot
 from other_functions import with_functions
-from processes import children_of, lives
+from processes import children_of, is_alive
 
 WORLD = World((Room("start_loc"),), "start_loc")
 ROOT = os.geteuid() == 0
 USER = NOBODY if ROOT else os.geteuid()
 CLOSED = ("compiler", "child of a batch", "child")
 ROLES = (*CLOSED, "BatchServer", "ForkServer")
-NEVER = {"Max core file size": "0", "Max file size": "0", "Max locked memory": "0", "Max msgqueue size": "0"}
+ZERO_LIMITS = {
+    "Max core file size": "0",
+    "Max file size": "0",
+    "Max locked memory": "0",
+    "Max msgqueue size": "0",
+}
 ENVIRONMENT = {"PYTHONHASHSEED", "TZ", "LC_ALL", "PYTHONUTF8", "LD_BIND_NOW"}
 
 
 @dataclass(frozen=True)
-class Enclosed:
-    """One process of the engine, as the kernel tells of it.
+class IsolationState:
+    """The isolation of one process, read from the kernel.
 
     Args:
-        limits: soft and hard, by name.
+        limits: soft and hard limits by name.
         status: the lines of its status, by name.
-        owner: who owns the list of its memory, which is root where nobody else may look into it.
-        descriptors: what is open; None where only root may know.
-        environment: the names in it; None where only root may know.
+        owner: the owner of its memory map; root if nobody else may read the memory.
+        descriptors: the open file descriptors; None if only root may see them.
+        environment: the names of its variables; None if only root may see them.
     """
 
     limits: dict[str, tuple[str, str]]
@@ -48,7 +53,7 @@ class Enclosed:
     environment: set[str] | None
 
     @classmethod
-    def of(cls, pid: int) -> Enclosed:
+    def of(cls, pid: int) -> IsolationState:
         folder = Path(f"/proc/{pid}")
         limits = {
             line[:26].strip(): (line[26:47].strip(), line[47:68].strip())
@@ -63,20 +68,20 @@ class Enclosed:
 
 
 @pytest.fixture(scope="module")
-def enclosed() -> Iterator[dict[str, Enclosed]]:
-    """The processes of a worker by role, looked at while a program speaks."""
-    found: dict[str, Enclosed] = {}
+def states() -> Iterator[dict[str, IsolationState]]:
+    """Yield the state of each process of a worker by role, read while a program speaks."""
+    found: dict[str, IsolationState] = {}
     os.environ["A_SECRET"] = "hush"
     worker = Worker()
 
     def say(_robot: SimulatedRobot, message: str) -> None:
-        found["compiler"] = Enclosed.of(
+        found["compiler"] = IsolationState.of(
             IDLE_PROCESSES["codebotler.simulator.process.compiler"][-1]._process.pid
         )
         for kind, fork_server in worker._fork_servers.items():
-            found[kind.__name__] = Enclosed.of(fork_server.pid)
-            for pid in filter(lives, children_of(fork_server.pid)):
-                found[message] = Enclosed.of(pid)
+            found[kind.__name__] = IsolationState.of(fork_server.pid)
+            for pid in filter(is_alive, children_of(fork_server.pid)):
+                found[message] = IsolationState.of(pid)
 
     def new_robot() -> SimulatedRobot:
         return SimulatedRobot(WORLD, skills=with_functions(SKILLS, say=say))
@@ -90,28 +95,28 @@ def enclosed() -> Iterator[dict[str, Enclosed]]:
 
 
 def limits_of(role: str) -> dict[str, tuple[str, str]]:
-    """What a process is limited to for ever, soft and hard."""
+    """Return the permanent limits of a process, soft and hard."""
     memory = 384 if "batch" in role.lower() else 512
-    limits = {**NEVER, "Max address space": str(memory * 1024**2)}
+    limits = {**ZERO_LIMITS, "Max address space": str(memory * 1024**2)}
     return {name: (value, value) for name, value in limits.items()}
 
 
 @pytest.mark.parametrize("role", ROLES)
-def test_rights_are_given_up(enclosed: dict[str, Enclosed], role: str) -> None:
-    process = enclosed[role]
+def test_process_gives_up_its_rights(states: dict[str, IsolationState], role: str) -> None:
+    process = states[role]
     assert process.status["Uid"].split() == [str(USER)] * 4
     if ROOT:
         assert process.status["Gid"].split() == [str(NOBODY)] * 4
         assert process.status["Groups"] == ""
     assert process.status["NoNewPrivs"] == "1"
-    assert process.owner == 0, "its memory can be looked into"
+    assert process.owner == 0, "other users can read its memory"
     wanted = limits_of(role)
     assert {name: process.limits[name] for name in wanted} == wanted
 
 
 @pytest.mark.parametrize("role", CLOSED)
-def test_what_runs_or_parses_programs_is_closed(enclosed: dict[str, Enclosed], role: str) -> None:
-    process = enclosed[role]
+def test_process_that_runs_or_parses_programs_is_closed(states: dict[str, IsolationState], role: str) -> None:
+    process = states[role]
     assert process.status["Seccomp"] == "2"
     seconds = ("2", "3") if role == "child of a batch" else ("5", "6")
     wanted = {
@@ -125,19 +130,19 @@ def test_what_runs_or_parses_programs_is_closed(enclosed: dict[str, Enclosed], r
 
 @pytest.mark.skipif(not ROOT, reason="only root may ask the kernel what another process has open")
 @pytest.mark.parametrize("role", CLOSED)
-def test_nothing_is_open_but_the_channel(enclosed: dict[str, Enclosed], role: str) -> None:
-    assert enclosed[role].descriptors == {0, 1, 2, 3}
+def test_only_the_channel_is_open(states: dict[str, IsolationState], role: str) -> None:
+    assert states[role].descriptors == {0, 1, 2, 3}
 
 
 @pytest.mark.skipif(not ROOT, reason="only root may ask the kernel for another process's environment")
 @pytest.mark.parametrize("role", ROLES)
-def test_nothing_of_the_engines_environment_is_handed_on(enclosed: dict[str, Enclosed], role: str) -> None:
-    assert enclosed[role].environment == ENVIRONMENT
+def test_environment_of_the_engine_is_not_passed_on(states: dict[str, IsolationState], role: str) -> None:
+    assert states[role].environment == ENVIRONMENT
 
 
-# --- what the kernel does not tell of another process
+# --- settings that only the process itself can read
 
-ASKED = """
+REPORT = """
 import ctypes, os, sys
 from codebotler.simulator.sandbox import fork_server
 from codebotler.simulator.sandbox import isolation
@@ -148,14 +153,14 @@ os._exit(100 + signal.value + 50 * ctypes.CDLL(None).prctl(3))  # PR_GET_DUMPABL
 """
 DEEDS = {
     "pass": 150,
-    "os.geteuid = lambda: 1000; isolation.give_up_rights()": 109,  # whoever was root is not dumpable anyhow
+    "os.geteuid = lambda: 1000; isolation.give_up_rights()": 109,  # a process that was root is never dumpable
     "fork_server.isolate(1, None, 5, os.getppid().to_bytes(8, 'big'))": 159,
-    "fork_server.isolate(1, None, 5, (os.getppid() + 1).to_bytes(8, 'big'))": 1,  # orphaned before that
+    "fork_server.isolate(1, None, 5, (os.getppid() + 1).to_bytes(8, 'big'))": 1,  # its parent has ended
 }
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux can be asked")
 @pytest.mark.parametrize("deed", DEEDS)
 def test_process_ends_with_its_parent_and_hides_its_memory(deed: str) -> None:
-    process = subprocess.run([sys.executable, "-c", ASKED.format(deed=deed)], check=False, timeout=30)
+    process = subprocess.run([sys.executable, "-c", REPORT.format(deed=deed)], check=False, timeout=30)
     assert process.returncode == DEEDS[deed]

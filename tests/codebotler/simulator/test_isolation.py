@@ -1,4 +1,4 @@
-"""Programs are kept in whoever runs the engine, root or not, and missing isolation is reported."""
+"""Isolation holds for root and for ordinary users, and missing isolation is reported."""
 
 import json
 import os
@@ -51,13 +51,13 @@ ATTACKS = {
     "os.abort()": "Crash",
     "while True: pass": "TimeoutError",
 }
-"""What a program tries, and the kind of error it meets."""
+"""Code of hostile programs, with the kind of error that stops each."""
 
 
 @pytest.fixture(scope="module")
 def folder() -> Iterator[Path]:
-    """A folder that everybody may enter and write to, with a file that everybody may read."""
-    path = Path(tempfile.mkdtemp(prefix="iso-", dir="/tmp"))  # short: it must fit where another path stood
+    """Yield a folder that everybody may enter and write to, with a file that everybody may read."""
+    path = Path(tempfile.mkdtemp(prefix="iso-", dir="/tmp"))  # it replaces a path of a fixed length
     path.chmod(0o777)
     (path / "secret").write_text("hush", encoding="ascii")
     (path / "secret").chmod(0o644)
@@ -67,14 +67,14 @@ def folder() -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def open_to_all(folder: Path) -> list[str]:
-    """A command that starts Python with this project for every user: as it is installed, else as a copy."""
+    """Return a command that starts Python with this project for every user, from a copy if needed."""
     here = [sys.executable, "-B"]
-    if not ROOT or as_user(NOBODY, [*here, "-c", CHECK, "[]"]).returncode == 0:
+    if not ROOT or run_as(NOBODY, [*here, "-c", CHECK, "[]"]).returncode == 0:
         return here
-    python = copied_python(folder / "py")
+    python = copy_python(folder / "py")
     library = folder / "library"
     library.mkdir()
-    for path in needed():
+    for path in find_needed_modules():
         if path.is_dir():
             shutil.copytree(path, library / path.name)
         else:
@@ -82,8 +82,8 @@ def open_to_all(folder: Path) -> list[str]:
     return ["env", f"PYTHONPATH={library}", str(python), "-B"]
 
 
-def copied_python(to: Path) -> Path:
-    """A copy of the interpreter and its library, which may stand in the folder of another user."""
+def copy_python(to: Path) -> Path:
+    """Copy the interpreter and its library to a folder that other users can read."""
     library = Path(sysconfig.get_path("stdlib"))
     unneeded = shutil.ignore_patterns("site-packages", "test", "idlelib", "tkinter", "ensurepip", "config-*")
     shutil.copytree(library, to / "lib" / library.name, ignore=unneeded)
@@ -100,8 +100,8 @@ def copied_python(to: Path) -> Path:
     return copy
 
 
-def needed() -> list[Path]:
-    """The packages and modules outside the standard library that the engine needs."""
+def find_needed_modules() -> list[Path]:
+    """Return the packages and modules outside the standard library that the engine needs."""
     listing = (
         "import sys, codebotler.core.trace, codebotler.simulator.engine\n"
         "for name, module in list(sys.modules.items()):\n"
@@ -117,20 +117,20 @@ def needed() -> list[Path]:
     ]
 
 
-def as_user(user: int, command: list[str]) -> subprocess.CompletedProcess[str]:
+def run_as(user: int, command: list[str]) -> subprocess.CompletedProcess[str]:
     command = command if user == os.geteuid() else [*BECOME, *command]
     return subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("user", [0, NOBODY] if ROOT else [os.geteuid()])
-def test_programs_are_kept_in_whoever_runs_the_engine(
+def test_programs_cannot_break_out_for_any_user_of_the_engine(
     folder: Path, open_to_all: list[str], user: int
 ) -> None:
     attacks = [
         body.replace("SECRET", str(folder / "secret")).replace("FOLDER", str(folder)) for body in ATTACKS
     ]
-    process = as_user(user, [*open_to_all, "-c", CHECK, json.dumps([*attacks, "say('a')"])])
+    process = run_as(user, [*open_to_all, "-c", CHECK, json.dumps([*attacks, "say('a')"])])
     assert (process.returncode, process.stderr) == (0, "")
     ran_as, _, printed = process.stdout.partition(" ")
     assert int(ran_as) == user
@@ -172,8 +172,8 @@ main()
 MISSING = r"(roboeval: )?[^\n]*less isolated[^\n]*kernel does not allow[^\n]*\(seccomp\)\n"
 
 
-def evaluated(*options: str, before: str = "import sys") -> subprocess.CompletedProcess[str]:
-    """`roboeval evaluate` in a process that has done something before."""
+def run_evaluate(*options: str, before: str = "import sys") -> subprocess.CompletedProcess[str]:
+    """Run `roboeval evaluate` in a process that executes some code first."""
     arguments = ["evaluate", "recorded:careful", "--tasks", "SayGoodDay", "--json", *options]
     return subprocess.run(
         [sys.executable, "-c", before + EVALUATE, *arguments],
@@ -184,33 +184,33 @@ def evaluated(*options: str, before: str = "import sys") -> subprocess.Completed
     )
 
 
-def without_progress(told: str) -> str:
-    """What was said beside how far it has come, which is told after a while on a slow machine."""
-    return re.sub(r"^judging: .*\n", "", told, flags=re.MULTILINE)
+def remove_progress(output: str) -> str:
+    """Remove the progress that a slow machine shows after a while."""
+    return re.sub(r"^judging: .*\n", "", output, flags=re.MULTILINE)
 
 
 @pytest.mark.slow
-def test_kernel_that_refuses_a_filter_is_told_of_in_one_line_and_the_verdicts_are_the_same() -> None:
-    below, bare = evaluated(before=BELOW_A_FILTER), evaluated()
+def test_missing_seccomp_is_one_warning_and_changes_no_verdict() -> None:
+    below, bare = run_evaluate(before=BELOW_A_FILTER), run_evaluate()
     assert below.returncode == 0
-    assert re.fullmatch(MISSING, without_progress(below.stderr))
-    assert (bare.returncode, without_progress(bare.stderr)) == (0, "")
+    assert re.fullmatch(MISSING, remove_progress(below.stderr))
+    assert (bare.returncode, remove_progress(bare.stderr)) == (0, "")
     assert below.stdout == bare.stdout != ""
 
 
 @pytest.mark.slow
-def test_isolation_that_is_required_is_refused_where_the_kernel_refuses_a_filter() -> None:
-    refused = evaluated("--require-isolation", before=BELOW_A_FILTER)
+def test_required_isolation_fails_without_seccomp() -> None:
+    refused = run_evaluate("--require-isolation", before=BELOW_A_FILTER)
     assert (refused.returncode, refused.stdout) == (1, "")
     assert re.fullmatch(MISSING, refused.stderr)
-    assert evaluated("--require-isolation").returncode == 0
+    assert run_evaluate("--require-isolation").returncode == 0
 
 
 @pytest.mark.slow
-def test_all_other_isolation_holds_where_the_kernel_refuses_a_filter(folder: Path) -> None:
+def test_other_layers_of_isolation_hold_without_seccomp(folder: Path) -> None:
     attacks = {f"open('{folder}/secret')": "OSError", "os.fork()": "BlockingIOError", "say('a')": None}
     check = BELOW_A_FILTER + CHECK.replace("require_isolation=True", "require_isolation=False")
-    process = as_user(os.geteuid(), [sys.executable, "-c", check, json.dumps(list(attacks))])
+    process = run_as(os.geteuid(), [sys.executable, "-c", check, json.dumps(list(attacks))])
     assert process.returncode == 0
     assert re.fullmatch(MISSING, process.stderr)
     outcomes = json.loads(process.stdout.partition(" ")[2])

@@ -1,4 +1,4 @@
-"""Each layer of isolation holds by itself, with all others left out; without it, the same deed is done."""
+"""Each layer of isolation stops its deeds without the other layers, and without it they succeed."""
 
 import json
 import os
@@ -76,15 +76,15 @@ for line in sys.stdin:
         told = output.read()
     print(json.dumps([os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), told]), flush=True)
 """
-"""Forks a process for each script, which costs a tenth of starting one."""
+"""Fork a process for each script, which takes a tenth of the time of starting one."""
 
 
-def indented(code: str) -> str:
+def indent(code: str) -> str:
     return code.strip().replace("\n", "\n    ")
 
 
 @cache
-def forking() -> subprocess.Popen[str]:
+def fork_server() -> subprocess.Popen[str]:
     """Start the process from which scripts are forked."""
     return subprocess.Popen(
         [sys.executable, "-B", "-c", FORKING], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -92,17 +92,17 @@ def forking() -> subprocess.Popen[str]:
 
 
 @pytest.fixture(autouse=True, scope="module")
-def no_process_is_left() -> Iterator[None]:
+def end_fork_server() -> Iterator[None]:
     yield
-    with forking():
-        forking().kill()
-    forking.cache_clear()
+    with fork_server():
+        fork_server().kill()
+    fork_server.cache_clear()
 
 
-def result(layer: str, deed: str, before: str, folder: str = "/") -> str:
-    """What a process says that puts up a layer and then does something; or the signal that ended it."""
-    script = SCRIPT.format(before=before, layer=layer, deed=indented(deed))
-    server = forking()
+def run_behind(layer: str, deed: str, before: str, folder: str = "/") -> str:
+    """Run a deed behind a layer; return the output of the process, or the signal that ended it."""
+    script = SCRIPT.format(before=before, layer=layer, deed=indent(deed))
+    server = fork_server()
     assert server.stdin is not None
     assert server.stdout is not None
     server.stdin.write(json.dumps([script, folder]) + "\n")
@@ -115,19 +115,19 @@ def result(layer: str, deed: str, before: str, folder: str = "/") -> str:
 
 @dataclass(frozen=True)
 class Deed:
-    """Something a process does, and what it comes to behind one layer.
+    """An action of a process, and its result behind one layer.
 
     Args:
-        layer: puts up the layer.
-        deed: what is done.
-        comes_to: what the process says then: `done`, the name of an error or of the signal that ended it.
-        before: what is done before, with and without the layer.
-        bare: what the deed comes to without the layer.
+        layer: the code that sets up the layer.
+        deed: the code of the action.
+        comes_to: the result: `done`, or the name of an error or of the signal that ended the process.
+        before: the code that runs first, with and without the layer.
+        bare: the result without the layer.
     """
 
     layer: str
     deed: str
-    comes_to: str
+    result: str
     before: str = ""
     bare: str = "done"
 
@@ -142,9 +142,9 @@ parent = os.getpid()
 if os.fork():
     os._exit(len(os.read(reader, 1)) - 1)
 """
-OUTLIVE = "os.write(writer, b'x')\ntime.sleep(0.7)"
-SEEN_BY_OTHERS = (
-    "isolation.become_nobody(); isolation.prctl(isolation.PR_SET_DUMPABLE, 1)"  # a new user is hidden already
+OUTLIVE_PARENT = "os.write(writer, b'x')\ntime.sleep(0.7)"
+BECOME_VISIBLE = (
+    "isolation.become_nobody(); isolation.prctl(isolation.PR_SET_DUMPABLE, 1)"  # the change of user hid it
 )
 LOOK = """
 target = os.getpid()
@@ -172,38 +172,38 @@ if not os.WCOREDUMP(os.waitpid(dumper, 0)[1]):
 """
 
 
-def denied(deed: str, before: str = "") -> Deed:
-    """What the list of system calls refuses."""
+def deny(deed: str, before: str = "") -> Deed:
+    """Return a deed that the list of system calls refuses."""
     return Deed("only_seccomp()", deed, "EPERM", before)
 
 
-def allowed(deed: str, before: str = "", comes_to: str = "done") -> Deed:
-    """What the list lets through."""
-    return Deed("only_seccomp()", deed, comes_to, before, bare=comes_to)
+def allow(deed: str, before: str = "", result: str = "done") -> Deed:
+    """Return a deed that the list of system calls allows."""
+    return Deed("only_seccomp()", deed, result, before, bare=result)
 
 
 DEEDS = {
-    "seccomp: socket": denied("socket.socket()"),
-    "seccomp: pair of sockets": denied("socket.socketpair()"),
-    "seccomp: open": denied("os.open('/dev/null', os.O_RDONLY)"),
-    "seccomp: stat": denied("os.stat('/')"),
-    "seccomp: truncate": denied("os.ftruncate(file.fileno(), 0)", A_FILE),
-    "seccomp: fork": denied("os.fork() or os._exit(0)"),
-    "seccomp: exec": denied("os.execv('/bin/sh', ['sh', '-c', 'echo done'])"),
-    "seccomp: ptrace": denied("succeed(libc.ptrace(0, 0, 0, 0))"),
-    "seccomp: kill": denied("os.kill(os.getpid(), 0)"),
-    "seccomp: signal handler": denied("signal.signal(signal.SIGTERM, signal.SIG_IGN)"),
-    "seccomp: timer": denied("signal.setitimer(signal.ITIMER_REAL, 100)"),
-    "seccomp: wait": denied("select.select([], [], [], 0)"),
-    "seccomp: user": denied("os.setuid(os.getuid())"),
-    "seccomp: prctl": denied("isolation.prctl(isolation.PR_SET_DUMPABLE, 0)"),
-    "seccomp: limit": denied("succeed(libc.setrlimit(4, bytes(16)))"),
-    "seccomp: true chance": denied("os.getrandom(1)"),
-    "seccomp: descriptor": denied("os.dup(3)"),
-    "seccomp: read elsewhere": denied("os.read(reader, 1)", A_PIPE),
-    "seccomp: write elsewhere": denied("os.write(writer, b'x')", A_PIPE),
-    "seccomp: executable memory": denied("succeed(libc.mmap(None, 4096, EXECUTABLE, PRIVATE, -1, 0))"),
-    "seccomp: memory made executable": denied("succeed(libc.mprotect(page, 4096, EXECUTABLE))", A_PAGE),
+    "seccomp: socket": deny("socket.socket()"),
+    "seccomp: pair of sockets": deny("socket.socketpair()"),
+    "seccomp: open": deny("os.open('/dev/null', os.O_RDONLY)"),
+    "seccomp: stat": deny("os.stat('/')"),
+    "seccomp: truncate": deny("os.ftruncate(file.fileno(), 0)", A_FILE),
+    "seccomp: fork": deny("os.fork() or os._exit(0)"),
+    "seccomp: exec": deny("os.execv('/bin/sh', ['sh', '-c', 'echo done'])"),
+    "seccomp: ptrace": deny("succeed(libc.ptrace(0, 0, 0, 0))"),
+    "seccomp: kill": deny("os.kill(os.getpid(), 0)"),
+    "seccomp: signal handler": deny("signal.signal(signal.SIGTERM, signal.SIG_IGN)"),
+    "seccomp: timer": deny("signal.setitimer(signal.ITIMER_REAL, 100)"),
+    "seccomp: wait": deny("select.select([], [], [], 0)"),
+    "seccomp: user": deny("os.setuid(os.getuid())"),
+    "seccomp: prctl": deny("isolation.prctl(isolation.PR_SET_DUMPABLE, 0)"),
+    "seccomp: limit": deny("succeed(libc.setrlimit(4, bytes(16)))"),
+    "seccomp: true chance": deny("os.getrandom(1)"),
+    "seccomp: descriptor": deny("os.dup(3)"),
+    "seccomp: read elsewhere": deny("os.read(reader, 1)", A_PIPE),
+    "seccomp: write elsewhere": deny("os.write(writer, b'x')", A_PIPE),
+    "seccomp: executable memory": deny("succeed(libc.mmap(None, 4096, EXECUTABLE, PRIVATE, -1, 0))"),
+    "seccomp: memory made executable": deny("succeed(libc.mprotect(page, 4096, EXECUTABLE))", A_PAGE),
     "seccomp: wait for a futex": Deed(
         "only_seccomp()",
         "succeed(libc.syscall(futex, word, 0, 0, a_moment))",
@@ -211,11 +211,11 @@ DEEDS = {
         A_SHORT_WAIT,
         bare="ETIMEDOUT",
     ),
-    "seccomp: wake by a futex": allowed("succeed(libc.pthread_once(word, libc.getpid))", A_SHORT_WAIT),
-    "seccomp: memory": allowed(A_PAGE),
-    "seccomp: memory made read-only": allowed("succeed(libc.mprotect(page, 4096, READABLE))", A_PAGE),
-    "seccomp: read on the channel": allowed("os.read(3, 1)", comes_to="EBADF"),  # which only writes here
-    "seccomp: clock": allowed("time.time()"),
+    "seccomp: wake by a futex": allow("succeed(libc.pthread_once(word, libc.getpid))", A_SHORT_WAIT),
+    "seccomp: memory": allow(A_PAGE),
+    "seccomp: memory made read-only": allow("succeed(libc.mprotect(page, 4096, READABLE))", A_PAGE),
+    "seccomp: read on the channel": allow("os.read(3, 1)", result="EBADF"),  # this channel is write-only
+    "seccomp: clock": allow("time.time()"),
     "FSIZE": Deed("limit('FSIZE')", "os.write(file.fileno(), b'x')", "EFBIG", A_FILE),
     "NOFILE": Deed("limit('NOFILE')", "os.open('/dev/null', os.O_RDONLY)", "EMFILE"),
     "NPROC": Deed("limit('NPROC')", "os.fork() or os._exit(0)", "EAGAIN", NOBODY),
@@ -225,26 +225,26 @@ DEEDS = {
     "MSGQUEUE": Deed("limit('MSGQUEUE')", A_QUEUE, "EMFILE", NOBODY),
     "AS": Deed("limit('AS')", "succeed(libc.mmap(None, 10**9, READABLE, PRIVATE, -1, 0))", "ENOMEM"),
     "CPU": Deed("isolation.limit_time(1)", "while time.process_time() < 1.5: pass", "SIGXCPU"),
-    "death with the parent": Deed("isolation.die_with_parent()", OUTLIVE, "", AN_ORPHAN),
-    "hidden memory": Deed("isolation.prctl(isolation.PR_SET_DUMPABLE, 0)", LOOK, "EACCES", SEEN_BY_OTHERS),
+    "death with the parent": Deed("isolation.die_with_parent()", OUTLIVE_PARENT, "", AN_ORPHAN),
+    "hidden memory": Deed("isolation.prctl(isolation.PR_SET_DUMPABLE, 0)", LOOK, "EACCES", BECOME_VISIBLE),
 }
 
 
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "CPU")) for name in DEEDS]
 )
-def test_wall_holds_by_itself(name: str) -> None:
+def test_layer_holds_by_itself(name: str) -> None:
     case = DEEDS[name]
-    assert result("pass", case.deed, case.before) == case.bare
-    assert result(case.layer, case.deed, case.before) == case.comes_to
+    assert run_behind("pass", case.deed, case.before) == case.bare
+    assert run_behind(case.layer, case.deed, case.before) == case.result
 
 
-# --- what only root has to lose
+# --- rights of root
 
 
 @pytest.fixture(scope="module")
 def folder() -> Iterator[str]:
-    """A folder that everybody may enter, with a file of root's and a program that makes its user root."""
+    """Yield a folder that everybody may enter, with a file of root and a setuid-root program."""
     path = Path(tempfile.mkdtemp(prefix="layers-"))
     path.chmod(0o755)
     (path / "secret").touch(0o600)
@@ -282,13 +282,13 @@ ROOTS_DEEDS = {
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root has these rights to lose")
 @pytest.mark.parametrize("name", ROOTS_DEEDS)
-def test_wall_holds_root_by_itself(folder: str, name: str) -> None:
+def test_layer_holds_root_by_itself(folder: str, name: str) -> None:
     case = ROOTS_DEEDS[name]
-    bare = result("pass", case.deed, case.before, folder)
+    bare = run_behind("pass", case.deed, case.before, folder)
     if bare != case.bare and name in ("no new rights", "dumps of memory"):
         pytest.skip(f"this machine does not allow the deed to anybody ({bare})")
     assert bare == case.bare
-    assert result(case.layer, case.deed, case.before, folder) == case.comes_to
+    assert run_behind(case.layer, case.deed, case.before, folder) == case.result
 
 
 # --- other ways into the kernel
@@ -304,21 +304,21 @@ ctypes.memmove(page, bytes.fromhex("b814000000cd80c3"), 8)  # mov eax, 20; int 0
 )
 def test_call_by_the_table_of_another_architecture_ends_the_process() -> None:
     call = "ctypes.CFUNCTYPE(ctypes.c_int)(page)()"
-    if (bare := result("pass", call, OLD_CALLS)) != "done":
+    if (bare := run_behind("pass", call, OLD_CALLS)) != "done":
         pytest.skip(f"this kernel has no 32-bit calls ({bare})")
-    assert result("only_seccomp()", call, OLD_CALLS) == "SIGSYS"
+    assert run_behind("only_seccomp()", call, OLD_CALLS) == "SIGSYS"
 
 
 def test_call_by_an_x32_number_ends_the_process() -> None:
     call = "libc.syscall(0x40000000 + 39)"
-    assert result("pass", call, "") == "done"
-    assert result("only_seccomp()", call, "") == "SIGSYS"
+    assert run_behind("pass", call, "") == "done"
+    assert run_behind("only_seccomp()", call, "") == "SIGSYS"
 
 
 MACHINE = platform.machine()
 ON_THE_LIST = set(isolation.SYSCALLS[MACHINE][1].values()) if MACHINE in isolation.SYSCALLS else set()
-PAST_LISTS = {335: "SIGILL", 336: "ENXIO"} if MACHINE == "x86_64" else {}  # what newer kernels say to them
-HIGHEST = 700  # of system calls; no kernel has as many
+OUTSIDE_LISTS = {335: "SIGILL", 336: "ENXIO"} if MACHINE == "x86_64" else {}  # the results of newer kernels
+HIGHEST = 700  # no kernel has as many system calls
 CALL = "libc.syscall(ctypes.c_long(number), 0, 0, 0, 0, 0, 0)"
 EACH_REFUSED = f"""
 for number in {{}}:
@@ -338,24 +338,27 @@ one_list = pytest.mark.skipif(MACHINE not in isolation.SYSCALLS, reason="this ki
 
 
 @one_list
-def test_every_system_call_that_is_not_on_the_list_is_refused() -> None:
-    numbers = {*range(HIGHEST), isolation.X32 - 1, 2**32 + 2} - ON_THE_LIST - PAST_LISTS.keys()
-    assert result("only_seccomp()", EACH_REFUSED.format(sorted(numbers)), NOBODY) == "done"
+def test_unlisted_system_calls_are_refused() -> None:
+    numbers = {*range(HIGHEST), isolation.X32 - 1, 2**32 + 2} - ON_THE_LIST - OUTSIDE_LISTS.keys()
+    assert run_behind("only_seccomp()", EACH_REFUSED.format(sorted(numbers)), NOBODY) == "done"
 
 
 @pytest.mark.slow
 @one_list
 def test_every_number_of_another_interface_ends_the_process() -> None:
     numbers = [*range(isolation.X32, isolation.X32 + HIGHEST), 2**31 - 1, 2**31]
-    assert result("pass", EACH_ENDS_ITS_PROCESS.format(numbers), f"{NOBODY}; limit('CORE')") == "done"
+    assert run_behind("pass", EACH_ENDS_ITS_PROCESS.format(numbers), f"{NOBODY}; limit('CORE')") == "done"
 
 
-@pytest.mark.parametrize("number", PAST_LISTS)
-def test_calls_that_newer_kernels_let_past_any_list_do_nothing(number: int) -> None:
-    assert result("only_seccomp()", f"succeed(libc.syscall({number}))", "") in ("EPERM", PAST_LISTS[number])
+@pytest.mark.parametrize("number", OUTSIDE_LISTS)
+def test_calls_that_newer_kernels_exempt_from_lists_do_nothing(number: int) -> None:
+    assert run_behind("only_seccomp()", f"succeed(libc.syscall({number}))", "") in (
+        "EPERM",
+        OUTSIDE_LISTS[number],
+    )
 
 
-def test_list_of_system_calls_is_known_for_two_kinds_of_machines_only() -> None:
+def test_list_of_system_calls_exists_for_two_kinds_of_machines() -> None:
     assert [
         isolation.seccomp_filter(machine) is not None for machine in ("x86_64", "aarch64", "riscv64")
     ] == [
@@ -365,8 +368,8 @@ def test_list_of_system_calls_is_known_for_two_kinds_of_machines_only() -> None:
     ]
 
 
-def test_list_of_system_calls_is_no_longer_than_it_must_be() -> None:
-    """One more is a decision, and no oversight."""
+def test_list_of_system_calls_is_minimal() -> None:
+    """Allowing one more call must be a decision, not an oversight."""
     needed = (
         "read write mmap mprotect munmap brk rt_sigreturn sched_yield mremap madvise getpid exit gettimeofday"
     )

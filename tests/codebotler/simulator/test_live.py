@@ -1,4 +1,4 @@
-"""Runs on a robot: time passes by itself, nothing is done twice, and whoever stops the robot ends the run."""
+"""Runs on a live robot: real time, no action twice, and a stop of the robot ends the run."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from processes import are_gone, children_of, engine_processes, fork_servers
 LIVE = replace(PAPER_SETTINGS, literals="as-written", limits=LIVE_LIMITS)
 
 
-class Machine:
-    """A robot that takes two seconds by its own clock for each skill, and waits for nothing in truth."""
+class LiveRobot:
+    """A robot that moves its clock by two seconds per skill, without a real wait."""
 
     def __init__(self, does: Callable[[str], Result] = lambda _: None) -> None:
         self.settings, self.skills = LIVE, SKILLS
@@ -54,7 +54,7 @@ class Machine:
 
 @pytest.fixture
 def others() -> set[int]:
-    """The processes of engines that other tests keep open."""
+    """Return the processes of engines that other tests keep open."""
     return engine_processes()
 
 
@@ -66,20 +66,20 @@ def worker() -> Iterator[Worker]:
 
 
 @pytest.fixture
-def own_worker(others: set[int]) -> Iterator[Worker]:  # noqa: ARG001 - told before it starts
-    """A worker whose processes a test ends."""
+def own_worker(others: set[int]) -> Iterator[Worker]:  # noqa: ARG001 - counted before the worker starts
+    """Yield a worker whose processes the test may end."""
     worker = Worker(one_process_per_run=True)
     yield worker
     worker.close()
 
 
-def done(worker: Worker, program: str) -> tuple[list[str], Outcome]:
-    machine = Machine()
+def run_live(worker: Worker, program: str) -> tuple[list[str], Outcome]:
+    machine = LiveRobot()
     outcome = worker.run_live(program, machine)
     return machine.done, outcome
 
 
-def test_clock_is_the_robots_and_sleeping_is_asked_of_it(worker: Worker) -> None:
+def test_robot_keeps_the_clock_and_sleeps(worker: Worker) -> None:
     program = (
         "def task_program():\n"
         "    say('Hello')\n"
@@ -87,12 +87,12 @@ def test_clock_is_the_robots_and_sleeping_is_asked_of_it(worker: Worker) -> None
         "    time.sleep(30)\n"
         "    say(time.strftime('%H:%M:%S'))\n"
     )
-    happened, outcome = done(worker, program)
+    happened, outcome = run_live(worker, program)
     assert happened == ["Hello", "2.0", "sleeps 30 s", "12:00:34"]
     assert outcome == Outcome(Status.FINISHED, tuple(Event("say", text) for text in happened))
 
 
-def test_a_live_program_says_where_it_is(worker: Worker) -> None:
+def test_robot_knows_the_current_line_of_a_live_program(worker: Worker) -> None:
     program = """def greet(name):
     say("hello " + name)
 
@@ -103,37 +103,35 @@ def task_program():
     sorted([2, 1], key=lambda n: say(str(n)) or n)
     exec("say('exec')")
 """
-    machine = Machine()
+    machine = LiveRobot()
     assert worker.run_live(program, machine).status is Status.FINISHED
     assert machine.lines == [2, 7, 2, 7, 8, 8, 9]
     lies = f"""def task_program():
     exec(compile("\\n" * 1_000_000 + "say('far')", {PROGRAM!r}, "exec"))
 """
-    machine = Machine()
+    machine = LiveRobot()
     worker.run_live(lies, machine)
     assert machine.lines == [None]
 
 
-def test_fuel_is_counted_anew_after_each_skill_and_sleep(worker: Worker) -> None:
+def test_limit_of_turns_restarts_after_each_skill_and_sleep(worker: Worker) -> None:
     turns = "    for _ in range(150_000): pass\n"
     both = f"def task_program():\n{turns}    say('a')\n{turns}    time.sleep(1)\n{turns}"
-    assert done(worker, both)[1].status == Status.FINISHED
-    happened, outcome = done(worker, f"def task_program():\n    say('a')\n{turns}{turns}")
+    assert run_live(worker, both)[1].status == Status.FINISHED
+    happened, outcome = run_live(worker, f"def task_program():\n    say('a')\n{turns}{turns}")
     assert (happened, outcome.status) == (["a"], Status.TIMEOUT)
 
 
 @pytest.mark.slow
-def test_there_is_no_limit_of_skill_calls_or_of_time(worker: Worker) -> None:
+def test_long_live_runs_have_no_limit_of_time(worker: Worker) -> None:
     program = "def task_program():\n    for i in range(1500): say(str(i)); time.sleep(60)\n"
-    happened, outcome = done(worker, program)
+    happened, outcome = run_live(worker, program)
     assert outcome.status == Status.FINISHED
     assert len(happened) == 3000
 
 
 @pytest.mark.slow
-def test_program_may_compute_for_long_if_it_acts_in_between(
-    worker: Worker, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_program_may_compute_for_long_between_skills(worker: Worker, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("codebotler.simulator.process.isolated_process.PROCESS_WAIT_SECONDS", 3.0)
     program = (
         "def task_program():\n"
@@ -141,45 +139,45 @@ def test_program_may_compute_for_long_if_it_acts_in_between(
         "        for _ in range(20): sum(range(1_200_000))\n"
         "        say(str(i))\n"
     )
-    assert done(worker, program)[0] == [str(number) for number in range(20)]
+    assert run_live(worker, program)[0] == [str(number) for number in range(20)]
 
 
 def test_program_that_never_stops_calling_ends(worker: Worker) -> None:
-    machine = Machine()
+    machine = LiveRobot()
     machine.settings = replace(LIVE, limits=replace(LIVE_LIMITS, calls=5))
     outcome = worker.run_live("def task_program():\n    while True: say('a')\n", machine)
     assert (outcome.status, machine.done) == (Status.TIMEOUT, ["a"] * 5)
-    assert LIVE_LIMITS.calls <= 100_000  # each is kept in memory and logged
+    assert LIVE_LIMITS.calls <= 100_000  # every call is kept in memory and logged
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seconds", ["-1.0", "NaN", "Infinity", "true", '"1"', "[]"])
-def test_request_to_sleep_that_no_child_makes_ends_the_run(worker: Worker, seconds: str) -> None:
+def test_forged_request_to_sleep_ends_the_run(worker: Worker, seconds: str) -> None:
     frame = f'["sleep",[{seconds}],0.0]'.encode()
     program = (
         "import os\n"
         f"def task_program():\n    os.write(3, len({frame!r}).to_bytes(4, 'big') + {frame!r})\n"
         "    say('a')\n"
     )
-    machine = Machine()
+    machine = LiveRobot()
     assert worker.run_live(program, machine).status == Status.KILLED
     assert machine.done == []
 
 
 @pytest.mark.slow
-def test_programs_that_import_run_once_only(worker: Worker) -> None:
-    happened, outcome = done(
+def test_program_that_imports_runs_only_once(worker: Worker) -> None:
+    happened, outcome = run_live(
         worker, "def task_program():\n    say('a')\n    exec('import random')\n    say('b')\n"
     )
     assert (happened, outcome.status) == (["a", "b"], Status.FINISHED)
 
 
-def test_robots_errors_reach_the_program_in_its_own_words(worker: Worker) -> None:
+def test_errors_of_the_robot_reach_the_program_unchanged(worker: Worker) -> None:
     def does(_: str) -> Result:
         raise RobotError("GoToInvalidLocation", "the door is shut")
 
     program = "def task_program():\n    go_to('Hall')\n"
-    outcome = worker.run_live(program, Machine(does))
+    outcome = worker.run_live(program, LiveRobot(does))
     assert outcome.error is not None
     assert (outcome.error.kind, outcome.error.message, outcome.line) == (
         "GoToInvalidLocation",
@@ -189,10 +187,10 @@ def test_robots_errors_reach_the_program_in_its_own_words(worker: Worker) -> Non
 
 
 class StoppedError(Exception):
-    """Somebody has stopped the robot."""
+    """A person stopped the robot."""
 
 
-def test_what_the_robot_throws_besides_ends_the_child_and_comes_through(worker: Worker) -> None:
+def test_other_exceptions_of_the_robot_end_the_child_and_are_raised(worker: Worker) -> None:
     def does(text: str) -> Result:
         if text == "b":
             raise StoppedError
@@ -205,16 +203,16 @@ def test_what_the_robot_throws_besides_ends_the_child_and_comes_through(worker: 
         "            try: say(text)\n"
         "            except BaseException: pass\n"
     )
-    machine = Machine(does)
+    machine = LiveRobot(does)
     with pytest.raises(StoppedError):
         worker.run_live(stubborn, machine)
     assert machine.done == ["a"]
     assert are_gone(children_of(worker._fork_servers[ForkServer].pid))
-    assert done(worker, "def task_program(): say('next')")[0] == ["next"]
+    assert run_live(worker, "def task_program(): say('next')")[0] == ["next"]
 
 
 @pytest.mark.slow
-def test_run_whose_process_is_lost_is_not_run_again(own_worker: Worker, others: set[int]) -> None:
+def test_live_run_whose_process_is_lost_is_not_repeated(own_worker: Worker, others: set[int]) -> None:
     def does(_: str) -> Result:
         family = engine_processes() - others
         for pid in set(fork_servers()) - others:
@@ -222,23 +220,23 @@ def test_run_whose_process_is_lost_is_not_run_again(own_worker: Worker, others: 
         assert are_gone(family)
         return None
 
-    machine = Machine(does)
+    machine = LiveRobot(does)
     with pytest.raises(EngineError, match="lost"):
         own_worker.run_live("def task_program():\n    say('a')\n    say('b')\n", machine)
     assert machine.done == ["a"]
-    assert done(own_worker, "def task_program(): say('next')")[0] == ["next"]
+    assert run_live(own_worker, "def task_program(): say('next')")[0] == ["next"]
 
 
-def test_stop_ends_a_run_that_sleeps(own_worker: Worker, others: set[int]) -> None:
+def test_stop_ends_a_sleeping_run(own_worker: Worker, others: set[int]) -> None:
     sleeps, may_go_on = threading.Event(), threading.Event()
 
-    class Sleeper(Machine):
+    class SleepingRobot(LiveRobot):
         def sleep_until(self, now: float) -> None:
             sleeps.set()
             assert may_go_on.wait(30)
             super().sleep_until(now)
 
-    machine = Sleeper()
+    machine = SleepingRobot()
     with ThreadPoolExecutor(1) as thread:
         program = "def task_program():\n    time.sleep(3600)\n    say('a')\n"
         running = thread.submit(own_worker.run_live, program, machine)
@@ -252,8 +250,8 @@ def test_stop_ends_a_run_that_sleeps(own_worker: Worker, others: set[int]) -> No
     assert machine.done == ["sleeps 3600 s"]
 
 
-def test_program_that_does_not_parse_is_told_as_in_simulation(worker: Worker) -> None:
-    happened, outcome = done(worker, "def task_program(:\n")
+def test_unparsable_program_has_the_same_error_as_in_simulation(worker: Worker) -> None:
+    happened, outcome = run_live(worker, "def task_program(:\n")
     assert (happened, outcome.status, outcome.error and outcome.error.kind) == (
         [],
         Status.PYTHON_ERROR,

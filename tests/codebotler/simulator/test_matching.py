@@ -1,4 +1,4 @@
-"""What a request means: the same name, else the name with the longest run of whole words in it."""
+"""A request means the equal name, or else the name whose whole words it holds in the longest run."""
 
 import pytest
 
@@ -31,7 +31,7 @@ ROOMS = ("kitchen", "kitchen table", "shelf", "bookshelf", "lab 1", "lab 10", "a
         ("the shelf at the kitchen table", ["kitchen table"]),
     ],
 )
-def test_a_request_means_the_longest_run_of_whole_words(request_: str, rooms: list[str]) -> None:
+def test_request_means_the_longest_run_of_whole_words(request_: str, rooms: list[str]) -> None:
     assert meant_by(request_, ROOMS) == rooms
     assert meant_by(request_, ROOMS, plain=True) == rooms
 
@@ -60,7 +60,7 @@ def robots() -> list[SimulatedRobot]:
 
 
 @pytest.mark.parametrize("robot", robots())
-def test_robots_drive_to_the_room_that_is_meant(robot: SimulatedRobot) -> None:
+def test_robots_drive_to_the_room_that_the_request_means(robot: SimulatedRobot) -> None:
     for request, room in (
         ("kitchen table", "kitchen table"),
         ("bookshelf", "bookshelf"),
@@ -75,7 +75,7 @@ def test_robots_drive_to_the_room_that_is_meant(robot: SimulatedRobot) -> None:
     assert robot.room == "shelf"
 
 
-def in_the_shelf() -> SimulatedRobot:
+def robot_at_the_shelf() -> SimulatedRobot:
     robot = SimulatedRobot(WORLD, SIMULATION)
     robot.perform("go_to", ["shelf"])
     return robot
@@ -97,22 +97,22 @@ def in_the_shelf() -> SimulatedRobot:
         ("person in a red coat", False),
     ],
 )
-def test_what_a_look_finds(request_: str, is_there: bool) -> None:  # noqa: FBT001 - a case
-    assert in_the_shelf().perform("is_in_room", [request_]) is is_there
+def test_look_finds_things_and_people_by_whole_words(request_: str, is_there: bool) -> None:  # noqa: FBT001 - a case
+    assert robot_at_the_shelf().perform("is_in_room", [request_]) is is_there
 
 
 def test_things_are_picked_up_by_the_longest_name() -> None:
-    robot = in_the_shelf()
+    robot = robot_at_the_shelf()
     robot.perform("pick", ["pancake"])
     assert robot.taken is not None
     assert robot.taken.label == "pancake"
     robot.perform("place", ["pancake"])
     with pytest.raises(RobotError, match="could mean"):
         robot.perform("pick", ["pan or mug"])
-    robot.perform("pick", ["mug"])  # either of two that are alike
+    robot.perform("pick", ["mug"])  # the two mugs are equal, so the request is not ambiguous
 
 
-def test_sampled_things_are_told_apart_by_whole_words() -> None:
+def test_sampled_robot_distinguishes_things_by_whole_words() -> None:
     for sample in range(20):
         robot = SampledRobot(RoomMap(("hall",), "hall"), FactSampler(sample=sample))
         robot.perform("is_in_room", ["pan"])
@@ -120,10 +120,10 @@ def test_sampled_things_are_told_apart_by_whole_words() -> None:
         if robot.trace[0].found != robot.trace[1].found:
             break
     else:
-        pytest.fail("a pan is a pancake")
+        pytest.fail("a pan and a pancake are always found together")
 
 
-def test_no_phrase_with_a_word_for_people_finds_somebody_where_nobody_is() -> None:
+def test_phrase_about_people_finds_nobody_in_an_empty_room() -> None:
     for sample in range(20):
         robot = SampledRobot(RoomMap(("hall",), "hall"), FactSampler(sample=sample))
         if not robot.perform("is_in_room", ["person"]):

@@ -1,4 +1,4 @@
-"""The user's own skills in simulation: what they draw, and which of their attempts house rules count."""
+"""Own skills in simulation: their random results, and failed attempts that count for house rules."""
 
 from collections.abc import Sequence
 
@@ -32,28 +32,28 @@ def pour_out(sim: Simulation, what: str) -> None:
 
 
 @skill
-def describe(sim: Simulation) -> str:  # type: ignore[empty-body]  # its result is drawn
+def describe(sim: Simulation) -> str:  # type: ignore[empty-body]  # its result is random
     """Describe the room."""
 
 
 @skill
-def choose_room(sim: Simulation) -> RoomName:  # type: ignore[empty-body]  # its result is drawn
+def choose_room(sim: Simulation) -> RoomName:  # type: ignore[empty-body]  # its result is random
     """Choose a room."""
 
 
 @skill
-def choose_things(sim: Simulation) -> list[ThingName]:  # type: ignore[empty-body]  # its result is drawn
+def choose_things(sim: Simulation) -> list[ThingName]:  # type: ignore[empty-body]  # its result is random
     """Choose some things."""
 
 
 @skill
-def choose_person(sim: Simulation) -> PersonName:  # type: ignore[empty-body]  # its result is drawn
+def choose_person(sim: Simulation) -> PersonName:  # type: ignore[empty-body]  # its result is random
     """Choose a person."""
 
 
-OWN = (search_for, pour_out, describe, choose_room, choose_things, choose_person)
+OWN_SKILLS = (search_for, pour_out, describe, choose_room, choose_things, choose_person)
 TABLE = SKILLS
-for _skill in OWN:
+for _skill in OWN_SKILLS:
     TABLE = TABLE.with_skill(_skill)
 WORLD = World(
     (Room("hall", ("mug", "cup|glass")), Room("lab", ("pen",), (Person("ann"),))),
@@ -71,28 +71,28 @@ def robots(rules: Sequence[Rule] = (), samples: int = 1) -> list[SimulatedRobot]
     return [SimulatedRobot(WORLD, skills=TABLE, guard=guard()), *sampled]
 
 
-def drawn(row: Skill) -> set[object]:
+def random_results(row: Skill) -> set[object]:
     results = (one.perform(row.name, []) for one in robots(samples=60))
     return {each for result in results for each in (result if isinstance(result, list) else [result])}
 
 
-def test_drawn_texts_are_never_empty() -> None:
-    texts = drawn(describe)
+def test_random_texts_are_never_empty() -> None:
+    texts = random_results(describe)
     assert len(texts) > 1
     assert all(texts)
 
 
-def test_drawn_names_are_those_of_the_world() -> None:
-    assert drawn(choose_room) == {"hall", "lab"}
-    assert drawn(choose_things) == {"mug", "pen"}
-    assert drawn(choose_person) == {"ann"}
+def test_random_names_are_those_of_the_world() -> None:
+    assert random_results(choose_room) == {"hall", "lab"}
+    assert random_results(choose_things) == {"mug", "pen"}
+    assert random_results(choose_person) == {"ann"}
 
 
-def test_models_see_a_name_as_a_text() -> None:
+def test_signature_shows_names_as_texts() -> None:
     assert choose_things.signature == "choose_things() -> list[str]"
 
 
-def test_truths_are_compared_without_regard_to_capitals() -> None:
+def test_truths_ignore_capitals() -> None:
     assert SimulatedRobot(WORLD, skills=TABLE).perform("search_for", ["water"]) is True
 
 

@@ -1,4 +1,4 @@
-"""A world is as a robot left or saw it before the program began, and rules count what was done before."""
+"""Sampled worlds and house rules take the robot's earlier events into account."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def event(kind: str, text: str, place: str = "kitchen", **more: object) -> Event
 
 
 def robots(*past: Event, rules: tuple[Rule, ...] = ()) -> list[SampledRobot]:
-    """The robot in several worlds that are as these events left them."""
+    """Return the robot in several sampled worlds after these events."""
     room_map = replace(ROOMS, past=past)
     guards = [RuleGuard(rules, room_map) if rules else None for _ in WORLDS]
     return [SampledRobot(room_map, FactSampler(0, n), guard=guards[n]) for n in WORLDS]
@@ -38,15 +38,15 @@ def robots(*past: Event, rules: tuple[Rule, ...] = ()) -> list[SampledRobot]:
 
 @pytest.mark.parametrize("found", [True, False])
 @pytest.mark.parametrize("what", ["mug", "the mug", "person", "Anne"])
-def test_a_look_finds_what_was_seen_last(what: str, found: bool) -> None:  # noqa: FBT001 - a value of pytest
+def test_look_finds_the_result_of_the_last_look(what: str, found: bool) -> None:  # noqa: FBT001 - a row of a table
     before = event(CHECK, what, found=not found)
     for robot in robots(before, event(CHECK, what, found=found)):
         assert robot.perform("is_in_room", [what]) is found
     elsewhere = {one.perform("is_in_room", [what]) for one in robots(event(CHECK, what, "lab", found=found))}
-    assert elsewhere == {True, False}, "another room is still imagined"
+    assert elsewhere == {True, False}, "looks in another room must stay random"
 
 
-def test_a_thing_that_could_not_be_picked_up_is_not_there() -> None:
+def test_thing_that_could_not_be_picked_up_is_absent() -> None:
     failed = event(PICK, "mug", "lab", failed="PickInvalidObject")
     for robot in robots(event(CHECK, "mug", "lab", found=True), failed, event(GOTO, "kitchen")):
         robot.perform("go_to", ["lab"])
@@ -57,7 +57,7 @@ def test_a_thing_that_could_not_be_picked_up_is_not_there() -> None:
     assert {one.perform("is_in_room", ["mug"]) for one in unsure} == {True, False}
 
 
-def test_an_answer_stays_the_same() -> None:
+def test_earlier_answer_is_repeated() -> None:
     asked = event(ASK, "Tea?", options=YES_NO, answer="no", to="Anne")
     for robot in robots(asked):
         assert robot.perform("ask", ["Anne", "Tea?", YES_NO]) == 1
@@ -65,7 +65,7 @@ def test_an_answer_stays_the_same() -> None:
     assert len({robot.perform("ask", ["Anne", "Coffee?", YES_NO]) for robot in robots(asked)}) == 2
 
 
-def test_the_robot_holds_what_it_picked_up() -> None:
+def test_robot_holds_the_thing_that_it_picked_up() -> None:
     for robot in robots(event(PICK, "mug", "lab")):
         assert (robot.held, robot.room) == ("mug", "kitchen")
         with pytest.raises(RobotError, match="holds"):
@@ -75,14 +75,14 @@ def test_the_robot_holds_what_it_picked_up() -> None:
         robot.perform("go_to", ["lab"])
 
 
-def test_a_thing_is_where_it_was_put_down() -> None:
+def test_thing_is_where_it_was_put_down() -> None:
     for robot in robots(event(PICK, "mug", "lab"), event(PLACE, "mug", holding="mug")):
         assert robot.held is None
         assert robot.perform("is_in_room", ["mug"])
         robot.perform("pick", ["mug"])
 
 
-def test_rules_count_what_was_done_before() -> None:
+def test_rules_count_earlier_events() -> None:
     once = Rule("once", "Ask once.", parse('not tr.AtLeast(ask(".*", ".*"), 2)'))
     asked = event(ASK, "Tea?", options=YES_NO, answer="no", to="Anne")
     for robot in robots(asked, rules=(once,)):
@@ -92,7 +92,7 @@ def test_rules_count_what_was_done_before() -> None:
         robot.perform("ask", ["Anne", "Coffee?", YES_NO])
 
 
-def test_rules_know_rooms_by_their_names_after_earlier_drives() -> None:
+def test_rules_use_room_names_for_earlier_drives() -> None:
     never_back = Rule(
         "never-back",
         "N.",
@@ -104,7 +104,7 @@ def test_rules_know_rooms_by_their_names_after_earlier_drives() -> None:
             robot.perform("go_to", ["kitchen"])
 
 
-def test_poses_before_count() -> None:
+def test_rules_count_earlier_poses() -> None:
     plan = tuple(
         Room(name, (), (), ((x, 0.0), (x + 1, 0.0), (x + 1, 1.0), (x, 1.0)), (x + 0.5, 0.5))
         for x, name in enumerate(ROOMS.rooms)
@@ -117,7 +117,7 @@ def test_poses_before_count() -> None:
         robot.perform("go_to", ["lab"])
 
 
-def test_a_past_travels_to_the_child() -> None:
+def test_map_with_a_past_can_be_pickled() -> None:
     room_map = replace(ROOMS, past=(event(PICK, "mug"),))
     assert pickle.loads(pickle.dumps(room_map)) == room_map
     assert hash(room_map) == hash(replace(room_map))
@@ -126,13 +126,13 @@ def test_a_past_travels_to_the_child() -> None:
 @pytest.mark.parametrize(
     "looks", [(("mug", True), ("blue mug", False)), (("blue mug", False), ("mug", True))]
 )
-def test_names_within_names_are_seen_apart(looks: tuple[tuple[str, bool], ...]) -> None:
+def test_looks_distinguish_a_name_within_another(looks: tuple[tuple[str, bool], ...]) -> None:
     for robot in robots(*(event(CHECK, name, found=found) for name, found in looks)):
         assert robot.perform("is_in_room", ["mug"])
         assert not robot.perform("is_in_room", ["blue mug"])
 
 
-def test_what_was_picked_up_in_an_unknown_room_is_held() -> None:
+def test_robot_holds_a_thing_from_an_unknown_room() -> None:
     ambiguous = RoomMap(
         ("hall", "kitchen", "lab"), "kitchen", plain=True, past=(event(PICK, "mug", "cellar"),)
     )

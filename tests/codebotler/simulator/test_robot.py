@@ -16,7 +16,7 @@ from codebotler.simulator.worlds.robot import Result, SimulatedRobot
 Texts: TypeAlias = tuple[str, ...]
 
 
-def test_a_thing_that_was_put_down_is_found_by_its_name_without_a_regex() -> None:
+def test_thing_that_was_put_down_is_found_without_a_regex() -> None:
     before = _pattern.cache_info()
     thing = Thing("Mug (of Amy)", is_pattern=False)
     assert thing.is_meant_by("the mug (OF AMY), please")
@@ -32,7 +32,7 @@ def options(*texts: str) -> tuple[Option, ...]:
 def robot_in(
     *rooms: str, objects: Texts = (), answers: Texts | None = None, start: str | None = None
 ) -> SimulatedRobot:
-    """A robot in the first of some rooms, where the objects and the one person are."""
+    """Return a robot in the first room, which holds the objects and the person."""
     people = () if answers is None else (Person(".*", answers),)
     first, *others = rooms or ("lab",)
     here = Room(first, objects=objects, people=people)
@@ -40,7 +40,7 @@ def robot_in(
 
 
 def failure(robot: SimulatedRobot, skill: str, *arguments: str | tuple[Option, ...]) -> str:
-    """The kind of error that a skill ends in."""
+    """Perform a skill that must fail, and return the kind of its error."""
     with pytest.raises(RobotError) as caught:
         robot.perform(skill, arguments)
     assert str(caught.value)
@@ -53,7 +53,7 @@ def go(request: str, *rooms: str) -> str:
     return robot.room
 
 
-def sees(request: str, *objects: str) -> Result:
+def look_for(request: str, *objects: str) -> Result:
     return robot_in(objects=objects).perform("is_in_room", [request])
 
 
@@ -69,28 +69,28 @@ def test_request_may_not_be_shorter_than_the_label_of_the_room() -> None:
     assert failure(robot, "go_to", "conference") == "GoToInvalidLocation"
 
 
-def test_room_12_is_found_as_room_1_where_that_comes_first() -> None:
+def test_request_for_room_12_finds_an_earlier_room_1() -> None:
     rooms = [f"conference room {number}" for number in range(1, 13)]
     assert go("conference room 12", *rooms) == "conference room 1"
 
 
-def test_of_two_rooms_in_one_request_the_first_of_the_world_is_meant() -> None:
+def test_request_with_two_rooms_means_the_first_of_the_world() -> None:
     assert go("alice's and bob's office", "bob's office", "alice's office") == "bob's office"
 
 
-def test_room_named_later_in_the_world_is_found_where_the_earlier_one_does_not_match() -> None:
+def test_later_room_is_found_if_the_earlier_one_does_not_match() -> None:
     assert go("alice's office", "bob's office", "alice's office") == "alice's office"
 
 
 @pytest.mark.parametrize("matching", ["label-in-request", "whole-words"])
-def test_a_name_is_found_by_itself_though_it_is_another_regex(matching: Matching) -> None:
+def test_name_is_found_literally_even_if_it_is_another_regex(matching: Matching) -> None:
     for request in ("Lab (2F)", "lab (2f)"):
         assert resolve_room(("hall", "Lab (2F)"), request, matching) == "Lab (2F)"
         assert Thing("lab (2F)").is_meant_by(request, matching)
     assert resolve_room(("hall", "Lab (2F)"), "Lab (2", matching) is None
 
 
-def test_labels_are_looked_for_without_case_and_across_lines() -> None:
+def test_labels_ignore_case_and_match_across_lines() -> None:
     assert go("MAIN OFFICE", "Main Office") == "Main Office"
     assert go("room\n5", "room.5") == "room.5"
 
@@ -108,19 +108,17 @@ def test_labels_are_looked_for_without_case_and_across_lines() -> None:
         ("mugs", "^mug$", False),
     ],
 )
-def test_object_is_found_where_its_label_stands_in_the_request(
-    request_: str, label: str, found: object
-) -> None:
-    assert sees(request_, label) is found
+def test_object_is_found_if_the_request_holds_its_label(request_: str, label: str, found: object) -> None:
+    assert look_for(request_, label) is found
 
 
 @given(st.text())
-def test_in_an_occupied_room_anything_is_there(request: str) -> None:
+def test_look_in_an_occupied_room_finds_anything(request: str) -> None:
     assert robot_in(answers=("yes",)).perform("is_in_room", [request]) is True
 
 
 @given(st.text())
-def test_in_an_empty_room_nothing_is_there(request: str) -> None:
+def test_look_in_an_empty_room_finds_nothing(request: str) -> None:
     assert robot_in().perform("is_in_room", [request]) is False
 
 
@@ -146,14 +144,14 @@ def test_placed_object_is_found_by_its_request_as_literal_text() -> None:
     robot.perform("pick", ["stapler ("])
 
 
-def test_placed_object_with_special_characters_is_no_pattern() -> None:
+def test_placed_object_with_special_characters_is_not_a_regex() -> None:
     robot = robot_in(objects=("mug",))
     robot.perform("pick", ["mug.*"])
     robot.perform("place", ["mug.*"])
     assert robot.perform("is_in_room", ["mug and tea"]) is False
 
 
-# --- what the skills do (section 3)
+# --- effects of skills (section 3)
 
 
 def test_location_is_the_label_and_leaves_no_event() -> None:
@@ -163,7 +161,7 @@ def test_location_is_the_label_and_leaves_no_event() -> None:
     assert robot.trace == (Event("goto", "The LAB"),)
 
 
-def test_rooms_come_in_the_order_of_the_world_with_the_start_and_leave_no_event() -> None:
+def test_rooms_are_in_the_order_of_the_world_and_leave_no_event() -> None:
     robot = robot_in("start_loc", "b", "a")
     assert robot.perform("get_all_rooms", []) == ["start_loc", "b", "a"]
     assert robot.trace == ()
@@ -183,27 +181,27 @@ def test_failed_drive_is_recorded_and_leaves_the_robot_where_it_is() -> None:
     assert (robot.room, robot.trace) == ("start", (Event("goto", "attic"),))
 
 
-def test_look_is_recorded_with_what_it_saw() -> None:
+def test_look_is_recorded_with_its_result() -> None:
     robot = robot_in(objects=("mug",))
     robot.perform("is_in_room", ["mug"])
     robot.perform("is_in_room", ["cup"])
     assert robot.trace == (Event("check", "mug", found=True), Event("check", "cup", found=False))
 
 
-def test_saying_needs_nobody() -> None:
+def test_speaking_needs_no_listener() -> None:
     robot = robot_in()
     assert robot.perform("say", ["Hello"]) is None
     assert robot.trace == (Event("say", "Hello"),)
 
 
 @pytest.mark.parametrize("skill", ["go_to", "is_in_room", "say", "pick"])
-def test_events_hold_the_request_with_its_case_but_without_the_spaces_at_its_ends(skill: str) -> None:
+def test_events_hold_the_request_with_its_case_but_stripped(skill: str) -> None:
     robot = robot_in("The Lab", objects=("lab",))
     robot.perform(skill, [" \t the Lab \n"])
     assert [event.text for event in robot.trace] == ["the Lab"]
 
 
-def test_options_keep_their_spaces_and_the_question_loses_those_at_its_ends() -> None:
+def test_options_keep_their_spaces_but_the_question_is_stripped() -> None:
     robot = robot_in(answers=(".*",))
     robot.perform("ask", ["", "  Tea?\n", options(" Yes ", "No")])
     assert robot.trace == (Event("ask", "Tea?", options(" Yes ", "No"), answer=" Yes "),)
@@ -236,7 +234,7 @@ def test_failed_pick_and_failed_place_leave_no_event() -> None:
     assert (robot.trace, robot.held) == ((), None)
 
 
-def test_full_hands_are_noticed_before_a_missing_object() -> None:
+def test_held_object_is_an_error_before_a_missing_one() -> None:
     robot = robot_in(objects=("mug", "cup"))
     robot.perform("pick", ["mug"])
     assert failure(robot, "pick", "cup") == "PickWhileHolding"
@@ -253,7 +251,7 @@ def test_empty_request_that_was_picked_can_be_placed() -> None:
     robot.perform("place", [""])
 
 
-def test_robot_works_in_a_copy_of_the_world() -> None:
+def test_robot_leaves_the_world_unchanged() -> None:
     world = World((Room("lab", ("mug",), (Person(".*", ("a", "b")),)),), "lab")
     for _ in range(2):
         robot = SimulatedRobot(world)
@@ -261,7 +259,7 @@ def test_robot_works_in_a_copy_of_the_world() -> None:
         assert robot.perform("ask", ["", "?", options("a", "b")]) == 0
 
 
-def test_events_say_where_and_when_they_happened() -> None:
+def test_events_have_place_and_time() -> None:
     robot = robot_in("hall", "lab")
     robot.perform("go_to", ["lab"])
     robot.now = 2.5
@@ -269,7 +267,7 @@ def test_events_say_where_and_when_they_happened() -> None:
     assert [(event.place, event.time) for event in robot.trace] == [("hall", 0.0), ("lab", 2.5)]
 
 
-def test_a_look_changes_something_where_somebody_may_come() -> None:
+def test_look_is_idle_unless_a_person_may_come() -> None:
     for looks in (0, 2):
         people = (Person("ann", after_looks=looks),)
         robot = SimulatedRobot(World((Room("hall", people=people),), "hall"))
@@ -279,7 +277,7 @@ def test_a_look_changes_something_where_somebody_may_come() -> None:
 # --- questions (section 4)
 
 
-def test_question_without_options_is_recorded_and_fails_even_where_nobody_is() -> None:
+def test_question_without_options_is_recorded_and_fails_even_in_an_empty_room() -> None:
     for answers in (None, ("yes",)):
         robot = robot_in(answers=answers)
         assert failure(robot, "ask", "bob", "Tea?", ()) == "AskEmptyOptions"
@@ -292,14 +290,14 @@ def test_question_without_options_uses_up_no_answer() -> None:
     assert robot.perform("ask", ["", "?", options("milk", "tea")]) == 1
 
 
-def test_question_to_nobody_is_recorded_and_fails() -> None:
+def test_question_in_an_empty_room_is_recorded_and_fails() -> None:
     robot = robot_in()
     assert failure(robot, "ask", "bob", "Tea?", options("yes")) == "AskNoPerson"
     assert robot.trace == (Event("ask", "Tea?", options("yes")),)
 
 
 @given(st.text())
-def test_whoever_is_there_answers_to_any_name(name: str) -> None:
+def test_person_answers_to_any_name(name: str) -> None:
     assert robot_in(answers=("yes",)).perform("ask", [name, "?", options("no", "yes")]) == 1
 
 
@@ -346,14 +344,14 @@ def test_event_of_a_question_holds_the_answer() -> None:
         ("yes", "Tea?", ("maybe", "no"), 1),
     ],
 )
-def test_answer_is_looked_for_in_the_options_and_else_is_a_yes_or_a_no(
+def test_answer_chooses_the_option_that_holds_it_or_else_yes_or_no(
     answer: str, question: str, offered: Texts, chosen: int | None
 ) -> None:
     assert choose(answer, question, options(*offered)) == chosen
 
 
 @given(st.text(), st.lists(st.text(), min_size=1).map(tuple))
-def test_answer_that_fits_all_chooses_the_first_option(question: str, offered: Texts) -> None:
+def test_answer_that_matches_all_options_chooses_the_first(question: str, offered: Texts) -> None:
     assert choose(".*", question, options(*offered)) == 0
 
 
@@ -387,7 +385,7 @@ def test_number_among_the_options_is_matched_as_text() -> None:
 # --- the rest
 
 
-def test_events_say_where_they_happen_and_where_drives_lead() -> None:
+def test_events_have_the_place_and_the_destination_of_drives() -> None:
     robot = robot_in("hall", "lab", "office")
     for request in ("the lab", "attic", "office"):
         try:
@@ -402,6 +400,6 @@ def test_events_say_where_they_happen_and_where_drives_lead() -> None:
     ]
 
 
-def test_rules_are_the_suites_own() -> None:
+def test_robot_uses_the_settings_of_the_suite() -> None:
     settings = SimulationSettings(literals="as-written")
     assert SimulatedRobot(World((Room("a"),), "a"), settings).settings is settings

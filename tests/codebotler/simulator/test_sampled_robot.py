@@ -1,4 +1,4 @@
-"""What holds in a world that is drawn while the program asks about it."""
+"""A sampled world draws its facts when the program asks, and keeps them."""
 
 import itertools
 import os
@@ -34,8 +34,8 @@ def look(robot: SampledRobot, what: str) -> Result:
     return robot.perform("is_in_room", [what])
 
 
-def where(what: str, *, there: bool) -> SampledRobot:
-    """A robot in a kitchen in which it has looked for something and found it, or not."""
+def kitchen_robot(what: str, *, there: bool) -> SampledRobot:
+    """Return a robot that looked for something in the kitchen and found it, or did not."""
     robots = (robot_in(sample=number) for number in range(100))
     return next(robot for robot in robots if look(robot, what) is there)
 
@@ -46,10 +46,10 @@ def failure(robot: SampledRobot, skill: str, *arguments: Any) -> str:  # noqa: A
     return caught.value.kind
 
 
-# --- rooms are certain
+# --- rooms
 
 
-def test_rooms_are_those_of_the_plan_and_found_as_in_the_simulator() -> None:
+def test_rooms_are_those_of_the_map_and_match_as_in_the_simulator() -> None:
     robot = SampledRobot(ROOMS, FactSampler())
     assert robot.perform("get_all_rooms", ()) == ["start_loc", "kitchen", "lab"]
     assert robot.perform("get_current_location", ()) == "start_loc"
@@ -71,7 +71,7 @@ def test_rooms_of_a_world_keep_their_regexes_and_their_start() -> None:
     assert robot.room == "lab [12]"
 
 
-def test_guessed_rooms_are_plain_texts_and_any_other_is_found_too() -> None:
+def test_guessed_rooms_are_plain_texts_and_other_rooms_exist_too() -> None:
     robot = SampledRobot(RoomMap(("c++ lab", "hall"), "hall", guessed=True), FactSampler())
     robot.perform("go_to", ["C++ lab"])
     assert robot.room == "c++ lab"
@@ -82,15 +82,15 @@ def test_guessed_rooms_are_plain_texts_and_any_other_is_found_too() -> None:
     assert failure(robot, "go_to", " ") == "GoToInvalidLocation"
 
 
-def test_a_room_is_preferred_to_one_that_its_name_contains() -> None:
+def test_longer_room_name_is_preferred_to_one_that_it_contains() -> None:
     room_map = RoomMap(("lab", "lab 2", "hall"), "hall", guessed=True)
     assert (room_map.room("Lab 2"), room_map.room("the lab"), room_map.room("")) == ("lab 2", "lab", None)
 
 
-# --- what is looked for is drawn, once
+# --- looks
 
 
-def test_a_fact_asked_twice_is_the_same() -> None:
+def test_repeated_look_has_the_same_result() -> None:
     for sample in range(30):
         robot = robot_in(sample=sample)
         first = look(robot, "mug")
@@ -102,14 +102,14 @@ def test_a_fact_asked_twice_is_the_same() -> None:
         assert len([fact for fact in robot.facts if '"kitchen"' in fact.sentence]) == 1
 
 
-def test_what_is_looked_for_is_there_in_about_every_second_world_and_differs_by_room() -> None:
+def test_look_succeeds_in_about_half_of_the_worlds_and_differs_by_room() -> None:
     seen = [look(robot_in(sample=number), "mug") for number in range(200)]
     assert 70 < sum(map(bool, seen)) < 130
     in_lab = [look(robot_in("lab", number), "mug") for number in range(200)]
     assert seen != in_lab
 
 
-def test_a_lucky_world_has_most_of_what_is_looked_for() -> None:
+def test_look_in_a_lucky_world_mostly_succeeds() -> None:
     seen = [
         FactSampler(sample=number, lucky=True).decide("is_there", "kitchen", "mug").result
         for number in range(200)
@@ -117,9 +117,9 @@ def test_a_lucky_world_has_most_of_what_is_looked_for() -> None:
     assert 155 < sum(seen) < 195
 
 
-def test_a_longer_request_finds_what_a_part_of_it_finds() -> None:
-    assert look(where("stapler", there=True), "red stapler") is True
-    assert look(where("red stapler", there=False), "stapler") is False
+def test_look_for_a_longer_name_agrees_with_one_for_a_part() -> None:
+    assert look(kitchen_robot("stapler", there=True), "red stapler") is True
+    assert look(kitchen_robot("red stapler", there=False), "stapler") is False
 
 
 def test_all_words_for_people_mean_the_same() -> None:
@@ -131,17 +131,17 @@ def test_all_words_for_people_mean_the_same() -> None:
     assert normalized("anne") == "anne"
 
 
-def test_a_thing_is_nobody() -> None:
+def test_thing_is_not_a_person() -> None:
     robots = (robot_in(sample=number) for number in range(40))
     assert {look(robot, "person") for robot in robots if look(robot, "body")} == {True, False}
 
 
-def test_looking_and_speaking_leave_the_robot_as_it_is() -> None:
+def test_looking_and_speaking_are_idle() -> None:
     assert robot_in().idle_skills == {"is_in_room", "get_all_rooms", "get_current_location", "say"}
 
 
-def test_an_object_picked_up_is_gone_and_put_down_is_there() -> None:
-    robot = where("mug", there=True)
+def test_picked_object_is_gone_and_placed_object_is_there() -> None:
+    robot = kitchen_robot("mug", there=True)
     robot.perform("pick", ["mug"])
     assert look(robot, "mug") is False
     robot.perform("go_to", ["lab"])
@@ -155,8 +155,8 @@ def test_an_object_picked_up_is_gone_and_put_down_is_there() -> None:
     assert look(robot, "mug") is True
 
 
-def test_put_down_it_is_there_although_it_was_missed_before() -> None:
-    robot = where("mug", there=False)
+def test_placed_object_is_there_even_if_an_earlier_look_missed_it() -> None:
+    robot = kitchen_robot("mug", there=False)
     robot.perform("go_to", ["lab"])
     robot.perform("pick", ["mug"])
     robot.perform("go_to", ["kitchen"])
@@ -164,10 +164,10 @@ def test_put_down_it_is_there_although_it_was_missed_before() -> None:
     assert look(robot, "mug") is True
 
 
-# --- what the program never looked for
+# --- assumptions without a look
 
 
-def test_what_it_never_looked_for_is_as_the_program_takes_it() -> None:
+def test_assumption_without_a_look_is_true() -> None:
     for number in range(30):
         robot = robot_in(sample=number)
         robot.perform("pick", ["stapler"])
@@ -178,7 +178,7 @@ def test_what_it_never_looked_for_is_as_the_program_takes_it() -> None:
         assert fact.sentence == '"alice" is in "kitchen"'
 
 
-def test_it_may_take_another_one_where_it_never_looked() -> None:
+def test_second_pick_without_a_look_succeeds_until_a_look() -> None:
     robot = robot_in()
     for _ in range(2):
         robot.perform("pick", ["stapler"])
@@ -189,22 +189,22 @@ def test_it_may_take_another_one_where_it_never_looked() -> None:
     assert failure(robot, "pick", "stapler") == "PickInvalidObject"
 
 
-def test_an_absence_that_it_saw_counts() -> None:
-    assert failure(where("mug", there=False), "pick", "mug") == "PickInvalidObject"
-    assert failure(where("alice", there=False), "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
-    nobody = where("person", there=False)
+def test_observed_absence_makes_skills_fail() -> None:
+    assert failure(kitchen_robot("mug", there=False), "pick", "mug") == "PickInvalidObject"
+    assert failure(kitchen_robot("alice", there=False), "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
+    nobody = kitchen_robot("person", there=False)
     assert failure(nobody, "ask", "", "Tea?", YES_NO) == "AskNoPerson"
     assert failure(nobody, "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
 
 
-def test_that_an_object_is_absent_says_nothing_of_people_nor_of_other_rooms() -> None:
-    robot = where("mug", there=False)
+def test_absent_object_says_nothing_about_people_or_other_rooms() -> None:
+    robot = kitchen_robot("mug", there=False)
     robot.perform("ask", ["", "Where is the mug?", YES_NO])
     robot.perform("go_to", ["lab"])
     robot.perform("pick", ["mug"])
 
 
-def test_strict_draws_what_the_program_takes_for_granted() -> None:
+def test_strict_world_draws_the_assumptions_of_the_program() -> None:
     picked: set[str] = set()
     answered: set[str] = set()
     granted: list[tuple[str, Sequence[Argument], set[str]]] = [
@@ -224,7 +224,7 @@ def test_strict_draws_what_the_program_takes_for_granted() -> None:
     assert answered == {"done", "AskNoPerson"}
 
 
-def test_strict_has_no_second_one_to_take() -> None:
+def test_strict_world_has_no_second_object() -> None:
     robots = (robot_in(sample=number, strict=True) for number in range(100))
     robot = next(robot for robot in robots if robot.sampler.decide("is_there", "kitchen", "mug").result)
     robot.perform("pick", ["mug"])
@@ -234,7 +234,7 @@ def test_strict_has_no_second_one_to_take() -> None:
     assert failure(robot, "pick", "mug") == "PickInvalidObject"
 
 
-def test_it_holds_one_thing_and_questions_need_options() -> None:
+def test_robot_holds_one_thing_and_questions_need_options() -> None:
     robot = robot_in()
     assert failure(robot, "ask", "alice", "Tea?", ()) == "AskEmptyOptions"
     assert failure(robot, "place", "mug") == "PlaceNoObject"
@@ -245,7 +245,7 @@ def test_it_holds_one_thing_and_questions_need_options() -> None:
 # --- answers
 
 
-def test_answers_are_drawn_from_the_options_and_stay() -> None:
+def test_answers_are_random_options_and_stay_the_same() -> None:
     options = tuple(Option(text) for text in ("tea", "water", "1", "10"))
     chosen = set()
     for number in range(60):
@@ -272,10 +272,10 @@ def test_an_answer_that_is_no_longer_offered_is_drawn_again() -> None:
     ]
 
 
-# --- what is owed to chance
+# --- excuses for bad luck
 
 
-def searched(what: str, in_kitchen: bool, in_lab: bool, seed: int = 0) -> SampledRobot:  # noqa: FBT001 - a table
+def search_rooms(what: str, in_kitchen: bool, in_lab: bool, seed: int = 0) -> SampledRobot:  # noqa: FBT001 - a row of a table
     for number in itertools.count():
         robot = robot_in(sample=number, seed=seed)
         if look(robot, what) is not in_kitchen:
@@ -286,17 +286,17 @@ def searched(what: str, in_kitchen: bool, in_lab: bool, seed: int = 0) -> Sample
     raise AssertionError
 
 
-def test_a_search_in_vain_excuses_what_comes_of_it() -> None:
-    robot = searched("mug", in_kitchen=False, in_lab=False)
+def test_search_in_vain_excuses_the_failures_that_follow() -> None:
+    robot = search_rooms("mug", in_kitchen=False, in_lab=False)
     assert failure(robot, "place", "mug") == "PlaceNoObject"
     assert len(robot.excuses) == 1
     assert failure(robot, "place", "cup") == "PlaceNoObject"
     assert len(robot.excuses) == 1
-    assert failure(searched("alice", in_kitchen=False, in_lab=False), "ask", "alice", "Tea?", YES_NO)
+    assert failure(search_rooms("alice", in_kitchen=False, in_lab=False), "ask", "alice", "Tea?", YES_NO)
 
 
-def test_one_look_in_vain_excuses_nothing() -> None:
-    robot = where("mug", there=False)
+def test_single_look_in_vain_excuses_nothing() -> None:
+    robot = kitchen_robot("mug", there=False)
     for skill in ("place", "pick"):
         assert failure(robot, skill, "mug") in {"PlaceNoObject", "PickInvalidObject"}
     assert look(robot, "mug") is False
@@ -304,16 +304,16 @@ def test_one_look_in_vain_excuses_nothing() -> None:
     assert robot.excuses == set()
 
 
-def test_a_search_that_found_it_once_excuses_nothing() -> None:
-    robot = searched("alice", in_kitchen=True, in_lab=False)
+def test_search_that_found_the_person_excuses_nothing() -> None:
+    robot = search_rooms("alice", in_kitchen=True, in_lab=False)
     assert failure(robot, "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
     assert robot.excuses == set()
 
 
-def test_found_once_in_a_long_search_excuses_nothing() -> None:
-    robot = searched("alice", in_kitchen=False, in_lab=True)
+def test_long_search_that_found_the_person_once_excuses_nothing() -> None:
+    robot = search_rooms("alice", in_kitchen=False, in_lab=True)
     while not robot.here.lacks("alice"):
-        robot = searched("alice", in_kitchen=False, in_lab=True, seed=robot.sampler.seed + 1)
+        robot = search_rooms("alice", in_kitchen=False, in_lab=True, seed=robot.sampler.seed + 1)
         robot.perform("go_to", ["start_loc"])
         look(robot, "alice")
     assert len(robot.searches["alice"].vain) == 2
@@ -322,21 +322,21 @@ def test_found_once_in_a_long_search_excuses_nothing() -> None:
 
 
 @pytest.mark.parametrize(("sought", "placed"), [("my blue mug", "mug"), ("mug", "the blue mug")])
-def test_a_search_by_a_longer_or_a_shorter_name_is_one_too(sought: str, placed: str) -> None:
-    robot = searched(sought, in_kitchen=False, in_lab=False)
+def test_search_by_a_longer_or_shorter_name_excuses_failures(sought: str, placed: str) -> None:
+    robot = search_rooms(sought, in_kitchen=False, in_lab=False)
     assert failure(robot, "place", placed) == "PlaceNoObject"
     assert len(robot.excuses) == 1
 
 
 def test_waiting_in_vain_does_not_excuse_asking() -> None:
-    robot = where("guest", there=False)
+    robot = kitchen_robot("guest", there=False)
     robot.now = 60.0
     look(robot, "guest")
     assert failure(robot, "ask", "guest", "Tea?", YES_NO) == "AskNoPerson"
     assert robot.excuses == set()
 
 
-def test_who_has_a_name_is_somebody() -> None:
+def test_named_person_is_also_found_as_a_person() -> None:
     for sample in range(20):
         robot = SampledRobot(ROOMS, FactSampler(sample=sample))
         if look(robot, "Bob"):
@@ -346,14 +346,14 @@ def test_who_has_a_name_is_somebody() -> None:
             assert not look(robot, "Bob")
 
 
-def test_what_was_taken_is_gone_also_if_it_has_a_name() -> None:
-    robot = where("Coke", there=True)
+def test_picked_thing_with_a_capitalized_name_is_gone() -> None:
+    robot = kitchen_robot("Coke", there=True)
     robot.perform("pick", ["Coke"])
     assert not look(robot, "Coke")
 
 
 @pytest.mark.parametrize("options", [("No", "Yes"), ("Yes", "No")])
-def test_who_is_lucky_meets_people_who_mostly_agree(options: tuple[str, ...]) -> None:
+def test_people_in_a_lucky_world_mostly_agree(options: tuple[str, ...]) -> None:
     def says_yes(sample: int, *, lucky: bool) -> bool:
         robot = SampledRobot(ROOMS, FactSampler(sample=sample, lucky=lucky))
         chosen = robot.perform("ask", ["Bob", "Tea?", tuple(map(Option, options))])
@@ -363,8 +363,8 @@ def test_who_is_lucky_meets_people_who_mostly_agree(options: tuple[str, ...]) ->
     assert sum(says_yes(sample, lucky=True) for sample in range(64)) > 52
 
 
-def test_finding_two_of_what_it_searches_excuses_picking_both() -> None:
-    robot = searched("mug", in_kitchen=True, in_lab=True)
+def test_finding_the_thing_twice_excuses_picking_both() -> None:
+    robot = search_rooms("mug", in_kitchen=True, in_lab=True)
     robot.perform("pick", ["mug"])
     assert failure(robot, "pick", "mug") == "PickWhileHolding"
     assert len(robot.excuses) == 1
@@ -372,25 +372,25 @@ def test_finding_two_of_what_it_searches_excuses_picking_both() -> None:
     assert len(robot.excuses) == 1
 
 
-def test_strict_excuses_nothing() -> None:
-    robot = searched("mug", in_kitchen=False, in_lab=False)
+def test_strict_world_excuses_nothing() -> None:
+    robot = search_rooms("mug", in_kitchen=False, in_lab=False)
     robot.sampler = FactSampler(robot.sampler.seed, robot.sampler.sample, strict=True)
     assert failure(robot, "place", "mug") == "PlaceNoObject"
     assert robot.excuses == set()
 
 
-# --- the same seed draws the same
+# --- seeds
 
 
-def test_draws_depend_on_seed_sample_and_fact_alone() -> None:
-    def drawn(sampler: FactSampler) -> list[int]:
+def test_draws_depend_only_on_seed_sample_and_fact() -> None:
+    def draw_numbers(sampler: FactSampler) -> list[int]:
         return [sampler.draw(1_000, "a fact", str(number)) for number in range(20)]
 
-    assert drawn(FactSampler(7, 3)) == drawn(FactSampler(7, 3))
+    assert draw_numbers(FactSampler(7, 3)) == draw_numbers(FactSampler(7, 3))
     assert (
         len(
             {
-                tuple(drawn(sampler))
+                tuple(draw_numbers(sampler))
                 for sampler in (FactSampler(7, 3), FactSampler(7, 4), FactSampler(8, 3), FactSampler(73, 0))
             }
         )
@@ -399,14 +399,14 @@ def test_draws_depend_on_seed_sample_and_fact_alone() -> None:
     assert FactSampler(1).draw(1_000, "ab", "c") != FactSampler(1).draw(1_000, "a", "bc")
 
 
-def test_draws_are_the_same_whatever_hashing_does() -> None:
-    told = (
+def test_draws_do_not_depend_on_the_hash_seed() -> None:
+    code = (
         "from codebotler.simulator.worlds.fact_sampler import FactSampler\n"
         "print([FactSampler(5).draw(99, 'x', str(n)) for n in range(9)])\n"
     )
     printed = {
         subprocess.run(
-            [sys.executable, "-c", told],
+            [sys.executable, "-c", code],
             env={**os.environ, "PYTHONHASHSEED": seed},
             capture_output=True,
             check=True,
@@ -416,7 +416,7 @@ def test_draws_are_the_same_whatever_hashing_does() -> None:
     assert printed == {f"{[FactSampler(5).draw(99, 'x', str(n)) for n in range(9)]}\n".encode()}
 
 
-def test_a_draw_knows_in_which_worlds_it_would_be_the_same() -> None:
+def test_draw_holds_exactly_in_worlds_with_the_same_result() -> None:
     robot = robot_in(sample=1)
     look(robot, "mug")
     robot.perform("ask", ["", "Tea?", YES_NO])
@@ -427,18 +427,18 @@ def test_a_draw_knows_in_which_worlds_it_would_be_the_same() -> None:
         assert all(draw.holds_in(other.sampler) for draw in robot.draws) is same
 
 
-def asked_by_options(question: str, *options: str, person: str = "", sample: int = 0) -> str:
+def answer_by_options(question: str, *options: str, person: str = "", sample: int = 0) -> str:
     robot = SampledRobot(ROOMS, FactSampler(sample=sample, by_options=True))
     chosen = robot.perform("ask", [person, question, tuple(map(Option, options))])
     assert isinstance(chosen, int)
     return options[chosen].lower()
 
 
-def test_answers_by_options_depend_on_no_words_of_the_question() -> None:
+def test_answers_by_options_ignore_the_words_of_the_question() -> None:
     worlds = range(20)
-    first = [asked_by_options("Tea or coffee?", "tea", "coffee", sample=number) for number in worlds]
+    first = [answer_by_options("Tea or coffee?", "tea", "coffee", sample=number) for number in worlds]
     same = [
-        asked_by_options("What would you like?", "Coffee", "Tea", person="person", sample=number)
+        answer_by_options("What would you like?", "Coffee", "Tea", person="person", sample=number)
         for number in worlds
     ]
     assert first == same

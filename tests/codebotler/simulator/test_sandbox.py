@@ -1,4 +1,4 @@
-"""What a program finds around it, and that it finds no way out."""
+"""Programs find the documented environment, and no way out of it."""
 
 import textwrap
 from typing import TypeAlias
@@ -29,18 +29,18 @@ def task(body: str) -> str:
     return "def task_program():\n" + textwrap.indent(body, "    ") + "\n"
 
 
-def said(outcome: Outcome) -> list[str]:
-    """What the robot said in a run that ended well."""
+def texts_of(outcome: Outcome) -> list[str]:
+    """Return the texts that the robot said in a finished run."""
     assert outcome.status == Status.FINISHED, outcome
     return [event.text for event in outcome.trace if event.kind == "say"]
 
 
-def on_the_line(text: str) -> str:
-    """What writes a frame past the skills."""
+def write_frame(text: str) -> str:
+    """Return code that writes a frame to the channel, without a skill."""
     return f"import os\nos.write(3, {len(text).to_bytes(4, 'big') + text.encode()!r})\n"
 
 
-def all_of(*tables: dict[str, tuple[str, object]]) -> dict[str, str]:
+def programs_of(*tables: dict[str, tuple[str, object]]) -> dict[str, str]:
     return {name: program for table in tables for name, (program, _) in table.items()}
 
 
@@ -49,10 +49,10 @@ def run_all(programs: dict[str, str], settings: SimulationSettings) -> Outcomes:
     return dict(zip(programs, run(pairs, workers=1, settings=settings), strict=True))
 
 
-# --- what works: each program says these things
+# --- programs that work: each says these texts
 
 WORKS: dict[str, tuple[str, object]] = {
-    # bugs of the original evaluator (SEMANTICS.md, section 9), by their number
+    # bugs of the original evaluator by number (SEMANTICS.md, section 9)
     "1 text with the name of a skill": (
         task("""say("amy's lab".replace("'s lab", ""))"""),
         ["amy"],
@@ -327,14 +327,14 @@ WORKS: dict[str, tuple[str, object]] = {
     "prints a gigabyte": (task("text = 'x' * 10**6\nfor i in range(1000): print(text)\nsay('a')"), ["a"]),
     "swallows a caught stop of its own": (task("try:\n    exit()\nexcept SystemExit:\n    say('a')"), ["a"]),
 }
-# --- what fails: each program ends in this error, and leaves this trace
+# --- programs that fail: each ends with this status, kind of error and message
 
 T = Status.TIMEOUT
 P = Status.PYTHON_ERROR
-ON_THE_LINE = "the program wrote to the sandbox channel"
-SPENT = "200,000 turns of loops"
+FORGED_MESSAGE = "the program wrote to the sandbox channel"
+TOO_MANY_TURNS = "200,000 turns of loops"
 TOO_DEEP = "the program is too large, or nested too deeply"
-SUPPRESSED = "from contextlib import suppress\nwith suppress(BaseException):\n    while 1: pass\n"
+SUPPRESSES_ERRORS = "from contextlib import suppress\nwith suppress(BaseException):\n    while 1: pass\n"
 FAILS: dict[str, tuple[str, object]] = {
     "16 endless recursion keeps its class": (
         (
@@ -402,55 +402,55 @@ FAILS: dict[str, tuple[str, object]] = {
         task("say(text='a')"),
         (P, "TypeError", "say() got an unexpected keyword argument 'text'"),
     ),
-    # limits that are swallowed
-    "endless loop": (task("while True: pass"), (T, "TimeoutError", SPENT)),
+    # programs that catch the error of a limit
+    "endless loop": (task("while True: pass"), (T, "TimeoutError", TOO_MANY_TURNS)),
     "swallows in a loop": (
         task("while True:\n    try:\n        while True: pass\n    except BaseException: pass"),
-        (T, "TimeoutError", SPENT),
+        (T, "TimeoutError", TOO_MANY_TURNS),
     ),
     "swallows once and ends": (
         task("try:\n    while True: pass\nexcept BaseException: pass"),
-        (T, "TimeoutError", SPENT),
+        (T, "TimeoutError", TOO_MANY_TURNS),
     ),
     "swallows and acts": (
         task("try:\n    while True: pass\nexcept: pass\nfinally:\n    say('a')"),
-        (T, "TimeoutError", SPENT),
+        (T, "TimeoutError", TOO_MANY_TURNS),
     ),
     "swallows by continue in finally": (
         task("while True:\n    try:\n        while True: pass\n    finally:\n        continue"),
-        (T, "TimeoutError", SPENT),
+        (T, "TimeoutError", TOO_MANY_TURNS),
     ),
     "swallows by suppress": (
         task(
             "from contextlib import suppress\nwhile 1:\n"
             "    with suppress(BaseException):\n        while 1: pass"
         ),
-        (T, "TimeoutError", SPENT),
+        (T, "TimeoutError", TOO_MANY_TURNS),
     ),
     "swallows in a generator": (
         task("def g():\n    while 1:\n        try: yield\n        except: pass\nfor _ in g(): pass"),
-        (T, "TimeoutError", SPENT),
+        (T, "TimeoutError", TOO_MANY_TURNS),
     ),
     "swallows in recursion": (
         "def f():\n    try:\n        while 1: pass\n    except BaseException: f()\n" + task("f()"),
-        (T, "TimeoutError", SPENT),
+        (T, "TimeoutError", TOO_MANY_TURNS),
     ),
     "swallows in __del__": (
         task("class A:\n    def __del__(self):\n        while True: pass\nA()\nsay('a')"),
-        (T, "TimeoutError", SPENT),
+        (T, "TimeoutError", TOO_MANY_TURNS),
     ),
-    "spends in a comprehension": (task("[0 for i in range(10**9)]"), (T, "TimeoutError", SPENT)),
-    "spends in a lambda": (task("sum(map(lambda x: x, range(10**9)))"), (T, "TimeoutError", SPENT)),
-    "exits after the budget": (task(SUPPRESSED + "exit()"), (T, "TimeoutError", SPENT)),
-    "ends after the budget": (task(SUPPRESSED + "1"), (T, "TimeoutError", SPENT)),
-    "fails after the budget": (task(SUPPRESSED + "1 / 0"), (T, "TimeoutError", SPENT)),
-    "acts after the budget": (task(SUPPRESSED + "say('a')"), (T, "TimeoutError", SPENT)),
-    "one turn too many": (task("for i in range(200_000): pass"), (T, "TimeoutError", SPENT)),
+    "spends in a comprehension": (task("[0 for i in range(10**9)]"), (T, "TimeoutError", TOO_MANY_TURNS)),
+    "spends in a lambda": (task("sum(map(lambda x: x, range(10**9)))"), (T, "TimeoutError", TOO_MANY_TURNS)),
+    "exits after the budget": (task(SUPPRESSES_ERRORS + "exit()"), (T, "TimeoutError", TOO_MANY_TURNS)),
+    "ends after the budget": (task(SUPPRESSES_ERRORS + "1"), (T, "TimeoutError", TOO_MANY_TURNS)),
+    "fails after the budget": (task(SUPPRESSES_ERRORS + "1 / 0"), (T, "TimeoutError", TOO_MANY_TURNS)),
+    "acts after the budget": (task(SUPPRESSES_ERRORS + "say('a')"), (T, "TimeoutError", TOO_MANY_TURNS)),
+    "one turn too many": (task("for i in range(200_000): pass"), (T, "TimeoutError", TOO_MANY_TURNS)),
     "a string that is too long to send": (
         task("say('x' * 2_000_000)"),
         (T, "TimeoutError", "a text of more than 10,000 characters"),
     ),
-    # exceptions that deceive
+    # deceptive exceptions
     "raises the robot's error anew": (
         task("try:\n    go_to('x')\nexcept Exception as error:\n    raise type(error)('mine')"),
         (Status.ROBOT_ERROR, "GoToInvalidLocation", 'there is no room "x"'),
@@ -474,7 +474,7 @@ FAILS: dict[str, tuple[str, object]] = {
         task("class E(SystemExit):\n    code = property(lambda self: None)\nraise E(3)"),
         (P, "E", "3"),
     ),
-    # what does not parse
+    # programs that do not parse
     "null character": ("x = 1\ny = '\0'\n", (P, "SyntaxError", "source code cannot contain null characters")),
     "nested too deeply": ("x = " + "[" * 150 + "-" * 150 + "1" + "]" * 150, (P, "MemoryError", TOO_DEEP)),
     "nested far too deeply": ("x = " + "-" * 100_000 + "1", (P, "MemoryError", TOO_DEEP)),
@@ -491,7 +491,7 @@ FAILS: dict[str, tuple[str, object]] = {
         "__import__('numpy')\n",
         (P, "ModuleNotFoundError", "No module named 'numpy'"),
     ),
-    # what hangs, and what the kernel refuses
+    # programs that hang, and calls that the kernel refuses
     "hangs in C": (
         task("sum(range(10**12))"),
         (T, "TimeoutError", "5 seconds of processor time"),
@@ -529,33 +529,33 @@ FAILS: dict[str, tuple[str, object]] = {
     ),
     "closes the line": (task("import os\nos.close(3)"), (P, "PermissionError", None)),
     "says nonsense on the line": (
-        task(on_the_line("junk")),
-        (Status.KILLED, "Crash", ON_THE_LINE),
+        task(write_frame("junk")),
+        (Status.KILLED, "Crash", FORGED_MESSAGE),
     ),
     "says too much on the line": (
         task("import os\nos.write(3, b'\\xff\\xff\\xff\\xff')"),
-        (Status.KILLED, "Crash", ON_THE_LINE),
+        (Status.KILLED, "Crash", FORGED_MESSAGE),
     ),
     "says null on the line": (
-        task(on_the_line("null") + "say('a')"),
+        task(write_frame("null") + "say('a')"),
         (Status.KILLED, "Crash", None),
     ),
     "asks for a skill that is none": (
-        task(on_the_line('["fly", [3]]')),
-        (Status.KILLED, "Crash", ON_THE_LINE),
+        task(write_frame('["fly", [3]]')),
+        (Status.KILLED, "Crash", FORGED_MESSAGE),
     ),
     "asks with another type": (
-        task(on_the_line('["say", [3]]')),
-        (Status.KILLED, "Crash", ON_THE_LINE),
+        task(write_frame('["say", [3]]')),
+        (Status.KILLED, "Crash", FORGED_MESSAGE),
     ),
     "forges a robot error": (
-        task(on_the_line('{"end": "robot-error", "number": 99}')),
+        task(write_frame('{"end": "robot-error", "number": 99}')),
         (Status.KILLED, "Crash", None),
     ),
 }
 
 
-# --- where it ends: each program ends in this kind of error at this line
+# --- lines: each program ends in this kind of error at this line
 
 LINES: dict[str, tuple[str, object]] = {
     "a name that is none": (task("say('a')\n\nundefined"), ("NameError", 4)),
@@ -584,12 +584,12 @@ LINES: dict[str, tuple[str, object]] = {
     },
 }
 
-# --- limits: what stays within one, what goes beyond it, and what is said then
+# --- limits: code within the limit, code beyond it, and the message
 
 LIMITS = {
     "time": ("for i in range(3600): time.sleep(1)", "time.sleep(0.1)", "3,600 seconds of simulated time"),
     "calls": ("for i in range(1000): say(str(i))", "get_all_rooms()", "1,000 skill calls"),
-    "ticks": ("for i in range(199_998): pass", "[0 for i in 'ab']", SPENT),
+    "ticks": ("for i in range(199_998): pass", "[0 for i in 'ab']", TOO_MANY_TURNS),
     "text": ("say('x' * 10_000)", "say('x' * 10_001)", "a text of more than 10,000 characters"),
     "option": ("say('x')", "ask('', '', ['x' * 10_001])", "a text of more than 10,000 characters"),
     "trace": (
@@ -610,8 +610,8 @@ HONEST = task("say('honest')")
 
 @pytest.fixture(scope="module")
 def outcomes() -> Outcomes:
-    """Every quick program's outcome, with an honest program after each that fails."""
-    programs = all_of(LINES, WITHIN, BEYOND, WORKS)
+    """Return the outcomes of the quick programs, with an honest program after each that fails."""
+    programs = programs_of(LINES, WITHIN, BEYOND, WORKS)
     for number, name in enumerate(FAILS):
         if name not in SLOW:
             programs |= {name: FAILS[name][0], f"after {name}": task(f"say('honest {number}')")}
@@ -620,7 +620,7 @@ def outcomes() -> Outcomes:
 
 @pytest.fixture(scope="module")
 def slow_outcomes() -> Outcomes:
-    """The outcomes of programs that the engine must end, with an honest program after each."""
+    """Return the outcomes of programs that the engine must end, with an honest program after each."""
     return run_all(
         {
             name: source
@@ -633,27 +633,23 @@ def slow_outcomes() -> Outcomes:
 
 @pytest.mark.parametrize("name", WORKS)
 def test_program_works(outcomes: Outcomes, name: str) -> None:
-    assert said(outcomes[name]) == WORKS[name][1]
+    assert texts_of(outcomes[name]) == WORKS[name][1]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SLOW)
-def test_program_that_hangs_is_ended_and_leaves_the_next_one_alone(
-    slow_outcomes: Outcomes, name: str
-) -> None:
-    check_failure(slow_outcomes, name)
-    assert said(slow_outcomes[f"after {name}"]) == ["honest"]
+def test_program_that_hangs_is_ended_without_harm_to_the_next_one(slow_outcomes: Outcomes, name: str) -> None:
+    assert_expected_failure(slow_outcomes, name)
+    assert texts_of(slow_outcomes[f"after {name}"]) == ["honest"]
 
 
 @pytest.mark.parametrize("name", [name for name in FAILS if name not in SLOW])
-def test_program_fails_with_the_right_status_and_leaves_the_next_one_alone(
-    outcomes: Outcomes, name: str
-) -> None:
-    check_failure(outcomes, name)
-    assert said(outcomes[f"after {name}"]) == [f"honest {list(FAILS).index(name)}"]
+def test_program_fails_with_its_status_without_harm_to_the_next_one(outcomes: Outcomes, name: str) -> None:
+    assert_expected_failure(outcomes, name)
+    assert texts_of(outcomes[f"after {name}"]) == [f"honest {list(FAILS).index(name)}"]
 
 
-def check_failure(outcomes: Outcomes, name: str) -> None:
+def assert_expected_failure(outcomes: Outcomes, name: str) -> None:
     expected = FAILS[name][1]
     assert isinstance(expected, tuple)
     status, kind, message = expected
@@ -666,7 +662,7 @@ def check_failure(outcomes: Outcomes, name: str) -> None:
         assert outcome.trace == ()
 
 
-def one(program: str, settings: SimulationSettings | None = None, world: World = HOUSE) -> Outcome:
+def run_one(program: str, settings: SimulationSettings | None = None, world: World = HOUSE) -> Outcome:
     (outcome,) = run([(program, world)], workers=1, settings=settings or SimulationSettings())
     return outcome
 
@@ -702,8 +698,8 @@ CLOCK: dict[str, tuple[str, object]] = {
 @pytest.fixture(scope="module")
 def clock() -> list[str]:
     body = "".join(f"say(str({expression}))\n" for expression, _ in CLOCK.values())
-    return said(
-        one(
+    return texts_of(
+        run_one(
             "import datetime\n" + task("time.sleep(90.5)\n" + body), SimulationSettings(literals="as-written")
         )
     )
@@ -714,8 +710,8 @@ def test_every_clock_shows_the_simulated_time(clock: list[str], name: str) -> No
     assert clock[list(CLOCK).index(name)] == CLOCK[name][1]
 
 
-def test_events_carry_the_simulated_time_and_sleeping_is_none() -> None:
-    outcome = one(task("say('a')\ntime.sleep(3.5)\nsay('b')\ntime.sleep(True)\nsay('c')"))
+def test_events_have_the_simulated_time_and_sleep_leaves_no_event() -> None:
+    outcome = run_one(task("say('a')\ntime.sleep(3.5)\nsay('b')\ntime.sleep(True)\nsay('c')"))
     assert [event.time for event in outcome.trace] == [0.0, 3.5, 4.5]
 
 
@@ -723,7 +719,7 @@ def test_events_carry_the_simulated_time_and_sleeping_is_none() -> None:
 
 
 @pytest.mark.parametrize("name", LIMITS)
-def test_limit_is_reached_only_beyond_it(outcomes: Outcomes, name: str) -> None:
+def test_program_is_ended_only_beyond_the_limit(outcomes: Outcomes, name: str) -> None:
     assert outcomes[f"within {name}"].status == Status.FINISHED
     outcome = outcomes[f"beyond {name}"]
     assert outcome.status == Status.TIMEOUT
@@ -731,11 +727,11 @@ def test_limit_is_reached_only_beyond_it(outcomes: Outcomes, name: str) -> None:
     assert outcome.line == 3
 
 
-def test_trace_up_to_the_limit_is_kept_and_nothing_happens_after_it() -> None:
+def test_trace_up_to_the_limit_is_kept_and_ends_there() -> None:
     swallowing = (
         "n = 0\nwhile True:\n    try:\n        n += 1\n        say(str(n))\n    except BaseException: pass"
     )
-    outcome = one(task(swallowing))
+    outcome = run_one(task(swallowing))
     assert outcome.status == Status.TIMEOUT
     assert [event.text for event in outcome.trace] == [str(n) for n in range(1, 1001)]
 
@@ -743,14 +739,14 @@ def test_trace_up_to_the_limit_is_kept_and_nothing_happens_after_it() -> None:
 # --- the rest
 
 
-def test_literals_are_kept_as_written_where_the_suite_wants_it() -> None:
+def test_literals_are_kept_as_written_if_the_suite_says_so() -> None:
     program = task('"""Doc."""\nsay(\'ABC\')\nsay(f\'X{1:X}\')\nsay(task_program.__doc__)')
-    assert said(one(program, SimulationSettings(literals="as-written"))) == ["ABC", "X1", "Doc."]
-    assert said(one(program)) == ["abc", "x1", "doc."]
+    assert texts_of(run_one(program, SimulationSettings(literals="as-written"))) == ["ABC", "X1", "Doc."]
+    assert texts_of(run_one(program)) == ["abc", "x1", "doc."]
 
 
-def test_options_that_are_no_text_are_marked_in_the_trace() -> None:
-    outcome = one(task(ASKING + "ask('', 'q', [1, None, 'Two', 2])"))
+def test_options_that_are_not_text_are_marked_in_the_trace() -> None:
+    outcome = run_one(task(ASKING + "ask('', 'q', [1, None, 'Two', 2])"))
     options = (
         Option("1", is_text=False),
         Option("None", is_text=False),
@@ -760,8 +756,8 @@ def test_options_that_are_no_text_are_marked_in_the_trace() -> None:
     assert outcome.trace == (Event("goto", "amy's lab"), Event("ask", "q", options, answer="2"))
 
 
-def test_options_are_recorded_as_they_were_at_the_time_of_the_call() -> None:
-    outcome = one(task(ASKING + "options = ['2']\nask('', 'q', options)\noptions.append('3')"))
+def test_options_are_recorded_as_at_the_time_of_the_call() -> None:
+    outcome = run_one(task(ASKING + "options = ['2']\nask('', 'q', options)\noptions.append('3')"))
     assert outcome.trace[-1].options == (Option("2"),)
 
 
@@ -772,8 +768,8 @@ def test_outcome_names_the_line_of_the_program(outcomes: Outcomes, name: str) ->
     assert (outcome.error.kind, outcome.line) == LINES[name][1]
 
 
-def test_uncaught_robot_error_keeps_the_trace_and_says_why() -> None:
-    assert one(task("say('a')\ngo_to('Attic')")) == Outcome(
+def test_uncaught_robot_error_keeps_the_trace_and_the_message() -> None:
+    assert run_one(task("say('a')\ngo_to('Attic')")) == Outcome(
         Status.ROBOT_ERROR,
         (Event("say", "a"), Event("goto", "attic")),
         RunError("GoToInvalidLocation", 'there is no room "attic"'),
@@ -781,9 +777,9 @@ def test_uncaught_robot_error_keeps_the_trace_and_says_why() -> None:
     )
 
 
-def test_error_that_looks_like_the_robots_is_the_programs_own() -> None:
+def test_imitated_robot_error_is_an_error_of_the_program() -> None:
     copied = "class GoToInvalidLocation(Exception): number = 0\n"
-    outcome = one(copied + task("raise GoToInvalidLocation('x')"))
+    outcome = run_one(copied + task("raise GoToInvalidLocation('x')"))
     assert (outcome.status, outcome.error) == (Status.PYTHON_ERROR, RunError("GoToInvalidLocation", "x"))
 
 
@@ -814,8 +810,8 @@ say(str(random.random()))
     settings = SimulationSettings(literals="as-written")
     pairs = [(task(looks), HOUSE), (marks + task("say('a')"), HOUSE), (task(looks + "\n"), HOUSE)]
     before, between, after = run(pairs, workers=1, settings=settings)
-    assert said(between) == ["a"]
-    assert said(before)[:-1] == ["['a', 'b']", "False", "False", "False", "False", "0.0", "True"]
+    assert texts_of(between) == ["a"]
+    assert texts_of(before)[:-1] == ["['a', 'b']", "False", "False", "False", "False", "0.0", "True"]
     assert after == before
 
 
@@ -825,4 +821,4 @@ def test_worlds_of_one_program_cannot_see_each_other() -> None:
     )
     worlds = [World((Room("a"),), "a", about=str(number)) for number in range(4)]
     outcomes = list(run([(program, world) for world in worlds], workers=1))
-    assert [said(outcome) for outcome in outcomes] == [["2"]] * 4
+    assert [texts_of(outcome) for outcome in outcomes] == [["2"]] * 4

@@ -7,7 +7,7 @@ from codebotler.simulator.settings import PAPER_SETTINGS, Limits, SimulationSett
 from codebotler.simulator.worlds.matching import Matching, finds
 
 
-def test_rules_of_the_paper_are_those_that_the_published_verdicts_rest_on() -> None:
+def test_paper_settings_are_those_of_the_published_verdicts() -> None:
     assert (PAPER_SETTINGS.literals, PAPER_SETTINGS.matching, PAPER_SETTINGS.people) == (
         "lowercase",
         "label-in-request",
@@ -22,14 +22,14 @@ def test_rules_of_the_paper_are_those_that_the_published_verdicts_rest_on() -> N
 
 @pytest.mark.parametrize("matching", ["label-in-request", "whole-words", "longest-name"])
 @pytest.mark.parametrize("label", ["(?i)yes", "(?x) yes # or no", "(?s).*yes", ".*yes|(?i:no)"])
-def test_a_label_may_have_flags(label: str, matching: Matching) -> None:
+def test_label_may_have_flags(label: str, matching: Matching) -> None:
     options = (Option("later"), Option("Yes"))
     assert choose(label, "Tea?", options, SimulationSettings(matching=matching)) == 1
     assert finds("oh yes", label, matching)
     assert not finds("later", label, matching)
 
 
-def test_an_answer_means_the_option_with_the_whole_word_or_else_a_part() -> None:
+def test_answer_prefers_a_whole_word_of_an_option_to_a_part() -> None:
     settings = SimulationSettings(matching="longest-name")
     options = tuple(map(Option, ("Warmer", "Colder", "no")))
     assert choose("warm", "Warmer or colder?", options, settings) == 0

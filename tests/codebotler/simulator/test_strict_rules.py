@@ -1,4 +1,4 @@
-"""The settings by which a suite is stricter: whole words, own names, what happened; people who leave."""
+"""Stricter settings of a suite: whole words, own names, events as they happened, people who leave."""
 
 from pathlib import Path
 
@@ -38,7 +38,7 @@ def robot(world: World = WORLD, settings: SimulationSettings = STRICT) -> Simula
     return SimulatedRobot(world, settings)
 
 
-def test_rooms_are_found_by_whole_words_and_a_visit_is_where_it_leads() -> None:
+def test_rooms_match_whole_words_and_drives_are_recorded_by_their_destination() -> None:
     one = robot()
     one.perform("go_to", ["Room 12 or perhaps room 1"])
     one.perform("go_to", ["the room 12"])
@@ -51,7 +51,7 @@ def test_rooms_are_found_by_whole_words_and_a_visit_is_where_it_leads() -> None:
     assert (loose.room, loose.trace[0].text) == ("room 1", "room 123")
 
 
-def test_words_for_people_are_usual_ones_where_a_suite_names_none() -> None:
+def test_words_for_people_have_a_default() -> None:
     settings = SimulationFile.model_validate({"people": "own-name-or-word"}).settings()
     assert robot(settings=settings).settings.words_for_people == WORDS_FOR_PEOPLE
     assert SimulationFile.model_validate(
@@ -84,21 +84,21 @@ WORDS = SimulationSettings(
         (("one", "two", "not at all"), None, 2),
     ],
 )
-def test_yes_and_no_are_understood_in_other_words(
+def test_other_words_for_yes_and_no_are_understood(
     options: tuple[str, ...], by_yes: int | None, by_no: int | None
 ) -> None:
     offered = tuple(map(Option, options))
     assert [choose(answer, "Tea?", offered, WORDS) for answer in ("yes", "no")] == [by_yes, by_no]
 
 
-def test_who_wants_something_says_yes_to_it_in_other_words() -> None:
+def test_person_who_wants_something_agrees_to_it_in_other_words() -> None:
     offered = (Option("Sure"), Option("No, let me choose again"))
     assert [choose("tea", f"So that is {drink}?", offered, WORDS) for drink in ("tea", "water")] == [0, 1]
     assert choose("tea", "So that is tea?", offered, STRICT) is None
     assert choose("tea", "So what is it?", (Option("water"), Option("milk")), WORDS) is None
 
 
-def test_without_such_words_only_yes_is_yes() -> None:
+def test_without_other_words_only_yes_agrees() -> None:
     offered = (Option("Sure"), Option("No thanks"))
     assert [choose(answer, "Tea?", offered, STRICT) for answer in ("yes", "no")] == [1, 1]
 
@@ -120,7 +120,7 @@ def test_without_such_words_only_yes_is_yes() -> None:
 def test_people_are_found_by_their_own_name_or_a_word_for_people(
     entity: str,
     strict: bool,  # noqa: FBT001 - a parameter of the test
-    loose: bool,  # noqa: FBT001 - the same
+    loose: bool,  # noqa: FBT001 - a parameter of the test
 ) -> None:
     for settings, seen in ((STRICT, strict), (PAPER_SETTINGS, loose)):
         one = robot(settings=settings)
@@ -128,7 +128,7 @@ def test_people_are_found_by_their_own_name_or_a_word_for_people(
         assert one.perform("is_in_room", [entity]) is seen
 
 
-def test_who_is_asked_is_who_is_meant() -> None:
+def test_question_reaches_the_person_that_it_means() -> None:
     one = robot()
     one.perform("go_to", ["room 12"])
     assert one.perform("ask", ["visitor", "Tea?", YES_NO]) == 2
@@ -145,7 +145,7 @@ def test_answers_are_whole_words() -> None:
         assert each.perform("ask", ["kim", "Tea?", YES_NO]) == chosen
 
 
-def test_what_is_moved_is_the_thing_by_whatever_name() -> None:
+def test_thing_can_be_picked_and_placed_by_other_names() -> None:
     one = robot()
     one.perform("go_to", ["room 1"])
     one.perform("pick", ["the old stapler"])
@@ -159,7 +159,7 @@ def test_what_is_moved_is_the_thing_by_whatever_name() -> None:
     one.perform("pick", ["stapler"])
 
 
-def test_a_topic_is_answered_by_itself() -> None:
+def test_person_has_a_separate_answer_for_each_topic() -> None:
     knows = Person("kim", (1,), (("bread", "no"), ("cheese", "yes")))
     one = robot(World((Room("hall", people=(knows,)),), "hall"))
     options = (Option("Yes"), Option("No"))
@@ -183,7 +183,7 @@ def test_people_come_after_looks_in_vain_and_leave_when_asked() -> None:
         one.perform("ask", ["", "Tea?", YES_NO])
 
 
-WAITS = """
+WAITS_FOR_A_PERSON = """
 def task_program():
     looks = 1
     while not is_in_room("person"):
@@ -193,9 +193,9 @@ def task_program():
 """
 
 
-def test_a_program_that_waits_meets_who_comes() -> None:
+def test_waiting_program_meets_the_person_who_comes() -> None:
     world = World((Room("hall", people=(Person("kim", after_looks=5),)),), "hall")
-    (outcome,) = run([(WAITS, world)], workers=1, settings=STRICT)
+    (outcome,) = run([(WAITS_FOR_A_PERSON, world)], workers=1, settings=STRICT)
     assert outcome.status is Status.FINISHED
     assert outcome.trace[-1].text == "6"
 
@@ -214,7 +214,7 @@ people:
 """
 
 
-def test_world_files_say_so_and_are_written_so(tmp_path: Path) -> None:
+def test_people_survive_the_round_trip_through_a_world_file(tmp_path: Path) -> None:
     path = tmp_path / "world.yaml"
     path.write_text(FILE)
     world = read_world(path)
@@ -233,11 +233,13 @@ def test_world_files_say_so_and_are_written_so(tmp_path: Path) -> None:
         ("tea:", "(a+)+$:", "line 8: "),
         ("name: kim", "name: (a+)+$", "may take too long"),
         ("['yes',", "['(a|aa)+$',", "line 7: "),
-        ("tea:", "'(?#cup)(?i)tea':", "global flags"),  # which Python accepts, but not within another regex
+        ("tea:", "'(?#cup)(?i)tea':", "global flags"),  # Python accepts it only outside another regex
         ("after_looks: 3", "after_looks: -3", "line 9"),
     ],
 )
-def test_mistakes_in_world_files_are_told(tmp_path: Path, good: str, bad: str, problem: str) -> None:
+def test_mistake_in_a_world_file_is_an_error_that_names_it(
+    tmp_path: Path, good: str, bad: str, problem: str
+) -> None:
     path = tmp_path / "world.yaml"
     path.write_text(FILE.replace(good, bad))
     with pytest.raises(UserError) as error:

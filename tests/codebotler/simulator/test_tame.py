@@ -1,4 +1,4 @@
-"""Which programs may share a process with others: each rule by a tame program and one that breaks only it."""
+"""Rules for programs that may share a process, each with a program that keeps it and one that breaks it."""
 
 import ast
 import json
@@ -31,7 +31,7 @@ from in_process import all_of
 NAMES = frozenset(SKILLS)
 WORLD = World((Room("hall"),), "hall")
 
-# What a rule says; the smallest program that keeps it; the smallest one that breaks it and no other rule.
+# Each rule has the smallest program that keeps it, and the smallest one that breaks only this rule.
 RULES = [
     # --- names that are bound
     ("a function's name has no two underscores first", "def _f(): pass", "def __f(): pass"),
@@ -357,7 +357,7 @@ NEW_IN_312 = [
 ]
 RULES += NEW_IN_312 * (sys.version_info >= (3, 12))
 
-# All that a tame program may name, by where it stands.
+# All names that a tame program may use, by the code around them.
 CALLS = """
 all any dict len list max min next sorted sum tuple abs bool chr divmod float int ord pow print range repr
 """
@@ -385,10 +385,10 @@ PLACES = {
     "list(x.{}())": "items keys values",
     "time.{}()": "asctime ctime gmtime localtime monotonic perf_counter sleep strftime time",
 }
-NAMED = tuple(place for place in PLACES if "." not in place)  # where the name is that of no method
+SPOTS = tuple(place for place in PLACES if "." not in place)  # places for names that are not methods
 
-# What would tell programs apart: by an address, or by what a process has done before.
-TELLING = """
+# These names reveal an address, or the earlier work of the process.
+REVEALING_NAMES = """
 aiter anext ascii breakpoint bytearray bytes callable classmethod compile complex copyright credits
 delattr dir eval exec exit format frozenset getattr globals hasattr hash help hex id input issubclass iter
 license locals memoryview object oct open property quit set setattr slice staticmethod super sys type vars
@@ -402,46 +402,46 @@ values with_traceback __class__ __dict__ __format__ __getitem__ __init__ __iter_
 
 
 def is_tame(source: str) -> bool:
-    with warnings.catch_warnings(action="ignore"):  # of programs that compare numbers by `is`
+    with warnings.catch_warnings(action="ignore"):  # some programs compare numbers by `is`
         tree = ast.parse(source)
     return tame.is_tame(tree, nodes_of(tree), NAMES)
 
 
 @pytest.mark.parametrize(("keeps", "breaks"), [rule[1:] for rule in RULES], ids=[rule[0] for rule in RULES])
-def test_a_program_is_tame_that_keeps_a_rule_and_wild_if_it_breaks_it(keeps: str, breaks: str) -> None:
+def test_program_is_tame_if_it_keeps_the_rule_and_wild_if_it_breaks_it(keeps: str, breaks: str) -> None:
     assert is_tame(keeps)
     assert not is_tame(breaks)
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_tame_programs_name_what_they_need(place: str) -> None:
+def test_tame_program_may_use_every_allowed_name(place: str) -> None:
     assert [name for name in PLACES[place].split() if not is_tame(place.format(name))] == []
 
 
 @pytest.mark.parametrize(
-    "place", [*NAMED, "x = {}", "{}.time()", "def f(): global {}", "{} = 1", "f({}=1, a={})", "{}(zip(x), x)"]
+    "place", [*SPOTS, "x = {}", "{}.time()", "def f(): global {}", "{} = 1", "f({}=1, a={})", "{}(zip(x), x)"]
 )
-def test_no_program_is_tame_that_names_what_would_tell_it_where_it_runs(place: str) -> None:
-    assert [name for name in TELLING.split() if is_tame(place.format(name, name))] == []
+def test_program_with_a_revealing_name_is_wild(place: str) -> None:
+    assert [name for name in REVEALING_NAMES.split() if is_tame(place.format(name, name))] == []
 
 
 @pytest.mark.parametrize(
     "program", ["x.{}()", "x.{}", "'a'.{}(1)", "list(map(x.{}, 'a'))", "list(map(str.{}, 'a'))", "time.{}()"]
 )
-def test_methods_that_give_more_than_data_are_wild(program: str) -> None:
+def test_methods_that_return_more_than_data_are_wild(program: str) -> None:
     assert {method for method in METHODS.split() if is_tame(program.format(method))} <= {"format"}
 
 
-def test_a_program_that_is_nested_too_deeply_to_be_looked_at_is_wild() -> None:
+def test_too_deeply_nested_program_is_wild() -> None:
     tree = ast.Module([ast.Expr(ast.Constant(1))], [])
     for _ in range(5_000):
         tree.body = [ast.If(ast.Constant(1), tree.body, [])]
     assert not tame.is_tame(tree, {}, NAMES)
 
 
-def test_skills_are_those_that_the_program_may_call() -> None:
+def test_name_of_an_added_skill_is_not_data() -> None:
     tree = ast.parse("x = wave\nwave(x)")
-    assert tame.is_tame(tree, nodes_of(tree), NAMES)  # a name of nothing, like any other
+    assert tame.is_tame(tree, nodes_of(tree), NAMES)  # without a skill `wave`, the name is like any other
     assert not tame.is_tame(tree, nodes_of(tree), NAMES | {"wave"})
 
 
@@ -461,7 +461,7 @@ USES_ONE = """
 
 
 def names_of_ordinary_programs() -> list[str]:
-    """All names that a program finds in a process of its own without doing anything for it."""
+    """Return all names that a program in a process of its own finds at its start."""
     worker = Worker(one_process_per_run=True)
     try:
         outcome = worker.run(
@@ -473,11 +473,11 @@ def names_of_ordinary_programs() -> list[str]:
     return [event.text for event in outcome.trace]
 
 
-def test_each_name_that_other_programs_find_is_allowed_or_makes_a_program_wild() -> None:
+def test_every_name_of_ordinary_programs_is_allowed_or_wild() -> None:
     names = names_of_ordinary_programs()
     assert {"say", "print", "exit", "sys", "time", "open", "__name__", "__spec__"} < set(names)
     allowed = NAMES | GIVEN | {"time", "__name__"}
-    places = [*NAMED, "x = {}", "{}.time()", "say({})", "f(*{})", "try: pass\nexcept {}: pass", "raise {}(1)"]
+    places = [*SPOTS, "x = {}", "{}.time()", "say({})", "f(*{})", "try: pass\nexcept {}: pass", "raise {}(1)"]
     own = {"None", "True", "False", "task_program"}
     for name in (name for name in names if name.isidentifier() and name not in own):
         if name not in allowed:
@@ -486,7 +486,7 @@ def test_each_name_that_other_programs_find_is_allowed_or_makes_a_program_wild()
             assert not is_tame(f"x = {name}")
 
 
-def test_the_compiler_knows_names_that_its_own_interpreter_lacks() -> None:
+def test_compiler_knows_names_that_its_own_interpreter_lacks() -> None:
     for program, is_wild in (
         ("x = exit", True),
         ("x = quit", True),
@@ -498,7 +498,7 @@ def test_the_compiler_knows_names_that_its_own_interpreter_lacks() -> None:
         assert compiled.is_tame is not is_wild
 
 
-def test_programs_that_are_compiled_together_are_as_if_each_were_alone() -> None:
+def test_programs_compiled_together_and_alone_are_equal() -> None:
     deep = "x = " + "[" * 3_000 + "]" * 3_000
     programs = ["say('Hi')", "import os", "x = (", deep, "\ud800", "go_to('lab')\n" * 3_000, "say('Ho')"]
     skills = tuple(NAMES)
@@ -512,7 +512,7 @@ def test_programs_that_are_compiled_together_are_as_if_each_were_alone() -> None
 
 
 @pytest.mark.slow
-def test_a_program_that_exhausts_the_compiler_costs_those_beside_it_nothing() -> None:
+def test_program_that_exhausts_the_compiler_does_not_affect_the_others() -> None:
     greedy = f"import {'.'.join(['a'] * 40_000)}\n"
     first, refused, last = compile_programs(["say(1)", greedy, "say(2)"], "lowercase", ("say",))
     assert isinstance(first, CompiledProgram)
@@ -523,14 +523,14 @@ def test_a_program_that_exhausts_the_compiler_costs_those_beside_it_nothing() ->
 
 
 @pytest.mark.parametrize("number", [signal.SIGXCPU, signal.SIGSYS, signal.SIGSEGV])
-def test_a_compiler_that_dies_at_several_programs_is_replaced(number: int) -> None:
+def test_killed_compiler_is_replaced_for_several_programs(number: int) -> None:
     compile_programs(["say(0)", "say(1)"], "lowercase", ("say",))
     os.kill(IDLE_PROCESSES["codebotler.simulator.process.compiler"][-1]._process.pid, number)
     together = compile_programs(["say(1)", "say(2)"], "lowercase", ("say",))
     assert [type(one) for one in together] == [CompiledProgram, CompiledProgram]
 
 
-def test_tame_programs_find_each_name_that_is_allowed() -> None:
+def test_tame_programs_find_every_allowed_name() -> None:
     uses = {name: f"{name}()" for name in PLACES["{}(x)"].split()}
     uses |= {name: f"list({name}())" for name in PLACES["list({}(x))"].split()}
     uses |= {"__name__": "__name__"}

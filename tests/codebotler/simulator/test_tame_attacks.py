@@ -1,9 +1,9 @@
-"""Programs that aim at what tame programs rely on: the verifier, the child that they share, the replay.
+"""Attacks on the verifier of tame programs, on the child that they share, and on the replay.
 
-Each file of tests/hostile_tame is one. Its first line says what it tries, and `# tame: yes` or `# tame: no`
-what the verifier must say of it. A tame one runs in a child with honest programs before, between and after
-its runs, in three worlds each, and all outcomes are those of processes of their own. `# decided: alone` says
-that the child must leave it to these.
+Each file of tests/hostile_tame is one. Its first line names the attack, and `# tame: yes` or `# tame: no` the
+expected verdict of the verifier. A tame one runs in a shared child with honest programs before, between and
+after its runs, in three worlds each, and every outcome must be that of a process of its own. With
+`# decided: alone`, the child must leave the program to a process of its own.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def task_program():
     pick("nothing")
 """
 
-# Where `@` stands, data may stand and no function; a generator may only where a line begins with `~`.
+# `@` may be replaced by data but not by a function, and by a generator only if the line begins with `~`.
 PLACES = r"""
 @
 x = @
@@ -293,7 +293,7 @@ with x: pass
 
 @pytest.fixture(scope="module")
 def batches() -> Iterator[Worker]:
-    """A worker that runs tame programs together."""
+    """Yield a worker that runs tame programs together."""
     worker = Worker()
     yield worker
     worker.close()
@@ -301,7 +301,7 @@ def batches() -> Iterator[Worker]:
 
 @pytest.fixture(scope="module")
 def alone() -> Iterator[Worker]:
-    """A worker with a process for each run."""
+    """Yield a worker with a process for each run."""
     worker = Worker(one_process_per_run=True)
     yield worker
     worker.close()
@@ -309,7 +309,7 @@ def alone() -> Iterator[Worker]:
 
 @pytest.fixture(scope="module")
 def honest(alone: Worker) -> dict[str, list[str]]:
-    """All of the outcomes of honest programs, each of which had a process of its own."""
+    """Return the complete outcomes of honest programs in processes of their own."""
     return {source: run_alone(alone, source) for source in (HONEST, ALSO_HONEST)}
 
 
@@ -323,7 +323,7 @@ def run_alone(worker: Worker, source: str) -> list[str]:
 
 
 def run_together(worker: Worker, *sources: str) -> list[list[str | None]]:
-    """All of the outcomes of programs in one child, None where it left them to other processes."""
+    """Return the complete outcomes of programs in one child, None for runs that it did not decide."""
     known = worker.run_tame([(source, robots()) for source in sources])
     return [
         [all_of(known[number, run]) if (number, run) in known else None for run in range(len(WORLDS))]
@@ -332,7 +332,7 @@ def run_together(worker: Worker, *sources: str) -> list[list[str | None]]:
 
 
 def all_of(outcome: Outcome) -> str:
-    """Everything in an outcome, with the places and times that its comparison leaves out."""
+    """Return everything in an outcome, including the places and times that equality ignores."""
     return repr((outcome, outcome.trace))
 
 
@@ -342,14 +342,14 @@ def is_tame(source: str) -> bool:
 
 
 def with_line(line: str) -> str:
-    """A program in which something stands."""
+    """Return a program with this line in its module."""
     return f"x = []\n\ndef own(y):\n    pass\n\n{line}\n\ndef task_program():\n    pass\n".replace(
         "\\n", "\n"
     )
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_functions_stand_nowhere_among_data(place: str) -> None:
+def test_functions_are_never_data(place: str) -> None:
     line, takes_iterators = place.removeprefix("~"), place.startswith("~")
     assert is_tame(with_line(line.replace("@", "x")))
     for function in ("say", "own", "print", "time", "(lambda: 1)", "x.append", "__builtins__"):
@@ -359,25 +359,25 @@ def test_functions_stand_nowhere_among_data(place: str) -> None:
 
 
 @pytest.mark.parametrize("line", ANNOTATIONS)
-def test_annotations_name_types_only(line: str) -> None:
+def test_annotations_may_name_only_types(line: str) -> None:
     assert is_tame(with_line(line.replace("@", "str")))
     for name in ("x", "say", "own", "print", "time", "(lambda: 1)", "x.append", "__builtins__"):
         assert not is_tame(with_line(line.replace("@", name))), name
 
 
 @pytest.mark.parametrize("line", NOT_ALLOWED)
-def test_what_is_not_listed_is_not_allowed(line: str) -> None:
+def test_unlisted_statement_is_wild(line: str) -> None:
     assert not is_tame(with_line(line))
 
 
-def test_all_programs_say_what_they_are() -> None:
+def test_every_program_starts_with_a_docstring_and_has_a_verdict() -> None:
     assert len(TAME) + len(WILD) == len(PROGRAMS) > 100
     for source in PROGRAMS.values():
         assert source.startswith('"""'), source
 
 
 @pytest.mark.parametrize("name", WILD)
-def test_wild_program_is_left_alone(name: str, batches: Worker) -> None:
+def test_wild_program_does_not_run_in_the_shared_child(name: str, batches: Worker) -> None:
     assert not is_tame(PROGRAMS[name])
     before, wild, after = run_together(batches, HONEST, PROGRAMS[name], HONEST)
     assert wild == [None] * len(WORLDS)
@@ -387,7 +387,7 @@ def test_wild_program_is_left_alone(name: str, batches: Worker) -> None:
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in ONE_A_KIND)) for name in TAME]
 )
-def test_tame_program_is_felt_by_no_other_run(
+def test_tame_program_does_not_affect_other_runs(
     name: str, batches: Worker, alone: Worker, honest: Mapping[str, list[str]]
 ) -> None:
     source = PROGRAMS[name]
@@ -400,11 +400,11 @@ def test_tame_program_is_felt_by_no_other_run(
     assert together == [honest.get(each, wanted) for each in order]
 
 
-# --- a skill of somebody's own
+# --- own skills
 
 
 def wave(robot: SimulatedRobot, person: str) -> None:
-    """Wave, which takes time, and drive somebody away."""
+    """Wave, let time pass, and move to the first room."""
     robot.sleep_until(robot.now + 30)
     robot.record("wave", person)
     robot.room = robot.rooms[0]
@@ -426,9 +426,7 @@ def wave(robot: SimulatedRobot, person: str) -> None:
         ),
     ],
 )
-def test_a_skill_of_ones_own_is_felt_by_its_own_run_only(
-    lines: tuple[str, ...], batches: Worker, alone: Worker
-) -> None:
+def test_own_skill_affects_only_its_own_run(lines: tuple[str, ...], batches: Worker, alone: Worker) -> None:
     skills = SKILLS.with_skill(
         Skill("wave", (Parameter("person"),), NO_VALUE, "Wave.", Recording("wave", "person"), does=wave)
     )
@@ -441,14 +439,14 @@ def test_a_skill_of_ones_own_is_felt_by_its_own_run_only(
 
 
 class Polite(SimulatedRobot):
-    """A robot that says more than it was told."""
+    """Add a word to every event."""
 
     def record(self, kind: str, text: str, *more: object, **others: object) -> None:
-        """Add a word."""
-        super().record(kind, f"{text}, please", *more, **others)  # type: ignore[arg-type]  # as theirs
+        """Record the text with "please"."""
+        super().record(kind, f"{text}, please", *more, **others)  # type: ignore[arg-type]  # only passed on
 
 
-def test_a_robot_of_ones_own_class_does_what_its_class_does(batches: Worker) -> None:
+def test_robot_of_an_own_class_uses_its_methods(batches: Worker) -> None:
     outcome = batches.run("def task_program():\n    say('come')\n", partial(Polite, WORLDS[0], AS_WRITTEN))
     assert [event.text for event in outcome.trace] == ["come, please"]
 
@@ -462,20 +460,20 @@ def test_robots_in_sampled_worlds_are_copied_too(batches: Worker, alone: Worker)
     ]
 
 
-# --- what a child may say that a program has taken over
+# --- frames of a child that a program controls
 
 
-class Taken(IsolatedProcess):
-    """A child that says what it likes."""
+class HijackedChild(IsolatedProcess):
+    """A child that sends the given frames."""
 
     def __init__(self, *frames: bytes) -> None:
         self.frames = list(frames)
 
     def send(self, message: object) -> None:
-        """Listen to nobody."""
+        """Ignore the message."""
 
-    def receive_bytes(self, most: int) -> bytes | None:  # noqa: ARG002 - as theirs
-        """Say the next thing."""
+    def receive_bytes(self, most: int) -> bytes | None:  # noqa: ARG002 - the signature of the base class
+        """Return the next frame."""
         return self.frames.pop(0) if self.frames else None
 
 
@@ -520,12 +518,12 @@ MALFORMED = {
 def test_malformed_transcript_is_no_outcome(frame: bytes) -> None:
     robots = [SimulatedRobot(world, AS_WRITTEN) for world in WORLDS]
     good = TRANSCRIPT % (SAY + b"," + SAY.replace(b"0", b"5.0"), b"5.0", END)
-    told = outcomes(Taken(good, frame, good), [(b"", robots)])
-    first = next(told)
+    results = outcomes(HijackedChild(good, frame, good), [(b"", robots)])
+    first = next(results)
     assert first is not None
     assert (first.status, [event.time for event in first.trace]) == (Status.FINISHED, [0.0, 5.0])
     with pytest.raises(ProtocolError):
-        next(told)
+        next(results)
 
 
 @skill
@@ -534,7 +532,7 @@ def paint(_: Simulation, colour: Literal["red", "blue"], coats: int, litres: flo
 
 
 PAINT = SKILLS.with_skill(paint)
-MISFITS = {
+WRONG_ARGUMENTS = {
     "no choice": ["green", 1, 0.5, ["a"]],
     "a truth value for a number": ["red", True, 0.5, ["a"]],
     "a fraction for a whole number": ["red", 1.5, 0.5, ["a"]],
@@ -547,30 +545,32 @@ MISFITS = {
 }
 
 
-@pytest.mark.parametrize("values", MISFITS.values(), ids=MISFITS)
-def test_what_an_own_skill_does_not_take_is_refused_outside_of_the_sandbox(values: list[Any]) -> None:
+@pytest.mark.parametrize("values", WRONG_ARGUMENTS.values(), ids=WRONG_ARGUMENTS)
+def test_wrong_arguments_of_an_own_skill_are_refused_outside_of_the_sandbox(values: list[Any]) -> None:
     robots = [SimulatedRobot(WORLDS[0], AS_WRITTEN, PAINT)] * 2
     asked = TRANSCRIPT % (b'["paint",%s,0,"ask",null]', b"0", b"null")
     good = asked % json.dumps(["red", 1, 2, ["a"]]).encode()
-    told = outcomes(Taken(good, TRANSCRIPT % (b"", b"0", END)), [(b"", robots[:1])])
-    outcome = next(told)
+    results = outcomes(HijackedChild(good, TRANSCRIPT % (b"", b"0", END)), [(b"", robots[:1])])
+    outcome = next(results)
     assert outcome is not None
     assert trace_data(outcome.trace) == [["paint", "red", ["1", "2", "a"]]]
     with pytest.raises(ProtocolError):
-        next(outcomes(Taken(asked % json.dumps(values).encode()), [(b"", robots[1:])]))
+        next(outcomes(HijackedChild(asked % json.dumps(values).encode()), [(b"", robots[1:])]))
     with pytest.raises(ProtocolError):
         arguments_of(paint, values)
 
 
-def test_child_that_says_no_more_is_lost() -> None:
-    told = outcomes(Taken(b"null"), [(b"", [SimulatedRobot(world, AS_WRITTEN) for world in WORLDS])])
-    assert next(told) is None
+def test_silent_child_is_lost() -> None:
+    results = outcomes(
+        HijackedChild(b"null"), [(b"", [SimulatedRobot(world, AS_WRITTEN) for world in WORLDS])]
+    )
+    assert next(results) is None
     with pytest.raises(LostProcessError):
-        next(told)
+        next(results)
 
 
 @pytest.mark.slow
-def test_program_that_computes_for_too_long_is_felt_by_no_other(batches: Worker) -> None:
+def test_program_that_computes_for_too_long_does_not_affect_the_others(batches: Worker) -> None:
     source = "def task_program():\n    say('x')\n    say(str(sum(range(10**12))))\n"
     assert is_tame(source)
     before, endless, after = run_together(batches, HONEST, source, HONEST)

@@ -20,7 +20,7 @@ SPECIAL = ("len", "type", "list", "go_to", "time", "open", "ValueError")
 PLAIN = ("x", "y")
 Position = tuple[int, int]
 
-# Each statement, with N for a name, S for a special one, V for a value, and BLOCK for further statements.
+# In each statement, N is a name, S a special one, V a value, and BLOCK more statements.
 STATEMENTS = """
 N = V
 N += V
@@ -76,8 +76,8 @@ VALUES = (
 )  # fmt: skip
 
 
-def statements() -> list[str]:
-    """The statements above, of which some have several lines."""
+def split_statements() -> list[str]:
+    """Split the statements above, some of which have several lines."""
     found: list[str] = []
     for line in STATEMENTS.splitlines():
         if line.startswith((" ", "except", "finally")):
@@ -88,23 +88,23 @@ def statements() -> list[str]:
 
 
 class Writer:
-    """Writes random programs in which special names are bound in every way that Python has."""
+    """Write random programs that bind special names in every way that Python has."""
 
     def __init__(self, random: Random) -> None:
         self.random = random
-        self.statements = statements()
+        self.statements = split_statements()
 
     def program(self) -> str:
-        """A program whose function binds and reads special names."""
+        """Return a program whose function binds and reads special names."""
         return f"def task_program({self.random.choice(['', *SPECIAL])}):\n{self.block(1)}\n"
 
     def block(self, depth: int) -> str:
-        """Some statements, indented."""
+        """Return some indented statements."""
         lines = "\n".join(self.statement(depth) for _ in range(self.random.randint(1, 3)))
         return "\n".join("    " + line for line in lines.splitlines())
 
     def statement(self, depth: int) -> str:
-        """A statement, without others in it from some depth on."""
+        """Return a statement; deep ones hold no others."""
         chosen = self.random.choice(self.statements)
         while "BLOCK" in chosen and depth > 2:
             chosen = self.random.choice(self.statements)
@@ -112,18 +112,18 @@ class Writer:
         for line in chosen.splitlines():
             indent = line[: len(line) - len(line.lstrip())]
             head, block, _ = line.partition("BLOCK")
-            text += self.filled(head) + "\n"
+            text += self.fill(head) + "\n"
             if block:
                 text += "".join(f"{indent}{each}\n" for each in self.block(depth + 1).splitlines())
         return text.removesuffix("\n")
 
-    def filled(self, text: str, depth: int = 0) -> str:
-        """A string with names and values in place of its marks."""
+    def fill(self, text: str, depth: int = 0) -> str:
+        """Replace the marks of a string by names and values."""
         filled = ""
         for at, letter in enumerate(text):
             is_mark = not (text[at - 1 : at].isalnum() or text[at + 1 : at + 2].isalnum())
             if letter == "V" and is_mark:
-                filled += self.filled(self.random.choice(VALUES if depth < 2 else VALUES[:4]), depth + 1)
+                filled += self.fill(self.random.choice(VALUES if depth < 2 else VALUES[:4]), depth + 1)
             elif letter in "NS" and is_mark:
                 filled += self.random.choice((*SPECIAL, *PLAIN) if letter == "N" else SPECIAL)
             else:
@@ -131,18 +131,18 @@ class Writer:
         return filled
 
 
-def judged(source: str, monkeypatch: pytest.MonkeyPatch) -> tuple[set[Position], set[Position]] | None:
-    """Where the verifier takes special names for data, and where for what they name; None if it is wild."""
+def judge_names(source: str, monkeypatch: pytest.MonkeyPatch) -> tuple[set[Position], set[Position]] | None:
+    """Return where the verifier takes special names for data and where for functions; None if wild."""
     data: set[Position] = set()
     called: set[Position] = set()
     name, call = ProgramVerifier.ALLOWED[ast.Name], ProgramVerifier.ALLOWED[ast.Call]
 
-    def watch_name(verifier: ProgramVerifier, node: Any) -> None:  # noqa: ANN401 - as the verifier has it
+    def watch_name(verifier: ProgramVerifier, node: Any) -> None:  # noqa: ANN401 - the signature of the verifier
         name(verifier, node)
         if isinstance(node.ctx, ast.Load) and node.id in verifier.special:
             data.add((node.lineno, node.col_offset))
 
-    def watch_call(verifier: ProgramVerifier, node: Any) -> None:  # noqa: ANN401 - the same
+    def watch_call(verifier: ProgramVerifier, node: Any) -> None:  # noqa: ANN401 - the signature of the verifier
         call(verifier, node)
         if isinstance(node.func, ast.Name) and node.func.id in verifier.special:
             at = node.func.lineno, node.func.col_offset
@@ -155,8 +155,8 @@ def judged(source: str, monkeypatch: pytest.MonkeyPatch) -> tuple[set[Position],
         return (data, called) if tame.is_tame(tree, nodes_of(tree), NAMES) else None
 
 
-def loads(code: CodeType) -> Iterator[tuple[bool, Position]]:
-    """Each load of a name: whether it is of a global one, and where."""
+def find_loads(code: CodeType) -> Iterator[tuple[bool, Position]]:
+    """Yield each load of a name: whether the name is global, and the position."""
     for one in dis.get_instructions(code):
         if one.opname.startswith("LOAD_") and one.positions is not None and one.positions.lineno is not None:
             is_global = one.opname in {"LOAD_GLOBAL", "LOAD_NAME"}
@@ -164,46 +164,48 @@ def loads(code: CodeType) -> Iterator[tuple[bool, Position]]:
                 yield is_global, (one.positions.lineno, one.positions.col_offset or 0)
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
-            yield from loads(constant)
+            yield from find_loads(constant)
 
 
-def contradiction(source: str, monkeypatch: pytest.MonkeyPatch) -> bool | None:
-    """Whether verifier and compiler disagree on a program; None if it is wild, or does not compile."""
+def has_contradiction(source: str, monkeypatch: pytest.MonkeyPatch) -> bool | None:
+    """Return whether verifier and compiler disagree; None if the program is wild or invalid."""
     try:
         code = compile(source, "<program>", "exec")
     except SyntaxError:
         return None
-    found = judged(source, monkeypatch)
+    found = judge_names(source, monkeypatch)
     if found is None:
         return None
     data, called = found
-    return any(at in (data if is_global else called) for is_global, at in loads(code))
+    return any(at in (data if is_global else called) for is_global, at in find_loads(code))
 
 
-def count(programs: int, seed: int, monkeypatch: pytest.MonkeyPatch) -> int:
-    """How many of so many random programs are tame; fails where verifier and compiler disagree."""
+def count_tame(programs: int, seed: int, monkeypatch: pytest.MonkeyPatch) -> int:
+    """Count the tame ones of some random programs; fail if verifier and compiler disagree on one."""
     writer, tame_ones = Writer(Random(seed)), 0
     for _ in range(programs):
         source = writer.program()
-        disagree = contradiction(source, monkeypatch)
+        disagree = has_contradiction(source, monkeypatch)
         assert not disagree, source
         tame_ones += disagree is False
     return tame_ones
 
 
 @pytest.mark.filterwarnings("ignore::SyntaxWarning")
-def test_what_the_verifier_takes_for_data_is_local(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert count(250, 0, monkeypatch) > 10
+def test_names_that_the_verifier_takes_for_data_are_local(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert count_tame(250, 0, monkeypatch) > 10
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::SyntaxWarning")
-def test_what_the_verifier_takes_for_data_is_local_in_many_programs(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert count(10_000, int(os.environ.get("FUZZ_SEED", "1")), monkeypatch) > 500
+def test_names_that_the_verifier_takes_for_data_are_local_in_many_programs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert count_tame(10_000, int(os.environ.get("FUZZ_SEED", "1")), monkeypatch) > 500
 
 
 @pytest.mark.parametrize("name", ["type", "go_to", "time"])
-def test_name_that_is_only_annotated_in_parentheses_is_not_bound(name: str) -> None:
+def test_annotation_in_parentheses_does_not_bind_a_name(name: str) -> None:
     wild, plain = (
         ast.parse(f"def task_program():\n    {target}: int\n    say(f'{{{name}}}')\n")
         for target in (f"({name})", name)

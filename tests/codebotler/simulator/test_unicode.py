@@ -1,4 +1,4 @@
-"""A letter with its accent is the same as one character (NFC) and as two (NFD), wherever it comes from."""
+"""An accented letter is the same as one character (NFC) and as two (NFD), from every source."""
 
 from pathlib import Path
 from unicodedata import normalize
@@ -31,21 +31,21 @@ people: {café: [{name: René, answers: [thé]}]}
 """
 
 
-def in_form(form: str, text: str) -> str:
+def to_form(form: str, text: str) -> str:
     return normalize(form, text)  # type: ignore[arg-type]  # one of FORMS
 
 
 @pytest.mark.parametrize("ours", FORMS)
 @pytest.mark.parametrize("theirs", FORMS)
-def test_program_and_world_file_in_any_form(ours: str, theirs: str, tmp_path: Path) -> None:
-    (tmp_path / "world.yaml").write_text(in_form(theirs, WORLD))
-    outcome = run(in_form(ours, PROGRAM), read_world(tmp_path / "world.yaml"))
+def test_program_and_world_file_may_have_any_form(ours: str, theirs: str, tmp_path: Path) -> None:
+    (tmp_path / "world.yaml").write_text(to_form(theirs, WORLD))
+    outcome = run(to_form(ours, PROGRAM), read_world(tmp_path / "world.yaml"))
     assert (outcome.status, outcome.trace[-1].text) == ("finished", "thé")
-    assert holds(parse(in_form(ours, 'tr.Exists(at("café", say("thé")))')), outcome.trace)
-    assert not holds(parse(in_form(theirs, 'tr.Exists(say("café"))')), outcome.trace)
+    assert holds(parse(to_form(ours, 'tr.Exists(at("café", say("thé")))')), outcome.trace)
+    assert not holds(parse(to_form(theirs, 'tr.Exists(say("café"))')), outcome.trace)
 
 
-def test_escape_in_a_file_is_a_letter_like_any_other(tmp_path: Path) -> None:
+def test_escape_in_a_file_is_composed(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text('robot: start_loc\nrooms: [start_loc, "cafe\\u0301"]\n')
     assert read_world(tmp_path / "world.yaml").rooms[1].name == NFC
 
@@ -75,7 +75,7 @@ def test_rule_and_instruction_are_composed(tmp_path: Path) -> None:
 
 
 def test_tree_of_a_program_has_composed_texts() -> None:
-    assert NFC in repr(parse_leniently(f"x = '{NFD}'").body[0].value.value)  # type: ignore[attr-defined]  # of this tree
+    assert NFC in repr(parse_leniently(f"x = '{NFD}'").body[0].value.value)  # type: ignore[attr-defined]  # this tree has it
 
 
 def test_robot_is_asked_for_its_rooms_in_its_own_spelling(tmp_path: Path) -> None:

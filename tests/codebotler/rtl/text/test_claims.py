@@ -1,4 +1,4 @@
-"""What texts claim: numbers with their things, times of day, and what is affirmed or denied."""
+"""Claims of texts: numbers of things, times of day, affirmations and denials."""
 
 import pytest
 from hypothesis import given
@@ -60,7 +60,7 @@ SAVORY = [
 
 
 @pytest.mark.parametrize(("text", "given"), SAVORY)
-def test_a_number_stands_with_its_thing(text: str, given: set[int]) -> None:
+def test_number_belongs_to_its_thing(text: str, given: set[int]) -> None:
     assert Number(0, "savory", ("sweet", "office")).given(text) == given
     for number in range(5):
         assert Number(number, "savory", ("sweet", "office")).matches(text) == (given == {number})
@@ -68,7 +68,7 @@ def test_a_number_stands_with_its_thing(text: str, given: set[int]) -> None:
         assert Number(number, "savory", ("sweet", "office"), other=True).matches(text) == is_other
 
 
-def test_of_names_in_names_the_longest_counts() -> None:
+def test_longest_of_nested_names_owns_the_number() -> None:
     other = Number(0, "tea", ("iced tea", "tea"))
     assert other.given("2 iced teas, 3 teas") == {3}
     assert other.given("room 4 tea") == {4}
@@ -107,7 +107,7 @@ def test_a_unit_may_touch_its_number(unit: str) -> None:
         ("40%, 60%", {40, 60}),
     ],
 )
-def test_a_percentage_stands_with_its_sign(text: str, given: set[int]) -> None:
+def test_percentage_belongs_to_its_sign(text: str, given: set[int]) -> None:
     assert Number(0, "%|percent").given(text) == given
 
 
@@ -122,7 +122,7 @@ COUNTS = st.lists(st.integers(0, 30), min_size=3, max_size=3)
     st.sampled_from([", ", " and ", "; ", ". ", ", and "]),
     st.sampled_from(["", "Please buy: ", "We need ", "Hello! "]),
 )
-def test_of_several_things_each_has_its_own_number(
+def test_each_of_several_things_has_its_own_number(
     counts: list[int], order: list[int], form: str, joint: str, start: str
 ) -> None:
     text = start + joint.join(form.format(n=counts[at], t=THINGS[at]) for at in order)
@@ -142,7 +142,7 @@ def test_of_several_things_each_has_its_own_number(
         ("Did 2 people say yes?", set()),
     ],
 )
-def test_a_question_that_is_quoted_asks_nothing(text: str, numbers: set[int]) -> None:
+def test_quoted_question_does_not_hide_a_number(text: str, numbers: set[int]) -> None:
     assert Number(0, "people|yes", ()).given(text) == numbers
 
 
@@ -180,11 +180,11 @@ TIMES = [
 
 
 @pytest.mark.parametrize(("text", "times"), TIMES)
-def test_times_of_day(text: str, times: list[tuple[int, ...]]) -> None:
+def test_times_of_day_are_found(text: str, times: list[tuple[int, ...]]) -> None:
     assert [*times_in(text)] == times
 
 
-def test_a_time_lies_between_two_others_or_not() -> None:
+def test_time_matches_within_its_range_and_other_outside() -> None:
     lunch, odd = Time("11:00", "14:30"), Time("11:00", "14:30", other=True)
     for text, is_lunch, is_odd in [
         ("1 pm", True, False),
@@ -213,7 +213,7 @@ def test_a_time_lies_between_two_others_or_not() -> None:
         ("He saw Alice, Bob, he did not see Carl", "alice bob", ""),
         ("I know Alice and another Alice", "alice", ""),
         ("malice", "", ""),
-        # Questions and guesses say nothing.
+        # Questions and guesses claim nothing.
         ("Is Alice coming?", "", ""),
         ("Did Alice say yes, Bob?", "", ""),
         ("Is Alice coming, or not?", "", ""),
@@ -233,7 +233,7 @@ def test_a_time_lies_between_two_others_or_not() -> None:
         ("I asked Alice whether she would come but she declined", "", "alice"),
         ("I asked Alice", "", ""),
         ("Everyone I asked in the room of Alice declined", "", "alice"),
-        # Harmless words deny nothing, and two denials are none.
+        # Harmless words deny nothing, and a double denial affirms.
         ("Alice is coming and that is no problem at all", "alice", ""),
         ("Alice, don't be late", "alice", ""),
         ("Don't forget Alice", "alice", ""),
@@ -246,10 +246,10 @@ def test_a_time_lies_between_two_others_or_not() -> None:
         ("There are no rooms of Bob without one", "bob", ""),
         ("Without any: none. Alice", "alice", ""),
         ("You will not be alone, Alice. Bob wants to leave at 5, not earlier", "alice bob", ""),
-        # Words for a denial.
+        # Some words deny without a negation.
         ("Alice turned the invitation down. Bob has other plans", "", "alice bob"),
         ("The answer of Alice is negative", "", "alice"),
-        # What belongs together.
+        # A denial applies to the names of its own clause.
         ("In the room of Alice, there is no stapler", "", "alice"),
         ("In Bob's room, there is one, and in Alice's room, there is none", "bob", "alice"),
         ("Bob has a pen, but Alice has paper but no pen", "alice bob", "alice"),
@@ -262,7 +262,7 @@ def test_a_time_lies_between_two_others_or_not() -> None:
         ("You need not go: Alice, Bob", "", "alice bob"),
         ("As for Alice, it is there, and Bob, I am afraid, is not", "alice", "bob"),
         ("Anything but Alice", "alice", ""),
-        # Exceptions.
+        # An exception has the opposite claim.
         ("Everyone but Bob is coming", "", "bob"),
         ("Nobody apart from Alice wants to come", "alice", ""),
         ("All the rooms except Bob's have one", "", "bob"),
@@ -272,7 +272,7 @@ def test_a_time_lies_between_two_others_or_not() -> None:
         ("May your visit be nice, Alice. Bob may come", "alice", ""),
         ("You will look for Alice in vain", "", "alice"),
         ("I told everybody but nobody believed Alice", "", "alice"),
-        # What was sought and not found.
+        # A search in vain denies.
         ("I looked for one in the room of Alice, but could not find any", "", "alice"),
         (
             "Alice's room is done, nothing there. I checked the one of Bob, and there was no pen",
@@ -280,11 +280,11 @@ def test_a_time_lies_between_two_others_or_not() -> None:
             "alice bob",
         ),
         ("I looked in on Alice, but there was no pen in Bob's room", "alice", "bob"),
-        # Answers, and what is taken instead.
+        # Short answers and alternatives count.
         ("Alice? Yes. Bob? No.", "alice", "bob"),
         ("I took Alice rather than Bob", "alice", "bob"),
         ("Choose Alice instead of Bob. Instead of Bob, Alice", "alice", "bob"),
-        # What is still to be done.
+        # Plans claim nothing.
         ("I will ask Alice. I'm going to look for Bob", "", ""),
         ("Alice needs to think about it, and Bob wants to know more", "", ""),
         ("We are out of tea, Alice. He's out of milk, Bob", "", "alice bob"),
@@ -292,13 +292,13 @@ def test_a_time_lies_between_two_others_or_not() -> None:
         ("Alice will have to pass", "", "alice"),
     ],
 )
-def test_what_is_affirmed_and_what_denied(text: str, affirmed: str, denied: str) -> None:
+def test_claims_are_affirmed_or_denied(text: str, affirmed: str, denied: str) -> None:
     for name in ("alice", "bob"):
         assert Claim(name).matches(text) == (name in affirmed.split()), name
         assert Claim(name, denied=True).matches(text) == (name in denied.split()), name
 
 
-def test_a_mention_is_in_the_question_or_its_options_whatever_these_are() -> None:
+def test_mention_matches_the_question_or_any_option() -> None:
     options = (Option("1", is_text=False), Option("tea"))
     asks = (Event("ask", "Which drink?", options),)
     assert holds(parse('tr.Exists(mention("tea"))'), asks)
@@ -306,7 +306,7 @@ def test_a_mention_is_in_the_question_or_its_options_whatever_these_are() -> Non
     assert not holds(parse('tr.Exists(mention("water"))'), asks)
 
 
-def test_an_answer_is_what_was_chosen() -> None:
+def test_answered_matches_only_the_chosen_option() -> None:
     formula = parse('tr.Exists(answered(time("12:00", "12:00")))')
     options = (Option("11:00"), Option("noon"))
     assert holds(formula, (Event("ask", "When?", options, "noon"),))
@@ -314,7 +314,7 @@ def test_an_answer_is_what_was_chosen() -> None:
     assert not holds(formula, (Event("ask", "When?", options),))
 
 
-def test_what_happens_at_a_place_happens_where_the_robot_is() -> None:
+def test_at_matches_only_events_in_that_room() -> None:
     formula = parse('tr.Exists(at("lab 1", say("hello")))')
     assert holds(formula, (Event("say", "hello", place="lab 1"),))
     assert not holds(formula, (Event("say", "hello", place="lab 12"),))
@@ -331,7 +331,7 @@ def test_what_happens_at_a_place_happens_where_the_robot_is() -> None:
         ('tr.Exists(mention("a", "b"))', "mention takes 1 argument, not 2"),
     ],
 )
-def test_a_mistake_is_an_error_that_names_it(text: str, problem: str) -> None:
+def test_error_names_the_mistake(text: str, problem: str) -> None:
     with pytest.raises(RtlSyntaxError, match=None) as error:
         parse(text)
     assert problem in str(error.value)
@@ -346,6 +346,6 @@ def test_a_mistake_is_an_error_that_names_it(text: str, problem: str) -> None:
         'tr.Exists(say(words(time("11:00", "14:30"), denies("bob"))))',
     ],
 )
-def test_what_is_printed_is_rtl_again(text: str) -> None:
+def test_printed_formula_can_be_parsed_again(text: str) -> None:
     assert str(parse(text)) == text.replace('r"mugs\\b"', 'r"mugs\\b"')
     assert parse(str(parse(text))) == parse(text)

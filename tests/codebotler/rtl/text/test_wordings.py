@@ -1,4 +1,4 @@
-"""Sentences by somebody who did not know the rules: read as meant, or known to be read otherwise."""
+"""Sentences by an author who did not know the rules are read as meant, or listed as misread."""
 
 import re
 from pathlib import Path
@@ -19,19 +19,19 @@ OPPOSITE = {"affirms": "denies", "denies": "affirms", "open": "open"}
 def test_claims_are_read_as_meant() -> None:
     for one in WORDINGS["claims"]:
         meant = OPPOSITE[one["reads"]] if "missing" in one["claim"] else one["reads"]
-        expect(one, is_read=reading(one["message"], one["about"]) == meant)
+        assert_read(one, is_read=read_claim(one["message"], one["about"]) == meant)
 
 
 def test_contrasts_are_read_as_meant() -> None:
     states = {"there": "affirms", "missing": "denies", "open": "open"}
     for one in WORDINGS["contrasts"]:
         meant = {about: states[state] for state in states for about in one.get(state, [])}
-        read = {about: reading(one["message"], about) for about in meant}
-        expect(one, is_read=read == meant)
+        read = {about: read_claim(one["message"], about) for about in meant}
+        assert_read(one, is_read=read == meant)
 
 
-def reading(message: str, about: str) -> str:
-    """What a message says of something."""
+def read_claim(message: str, about: str) -> str:
+    """Return whether a message affirms or denies something, leaves it open, or does both."""
     affirmed, denied = (Claim(re.escape(about), denied=which).matches(message) for which in (False, True))
     return "both" if affirmed and denied else "affirms" if affirmed else "denies" if denied else "open"
 
@@ -40,7 +40,7 @@ def test_numbers_are_read_as_meant() -> None:
     for one in WORDINGS["numbers"]:
         number = Number(0, re.escape(one["of"]), tuple(map(re.escape, one["others"])))
         meant = frozenset() if one["gives"] is None else frozenset({one["gives"]})
-        expect(one, is_read=number.given(one["message"]) == meant)
+        assert_read(one, is_read=number.given(one["message"]) == meant)
 
 
 def test_times_are_read_as_meant() -> None:
@@ -48,18 +48,18 @@ def test_times_are_read_as_meant() -> None:
         named, meant = times_in(one["message"]), [minutes(time) for time in one["names"]]
         each_is_meant = all(any(time in readings for time in meant) for readings in named)
         each_is_named = all(any(time in readings for readings in named) for time in meant)
-        expect(one, is_read=len(named) == len(meant) and each_is_meant and each_is_named)
+        assert_read(one, is_read=len(named) == len(meant) and each_is_meant and each_is_named)
 
 
-def expect(one: dict[str, Any], *, is_read: bool) -> None:
-    """A sentence is read as meant, or else says that it is not; the file tells how many are not."""
+def assert_read(one: dict[str, Any], *, is_read: bool) -> None:
+    """Fail unless a sentence is read as meant, or is listed as misread and still is."""
     assert is_read != one.get("misread", False), one
 
 
-def test_few_are_read_otherwise() -> None:
-    misread = {kind: sum("misread" in one for one in told) for kind, told in WORDINGS.items()}
+def test_few_sentences_are_misread() -> None:
+    misread = {kind: sum("misread" in one for one in rows) for kind, rows in WORDINGS.items()}
     assert misread == {"claims": 21, "numbers": 14, "times": 2, "contrasts": 3}
-    assert {kind: len(told) for kind, told in WORDINGS.items()} == {
+    assert {kind: len(rows) for kind, rows in WORDINGS.items()} == {
         "claims": 150,
         "numbers": 100,
         "times": 50,
