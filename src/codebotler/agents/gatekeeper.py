@@ -17,6 +17,7 @@ from codebotler.agents.reports import CheckReport, MissionReport, RobotReport, r
 from codebotler.agents.steps import NOT_RUNNING, Steps
 from codebotler.checking.contracts.file import contract_from
 from codebotler.checking.contracts.text import contract_sentence
+from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.program import MAX_PROGRAM_LENGTH
 from codebotler.core.text.words import brief_part
@@ -59,6 +60,7 @@ class Gatekeeper:
     page: str = ""
     _session: MissionSession | None = field(default=None, init=False)  # the latest one of an agent
     _steps: Steps | None = field(default=None, init=False)  # of that session, if it is step by step
+    _reported: tuple[CheckResult, CheckReport] | None = field(default=None, init=False)  # the latest one
     _waiting: int = field(default=0, init=False)  # calls of agents that wait for a mission or a skill
     _under_way: set[str] = field(default_factory=set, init=False)  # what threads do for agents
 
@@ -140,7 +142,9 @@ class Gatekeeper:
 
     def may_ask_client(self, view: SessionView) -> bool:
         """Whether clients may open a dialog to approve a program that can run and is short enough to show."""
-        is_short = max(len(view.program), len(self.contract_text(view.contract))) <= MAX_ASKED_CHARACTERS
+        check = self._report_check(view)
+        contract = "" if check is None else check.contract
+        is_short = max(len(view.program), len(contract)) <= MAX_ASKED_CHARACTERS
         return self.asks_client and view.can_run and is_short
 
     def check(self, program: str) -> CheckReport:
@@ -195,14 +199,13 @@ class Gatekeeper:
         view = SessionView() if session is None else session.view
         events = [] if session is None else session.events()
         seen = min(len(events), after + MAX_REPORTED_EVENTS)
-        checked, contract = view.check, self.contract_text(view.contract)
         past = view.past and replace(view.past, trace=view.past.trace[-MAX_REPORTED_EVENTS:])
         return MissionReport(
             mission=view.id,
             state=view.phase,
             reason=view.reason or view.error,
             digest=view.digest,
-            check=report_check(checked, view.program, view.problems, contract) if checked else None,
+            check=self._report_check(view),
             remarks=[*view.unknown_rooms, *view.remarks],
             events=[text for text in map(event_text, events[after:seen]) if text],
             event_count=seen,
@@ -210,6 +213,15 @@ class Gatekeeper:
             is_over=view.is_over,
             next=self._next(view),
         )
+
+    def _report_check(self, view: SessionView) -> CheckReport | None:
+        """Describe the check of a mission. Its storyboards are drawn once, since agents may ask often."""
+        if view.check is None:
+            return None
+        if self._reported is None or self._reported[0] is not view.check:
+            contract = self.contract_text(view.contract)
+            self._reported = view.check, report_check(view.check, view.program, view.problems, contract)
+        return self._reported[1]
 
     def report_robot(self) -> RobotReport:
         """Describe the robot for agents: its skills, its house rules, and the rooms that are known now."""

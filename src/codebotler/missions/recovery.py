@@ -27,10 +27,12 @@ class PriorApproval:
     """An earlier approval of a program, which may cover the rest of a mission.
 
     Args:
+        mission: the ID of the approved mission.
         contract: what the approved program may do at most.
         done_before: how many steps earlier missions had done when the program was approved.
     """
 
+    mission: str
     contract: Contract
     done_before: int = 0
 
@@ -38,7 +40,7 @@ class PriorApproval:
     def of(cls, view: SessionView) -> PriorApproval | None:
         """Return the approval of the program in a session's view, or None if the program was not checked."""
         before = 0 if view.past is None else len(view.past.trace)
-        return None if view.contract is None else cls(view.contract, before)
+        return None if view.contract is None else cls(view.id, view.contract, before)
 
     def allows(self, view: SessionView, past: MissionPast) -> bool:
         """Whether the program in `view`, for the rest of the mission `past`, does only what was approved."""

@@ -167,7 +167,8 @@ class MissionSession(SharedView):
         """Approve the program that the person saw, whose digest is `seen`. `by` goes to the log.
 
         `disabled_rules` are those that the person saw switched off, or None to skip this comparison.
-        `is_person` is False if no person decides now, because an earlier approval covers the program.
+        `is_person` is False if no person decides now, because an earlier approval covers the program. It does
+        not cover what a person has changed since.
         """
         with self._editing:
             view, mission = self._view, self._mission
@@ -181,6 +182,8 @@ class MissionSession(SharedView):
                 raise MissionError("other rules are switched off now; review the program again")
             if not view.can_run:
                 raise MissionError("this program cannot run; mend it")
+            if self.is_changed_by_person and not is_person:
+                raise MissionError("a person has changed this program; a person must approve it")
             mission.approve(despite_problems=despite_problems, by=by)
             self.is_approved_by_person = is_person
 
@@ -197,7 +200,7 @@ class MissionSession(SharedView):
 
     def stop(self, by: str) -> None:
         """Stop the robot, then all other work. Return once the request has reached the robot."""
-        if not self._view.is_over:
+        if self.is_stuck or not self._view.is_over:
             self._stop_button.press(by)
 
     def stop_soon(self, by: str) -> None:

@@ -149,15 +149,21 @@ class OwnRobot:
         raise CancelledError
 
     def cancel(self) -> None:
-        """Call the object's `stop`, and cancel the running method if it is async."""
+        """Call the object's `stop`, and cancel the running method if it is async.
+
+        Another press calls `stop` again if it failed before, or if the method is still running.
+        """
         with self._stop_lock:
-            was_stopped, self._stopped = self._stopped, True
-            if not was_stopped:
+            is_calling = not self._stop_returned.is_set()  # on another thread
+            is_done = self._stopped and not (self._is_busy or self.failed_stop)
+            self._stopped = True
+            if not (is_calling or is_done):
                 self._stop_returned.clear()
         self.clock.stop()
-        if was_stopped:
-            self._stop_returned.wait(STOP_SECONDS)  # another thread is already calling `stop`
+        if is_calling or is_done:
+            self._stop_returned.wait(STOP_SECONDS)
             return
+        self.failed_stop = ""
         try:
             self._finish(self._body.stop(), STOP_SECONDS)
         except Exception as error:  # noqa: BLE001 - cancel must not raise

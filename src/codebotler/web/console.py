@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import threading
 import time
 from collections.abc import AsyncGenerator, Callable, Sequence
@@ -16,6 +17,7 @@ from codebotler.checking.check import check
 from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.files import make_folder
+from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.world import World
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.display.wording import BY_PAGE
@@ -78,7 +80,8 @@ class Console:
         self.unfinished = ""  # the mission that had begun and ended early before another one was written
         self._checking = threading.Lock()
         which = quote(f"{robot.name} {normalize_address(robot.address)}", safe="", errors="replace")
-        self._hold_file = home / "robots" / f"{which[:200]}.held"  # the time at which a person pressed STOP
+        self._hold_file = home / "robots" / f"{which[:200]}.held"  # changed when a person presses STOP
+        self._stopped: MissionSession | None = None  # the session at a person's last STOP in this process
         self._began = 0.0  # the time at which the current session began
 
     def __enter__(self) -> Self:
@@ -175,7 +178,10 @@ class Console:
 
     def rest_of(self, past: MissionPast, program: str = "", author: str = "") -> MissionOrder:
         """Return the order to continue a mission by `program`, its own if nothing was done, or a model's."""
-        if not program and (past.is_untouched or not past.instruction):
+        skills = called_skills(
+            parse_leniently(past.program), self.robot.skills
+        )  # none if an agent chose them
+        if not program and ((past.is_untouched and skills) or not past.instruction):
             program, author = past.program, past.model
             model = past.model if past.model in self.models else ""
         else:
@@ -190,13 +196,15 @@ class Console:
                 past = past_to_recover(session, self.robot, self.home)
                 if past is None:
                     return
-                approval = approval or PriorApproval.of(session.view)
+                if approval is None or session.is_approved_by_person:
+                    approval = PriorApproval.of(session.view)
                 session = self._begin(self.rest_of(past), after=session)
                 view = session.wait_until(lambda now: now.may_be_approved or now.waits_for_program)
-                if approval is not None and approval.allows(view, past) and self._may_recover is session:
-                    session.approve(
-                        view.digest, by=f"the approval of mission {past.mission}", is_person=False
-                    )
+                if approval is None or session.is_changed_by_person:  # a person must approve this rest
+                    continue
+                if approval.allows(view, past) and self._may_recover is session:
+                    by = f"the approval of mission {approval.mission}"
+                    session.approve(view.digest, by=by, is_person=False)
                     if self._may_recover is not session:
                         session.stop(BY_PAGE)
 
@@ -223,10 +231,11 @@ class Console:
     def _end_hold(self) -> None:
         """End the hold after a person's STOP if a person has approved the mission that began after it."""
         session = self.session
-        if session is not None and session.is_approved_by_person and self.is_held:
-            with suppress(OSError, ValueError):
-                if self._began > float(self._hold_file.read_text()):
-                    self._hold_file.unlink()
+        if session is None or not session.is_approved_by_person or session is self._stopped:
+            return
+        with suppress(OSError):
+            if self._began > self._hold_file.stat().st_mtime:
+                self._hold_file.unlink()
 
     def dismiss(self) -> None:
         """Dismiss the notice about interrupted missions."""
@@ -240,11 +249,14 @@ class Console:
         """
         with self._lock:
             session, self._may_recover = self.session, None
-            stops = session is not None and session.view.is_approved
+            is_stuck = session is not None and session.is_stuck
+            stops = is_stuck or (session is not None and session.view.is_approved)
             if holds and (stops or not only_moving):
+                self._stopped = session
                 with suppress(OSError):  # the robot must stop, whatever the disk does
-                    self._hold_file.write_text(repr(time.time()))
-        if session is None or session.view.is_over or not (stops or not only_moving):
+                    self._hold_file.touch()
+                    os.utime(self._hold_file)
+        if session is None or not (stops or not only_moving) or (session.view.is_over and not is_stuck):
             return False
         session.stop_soon(by)
         return True

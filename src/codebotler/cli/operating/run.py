@@ -116,7 +116,8 @@ def run(console: Console, request: Request) -> int:
                 if status and begun.id:
                     print_rich(continue_view(begun))
                 return status
-            approval = approval or PriorApproval.of(session.view)
+            if approval is None or session.is_approved_by_person:
+                approval = PriorApproval.of(session.view)
             order = console.rest_of(past)
             print_rich(past_view(past))
             note(f"recovering: asking {order.model} for the rest")
@@ -134,8 +135,11 @@ def _carry_out(
         session.reject(view.programless.sentence)
     elif view.check is None:
         note(f"not run: {shortened(view.reason)}")
-    elif _is_approved(session, view, robot, request, approval):
-        return _watched(session, view, robot, request)
+    else:
+        past = view.past
+        is_covered = approval is not None and past is not None and approval.allows(view, past)
+        if _is_approved(session, view, robot, request, is_covered=is_covered):
+            return _watched(session, view, robot, request, is_person=not is_covered)
     session.join(STOP_GRACE_SECONDS)
     return 1
 
@@ -173,13 +177,9 @@ def _show_check(view: SessionView, request: Request) -> None:
 
 
 def _is_approved(
-    session: MissionSession,
-    view: SessionView,
-    robot: Robot,
-    request: Request,
-    approval: PriorApproval | None,
+    session: MissionSession, view: SessionView, robot: Robot, request: Request, *, is_covered: bool
 ) -> bool:
-    """Show the result of the check, and return whether the user approves the program."""
+    """Show the check, and return whether the user approves the program now, or did before if `is_covered`."""
     _show_check(view, request)
     if view.contract is not None:
         print_rich(contract_view(view.contract, robot.skills))
@@ -188,7 +188,7 @@ def _is_approved(
         anyway = "; --despite-problems runs it anyway" if view.can_run else ""
         note(f"not run because of problems{anyway}")
         return False
-    if approval is not None and view.past is not None and approval.allows(view, view.past):
+    if is_covered:
         note("the rest stays within what was approved before")
     elif not request.yes and not confirm(f"run the program on the robot {robot.name}?"):
         session.stop("the person at the terminal")
@@ -197,12 +197,14 @@ def _is_approved(
     return True
 
 
-def _watched(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> int:
+def _watched(
+    session: MissionSession, view: SessionView, robot: Robot, request: Request, *, is_person: bool
+) -> int:
     """Run the program, print its events, and return the exit status."""
     with _stopped_by_signals(session) as got, EventPrinter(robot.name) as watcher:
         session.on_event = watcher
         with suppress(MissionError):  # the mission was stopped before it could start
-            session.approve(view.digest, despite_problems=request.despite_problems)
+            session.approve(view.digest, despite_problems=request.despite_problems, is_person=is_person)
         view = session.wait_until(lambda _: False)
     if session.error is not None:
         raise session.error
