@@ -1,4 +1,4 @@
-"""Contracts on the command line: shown, saved, and required."""
+"""Commands show, save and require contracts."""
 
 import json
 from pathlib import Path
@@ -63,7 +63,7 @@ def test_a_mission_stays_within_a_contract(folder: Path) -> None:
 
 def test_a_contract_is_never_written_over_another_file(folder: Path) -> None:
     (folder / "c.yaml").write_text("mine")
-    told = refused(
+    refusal = refused(
         "check",
         "greet.py",
         "--world",
@@ -73,11 +73,11 @@ def test_a_contract_is_never_written_over_another_file(folder: Path) -> None:
         name="codebotler",
         cwd=folder,
     )
-    assert told.file == "c.yaml"
+    assert refusal.file == "c.yaml"
     assert (folder / "c.yaml").read_text() == "mine"
 
 
 def test_a_contract_for_other_skills_is_refused(folder: Path) -> None:
     (folder / "c.yaml").write_text("version: 1\nskills:\n  fly: {}\n")
-    told = refused("check", "greet.py", "--within", "c.yaml", name="codebotler", cwd=folder)
-    assert told.at == ("c.yaml", 3)
+    refusal = refused("check", "greet.py", "--within", "c.yaml", name="codebotler", cwd=folder)
+    assert refusal.at == ("c.yaml", 3)

@@ -1,4 +1,4 @@
-"""Many programs and logs under house rules: what the rules would have stopped, and when."""
+"""`codebotler replay` shows what house rules would have stopped in programs and logs, and when."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_the_table_ends_with_numbers_for_each_rule(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_without_a_world_programs_run_where_they_believe_to_be(folder: Path) -> None:
+def test_without_a_world_programs_run_in_the_rooms_they_name(folder: Path) -> None:
     found = effects(folder, "plans/failed.py", "plans/kept.py")
     assert found["failed"][:4] == ("stopped", "vault", "before", 3)
     assert found["kept"] == EFFECTS["kept"]
@@ -138,17 +138,17 @@ def event(kind: str, /, **data: object) -> dict[str, object]:
     return {"time": 1.0, "clock": 0.0, "event": kind, **data}
 
 
-def called(skill: str, end: str = "result", result: str | None = None, **given: object) -> list[LogLine]:
+def call_lines(skill: str, end: str = "result", result: str | None = None, **given: object) -> list[LogLine]:
     call = event("skill", number=1, skill=skill, line=7, arguments=given)
     return [call, event(end, number=1, skill=skill, result=result)]
 
 
-TO_OFFICE = called("go_to", location="office")
-TO_VAULT = called("go_to", location="vault")
-FAILED = called("go_to", "cancelled", location="office")
-ASKED = called("ask", result="no", person="", question="Tea?", options=["yes", "no"])
-PICKED = called("pick", obj="mug")
-SAID = called("say", message="done")
+TO_OFFICE = call_lines("go_to", location="office")
+TO_VAULT = call_lines("go_to", location="vault")
+FAILED = call_lines("go_to", "cancelled", location="office")
+ASKED = call_lines("ask", result="no", person="", question="Tea?", options=["yes", "no"])
+PICKED = call_lines("pick", obj="mug")
+SAID = call_lines("say", message="done")
 SUNG = [event("rule", rule="x", says="X.", formula="x", what=["say", "la la"], prevented=True, line=3)]
 ENDED = [event("state", state="done")]
 LOGS = {
@@ -209,7 +209,7 @@ def test_own_skills_in_a_log_are_judged_by_their_own_names(folder: Path) -> None
     rule = 'not tr.AtLeast(pour("tea"), 2)'
     (folder / "rules.yaml").write_text(f"rules: [{{name: one, says: Once., always: '{rule}'}}]")
     failed = [event("error", number=1, skill="pour", kind="Spilled", message="spilled")]
-    lines = [called("pour", what="tea")[0], *failed, *called("pour", what="tea")]
+    lines = [call_lines("pour", what="tea")[0], *failed, *call_lines("pour", what="tea")]
     (folder / "pour.jsonl").write_bytes(b"".join(map(to_line, lines)))
     assert effects(folder, "pour.jsonl", "--skills", "own.py")["pour"][:3] == ("stopped", "one", "before")
 
@@ -233,8 +233,8 @@ def test_a_mission_is_judged_like_its_program(folder: Path) -> None:
         ("empty.py", b"", None),
         ("latin.py", b"say('\xe9')", 1),
         ("text.jsonl", b"hello\n", 1),
-        ("own.jsonl", to_line(called("pour")[0]), None),
-        ("old.jsonl", to_line(called("say", message="a", volume=3)[0]), None),
+        ("own.jsonl", to_line(call_lines("pour")[0]), None),
+        ("old.jsonl", to_line(call_lines("say", message="a", volume=3)[0]), None),
         ("map.jsonl", to_line(event("map", rooms=[{}], robot="hall")), None),
     ],
 )
@@ -257,21 +257,21 @@ def test_a_file_that_cannot_be_read_is_a_row(
         (["plans", "--rules", "gone.yaml"], "gone.yaml"),
     ],
 )
-def test_what_cannot_be_replayed_is_refused(folder: Path, arguments: list[str], file: str | None) -> None:
+def test_unusable_arguments_are_refused(folder: Path, arguments: list[str], file: str | None) -> None:
     (folder / "home").mkdir()
     assert refused("replay", *arguments, name="codebotler", cwd=folder).file == file
 
 
 @pytest.mark.slow
-def test_ctrl_c_ends_it_at_once(folder: Path) -> None:
+def test_ctrl_c_ends_replay_at_once(folder: Path) -> None:
     for number in range(40):
-        body = f"n = {number}\n    while True:\n        sum(range(10**7))"  # few ticks, much time
+        body = f"n = {number}\n    while True:\n        sum(range(10**7))"  # Each tick takes long.
         (folder / "plans" / f"{number}.py").write_text(f"def task_program():\n    {body}\n")
     arguments = ("replay", "plans", "--rules", "rules.yaml")
     with Forked("codebotler", *arguments, cwd=folder, environment=os.environ) as process:
         threads = Path(f"/proc/{process.pid}/task")
         while not any(children.read_text() for children in threads.glob("*/children")):
-            time.sleep(0.01)  # until the engine has started
+            time.sleep(0.01)  # Wait until the engine has started.
         process.send_signal(signal.SIGINT)
         _, err = process.communicate()
     assert (process.returncode, err) == (130, "codebotler: stopped\n")
