@@ -41,7 +41,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.web.console import Console
-from doubles import Answering, Several, raising
+from doubles import FakeModel, FakeRobot, fail_with
 from ended import cut, failed_mission, line_of
 
 WORLD = World((Room("hall"), Room("kitchen"), Room("vault")), "hall")
@@ -671,7 +671,7 @@ def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
 
 
 def test_a_question_is_asked_and_its_answer_is_one_of_the_options(tmp_path: Path) -> None:
-    robot = Answering(lambda skill, _: ANSWERS.get(skill))
+    robot = FakeRobot(lambda skill, _: ANSWERS.get(skill))
     gatekeeper = Gatekeeper(Console(robot, tmp_path, open_recorded))
 
     async def act(agent: Agent) -> None:
@@ -689,12 +689,12 @@ def test_a_question_is_asked_and_its_answer_is_one_of_the_options(tmp_path: Path
 
 
 def test_a_robot_that_is_lost_ends_the_steps(tmp_path: Path) -> None:
-    robot = Answering(lambda skill, _: ANSWERS.get(skill))
+    robot = FakeRobot(lambda skill, _: ANSWERS.get(skill))
     gatekeeper = Gatekeeper(Console(robot, tmp_path, open_recorded))
 
     async def act(agent: Agent) -> None:
         key, _ = await began(agent, gatekeeper)
-        robot.answer = raising(RobotLostError("its battery is empty"))
+        robot.answer = fail_with(RobotLostError("its battery is empty"))
         assert "ended" in await agent.fails("call_skill", steps=key, name="say", arguments={"message": "a"})
         await until(gatekeeper, lambda view: view.is_over)
         report = await agent.call("follow_mission")
@@ -806,7 +806,7 @@ def test_an_agent_checks_one_program_at_a_time(gatekeeper: Gatekeeper) -> None:
     use(gatekeeper, act)
 
 
-class Hanging(Several):
+class Hanging(FakeModel):
     """A model that never replies, until its request is cancelled."""
 
     def __init__(self) -> None:
@@ -1030,7 +1030,7 @@ def test_a_person_chooses_a_behaviour_in_the_dialog(
         return ElicitResult(action=action, content=content)
 
     robot = Simulated(WORLD, speed=None)
-    console = Console(robot, tmp_path, lambda _: Several([QUIET, HELLO]), candidates=2)
+    console = Console(robot, tmp_path, lambda _: FakeModel([QUIET, HELLO]), candidates=2)
     made = Gatekeeper(console, asks_client=True, writes=True, page="http://localhost:1/")
 
     async def act(agent: Agent) -> None:
@@ -1054,7 +1054,7 @@ def test_a_person_chooses_a_behaviour_in_the_dialog(
 
 def test_without_a_dialog_a_person_chooses_on_the_page(tmp_path: Path) -> None:
     robot = Simulated(WORLD, speed=None)
-    console = Console(robot, tmp_path, lambda _: Several([QUIET, HELLO]), candidates=2)
+    console = Console(robot, tmp_path, lambda _: FakeModel([QUIET, HELLO]), candidates=2)
     made = Gatekeeper(console, writes=True, page="http://localhost:1/")
 
     async def act(agent: Agent) -> None:

@@ -12,7 +12,7 @@ from codebotler.core.errors import UserError
 from codebotler.models.recorded import open_recorded
 from codebotler.prompts import prompt_for
 from command_line import Ended, Refusal, command
-from doubles import Several
+from doubles import FakeModel
 from roboeval.suites.load import Suite
 
 SAYS = 'def task_program():\n    say("{} mugs")\n'
@@ -27,11 +27,11 @@ class Terminal:
         self, programs: Sequence[str], *lines: str, model: str = "several", later: Sequence[str] = ()
     ) -> None:
         self.rounds, self.lines, self.model = [programs, *[later] * bool(later)], list(lines), model
-        self.asked_models: list[Several] = []
+        self.asked_models: list[FakeModel] = []
         self.asked: list[str] = []
 
-    def open(self) -> Several:
-        model = Several(self.rounds[min(len(self.asked_models), len(self.rounds) - 1)])
+    def open(self) -> FakeModel:
+        model = FakeModel(self.rounds[min(len(self.asked_models), len(self.rounds) - 1)])
         model.name = self.model
         self.asked_models.append(model)
         return model

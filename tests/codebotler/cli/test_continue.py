@@ -19,7 +19,7 @@ from codebotler.missions.storage.store import read_missions
 from codebotler.robots.simulated import Simulated
 from codebotler.web.console import Console
 from command_line import Ended, command
-from doubles import Several
+from doubles import FakeModel
 from ended import cut, failed_mission, line_of
 from server import Request as ModelRequest
 from server import Server
@@ -175,7 +175,7 @@ class Interrupted(Simulated):
 
 def test_nothing_is_recovered_after_a_signal(tmp_path: Path) -> None:
     world = World((Room("hall"), Room("kitchen")), "hall")
-    model = Several(('def task_program():\n    go_to("kitchen")\n    pick("mug")\n', REST))
+    model = FakeModel(('def task_program():\n    go_to("kitchen")\n    pick("mug")\n', REST))
     console = Console(Interrupted(world, speed=None), tmp_path, lambda _: model, models=("m",), world=world)
     handlers = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:

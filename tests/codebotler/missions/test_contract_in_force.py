@@ -23,7 +23,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.simulator.guard.contract import Contract, SkillBound
 from codebotler.simulator.guard.house_rule import UNKNOWN_ROOM
 from codebotler.simulator.worlds.room_map import RoomMap
-from doubles import Answering
+from doubles import FakeRobot
 
 ROOMS = RoomMap(("hall", "kitchen", "the vault", "café"), "hall", plain=True)
 HOUSE = World((Room("hall"), Room("kitchen", ("mug", "plate")), Room("vault")), "hall")
@@ -89,7 +89,7 @@ def ran(
     ],
 )
 def test_the_robot_is_not_told_what_the_contract_does_not_allow(tmp_path: Path, call: str) -> None:
-    robot = Answering()
+    robot = FakeRobot()
     mission, lines = ran(tmp_path, robot, STUBBORN.format(call))
     assert (mission.state, mission.summary.reason) == (
         MissionState.STOPPED,
@@ -114,13 +114,13 @@ def task_program():
     say("there are 2 mugs")
     ask("Ann", "Tea?", ["no"])
 """
-    robot = Answering(lambda skill, _: "no" if skill == "ask" else None)
+    robot = FakeRobot(lambda skill, _: "no" if skill == "ask" else None)
     mission, _ = ran(tmp_path, robot, program)
     assert mission.state is MissionState.DONE
 
 
 def test_all_contracts_count(tmp_path: Path) -> None:
-    robot = Answering()
+    robot = FakeRobot()
     mission = Mission(tmp_path, robot.name)
     mission.draft("def task_program():\n    go_to('kitchen')\n    go_to('hall')\n")
     mission.check([])
@@ -133,7 +133,7 @@ def test_all_contracts_count(tmp_path: Path) -> None:
 
 
 def test_a_call_too_many_stops_the_mission(tmp_path: Path) -> None:
-    robot = Answering()
+    robot = FakeRobot()
     mission, _ = ran(
         tmp_path, robot, "def task_program():\n    go_to('kitchen')\n    pick('mug')\n    pick('mug')\n"
     )
@@ -157,7 +157,7 @@ def task_program():
     except Exception:
         pick("mug")
 """
-    mission, _ = ran(tmp_path, Answering(answer), program)
+    mission, _ = ran(tmp_path, FakeRobot(answer), program)
     assert mission.state is MissionState.DONE
 
 
@@ -167,7 +167,7 @@ def test_a_robot_that_does_not_say_where_it_is_picks_up_nothing(tmp_path: Path) 
             raise RobotError("Unknown", "the robot has not found its place yet")
         return None
 
-    robot = Answering(answer)
+    robot = FakeRobot(answer)
     _, lines = ran(tmp_path, robot, "def task_program():\n    pick('mug')\n", place="")
     (told,) = [line for line in lines if line["event"] == "rule"]
     assert told["why"] == UNKNOWN_ROOM
@@ -220,7 +220,7 @@ def test_a_session_refuses_a_program_beyond_the_contract_of_its_start(tmp_path: 
 
 def test_the_answers_of_a_robot_do_not_leave_the_contract(tmp_path: Path) -> None:
     told: dict[str, RobotResult] = {"get_all_rooms": ["hall", "the vault"], "get_current_location": "hall"}
-    robot = Answering(lambda skill, _: told.get(skill))
+    robot = FakeRobot(lambda skill, _: told.get(skill))
     program = "def task_program():\n    for room in get_all_rooms():\n        go_to(room)\n"
     mission, _ = ran(tmp_path, robot, program)
     assert mission.state is MissionState.STOPPED

@@ -36,7 +36,7 @@ from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.robot import SimulatedRobot
 from codebotler.simulator.worlds.room_map import RoomMap
-from doubles import Answering
+from doubles import FakeRobot
 
 WORLD = read_world(OFFICE)
 MAP = RoomMap.of(WORLD)
@@ -236,9 +236,9 @@ def test_the_robot_stands_still_before_the_rule_is_logged(tmp_path: Path) -> Non
 # --- refused at the start
 
 
-def knowing(*, has_pose: bool, rooms: tuple[str, ...] = ("hall", "vault")) -> Answering:
+def knowing(*, has_pose: bool, rooms: tuple[str, ...] = ("hall", "vault")) -> FakeRobot:
     told = {"get_all_rooms": [*rooms], "get_current_location": "hall"}
-    robot = Answering(lambda skill, _: told.get(skill))  # type: ignore[arg-type, return-value]  # of these skills
+    robot = FakeRobot(lambda skill, _: told.get(skill))  # type: ignore[arg-type, return-value]  # of these skills
     robot.has_pose = has_pose
     return robot
 

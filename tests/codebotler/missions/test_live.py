@@ -21,7 +21,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.simulator.engine import run
 from codebotler.simulator.settings import PAPER_SETTINGS
 from codebotler.simulator.worker import Worker
-from doubles import Answering, giving, raising
+from doubles import FakeRobot, fail_with, replay
 from roboeval.suites.load import Suite
 
 FOUND = True
@@ -40,7 +40,7 @@ class Notes(list[tuple[str, dict[str, object]]]):
 
 def live(answer: Callable[[str, str], RobotResult] = lambda *_: None) -> tuple[LiveRobot, Notes]:
     notes = Notes()
-    return LiveRobot(Answering(answer), notes, place="hall"), notes
+    return LiveRobot(FakeRobot(answer), notes, place="hall"), notes
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def test_reference_programs_leave_the_simulators_traces(
 def test_a_question_without_options_is_named_wherever_its_text_stands() -> None:
     given = (Parameter("choices", ValueType(is_list=True), is_options=True), Parameter("title"))
     row = Skill("choose", given, TEXT_TYPE, "Let somebody choose.", Recording("choose", "title", "choices"))
-    answering = Answering()
+    answering = FakeRobot()
     answering.skills = SKILLS.with_skill(row)
     robot = LiveRobot(answering, Notes())
     with pytest.raises(RobotError, match='the question "A drink\\?" offers no options'):
@@ -119,7 +119,7 @@ def test_errors_reach_the_program_as_in_the_simulator(
 
 
 def test_events_tell_what_was_asked_and_what_came_of_it() -> None:
-    robot, _ = live(giving(None, FOUND, "Yes", None))
+    robot, _ = live(replay(None, FOUND, "Yes", None))
     robot.perform("go_to", [" kitchen "])
     robot.perform("is_in_room", ["mug"])
     assert robot.perform("ask", ["ann", "Tea?", OPTIONS]) == 0
@@ -134,7 +134,7 @@ def test_events_tell_what_was_asked_and_what_came_of_it() -> None:
 
 
 def test_everything_is_taken_down_in_order() -> None:
-    robot, notes = live(giving(None, "Yes"))
+    robot, notes = live(replay(None, "Yes"))
     robot.perform("say", ["hello"])
     robot.line = 3
     robot.sleep_until(5)
@@ -165,12 +165,12 @@ def test_clock_begins_with_the_first_skill() -> None:
 
 @pytest.mark.parametrize(("said", "position"), [("Yes", 0), (" no ", 1), ("NO", 1), ("yes ", 0)])
 def test_answer_is_the_option_of_that_text(said: str, position: int) -> None:
-    robot, _ = live(giving(said))
+    robot, _ = live(replay(said))
     assert robot.perform("ask", ["ann", "Tea?", OPTIONS]) == position
 
 
 def test_answer_that_was_not_offered_is_an_error() -> None:
-    robot, notes = live(giving("Perhaps"))
+    robot, notes = live(replay("Perhaps"))
     with pytest.raises(RobotError, match="Perhaps") as error:
         robot.perform("ask", ["ann", "Tea?", OPTIONS])
     assert error.value.kind == "AskInvalidOptions"
@@ -179,7 +179,7 @@ def test_answer_that_was_not_offered_is_an_error() -> None:
 
 
 def test_robots_own_words_are_kept() -> None:
-    robot, notes = live(raising(RobotError("GoToInvalidLocation", "the door is shut")))
+    robot, notes = live(fail_with(RobotError("GoToInvalidLocation", "the door is shut")))
     with pytest.raises(RobotError, match="the door is shut"):
         robot.perform("go_to", ["kitchen"])
     assert notes.kinds == ["skill", "feedback", "error"]
@@ -203,14 +203,14 @@ def test_robots_own_words_are_kept() -> None:
 def test_answer_that_the_skill_does_not_have_loses_the_robot(
     skill: str, arguments: list[str], answer: RobotResult
 ) -> None:
-    robot, _ = live(giving(answer))
+    robot, _ = live(replay(answer))
     with pytest.raises(RobotLostError, match=f"answered {skill} with"):
         robot.perform(skill, arguments)
 
 
 def test_ninth_skill_needs_nothing_here() -> None:
     row = Skill("measure", (Parameter("what"),), TEXT_TYPE, "Measure.", Recording("measure", "what"))
-    robot, notes = live(giving("20 degrees"))
+    robot, notes = live(replay("20 degrees"))
     robot.skills = SKILLS.with_skill(row)
     assert robot.perform("measure", ["the air"]) == "20 degrees"
     assert robot.trace == (Event("measure", "the air"),)
@@ -232,7 +232,7 @@ def test_nothing_starts_after_a_stop() -> None:
     with pytest.raises(StoppedError):
         robot.sleep_until(3600)
     assert (notes, robot.trace) == ([], ())
-    assert isinstance(robot.robot, Answering)
+    assert isinstance(robot.robot, FakeRobot)
     assert robot.robot.cancels == 1
     assert not robot.robot.clock.wait(1), "who sleeps wakes up"
 
@@ -259,7 +259,7 @@ def test_error_after_a_stop_does_not_reach_the_program() -> None:
 
 
 def test_somebody_else_who_stops_the_robot_ends_the_mission() -> None:
-    robot, notes = live(raising(CancelledError()))
+    robot, notes = live(fail_with(CancelledError()))
     with pytest.raises(RobotLostError, match="another client"):
         robot.perform("go_to", ["kitchen"])
     assert notes.kinds == ["skill", "feedback", "cancelled"]
@@ -273,7 +273,7 @@ def test_feedback_that_cannot_be_taken_down_stops_the_robot() -> None:
         if event == "feedback":
             raise FullError
 
-    machine = Answering()
+    machine = FakeRobot()
     robot = LiveRobot(machine, note)
     with pytest.raises(FullError):
         robot.perform("say", ["hello"])

@@ -35,7 +35,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.simulator import ledger
 from codebotler.simulator.pool import SHARED_POOL
 from codebotler.simulator.worker import Worker
-from doubles import Answering, giving, raising
+from doubles import FakeRobot, fail_with, replay
 from processes import are_gone, children_of
 
 HELLO = "def task_program():\n    say('hello')\n    say('bye')\n"
@@ -84,7 +84,7 @@ def kinds(mission: Mission) -> list[str]:
 
 
 def test_mission_goes_through_its_states_and_writes_all_that_happens(home: Path) -> None:
-    robot = Answering()
+    robot = FakeRobot()
     mission = done(home, robot)
     before = ["drafting", "drafting", "checked", "approved", "running"]
     said = ["skill", "feedback", "result"]
@@ -104,7 +104,7 @@ def test_each_event_is_on_the_disk_before_it_is_told(home: Path) -> None:
         assert read_events(home / "missions" / mission.id)[-1] == json.loads(json.dumps(line))
         told.append(1)
 
-    with Reservation(Answering(), home) as reserved, ready(home) as mission:
+    with Reservation(FakeRobot(), home) as reserved, ready(home) as mission:
         mission.on_event = count
         mission.run(reserved)
     assert len(told) == 8
@@ -134,7 +134,7 @@ STEP: dict[str, Callable[[Mission, Reservation], object]] = {
     ],
 )
 def test_illegal_steps_are_refused_with_a_sentence(home: Path, before: list[str], refused: list[str]) -> None:
-    with Reservation(Answering(), home) as reserved, Mission(home, "answering") as mission:
+    with Reservation(FakeRobot(), home) as reserved, Mission(home, "answering") as mission:
         for step in before:
             STEP[step](mission, reserved)
         state, events = mission.state, read_events(mission.folder)
@@ -202,19 +202,19 @@ def test_every_state_but_the_ends_has_a_way_out() -> None:
 @pytest.mark.parametrize(
     ("program", "answer", "reason", "line"),
     [
-        ("def task_program(:\n", giving(), "SyntaxError", 1),
-        ("def task_program():\n    say(helo)\n", giving(), "NameError", 2),
-        (HELLO, raising(RobotError("SayMute", "it is mute")), "SayMute: it is mute", 2),
-        (HELLO, raising(RobotLostError("its server died")), "the robot was lost: its server died", None),
-        (HELLO, raising(ValueError("odd")), "ValueError: odd", None),
-        (HELLO, giving("Hi"), "the robot was lost: .* say .*'Hi'", None),
-        ("def task_program():\n    while True: pass\n", giving(), "TimeoutError", 2),
+        ("def task_program(:\n", replay(), "SyntaxError", 1),
+        ("def task_program():\n    say(helo)\n", replay(), "NameError", 2),
+        (HELLO, fail_with(RobotError("SayMute", "it is mute")), "SayMute: it is mute", 2),
+        (HELLO, fail_with(RobotLostError("its server died")), "the robot was lost: its server died", None),
+        (HELLO, fail_with(ValueError("odd")), "ValueError: odd", None),
+        (HELLO, replay("Hi"), "the robot was lost: .* say .*'Hi'", None),
+        ("def task_program():\n    while True: pass\n", replay(), "TimeoutError", 2),
     ],
 )
 def test_mission_that_fails_says_why(
     home: Path, program: str, answer: Callable[[str, str], RobotResult], reason: str, line: int | None
 ) -> None:
-    robot = Answering(answer)
+    robot = FakeRobot(answer)
     mission = done(home, robot, program)
     summary = MissionSummary.read(mission.folder)
     assert (summary.state, summary.line) == ("failed", line)
@@ -224,7 +224,7 @@ def test_mission_that_fails_says_why(
 
 
 def test_robot_does_not_go_on_when_the_mission_fails_from_within(home: Path) -> None:
-    robot = Answering(raising(ValueError("odd")))
+    robot = FakeRobot(fail_with(ValueError("odd")))
     done(home, robot)
     assert robot.cancels == 1
 
@@ -294,7 +294,7 @@ def test_order_of_a_stop_is_that_the_robot_is_told_first(home: Path) -> None:
     order: list[str] = []
     may_go_on, blocked = threading.Event(), threading.Event()
 
-    class Telling(Answering):
+    class Telling(FakeRobot):
         def cancel(self) -> None:
             super().cancel()
             order.append("robot")
@@ -326,7 +326,7 @@ def test_order_of_a_stop_is_that_the_robot_is_told_first(home: Path) -> None:
 def test_stop_is_written_even_if_the_robot_has_ended_before_it_is_back(home: Path) -> None:
     asked, told, has_ended = threading.Event(), threading.Event(), threading.Event()
 
-    class Slow(Answering):
+    class Slow(FakeRobot):
         def cancel(self) -> None:
             super().cancel()
             if not told.is_set():
@@ -370,7 +370,7 @@ def test_robot_that_answers_after_a_stop_starts_nothing_more(home: Path, result:
             raise result
         return None
 
-    robot = Answering(answer)
+    robot = FakeRobot(answer)
     with (
         Reservation(robot, home) as reserved,
         ready(home) as mission,
@@ -393,7 +393,7 @@ def test_robot_that_does_not_confirm_a_stop_is_told_of(home: Path, monkeypatch: 
         may_answer.wait(60)
         return None
 
-    robot = Answering(never)
+    robot = FakeRobot(never)
     with Reservation(robot, home) as reserved, ready(home) as mission:
         with running(mission, reserved, "skill"):
             assert asked.wait(30)
@@ -422,7 +422,7 @@ def test_robot_that_cannot_even_be_told_to_stop_is_told_of(
     monkeypatch.setattr(module, "STOP_GRACE_SECONDS", 0.3)
     may_go_on = threading.Event()
 
-    class Blocked(Answering):
+    class Blocked(FakeRobot):
         def cancel(self) -> None:
             may_go_on.wait(60)
 
@@ -458,7 +458,7 @@ def test_skill_without_an_end_goes_on_until_the_stop(home: Path) -> None:
 def test_stop_may_come_again(home: Path) -> None:
     asked = threading.Event()
 
-    class Slow(Answering):
+    class Slow(FakeRobot):
         def cancel(self) -> None:
             super().cancel()
             if self.cancels > 1:
@@ -495,7 +495,7 @@ def test_stop_is_written_even_where_its_end_comes_first(home: Path) -> None:
     "ignore::pytest.PytestUnhandledThreadExceptionWarning"
 )  # the robot's, on its thread
 def test_robot_that_breaks_at_a_stop_is_told_of(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Breaks(Answering):
+    class Breaks(FakeRobot):
         def cancel(self) -> None:
             raise TypeError("no such motor")
 
@@ -515,7 +515,7 @@ def test_robot_that_breaks_at_a_stop_is_told_of(home: Path, monkeypatch: pytest.
 
 
 def test_stop_before_it_runs_ends_it(home: Path) -> None:
-    with Reservation(Answering(), home) as reserved, ready(home) as mission:
+    with Reservation(FakeRobot(), home) as reserved, ready(home) as mission:
         mission.stop("the test")
         with pytest.raises(MissionError, match="is stopped"):
             mission.run(reserved)
@@ -537,7 +537,7 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
             return super().run_live(source, robot)
 
     monkeypatch.setattr(module, "Worker", Slow)
-    with Reservation(Answering(), home) as reserved, ready(home) as mission:
+    with Reservation(FakeRobot(), home) as reserved, ready(home) as mission:
         assert mission.run(reserved) is MissionState.STOPPED
     assert begun == []
     assert "by the test" in mission.summary.reason
@@ -546,7 +546,7 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
 @pytest.mark.slow
 def test_stop_at_any_moment_ends_as_stopped(home: Path) -> None:
     for number in range(8):
-        with Reservation(Answering(), home) as reserved, ready(home, STUBBORN) as mission:
+        with Reservation(FakeRobot(), home) as reserved, ready(home, STUBBORN) as mission:
             threading.Timer(0.25 * number, mission.stop).start()
             state = MissionState.STOPPED
             while mission.state is MissionState.APPROVED:
@@ -579,7 +579,7 @@ def test_interrupted_run_stops_the_robot(home: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_events_that_cannot_be_written_stop_the_robot(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = Answering()
+    robot = FakeRobot()
     with Reservation(robot, home) as reserved, ready(home) as mission:
         real = os.write
 
@@ -604,7 +604,7 @@ def test_what_watches_may_break_and_the_robot_stops(home: Path) -> None:
         if line["event"] == "result":
             raise BrokenPipeError
 
-    robot = Answering()
+    robot = FakeRobot()
     with Reservation(robot, home) as reserved, ready(home) as mission:
         mission.on_event = told
         mission.run(reserved)
@@ -663,18 +663,18 @@ def test_robot_is_on_one_mission_at_a_time(home: Path) -> None:
 
 
 def test_robots_at_other_addresses_do_not_exclude_each_other(home: Path) -> None:
-    one, two = Answering(), Answering()
+    one, two = FakeRobot(), FakeRobot()
     one.address, two.address = "http://here:11311/", "http://there:11311/"
     with Reservation(one, home), Reservation(two, home):
         assert not (home / "robots").exists()
 
 
 def test_robot_that_cannot_be_connected_is_not_reserved(home: Path) -> None:
-    class Missing(Answering):
+    class Missing(FakeRobot):
         def connect(self) -> None:
             raise NotReadyError("no master")
 
-    class Half(Answering):
+    class Half(FakeRobot):
         def connect(self) -> None:
             super().connect()
             raise NotReadyError("no master")
@@ -685,7 +685,7 @@ def test_robot_that_cannot_be_connected_is_not_reserved(home: Path) -> None:
     with pytest.raises(NotReadyError, match="no master"):
         Reservation(half, home).__enter__()
     assert half.connections == 0, "what it has opened is closed"
-    with Reservation(Answering(), home):
+    with Reservation(FakeRobot(), home):
         pass
 
 

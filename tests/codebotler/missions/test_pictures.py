@@ -20,13 +20,13 @@ from codebotler.missions.storage.mcap import write_mcap
 from codebotler.missions.storage.pictures import PictureStore, read_picture
 from codebotler.robots.base import CameraPicture, Feedback, RobotArgument, RobotResult, ignore_feedback
 from codebotler.robots.reservation import Reservation
-from doubles import Answering
+from doubles import FakeRobot
 
 JPEG, PNG = b"\xff\xd8\xff and more", b"\x89PNG\r\n\x1a\n and more"
 PROGRAM = "def task_program():\n    is_in_room('mug')\n"
 
 
-class Showing(Answering):
+class Showing(FakeRobot):
     """A robot that shows pictures while it looks."""
 
     def __init__(self, *pictures: bytes) -> None:

@@ -31,7 +31,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.web.console import Console
-from doubles import Answering, raising
+from doubles import FakeRobot, fail_with
 
 
 def knowing(rooms: object, here: object = "") -> Callable[[str, str], RobotResult]:
@@ -51,7 +51,7 @@ def knowing(rooms: object, here: object = "") -> Callable[[str, str], RobotResul
 )
 def test_answer_that_is_none_is_said_before_the_robot_moves(rooms: object, here: object, named: str) -> None:
     with pytest.raises(NotReadyError, match=named):
-        ask_rooms(Answering(knowing(rooms, here)), print)
+        ask_rooms(FakeRobot(knowing(rooms, here)), print)
 
 
 def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
@@ -62,7 +62,7 @@ def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
             raise RobotError("GetCurrentLocationFailed", "not localised")
         return ["hall", "lab"]
 
-    plan, place = ask_rooms(Answering(answers), print)
+    plan, place = ask_rooms(FakeRobot(answers), print)
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", "lab"), "hall", "")
     assert re.fullmatch(r"[^\n]*where it is\b[^\n]*: not localised\n", capsys.readouterr().out)
@@ -70,14 +70,14 @@ def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
 
 def test_robot_that_somebody_stops_before_it_moves_is_not_ready() -> None:
     with pytest.raises(NotReadyError, match=r"rooms .*stopped"):
-        ask_rooms(Answering(raising(CancelledError())), print)
+        ask_rooms(FakeRobot(fail_with(CancelledError())), print)
 
 
 @pytest.mark.parametrize("fault", [None, ImportError("a library failed to import")])
 def test_interrupt_that_a_library_swallows_counts_all_the_same(
     fault: Exception | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    robot = Answering(knowing(["hall"], "hall"))
+    robot = FakeRobot(knowing(["hall"], "hall"))
 
     def swallowing() -> None:
         with suppress(KeyboardInterrupt):
@@ -87,7 +87,7 @@ def test_interrupt_that_a_library_swallows_counts_all_the_same(
             raise fault
 
     monkeypatch.setattr(robot, "connect", swallowing)
-    monkeypatch.setattr(robot, "perform", raising(AssertionError("it was asked to do something")))
+    monkeypatch.setattr(robot, "perform", fail_with(AssertionError("it was asked to do something")))
     (tmp_path / "go.py").write_text("def task_program():\n    say('hello')\n")
     before = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
@@ -131,7 +131,7 @@ def nobody(_name: str) -> Writing:
 
 
 def run_mission(
-    robot: Answering,
+    robot: FakeRobot,
     request: Request,
     home: Path,
     open_model: Callable[[str], Writing],
@@ -141,7 +141,7 @@ def run_mission(
 
 
 def test_a_check_sees_the_robots_own_words() -> None:
-    plan, place = ask_rooms(Answering(knowing(["hall", LAB], LAB)), print)
+    plan, place = ask_rooms(FakeRobot(knowing(["hall", LAB], LAB)), print)
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", LAB), LAB, LAB)
     assert check(TO_THE_LAB, room_map=plan).problems == ()
@@ -157,7 +157,7 @@ def test_a_model_is_told_the_robots_own_words(
     program: str, status: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = Writing(program)
-    robot = Answering(knowing(["hall", LAB], LAB))
+    robot = FakeRobot(knowing(["hall", LAB], LAB))
     assert run_mission(robot, Request("go to the lab", yes=True), tmp_path, lambda _: model) == status
     assert f"hall, {LAB}" in model.asked[0].text
     assert f"hall, {LAB}" in model.asked[0].messages[-1].text
@@ -168,7 +168,7 @@ def test_a_model_is_offered_no_skill_that_the_robot_lacks(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = Writing('def task_program():\n    go_to("hall")\n    pick("mug")\n')
-    robot = Answering(knowing(["hall"], "hall"))
+    robot = FakeRobot(knowing(["hall"], "hall"))
     robot.missing = {"pick": "no server listens"}
     assert run_mission(robot, Request("bring the mug", yes=True), tmp_path, lambda _: model) == 1
     asked = "\n".join(message.text for message in model.asked[0].messages)
@@ -182,7 +182,7 @@ def test_a_rule_with_a_misspelt_room_lets_no_mission_begin(tmp_path: Path, *, an
     (tmp_path / "go.py").write_text("def task_program():\n    say('hello')\n")
     bob = Rule("bob", "Leave Bob alone.", parse('not tr.Exists(goto("bobs office"))'), any_room=any_room)
     request = Request(str(tmp_path / "go.py"), yes=True)
-    robot = Answering(knowing(["hall", "bob's office"], "hall"))
+    robot = FakeRobot(knowing(["hall", "bob's office"], "hall"))
     if any_room:
         assert run_mission(robot, request, tmp_path, nobody, (bob,)) == 0
     else:
@@ -204,7 +204,7 @@ def test_rooms_of_the_simulated_robot_are_regexes_as_in_its_world() -> None:
 def test_robot_is_where_it_says_even_if_it_does_not_list_that_room(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    plan, place = ask_rooms(Answering(knowing(["hall", "lab"], "dock")), print)
+    plan, place = ask_rooms(FakeRobot(knowing(["hall", "lab"], "dock")), print)
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", "lab", "dock"), "dock", "dock")
     assert '"dock"' in capsys.readouterr().out
@@ -216,7 +216,7 @@ def test_what_is_odd_about_a_robot_is_told_to_who_runs_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "go.py").write_text("def task_program():\n    say('hello')\n")
-    robot = Answering(knowing(["hall", "lab"], "dock"))
+    robot = FakeRobot(knowing(["hall", "lab"], "dock"))
     assert run_mission(robot, Request(str(tmp_path / "go.py"), yes=True), tmp_path, nobody) == 0
     assert '"dock"' in capsys.readouterr().err
     (mission,) = read_missions(tmp_path)
@@ -224,7 +224,7 @@ def test_what_is_odd_about_a_robot_is_told_to_who_runs_it(
 
 
 def test_robot_that_does_not_know_where_it_is_is_nowhere() -> None:
-    plan, place = ask_rooms(Answering(knowing(["hall", "lab"])), print)
+    plan, place = ask_rooms(FakeRobot(knowing(["hall", "lab"])), print)
     assert plan is not None
     assert (plan.start, place) == ("hall", "")
 
@@ -232,12 +232,12 @@ def test_robot_that_does_not_know_where_it_is_is_nowhere() -> None:
 def test_more_rooms_than_a_check_takes_are_said(capsys: pytest.CaptureFixture[str]) -> None:
     rooms = [f"room {number} (of many)" for number in range(100_000)]
     began = time.monotonic()
-    plan, place = ask_rooms(Answering(knowing(rooms, rooms[7])), print)
+    plan, place = ask_rooms(FakeRobot(knowing(rooms, rooms[7])), print)
     assert place == rooms[7]
     assert limit_rooms(plan, print) is None
     assert time.monotonic() - began < 2, "that is no more than a look at each"
     assert re.search(r"\b100,000 rooms\b.*\b1,000\b", capsys.readouterr().out)
-    plan, _ = ask_rooms(Answering(knowing(rooms[:1_000], rooms[7])), print)
+    plan, _ = ask_rooms(FakeRobot(knowing(rooms[:1_000], rooms[7])), print)
     assert plan is not None
     assert limit_rooms(plan, print) is plan
 
@@ -256,7 +256,7 @@ def test_place_of_a_mission_is_in_the_robots_own_words(
     program = tmp_path / "say.py"
     program.write_text("def task_program():\n    say('hello')\n")
     request = Request(str(program), yes=True)
-    assert run_mission(Answering(knowing(["hall", LAB], LAB)), request, tmp_path / "home", nobody) == 0
+    assert run_mission(FakeRobot(knowing(["hall", LAB], LAB)), request, tmp_path / "home", nobody) == 0
     assert places == [LAB]
 
 
@@ -264,7 +264,7 @@ def test_a_robot_drives_to_the_places_of_the_world_in_the_rooms_that_it_lists() 
     world = World(
         (Room("hall"), Room("kitchen"), Room("sink", within="kitchen"), Room("bed", within="bedroom")), "hall"
     )
-    room_map, _ = ask_rooms(Answering(knowing(["hall", "kitchen"], "hall")), print, world)
+    room_map, _ = ask_rooms(FakeRobot(knowing(["hall", "kitchen"], "hall")), print, world)
     assert room_map is not None
     assert room_map.goals == ("hall", "kitchen", "sink")
     assert room_map.possible_rooms("sink") == ["sink"]

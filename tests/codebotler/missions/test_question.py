@@ -19,7 +19,7 @@ from codebotler.missions.mission import MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.storage.log import MissionState, MissionSummary, read_events
 from codebotler.robots.simulated import Simulated
-from doubles import Several
+from doubles import FakeModel
 
 HOUSE = World((Room("hall"), Room("kitchen", ("mug",))), "hall")
 STAY = 'def task_program():\n    say("hello")\n'
@@ -31,8 +31,8 @@ FETCH = 'def task_program():\n    go_to("kitchen")\n    pick("mug")\n    go_to("
 @contextmanager
 def asking(
     home: Path, *programs: str, asks: bool = True, name: str = "several"
-) -> Iterator[tuple[MissionSession, Several]]:
-    model = Several(programs)
+) -> Iterator[tuple[MissionSession, FakeModel]]:
+    model = FakeModel(programs)
     session = MissionSession(
         Simulated(HOUSE, speed=None),
         home,

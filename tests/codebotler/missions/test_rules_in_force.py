@@ -24,7 +24,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
 from codebotler.simulator.guard.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, Rule
 from codebotler.simulator.worlds.room_map import RoomMap
-from doubles import Answering
+from doubles import FakeRobot
 
 VAULT = Rule("vault", "Never go into the vault.", parse('not tr.Exists(goto("vault"))'))
 REPORT = Rule("report", "Say that it is done.", parse('tr.Exists(say("done"))'), "finally")
@@ -42,11 +42,11 @@ def task_program():
 """
 
 
-def answering(answer: Callable[[str, str], RobotResult] = lambda *_: None) -> Answering:
-    return Answering(answer)
+def answering(answer: Callable[[str, str], RobotResult] = lambda *_: None) -> FakeRobot:
+    return FakeRobot(answer)
 
 
-def knowing(*rooms: str) -> Answering:
+def knowing(*rooms: str) -> FakeRobot:
     """A robot that knows rooms, and is in the first."""
     told: dict[str, RobotResult] = {"get_all_rooms": [*rooms], "get_current_location": rooms[0]}
     return answering(lambda skill, _: told.get(skill))
@@ -88,7 +88,7 @@ def test_the_robot_is_not_told_what_a_rule_forbids_and_the_mission_stops(tmp_pat
 def test_the_robot_is_stopped_before_anything_is_logged(tmp_path: Path) -> None:
     seen: list[str] = []
 
-    class Noting(Answering):
+    class Noting(FakeRobot):
         def cancel(self) -> None:
             super().cancel()
             seen.append("cancel")

@@ -32,7 +32,7 @@ from codebotler.robots.face import (
 from codebotler.robots.open import ROBOT_KINDS, open_with_face
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
-from doubles import Answering
+from doubles import FakeRobot
 
 TEA = """def task_program():
     say("Good morning")
@@ -83,13 +83,13 @@ def going(does: Callable[[], object]) -> Iterator[list[object]]:
 
 @pytest.mark.parametrize("are_regexes", [True, False])
 def test_its_rooms_are_what_those_of_the_other_robot_are(are_regexes: bool) -> None:  # noqa: FBT001 - a parameter
-    inner = Answering()
+    inner = FakeRobot()
     inner.rooms_are_regexes = are_regexes
     assert RobotWithFace(inner, Face()).rooms_are_regexes is are_regexes
 
 
 def test_what_is_spoken_goes_to_the_face_and_all_else_to_the_robot() -> None:
-    inner, face = Answering(lambda skill, _: ["hall"] if skill == "get_all_rooms" else None), Face()
+    inner, face = FakeRobot(lambda skill, _: ["hall"] if skill == "get_all_rooms" else None), Face()
     robot = RobotWithFace(inner, face)
     robot.connect()
     assert robot.perform("get_all_rooms", []) == ["hall"]
@@ -120,7 +120,7 @@ def test_the_last_things_that_were_said_stay_until_another_mission() -> None:
 
 
 def test_what_the_face_has_the_robot_may_lack() -> None:
-    inner = Answering()
+    inner = FakeRobot()
     inner.missing = {"say": "no server", "ask": "no server", "pick": "no arm"}
     robot = RobotWithFace(inner, Face())
     assert robot.missing == {"pick": "no arm"}
@@ -254,7 +254,7 @@ def test_a_stop_ends_what_is_being_said() -> None:
 
 
 def test_the_robot_is_stopped_even_if_the_face_cannot_be() -> None:
-    inner, face = Answering(), Face()
+    inner, face = FakeRobot(), Face()
     robot = RobotWithFace(inner, face)
     robot.connect()
 

@@ -11,11 +11,11 @@ import pytest
 from codebotler.robots.base import NotReadyError, Options
 from codebotler.robots.open import open_robot
 from codebotler.robots.reservation import Reservation, lock_folder, normalize_address
-from doubles import Answering
+from doubles import FakeRobot
 
 
-def addressed(address: str) -> Answering:
-    robot = Answering()
+def addressed(address: str) -> FakeRobot:
+    robot = FakeRobot()
     robot.address = address
     return robot
 
@@ -75,7 +75,7 @@ def test_robot_with_an_address_is_kept_whatever_the_home(tmp_path: Path) -> None
         pytest.raises(NotReadyError, match="another tool"),
     ):
         Reservation(addressed("ws://robot:9090"), tmp_path / "two").__enter__()
-    with Reservation(Answering(), tmp_path / "one"), Reservation(Answering(), tmp_path / "two"):
+    with Reservation(FakeRobot(), tmp_path / "one"), Reservation(FakeRobot(), tmp_path / "two"):
         assert [file.name for file in (tmp_path / "one" / "robots").iterdir()] == ["answering.lock"]
 
 

@@ -35,7 +35,7 @@ from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console, Notifier
 from codebotler.web.panes.instruction import examples
-from doubles import Answering
+from doubles import FakeRobot
 from server import Server
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
@@ -444,7 +444,7 @@ def test_no_other_program_is_asked_for_while_one_is_being_approved(
 def test_a_stop_reaches_a_robot_that_is_asked_for_its_rooms(tmp_path: Path) -> None:
     told = threading.Event()
 
-    class Slow(Answering):
+    class Slow(FakeRobot):
         def cancel(self) -> None:
             super().cancel()
             told.set()
@@ -479,7 +479,7 @@ def test_nothing_begins_while_a_skill_has_not_ended_since_a_stop(
         may_answer.wait(60)
         return None
 
-    with desk_of(tmp_path, Answering(never)) as console:
+    with desk_of(tmp_path, FakeRobot(never)) as console:
         approved(console, "def task_program():\n    say('a')\n")
         assert is_asked.wait(30)
         console.stop("a person")
@@ -703,7 +703,7 @@ def test_viewers_are_woken_at_each_change(console: Console) -> None:
 def test_one_robot_answers_while_another_viewer_sleeps(tmp_path: Path) -> None:
     """What a viewer does not read does not pile up anywhere: a view is all there is."""
     answers: dict[str, RobotResult] = {"get_all_rooms": ["hall"], "get_current_location": "hall"}
-    robot = Answering(lambda skill, _: answers.get(skill))
+    robot = FakeRobot(lambda skill, _: answers.get(skill))
     with desk_of(tmp_path, robot) as console:
         approved(console, "def task_program():\n    for n in range(300):\n        say(str(n))\n")
         view = until(console, lambda view: view.is_over)
