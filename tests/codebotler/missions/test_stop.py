@@ -1,4 +1,4 @@
-"""The stop button: the robot is stopped first, whatever else there is to end."""
+"""The stop button cancels the robot first, and then calls its listeners."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from codebotler.missions.stop import StopButton
 from doubles import FakeRobot
 
 
-class Recording(FakeRobot):
-    """A robot that lists when it is cancelled."""
+class RecordingRobot(FakeRobot):
+    """A robot that records when it is cancelled."""
 
     def __init__(self, order: list[str]) -> None:
         super().__init__()
@@ -25,7 +25,7 @@ class Recording(FakeRobot):
 
 def test_robot_is_cancelled_before_listeners_and_the_newest_comes_first() -> None:
     order: list[str] = []
-    button = StopButton(Recording(order))
+    button = StopButton(RecordingRobot(order))
     button.on_press(lambda: order.append("log"))
     button.on_press(lambda: order.append("program"))
     button.press("a test")
@@ -42,7 +42,7 @@ def test_first_press_counts_and_each_reaches_the_robot() -> None:
     assert 0 <= button.seconds < 60
 
 
-def test_listener_that_fails_keeps_no_other_from_being_called() -> None:
+def test_failing_listener_does_not_prevent_the_others() -> None:
     called: list[str] = []
 
     def fail() -> None:
@@ -56,7 +56,7 @@ def test_listener_that_fails_keeps_no_other_from_being_called() -> None:
     assert called == ["first"]
 
 
-def test_robot_that_cannot_be_cancelled_keeps_no_listener_from_being_called() -> None:
+def test_error_in_cancel_does_not_prevent_the_listeners() -> None:
     class Breaks(FakeRobot):
         def cancel(self) -> None:
             raise TypeError("no such motor")
