@@ -39,7 +39,7 @@ def fenced(code: str, info: str = "python", marks: str = "```") -> str:
 
 
 @pytest.mark.parametrize("step", [10, pytest.param(1, marks=pytest.mark.slow)])
-def test_recorded_programs_stay_as_they_are_alone_and_in_chat(step: int) -> None:
+def test_recorded_programs_are_unchanged_alone_and_in_chat(step: int) -> None:
     for reply in RECORDED[::step]:
         program, once = reply.program, source(reply.program)
         assert source(once) == once
@@ -99,7 +99,7 @@ def test_recorded_programs_stay_as_they_are_alone_and_in_chat(step: int) -> None
         "Certainly\n\n" + TASK + "\nThis is all of it.\n",
     ],
 )
-def test_one_program_in_many_dresses(reply: str) -> None:
+def test_program_is_found_in_many_kinds_of_replies(reply: str) -> None:
     assert source(reply) == TASK
 
 
@@ -118,7 +118,7 @@ def test_one_program_in_many_dresses(reply: str) -> None:
         TASK + "\n\n# Task: drive home\n# at once\ndef task_program():\n    go_to('ho",
     ],
 )
-def test_what_a_base_model_writes_first_counts(reply: str) -> None:
+def test_first_program_of_a_base_model_counts(reply: str) -> None:
     assert source(reply, continues=True) == TASK
 
 
@@ -126,7 +126,7 @@ def test_code_without_a_definition_is_taken_as_it_is() -> None:
     assert source("1. Like this:\n   ```\n   go_to('home')\n   ```\n") == "go_to('home')\n"
 
 
-def test_what_parses_is_no_prose() -> None:
+def test_text_that_parses_is_not_prose() -> None:
     reply = "Here it is:\n\nrooms: list\n\n" + TASK + "\nThis is all of it.\n"
     assert source(reply) == "rooms: list\n\n" + TASK
 
@@ -137,12 +137,12 @@ def test_tabs_stay_tabs() -> None:
     assert source(body.lstrip()) == "def task_program():\n" + body
 
 
-def test_body_whose_first_line_opens_a_block() -> None:
+def test_body_that_begins_with_a_block_is_indented() -> None:
     body = "    if is_in_room('mug'):\n        pick('mug')\n    else:\n        say('no')\n"
     assert source(body.strip()) == "def task_program():\n" + body
 
 
-def test_code_in_front_and_behind_stays() -> None:
+def test_code_before_and_after_the_program_is_kept() -> None:
     constants = "import re\n\nX = 5  # comment\nA, B = (\n    1,\n    2,\n)\n"
     program = f"{constants}\n{HELPER}\n{USES_HELPER}\ntask_program()\n"
     assert source(program) == program
@@ -154,7 +154,7 @@ def test_text_that_looks_like_prose_or_fences_stays_in_a_string() -> None:
     assert source(program) == program
 
 
-def test_thoughts_that_end_in_nothing_are_no_program() -> None:
+def test_thought_without_an_answer_is_not_a_program() -> None:
     assert source("<think>\n" + fenced(TASK)) == ""
     kept = 'def task_program():\n    say("""\n<think> is a tag, and so is\n</think>\n""")\n'
     assert source(kept) == kept
@@ -176,7 +176,7 @@ def test_an_outline_is_taken_where_there_is_nothing_else() -> None:
     assert source("Here:\n" + fenced(outline)) == outline
 
 
-def test_other_blocks_come_along_only_where_needed() -> None:
+def test_other_blocks_are_added_only_if_needed() -> None:
     unused = "def unused():\n    pass\n"
     stub = "def go_to(room):\n    pass\n"
     needed = f"{HELPER}\n\n{USES_HELPER}"
@@ -189,7 +189,7 @@ def test_other_blocks_come_along_only_where_needed() -> None:
     assert source(fenced(USES_HELPER) + fenced(HELPER + TASK)) == HELPER + TASK
 
 
-def test_helpers_of_helpers_come_along() -> None:
+def test_helpers_of_helpers_are_added() -> None:
     helper = "def rooms():\n    return ROOMS\n"
     expected = f"ROOMS = []\n\n\n{helper}\n\n{USES_HELPER}"
     assert source(fenced("ROOMS = []\n") + fenced(helper) + fenced(USES_HELPER)) == expected
@@ -280,14 +280,14 @@ USES_X = "def a():\n    say(x)\n"
         pytest.param([CALLS_A, "a = 1\nreturn\n", "a = 2\n"], [0, 2], id="a helper has to compile"),
     ],
 )
-def test_which_other_blocks_come_along(given: list[str], kept: list[int]) -> None:
+def test_only_these_blocks_are_added(given: list[str], kept: list[int]) -> None:
     assert source(blocks(*given)) == "\n\n".join(given[i] for i in kept)
 
 
-def test_the_work_grows_with_the_reply_and_no_faster(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_work_grows_no_faster_than_the_reply(monkeypatch: pytest.MonkeyPatch) -> None:
     read = []
 
-    def counted(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
+    def count(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
         read.append(sum(1 for _ in ast.walk(tree)))
         return undefined_names(tree, skills)
 
@@ -297,7 +297,7 @@ def test_the_work_grows_with_the_reply_and_no_faster(monkeypatch: pytest.MonkeyP
         assert extract.function(blocks(USES_HELPER, "rooms = f0\n", *chain))[0].startswith(USES_HELPER)
         return sum(read)
 
-    monkeypatch.setattr("codebotler.prompts.extract.undefined_names", counted)
+    monkeypatch.setattr("codebotler.prompts.extract.undefined_names", count)
     assert work(80) < 10 * work(10)
 
 
@@ -305,11 +305,11 @@ def test_no_text_of_a_reply_is_parsed_twice(monkeypatch: pytest.MonkeyPatch) -> 
     texts: list[str] = []
     parse = ast.parse
 
-    def counted(text: str, name: str) -> ast.Module:
+    def count(text: str, name: str) -> ast.Module:
         texts.append(text)
         return parse(text, name)
 
-    monkeypatch.setattr(ast, "parse", counted)
+    monkeypatch.setattr(ast, "parse", count)
 
     for reply in (
         TASK,
@@ -317,7 +317,7 @@ def test_no_text_of_a_reply_is_parsed_twice(monkeypatch: pytest.MonkeyPatch) -> 
         BODY.lstrip(),
         f"Here it is for you:\n\n{fenced(TASK)}\nIt drives there.\nThen it speaks.\n",
     ):
-        new = reply.replace("hello", "good day")  # which no other test has parsed
+        new = reply.replace("hello", "good day")  # No other test parses this.
         texts.clear()
         extract.function(new)
         assert 0 < len(texts) == len(set(texts))
@@ -340,7 +340,7 @@ def test_no_text_of_a_reply_is_parsed_twice(monkeypatch: pytest.MonkeyPatch) -> 
 )
 def test_cut_off_stays_cut_off(reply: str) -> None:
     program = program_of(reply)
-    if "Dear all" not in reply:  # there, what may be prose is dropped, and the string stays open
+    if "Dear all" not in reply:  # In that one, text that may be prose is dropped, and the string stays open.
         assert program.source.rstrip("\n").endswith(reply.rstrip("`\n").rsplit("\n", 1)[-1])
     if "is_in" not in reply:
         assert [p.kind for p in find_flaws(program.source)] == ["SyntaxError"]
@@ -354,7 +354,7 @@ def test_nothing_is_lost_wherever_a_program_is_cut(program: str, at: int) -> Non
         assert source("```python\n" + cut).strip() == cut.strip()
 
 
-def test_broken_code_in_front_is_no_prose() -> None:
+def test_broken_code_before_the_program_is_kept() -> None:
     reply = "def helper(:\n    return 1\n\n" + TASK
     assert source(reply) == reply
 
@@ -368,7 +368,7 @@ def test_reply_without_code_is_the_source(reply: str) -> None:
 
 
 @given(st.text(alphabet=st.sampled_from("`~ \n\t#a(=:\"'\0\ud800é"), max_size=60) | st.text())
-def test_any_reply_and_any_source_is_taken(text: str) -> None:
+def test_any_text_is_read_without_an_error(text: str) -> None:
     program = program_of(text)
     assert isinstance(find_flaws(program.source), tuple)
     assert isinstance(find_flaws(text), tuple)

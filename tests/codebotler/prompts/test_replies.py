@@ -1,4 +1,4 @@
-"""Replies as models of many makers write them: thoughts, fences, and what their chat templates leave."""
+"""Programs are found in the replies of many models, among thoughts, fences and chat templates."""
 
 import pytest
 from hypothesis import given
@@ -23,7 +23,7 @@ def fenced(code: str, info: str = "python", marks: str = "```") -> str:
 
 
 def read(reply: str) -> tuple[str, str]:
-    """The program and the reasoning, read in this process."""
+    """Return the program and the reasoning, read in this process."""
     program, reasoning, _ = extract.function(reply)
     return program, reasoning
 
@@ -54,7 +54,7 @@ def test_last_complete_definition_counts(reply: str) -> None:
     assert source(reply) == TASK
 
 
-def test_stub_in_front_of_the_real_one_is_no_outline() -> None:
+def test_stub_before_the_real_definition_is_kept() -> None:
     both = f"def task_program():\n    pass\n\n\n{TASK}"
     assert source(f"{fenced(OTHER)}\nOr better:\n{fenced(both)}") == both
 
@@ -82,7 +82,7 @@ def test_turn_that_the_model_wrote_for_its_user_ends_the_reply(turn: str) -> Non
     assert source(fenced(TASK) + turn + fenced(OTHER)) == TASK
 
 
-def test_instruction_that_is_repeated_in_front_is_no_end() -> None:
+def test_instruction_before_the_program_does_not_end_the_reply() -> None:
     assert source("[INST] Say hello in the kitchen. [/INST]\n" + TASK) == TASK
 
 
@@ -97,7 +97,7 @@ def test_fence_within_a_text_of_the_program_does_not_end_it(program: str, info: 
     assert source(f"Here it is:\n{fenced(program, info, '~~~')}This is all of it.\n") == program
 
 
-def test_fence_in_the_docstring_of_a_program_without_fences() -> None:
+def test_fence_in_a_docstring_is_kept_without_other_fences() -> None:
     assert source(f"Here it is for you:\n\n{IN_DOCSTRING}\nThis is all of it.\n") == IN_DOCSTRING
 
 
@@ -105,7 +105,7 @@ def test_fence_in_the_docstring_of_a_program_without_fences() -> None:
     ("closing", "closes"),
     [("```", True), ("   ```", True), ("````  ", True), ("    ```", False), ("~~~", False)],
 )
-def test_what_closes_a_fence_of_code_that_was_cut_off(closing: str, closes: bool) -> None:  # noqa: FBT001 - a value of pytest
+def test_only_valid_closings_end_a_fence_of_cut_off_code(closing: str, closes: bool) -> None:  # noqa: FBT001 - pytest passes it
     program = source(f"```python\n{CUT_OFF}{closing}\nx = 1\n```\n")
     assert program == CUT_OFF if closes else program == f"{CUT_OFF}{closing}\nx = 1\n"
 
@@ -124,7 +124,7 @@ def test_what_closes_a_fence_of_code_that_was_cut_off(closing: str, closes: bool
         f"```python\n{BARE}```\nRun it:\n```\ntask_program()\n```\n",
     ],
 )
-def test_fence_that_is_not_where_it_should_be(reply: str) -> None:
+def test_misplaced_fences_do_not_hide_the_program(reply: str) -> None:
     assert source(reply) == TASK
 
 
@@ -200,7 +200,7 @@ def test_pair_of_markers_around_the_answer_is_dropped(reply: str) -> None:
     assert source(reply) == TASK
 
 
-# --- what chat templates leave
+# --- remains of chat templates
 
 
 @pytest.mark.parametrize(
@@ -257,7 +257,7 @@ def test_residue_around_the_program_is_dropped(reply: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["</s>", "[/INST]", "<|im_end|>", "python", "assistant", "<b>", "```"])
-def test_text_of_the_program_is_no_residue(text: str) -> None:
+def test_text_of_the_program_is_not_dropped(text: str) -> None:
     program = (
         f'X = """\n{text}\n"""\n\n\ndef task_program():\n    say("{text}")\n    say("{text}")  # {text}\n'
     )
@@ -326,7 +326,7 @@ def test_fenced_program_is_found_as_it_is(statements: list[str]) -> None:
 
 
 @given(REPLIES)
-def test_program_that_was_found_is_found_in_itself(reply: str) -> None:
+def test_program_is_found_again_in_itself(reply: str) -> None:
     program = source(reply)
     if task_definitions(parse_leniently(program)):
         assert source(program) == program
