@@ -52,8 +52,8 @@ class AgentServer(PageServer):
     @property
     def agent_token(self) -> str:
         ends = time.monotonic() + SOON
-        while (found := re.search(r"Authorization: Bearer (\S+)\n", self.said)) is None:
-            assert time.monotonic() < ends, self.said
+        while (found := re.search(r"Authorization: Bearer (\S+)\n", self.output)) is None:
+            assert time.monotonic() < ends, self.output
             time.sleep(0.02)
         return found[1]
 
