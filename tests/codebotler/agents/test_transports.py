@@ -130,7 +130,7 @@ def test_all_tools_work_over_http(server: AgentServer, mode: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_second_client_stops_what_the_first_runs(server: AgentServer) -> None:
+def test_a_second_client_stops_the_mission_of_the_first(server: AgentServer) -> None:
     async def main() -> None:
         async with asyncio.timeout(SOON), server.client() as first, server.client() as second:
             proposed = await call(first, "propose_mission", program=FAR)

@@ -48,7 +48,7 @@ COFFEE = ASKS.format(who="person", question="Coffee or tea?", options='["Coffee"
 @pytest.fixture(scope="module")
 def worker() -> Iterator[Worker]:
     started = Worker()
-    cluster_candidates(started, [LOOKS], CheckSettings(), ROOMS)  # starts the processes
+    cluster_candidates(started, [LOOKS], CheckSettings(), ROOMS)  # This starts the processes.
     yield started
     started.close()
 

@@ -25,7 +25,7 @@ def drive(start: str, end: str) -> Event:
 
 
 def cluster(size: int, name: str, *traces: Trace) -> CandidateCluster:
-    """Make a cluster from its run in each world. Each has a cup, and only the first one a mug."""
+    """Make a cluster from its run in each world. Every world has a cup, and only the first a mug."""
     outcomes = [Outcome(Status.FINISHED, trace) for trace in traces]
     samples = tuple(
         Sample(number, one, (CUP, NO_MUG if number else MUG)) for number, one in enumerate(outcomes)
@@ -110,7 +110,7 @@ def describe(*traces: Trace) -> list[str]:
     return describe_differences([one.samples[0] for one in made], [one.behaviours[0] for one in made])
 
 
-def test_sentences_say_only_what_differs() -> None:
+def test_sentences_describe_only_differences() -> None:
     greets = drive("hall", "lab"), say("Hello", "lab"), drive("lab", "hall")
     assert describe((*greets, *ONE), greets) == ['says "1 mugs" in hall', "says nothing in hall"]
     assert describe((drive("hall", "lab"),), ()) == ["ends in lab", "stays where it is"]

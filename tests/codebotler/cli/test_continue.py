@@ -1,4 +1,4 @@
-"""`codebotler continue` and `run --recover`: the rest of a mission, by a model or by a person."""
+"""`codebotler continue` and `run --recover` do the rest of a mission, written by a model or a person."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def test_a_mission_that_did_nothing_is_continued_with_its_own_program(folder: Pa
     assert read_calls(folder, after["id"])[0] == "go_to kitchen"
 
 
-def test_a_program_that_forgets_what_is_held_is_not_run(folder: Path) -> None:
+def test_a_program_that_forgets_the_held_thing_is_not_run(folder: Path) -> None:
     call(folder, "run", "begun.py", "--yes")
     refused = call(folder, "continue", "last", "again.py", "--yes")
     assert refused.status == 1
@@ -135,7 +135,7 @@ def test_a_program_that_forgets_what_is_held_is_not_run(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_model_is_shown_what_happened_and_writes_the_rest(folder: Path) -> None:
+def test_a_model_gets_the_past_and_writes_the_rest(folder: Path) -> None:
     with server(PROGRAM, REST) as model:
         assert call(folder, "run", "Bring Anne a mug.", *flags(model), "--yes").status == 1
         assert call(folder, "continue", *flags(model), "--yes").status == 0

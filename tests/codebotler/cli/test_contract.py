@@ -45,7 +45,7 @@ def test_a_program_beyond_a_saved_contract_is_rejected(folder: Path) -> None:
     other = command("codebotler", "check", "fetch.py", *world, "--within", "c.yaml", "--json", cwd=folder)
     assert (same.status, other.status) == (0, 1)
     problems = [problem["kind"] for problem in json.loads(other.out)["problems"]]
-    assert problems == ["OutsideContract"] * 3  # another room, and two skills
+    assert problems == ["OutsideContract"] * 3  # It enters another room and uses two other skills.
 
 
 def test_a_mission_stays_within_a_contract(folder: Path) -> None:

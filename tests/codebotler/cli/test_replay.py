@@ -38,7 +38,7 @@ robot: hall
 rooms: [hall, vault, office]
 people: {office: [{name: Ann, answers: ["no"]}]}
 """
-CAUGHT = "try:\n        say('la la')\n    except Exception:\n        say('done')"
+CATCH = "try:\n        say('la la')\n    except Exception:\n        say('done')"
 BODIES = {
     "before": "say('done')\n    go_to('vault')",
     "late": "go_to('office')\n    ask('Ann', 'Tea?', ['yes', 'no'])\n    say('done')",
@@ -46,7 +46,7 @@ BODIES = {
     "kept": "say('done')",
     "failed": "pick('mug')\n    go_to('vault')",
     "endless": "while True:\n        say('done')",
-    "refused": CAUGHT,
+    "refused": CATCH,
     "wild": "getattr(str, 'upper')\n    go_to('vault')",
     "wrong": "say('done'",
 }
@@ -145,19 +145,19 @@ def call_lines(skill: str, end: str = "result", result: str | None = None, **giv
 
 TO_OFFICE = call_lines("go_to", location="office")
 TO_VAULT = call_lines("go_to", location="vault")
-FAILED = call_lines("go_to", "cancelled", location="office")
-ASKED = call_lines("ask", result="no", person="", question="Tea?", options=["yes", "no"])
-PICKED = call_lines("pick", obj="mug")
-SAID = call_lines("say", message="done")
-SUNG = [event("rule", rule="x", says="X.", formula="x", what=["say", "la la"], prevented=True, line=3)]
-ENDED = [event("state", state="done")]
+FAILURE = call_lines("go_to", "cancelled", location="office")
+QUESTION = call_lines("ask", result="no", person="", question="Tea?", options=["yes", "no"])
+PICK = call_lines("pick", obj="mug")
+SAY = call_lines("say", message="done")
+SONG = [event("rule", rule="x", says="X.", formula="x", what=["say", "la la"], prevented=True, line=3)]
+END = [event("state", state="done")]
 LOGS = {
-    "kept": (SAID + TO_OFFICE + PICKED + ENDED, ("finished", "", "", None, "")),
-    "before": (SAID + TO_VAULT + ENDED, ("stopped", "vault", "before", 7, 'going to "vault"')),
-    "late": (ASKED + SAID + ENDED, ("stopped", "no-means-no", "late", 7, 'the answer "no" to "Tea?"')),
-    "at-end": (TO_OFFICE + ENDED, ("finished", "report", "at the end", None, "")),
-    "prevented": (SAID + SUNG + ENDED, ("stopped", "hush", "before", 3, 'saying "la la"')),
-    "stopped": ([*FAILED, event("state", state="stopped", line=7)], ("stopped", "", "", 7, "")),
+    "kept": (SAY + TO_OFFICE + PICK + END, ("finished", "", "", None, "")),
+    "before": (SAY + TO_VAULT + END, ("stopped", "vault", "before", 7, 'going to "vault"')),
+    "late": (QUESTION + SAY + END, ("stopped", "no-means-no", "late", 7, 'the answer "no" to "Tea?"')),
+    "at-end": (TO_OFFICE + END, ("finished", "report", "at the end", None, "")),
+    "prevented": (SAY + SONG + END, ("stopped", "hush", "before", 3, 'saying "la la"')),
+    "stopped": ([*FAILURE, event("state", state="stopped", line=7)], ("stopped", "", "", 7, "")),
 }
 
 
@@ -168,10 +168,10 @@ def test_logs_are_judged_without_running_anything(folder: Path) -> None:
     assert effects(folder, "mission") == {name: effect for name, (_, effect) in LOGS.items()}
 
 
-def test_a_rule_about_a_room_sees_where_the_log_says_the_robot_was(folder: Path) -> None:
+def test_a_rule_about_a_room_uses_the_positions_in_the_log(folder: Path) -> None:
     rule = 'not tr.Exists(at("office", say(".*")))'
     (folder / "rules.yaml").write_text(f"rules: [{{name: quiet, says: Hush., always: '{rule}'}}]")
-    for name, lines in {"there": TO_OFFICE + SAID, "here": FAILED + SAID, "map": SAID}.items():
+    for name, lines in {"there": TO_OFFICE + SAY, "here": FAILURE + SAY, "map": SAY}.items():
         (folder / f"{name}.jsonl").write_bytes(b"".join(map(to_line, lines)))
     there = {"name": "office", "footprint": [[0, 0], [1, 0], [1, 1]], "stand_at": [0, 0]}
     with (folder / "map.jsonl").open("ab") as file:
@@ -190,8 +190,8 @@ def test_leaving_rules_are_judged_before_drives_in_a_log(folder: Path) -> None:
     kept_back = event(
         "rule", rule="x", says="X.", formula="x", what=["goto", "office"], prevented=True, line=3
     )
-    for name, lines in {"did": TO_OFFICE, "tried": [kept_back], "kept": SAID + TO_OFFICE, "end": []}.items():
-        (folder / f"{name}.jsonl").write_bytes(b"".join(map(to_line, [*lines, *ENDED])))
+    for name, lines in {"did": TO_OFFICE, "tried": [kept_back], "kept": SAY + TO_OFFICE, "end": []}.items():
+        (folder / f"{name}.jsonl").write_bytes(b"".join(map(to_line, [*lines, *END])))
     found = effects(folder, "did.jsonl", "tried.jsonl", "kept.jsonl", "end.jsonl")
     assert {name: effect[1:3] for name, effect in found.items()} == {
         "did": ("bye", "before"),

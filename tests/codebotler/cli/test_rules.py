@@ -161,7 +161,7 @@ rules:
 """
 
 
-def test_a_rule_about_where_the_robot_is_holds_on_the_way(files: Path) -> None:
+def test_a_rule_about_the_robots_position_holds_on_the_way(files: Path) -> None:
     (files / "inside.yaml").write_text(NEVER_INSIDE)
     (files / "through.py").write_text(THROUGH)
     (files / "office.yaml").write_text(OFFICE.read_text())

@@ -501,7 +501,7 @@ def test_unusable_options_of_missions_are_refused(
     assert not (folder / "x.mcap").exists()
 
 
-def test_robots_are_listed_with_what_is_missing(folder: Path) -> None:
+def test_robots_are_listed_with_missing_requirements(folder: Path) -> None:
     status, out, err = call(folder, "robots")
     assert (status, err) == (0, "")
     assert re.search(r"^sim +works", out, re.MULTILINE)
@@ -511,7 +511,7 @@ def test_robots_are_listed_with_what_is_missing(folder: Path) -> None:
     assert all(kind["works"] or kind["missing"] for kind in kinds)
 
 
-def test_robots_are_judged_by_the_python_that_is_named(folder: Path) -> None:
+def test_robots_are_checked_with_the_given_python(folder: Path) -> None:
     status, out, err = call(folder, "robots", "--json", "--ros-python", sys.executable)
     assert (status, err) == (0, "")
     missing = {kind["name"]: kind["missing"] for kind in json.loads(out)}

@@ -161,7 +161,7 @@ def task_program():
     assert mission.state is MissionState.DONE
 
 
-def test_a_robot_that_does_not_say_where_it_is_picks_up_nothing(tmp_path: Path) -> None:
+def test_a_robot_without_a_known_position_picks_up_nothing(tmp_path: Path) -> None:
     def answer(skill: str, _text: str) -> RobotResult:
         if skill == "get_current_location":
             raise RobotError("Unknown", "the robot has not found its place yet")

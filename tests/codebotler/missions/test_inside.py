@@ -340,7 +340,7 @@ def test_a_pose_is_judged_also_while_no_skill_is_performed(
     assert [line["what"][:2] for line in lines if line["event"] == "rule"] == [["inside", "printer room 2"]]
 
 
-def test_a_broken_rule_is_logged_where_the_mission_ends_before_its_stop_returns(
+def test_a_broken_rule_is_logged_even_if_the_mission_ends_before_its_stop_returns(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def stop_late(worker: Worker) -> None:

@@ -231,7 +231,7 @@ def test_robot_does_not_go_on_when_the_mission_fails_from_within(home: Path) -> 
     assert robot.cancels == 1
 
 
-def test_program_can_catch_what_the_robot_cannot_do(home: Path) -> None:
+def test_program_can_catch_an_error_of_the_robot(home: Path) -> None:
     program = "def task_program():\n    try: go_to('moon')\n    except Exception as e: say(str(e))\n"
     robot = Simulated(WORLD, speed=None)
     mission = run_to_end(home, robot, program)

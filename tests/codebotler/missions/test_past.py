@@ -118,7 +118,7 @@ def test_a_mission_that_is_done_has_no_rest(tmp_path: Path) -> None:
         read_past(mission.folder, SKILLS)
 
 
-def test_a_continuation_that_never_ran_leaves_the_past_as_it_was(tmp_path: Path) -> None:
+def test_a_continuation_that_never_ran_leaves_the_past_unchanged(tmp_path: Path) -> None:
     past = read_past(fail(tmp_path, BRING), SKILLS)
     with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
         mission.continue_from(past)
@@ -178,7 +178,7 @@ def test_mission_without_a_program_cannot_be_continued(tmp_path: Path) -> None:
         read_past(mission.folder, SKILLS)
 
 
-def test_the_rest_begins_after_what_earlier_missions_did(tmp_path: Path) -> None:
+def test_the_rest_begins_after_the_steps_of_earlier_missions(tmp_path: Path) -> None:
     past = read_past(fail(tmp_path, BRING), SKILLS)
     with Mission(tmp_path, "simulated") as mission:
         mission.continue_from(past)
@@ -377,7 +377,7 @@ def task_program():
     assert texts == {("lab",)}
 
 
-def test_a_session_compares_the_rest_with_what_remained(tmp_path: Path) -> None:
+def test_a_session_compares_the_rest_with_the_remaining_steps(tmp_path: Path) -> None:
     mission = fail(tmp_path, BRING).name
     past = MissionPast(mission, "", "", POLL, "stopped", (WENT, ASKED, ASKED), "lab")
     session = MissionSession(

@@ -221,7 +221,7 @@ def test_warnings_about_a_robot_are_printed_and_logged(
     assert any('"dock"' in line.get("text", "") for line in read_events(tmp_path / "missions" / mission.id))
 
 
-def test_robot_that_does_not_know_where_it_is_is_nowhere() -> None:
+def test_robot_without_a_position_has_no_place() -> None:
     plan, place = ask_rooms(FakeRobot(replies(["hall", "lab"])), print)
     assert plan is not None
     assert (plan.start, place) == ("hall", "")

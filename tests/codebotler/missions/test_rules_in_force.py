@@ -600,7 +600,7 @@ def test_a_rule_stays_switched_off_if_no_other_program_comes(tmp_path: Path) -> 
     session.join(10)
 
 
-def test_a_rule_that_was_switched_off_is_in_force_for_what_a_model_writes_next(tmp_path: Path) -> None:
+def test_a_rule_that_was_switched_off_is_in_force_for_a_models_next_program(tmp_path: Path) -> None:
     order = MissionOrder(next(iter(recorded("recorded").replies)), "recorded")
     session = MissionSession(robot_in("hall", "vault"), tmp_path, order, open_model=recorded, rules=(VAULT,))
     session.start()

@@ -157,7 +157,7 @@ def test_error_names_the_address_of_a_redirect(name: str, server: Server) -> Non
 
 
 @pytest.fixture
-def proxied(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
+def proxy_server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
     with Server() as proxy:
         address = proxy.url.removesuffix("/v1")
         for variable in ("HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"):
@@ -168,19 +168,19 @@ def proxied(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
 
 @both
 def test_server_on_this_machine_is_never_asked_through_a_proxy(
-    name: str, server: Server, proxied: Server
+    name: str, server: Server, proxy_server: Server
 ) -> None:
     assert ask(name, server).program.startswith(TASK)
-    assert (len(server.requests), len(proxied.requests)) == (1, 0)
+    assert (len(server.requests), len(proxy_server.requests)) == (1, 0)
 
 
 @both
-def test_error_that_came_through_a_proxy_names_it(name: str, server: Server, proxied: Server) -> None:
+def test_error_that_came_through_a_proxy_names_it(name: str, server: Server, proxy_server: Server) -> None:
     server.url = "http://model.invalid/v1"
-    proxied.sends = lambda _request: (502, {"Content-Type": "text/html"}, b"<html>no route</html>")
+    proxy_server.sends = lambda _request: (502, {"Content-Type": "text/html"}, b"<html>no route</html>")
     with pytest.raises(ModelError) as caught:
         ask(name, server)
-    assert f"(through the proxy {proxied.url.removesuffix('/v1')})" in caught.value.sentence
+    assert f"(through the proxy {proxy_server.url.removesuffix('/v1')})" in caught.value.sentence
 
 
 @both
@@ -348,7 +348,7 @@ def test_base_models_take_no_effort(server: Server) -> None:
         ("anthropic:claude-sonnet-4-5", (0.2, None, 16_384)),
     ],
 )
-def test_settings_say_what_is_really_sent(
+def test_settings_show_the_values_that_are_sent(
     name: str, sent: tuple[float | None, float | None, int | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for key in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):

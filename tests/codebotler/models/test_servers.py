@@ -108,7 +108,7 @@ def test_server_that_does_not_stop_is_cut_at_the_functions_end(server: Server) -
     assert reply.program == TASK + PROGRAM
 
 
-def test_openai_is_chat_completions_where_a_base_url_is_given(server: Server) -> None:
+def test_openai_means_chat_completions_if_a_base_url_is_given(server: Server) -> None:
     model = open_model("openai:m", SamplingSettings(base_url=server.url))
     assert model.name == "openai-chat:m"
     reply, _ = ask("openai:m", server)
@@ -197,9 +197,7 @@ def test_endless_reply_times_out_though_its_pieces_arrive_in_time(name: str, ser
 
 @both
 @pytest.mark.parametrize("word", ["pk_location_name", "hf_rooms_to_visit"])
-def test_program_with_a_name_that_looks_like_a_key_stays_as_it_is(
-    name: str, server: Server, word: str
-) -> None:
+def test_program_with_a_name_that_looks_like_a_key_is_unchanged(name: str, server: Server, word: str) -> None:
     server.answer = lambda request: f"{TASK * request.is_chat}    {word} = 1\n"
     reply, _ = ask(name, server)
     assert reply.program == f"{TASK}    {word} = 1\n"
@@ -219,7 +217,9 @@ def test_short_key_that_a_server_sends_back_is_not_shown(
 
 @both
 @pytest.mark.parametrize("key", ["", " "])
-def test_blank_key_is_no_key(name: str, server: Server, monkeypatch: pytest.MonkeyPatch, key: str) -> None:
+def test_blank_key_counts_as_missing(
+    name: str, server: Server, monkeypatch: pytest.MonkeyPatch, key: str
+) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", key)
     reply, _ = ask(name, server)
     assert reply.program == TASK + PROGRAM

@@ -123,7 +123,7 @@ def test_valid_replies_are_parsed(reply: str, sighting: Sighting) -> None:
     assert parse_sighting(reply) == sighting
 
 
-def boxed(*numbers: object) -> str:
+def with_box(*numbers: object) -> str:
     return json.dumps({"found": True, "score": 0.5, "box": numbers})
 
 
@@ -147,12 +147,12 @@ def boxed(*numbers: object) -> str:
         ('{"found": false, "score": -0.1}', "-0.1"),
         ('{"found": true, "score": 1}', '"box"'),
         ('{"found": true, "score": 1, "box": null}', '"box"'),
-        (boxed(0, 0, 1), '"box"'),
-        (boxed(0, 0, 1, "1"), '"box"'),
-        (boxed(12, 40, 300, 200), "between 0 and 1"),
-        (boxed(-0.1, 0, 1, 1), "between 0 and 1"),
-        (boxed(0.8, 0, 0.2, 1), "left"),
-        (boxed(0, 0.5, 1, 0.5), "top"),
+        (with_box(0, 0, 1), '"box"'),
+        (with_box(0, 0, 1, "1"), '"box"'),
+        (with_box(12, 40, 300, 200), "between 0 and 1"),
+        (with_box(-0.1, 0, 1, 1), "between 0 and 1"),
+        (with_box(0.8, 0, 0.2, 1), "left"),
+        (with_box(0, 0.5, 1, 0.5), "top"),
         (" " * (MAX_REPLY_CHARACTERS + 1), "20,001 characters"),
     ],
 )
@@ -167,13 +167,13 @@ def test_a_fence_is_found_in_linear_time(unit: str) -> None:
 
 
 def test_model_is_asked_again_with_its_mistake(server: Server, detector: Detector) -> None:
-    replies = [boxed(12, 40, 300, 200), "", FOUND]
+    replies = [with_box(12, 40, 300, 200), "", FOUND]
     server.answer = lambda _: replies[len(server.requests) - 1]
     assert detector.look(PICTURE, "mug") == SIGHTING
     first, second, third = server.requests
     assert read_request(first) == read_request(second) == read_request(third)
     _, _, said, again = second.body["messages"]
-    assert said["content"] == boxed(12, 40, 300, 200)
+    assert said["content"] == with_box(12, 40, 300, 200)
     assert "[12.0, 40.0, 300.0, 200.0]" in again["content"]
     assert "not a JSON object" in json.dumps(third.body["messages"][2:])
 

@@ -57,7 +57,7 @@ def test_files_become_pictures(kind: str, tmp_path: Path) -> None:
 
 def test_picture_of_a_rotated_camera_is_upright() -> None:
     exif = Image.Exif()
-    exif[0x0112] = 6  # a quarter turn
+    exif[0x0112] = 6  # This value means a quarter turn.
     image = image_of(encode(make_halves(), "JPEG", exif=exif))
     assert image.size == (20, 40)
     assert is_near(image, (10, 5), RED)

@@ -34,7 +34,7 @@ def in_task(*statements: str) -> str:
     return "\n".join(["def task_program():", *("    " + s for s in statements)])
 
 
-def fenced(code: str, info: str = "python", marks: str = "```") -> str:
+def fence(code: str, info: str = "python", marks: str = "```") -> str:
     return f"{marks}{info}\n{code}{marks}\n"
 
 
@@ -45,7 +45,7 @@ def test_recorded_programs_are_unchanged_alone_and_in_chat(step: int) -> None:
         assert source(once) == once
         if reply.fails not in UNPARSABLE:
             assert once.strip("\n") == program.strip("\n")
-            assert source(f"Sure! Here it is:\n\n{fenced(program)}\nIt goes there.\n") == once
+            assert source(f"Sure! Here it is:\n\n{fence(program)}\nIt goes there.\n") == once
             assert source(f"Sure, here it is:\n\n{program}\nThis program goes there and talks.\n") == once
 
 
@@ -55,15 +55,15 @@ def test_recorded_programs_are_unchanged_alone_and_in_chat(step: int) -> None:
         TASK,
         "\n\n" + TASK + "\n\n",
         TASK.replace("\n", "\r\n"),
-        fenced(TASK),
-        fenced(TASK, "py"),
-        fenced(TASK, ""),
-        fenced(TASK, "Python title=x"),
-        fenced(TASK, marks="~~~"),
-        fenced(TASK, marks="````"),
+        fence(TASK),
+        fence(TASK, "py"),
+        fence(TASK, ""),
+        fence(TASK, "Python title=x"),
+        fence(TASK, marks="~~~"),
+        fence(TASK, marks="````"),
         "```python\n" + TASK,
         "```python\n" + TASK + "\nThis program drives there.",
-        "Here is the program:\n" + fenced(TASK) + "It says hello (once).",
+        "Here is the program:\n" + fence(TASK) + "It says hello (once).",
         "Here is the program:\n\n" + TASK + "\nThis program says hello\nand (of course) goes there.\n",
         " Here is the program:\n\n" + TASK,
         "Here's a program that\n(hopefully) works:\n" + TASK,
@@ -75,25 +75,25 @@ def test_recorded_programs_are_unchanged_alone_and_in_chat(step: int) -> None:
         "以下是程序：\n\n" + TASK + "\n它会说你好。\n",  # noqa: RUF001 - Chinese prose
         "  " + TASK.replace("\n", "\n  ").rstrip(" "),
         "Like this:\n\n    " + TASK.replace("\n", "\n    ").rstrip(" ") + "\nThat is all.\n",
-        "1. The program:\n   " + fenced(TASK).replace("\n", "\n   "),
-        "Install it:\n" + fenced("pip install robot\n", "bash") + "Then:\n" + fenced(TASK),
-        fenced(OTHER) + "Or better:\n" + fenced(TASK),
-        fenced(TASK) + "Or better:\n" + fenced(CUT_OFF + "\n").removesuffix("```\n"),
-        fenced(TASK) + "Call it:\n" + fenced("task_program()\n"),
-        "<think>\nPerhaps\n" + fenced(OTHER) + "or not.\n</think>\n\n" + fenced(TASK),
+        "1. The program:\n   " + fence(TASK).replace("\n", "\n   "),
+        "Install it:\n" + fence("pip install robot\n", "bash") + "Then:\n" + fence(TASK),
+        fence(OTHER) + "Or better:\n" + fence(TASK),
+        fence(TASK) + "Or better:\n" + fence(CUT_OFF + "\n").removesuffix("```\n"),
+        fence(TASK) + "Call it:\n" + fence("task_program()\n"),
+        "<think>\nPerhaps\n" + fence(OTHER) + "or not.\n</think>\n\n" + fence(TASK),
         "<think>" + OTHER + "</think>" + TASK,
         " <thinking>\n" + OTHER + "</thinking>\n" + BODY,
         OTHER + "\nThat may do.</think>\n\nHere it is:\n" + TASK,
-        fenced(TASK) + "<think>\n" + fenced(OTHER) + "\nHm, ",
+        fence(TASK) + "<think>\n" + fence(OTHER) + "\nHm, ",
         "<THINK>\n" + OTHER + "</Think>\n" + TASK,
         "<think>They say </think>, and\n\n" + OTHER + "\nor not.\n</think>\n" + TASK,
-        "<think>\nI will greet.</think>Here it is:\n" + fenced(TASK),
-        OTHER + "\nThat may do.</THINKING>\n" + fenced(TASK) + "It thinks.\n</think>\n",
-        fenced(TASK) + "To fill in:\n" + fenced('def task_program():\n    """Says it."""\n    ...\n'),
-        fenced("def task_program():\n    pass\n") + "Filled in:\n" + fenced(TASK),
+        "<think>\nI will greet.</think>Here it is:\n" + fence(TASK),
+        OTHER + "\nThat may do.</THINKING>\n" + fence(TASK) + "It thinks.\n</think>\n",
+        fence(TASK) + "To fill in:\n" + fence('def task_program():\n    """Says it."""\n    ...\n'),
+        fence("def task_program():\n    pass\n") + "Filled in:\n" + fence(TASK),
         BODY,
         BODY.lstrip(),
-        fenced(BODY),
+        fence(BODY),
         BODY + "```\nThis works.\n",
         TASK + "\n\n# Task: drive home\n# at once\ndef task_program():\n    go_to('ho",
         "Certainly\n\n" + TASK + "\nThis is all of it.\n",
@@ -107,14 +107,14 @@ def test_program_is_found_in_many_kinds_of_replies(reply: str) -> None:
     "reply",
     [
         TASK,
-        fenced(TASK),
-        BODY + "```\n\n# Task: say other\n" + fenced(OTHER),
-        TASK + "```\n\n# Task: say other\n" + fenced(OTHER),
+        fence(TASK),
+        BODY + "```\n\n# Task: say other\n" + fence(OTHER),
+        TASK + "```\n\n# Task: say other\n" + fence(OTHER),
         BODY + "\n\n# Task: drive home\ndef task_program():\n    go_to('home')\n",
         TASK + "\n\n# Task: drive home\ndef task_program():\n    go_to('home')\n",
         BODY + "\n\nTask: drive home\ndef task_program():\n    go_to('home')\n",
         TASK + "\n\nTask: drive home\ndef task_program():\n    go_to('home')\n",
-        fenced(TASK) + "\n# Task: say other\n" + fenced(OTHER),
+        fence(TASK) + "\n# Task: say other\n" + fence(OTHER),
         TASK + "\n\n# Task: drive home\n# at once\ndef task_program():\n    go_to('ho",
     ],
 )
@@ -122,7 +122,7 @@ def test_first_program_of_a_base_model_counts(reply: str) -> None:
     assert source(reply, continues=True) == TASK
 
 
-def test_code_without_a_definition_is_taken_as_it_is() -> None:
+def test_code_without_a_definition_is_unchanged() -> None:
     assert source("1. Like this:\n   ```\n   go_to('home')\n   ```\n") == "go_to('home')\n"
 
 
@@ -155,7 +155,7 @@ def test_text_that_looks_like_prose_or_fences_stays_in_a_string() -> None:
 
 
 def test_thought_without_an_answer_is_not_a_program() -> None:
-    assert source("<think>\n" + fenced(TASK)) == ""
+    assert source("<think>\n" + fence(TASK)) == ""
     kept = 'def task_program():\n    say("""\n<think> is a tag, and so is\n</think>\n""")\n'
     assert source(kept) == kept
 
@@ -165,38 +165,38 @@ def test_a_tag_in_code_begins_and_ends_no_thought(tag: str) -> None:
     in_line = f"def task_program():\n    say('a {tag}')\n"
     alone = f'def task_program():\n    say("""\n{tag}\n""")\n'
     for code in (in_line, alone):
-        assert source(f"<think>\nFirst:\n{fenced(OTHER)}</think>\nSo:\n{fenced(code)}Done.\n") == code
-        assert source(f"So:\n{fenced(code)}Done.\n") == code
-        assert source(f"So:\n{fenced(code)}".removesuffix("```\n")) == code
+        assert source(f"<think>\nFirst:\n{fence(OTHER)}</think>\nSo:\n{fence(code)}Done.\n") == code
+        assert source(f"So:\n{fence(code)}Done.\n") == code
+        assert source(f"So:\n{fence(code)}".removesuffix("```\n")) == code
     assert source(f"Here it is:\n\n{in_line}\nThat is all of it.\n") == in_line
 
 
-def test_an_outline_is_taken_where_there_is_nothing_else() -> None:
+def test_an_outline_is_taken_if_there_is_nothing_else() -> None:
     outline = "def task_program():\n    pass\n"
-    assert source("Here:\n" + fenced(outline)) == outline
+    assert source("Here:\n" + fence(outline)) == outline
 
 
 def test_other_blocks_are_added_only_if_needed() -> None:
     unused = "def unused():\n    pass\n"
     stub = "def go_to(room):\n    pass\n"
     needed = f"{HELPER}\n\n{USES_HELPER}"
-    assert source(fenced(HELPER) + "and\n" + fenced(unused) + fenced(stub) + fenced(USES_HELPER)) == needed
-    assert source(fenced(USES_HELPER) + fenced(HELPER)) == f"{USES_HELPER}\n\n{HELPER}"
-    assert source(fenced(HELPER) + fenced("rooms = list\n") + fenced(USES_HELPER)) == needed
-    assert source(fenced(HELPER + TASK) + fenced(USES_HELPER)) == f"{HELPER}{TASK}\n\n{USES_HELPER}"
+    assert source(fence(HELPER) + "and\n" + fence(unused) + fence(stub) + fence(USES_HELPER)) == needed
+    assert source(fence(USES_HELPER) + fence(HELPER)) == f"{USES_HELPER}\n\n{HELPER}"
+    assert source(fence(HELPER) + fence("rooms = list\n") + fence(USES_HELPER)) == needed
+    assert source(fence(HELPER + TASK) + fence(USES_HELPER)) == f"{HELPER}{TASK}\n\n{USES_HELPER}"
     newer = "def rooms():\n    return []\n"
     assert source(blocks(HELPER + TASK, newer, USES_HELPER)) == f"{newer}\n\n{USES_HELPER}"
-    assert source(fenced(USES_HELPER) + fenced(HELPER + TASK)) == HELPER + TASK
+    assert source(fence(USES_HELPER) + fence(HELPER + TASK)) == HELPER + TASK
 
 
 def test_helpers_of_helpers_are_added() -> None:
     helper = "def rooms():\n    return ROOMS\n"
     expected = f"ROOMS = []\n\n\n{helper}\n\n{USES_HELPER}"
-    assert source(fenced("ROOMS = []\n") + fenced(helper) + fenced(USES_HELPER)) == expected
+    assert source(fence("ROOMS = []\n") + fence(helper) + fence(USES_HELPER)) == expected
 
 
 def blocks(*codes: str) -> str:
-    return "and\n".join(fenced(code) for code in codes)
+    return "and\n".join(fence(code) for code in codes)
 
 
 CALLS_A = "def task_program():\n    a()\n"
@@ -315,7 +315,7 @@ def test_no_text_of_a_reply_is_parsed_twice(monkeypatch: pytest.MonkeyPatch) -> 
         TASK,
         BODY,
         BODY.lstrip(),
-        f"Here it is for you:\n\n{fenced(TASK)}\nIt drives there.\nThen it speaks.\n",
+        f"Here it is for you:\n\n{fence(TASK)}\nIt drives there.\nThen it speaks.\n",
     ):
         new = reply.replace("hello", "good day")  # No other test parses this.
         texts.clear()
@@ -327,7 +327,7 @@ def test_no_text_of_a_reply_is_parsed_twice(monkeypatch: pytest.MonkeyPatch) -> 
     "reply",
     [
         CUT_OFF,
-        fenced(CUT_OFF + "\n"),
+        fence(CUT_OFF + "\n"),
         "```python\n" + CUT_OFF,
         "Here you go:\n\n" + CUT_OFF,
         TASK + "\ndef helper(a,",

@@ -128,7 +128,7 @@ def test_robot_may_lack_the_skills_of_the_face() -> None:
     assert len(missing_skills(f"{TEA}    pick('mug')\n", robot)) == 1
 
 
-def test_a_robot_with_a_face_resumes_a_mission_as_without() -> None:
+def test_a_robot_with_a_face_resumes_a_mission_like_one_without() -> None:
     robot, _ = with_face()
     robot.connect()
     gone = Event("goto", "kitchen", place="hall")

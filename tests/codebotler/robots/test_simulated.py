@@ -125,7 +125,7 @@ def test_simulated_robot_is_opened_by_name_and_needs_a_world() -> None:
         open_robot("simm")
 
 
-def test_every_kind_of_robot_is_listed_with_what_is_missing() -> None:
+def test_every_kind_of_robot_is_listed_with_missing_requirements() -> None:
     kinds = {kind.name: kind for kind in check_readiness()}
     assert list(kinds) == ["sim", "pyrobosim", "ros1", "rosbridge", "ros2"]
     assert kinds["sim"].works
@@ -133,7 +133,7 @@ def test_every_kind_of_robot_is_listed_with_what_is_missing() -> None:
 
 
 @pytest.mark.parametrize("python", [Path(sys.executable), Path("/no/such/python")])
-def test_robots_on_ros_are_judged_by_the_python_that_is_named(python: Path) -> None:
+def test_robots_on_ros_are_checked_with_the_given_python(python: Path) -> None:
     kinds = {kind.name: kind for kind in check_readiness(python)}
     for name in ("ros1", "ros2"):
         assert not kinds[name].works

@@ -133,7 +133,7 @@ class PageServer:
         return self.ask(method, path, body, authorization=f"Bearer {unquote_plus(self.face_token)}")
 
     def run(self, program: str, *, despite_problems: bool = False) -> None:
-        """Have the robot run a program, as the API's clients do."""
+        """Let the robot run a program, as the API's clients do."""
         begun = self.call("POST", "/api/missions", {"program": program})
         assert begun.status == 201, begun.text
         ends = time.monotonic() + 60

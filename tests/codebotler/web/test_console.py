@@ -596,7 +596,7 @@ def test_a_check_does_not_delay_the_end(tmp_path: Path) -> None:
         assert time.monotonic() - began < 5
 
 
-def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stop_does_not_wait_for_a_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     go_on = threading.Event()
 
     def slow(program: str, **how: Any) -> CheckResult:  # noqa: ANN401 - passed on
