@@ -79,7 +79,7 @@ def test_page_offers_a_card_for_each_behaviour(server: PageServer, open_page: Op
     page.set_viewport_size({"width": DESK[0], "height": DESK[1]})
     page.get_by_role("button", name="This one: option 2").click()
     expect(page.get_by_role("button", name="Run it on the robot")).to_be_enabled()
-    assert "Traceback" not in server.said
+    assert "Traceback" not in server.output
     expect(page.get_by_text("Checked: no problems.")).to_be_visible()
     expect(page.locator(".which")).to_be_hidden()
     text = server.call("GET", "/api/missions/current").data["program"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Route, expect
 
-from faces import ASKS, REFUSED, SPEAKING, TWICE, face_of, option, said, until
+from faces import ASKS, REFUSED, SPEAKING, TWICE, face_of, last_statement, option, wait_until
 from pageserver import PageServer
 from server import Server
 from viewing import PHONE, OpenPage
@@ -65,7 +65,7 @@ def test_from_an_instruction_to_an_answer_on_the_face(tmp_path: Path, open_page:
         option(face, "No").click()
         expect(operator.locator(".headline")).to_have_text("Done")
         expect(operator.locator(".moment-answer .text")).to_have_text("No")
-        expect(said(face)).to_have_text("Alice says: No")
+        expect(last_statement(face)).to_have_text("Alice says: No")
         expect(face.locator("#doing")).to_have_text("I have finished.")
         assert face.evaluate("window.spoken") == ["Would you like a stapler? Yes, No", "Alice says: No"]
         for page in (operator, face):
@@ -116,7 +116,7 @@ def test_two_faces_are_in_step_and_the_first_answer_counts(server: PageServer, o
     option(one, "No, thank you").click()
     for face in (one, other):
         expect(face.locator("#asked")).to_be_hidden()
-        expect(said(face)).to_have_text("She says No, thank you")
+        expect(last_statement(face)).to_have_text("She says No, thank you")
     held[0].fallback()
     expect(other.locator("#ended")).to_contain_text('already answered: "No, thank you"')
 
@@ -160,7 +160,7 @@ def test_face_that_opens_late_shows_the_question(server: PageServer, open_page: 
     expect(option(face, "Yes")).to_be_enabled()
     face.reload()
     option(face, "Yes").click()
-    expect(said(face)).to_have_text("She says Yes")
+    expect(last_statement(face)).to_have_text("She says Yes")
     assert "Good morning" not in face.evaluate("window.spoken"), "a new face does not repeat old speech"
 
 
@@ -173,7 +173,7 @@ def test_a_touch_for_one_question_answers_no_other(server: PageServer, open_page
     expect(face.locator("#question")).to_have_text("Are you sure?")
     expect(option(face, "No")).to_be_enabled()
     option(face, "No").click()
-    expect(said(face)).to_have_text("YesNo")
+    expect(last_statement(face)).to_have_text("YesNo")
 
 
 # --- without a mouse
@@ -187,7 +187,7 @@ def test_questions_are_answered_by_number_keys(server: PageServer, open_page: Op
     face.keyboard.press("Control+1")
     expect(option(face, "Yes")).to_be_enabled()
     face.keyboard.press("2")
-    expect(said(face)).to_have_text("She says No, thank you")
+    expect(last_statement(face)).to_have_text("She says No, thank you")
 
 
 def test_questions_are_answered_by_tab_and_enter(server: PageServer, open_page: OpenPage) -> None:
@@ -199,7 +199,7 @@ def test_questions_are_answered_by_tab_and_enter(server: PageServer, open_page: 
         if face.evaluate("document.activeElement.innerText").endswith("Yes"):
             break
     face.keyboard.press("Enter")
-    expect(said(face)).to_have_text("She says Yes")
+    expect(last_statement(face)).to_have_text("She says Yes")
 
 
 def test_escape_stops_the_robot(server: PageServer, open_page: OpenPage) -> None:
@@ -222,7 +222,7 @@ def test_face_announces_events_to_screen_readers(server: PageServer, open_page: 
     line.evaluate("e => e.mark = 1")
     expect(face.locator("#options button").first).to_be_enabled()
     face.keyboard.press("1")
-    expect(said(face)).to_have_text("She says Yes")
+    expect(last_statement(face)).to_have_text("She says Yes")
     assert line.evaluate("e => e.mark") == 1, "an announcement is not written again"
 
 
@@ -242,12 +242,12 @@ def test_face_reports_a_lost_tool_and_reconnects(tmp_path: Path, open_page: Open
         expect(face.locator("#doing")).to_have_text("Hello. I have nothing to do right now.")
         face.locator("h1, body").first.click(position={"x": 5, "y": 5})
         server.run("def task_program():\n    for number in range(4):\n        say(str(number))\n")
-        until(face, "window.spoken.includes('3')")
+        wait_until(face, "window.spoken.includes('3')")
     expect(face.locator("#doing")).to_have_text("The robot cannot be reached. Trying again …")
     with PageServer(tmp_path, "--face", *tokens, "--port", str(port)) as server:
         expect(face.locator("#doing")).to_have_text("Hello. I have nothing to do right now.")
         server.run("def task_program():\n    say('here again')\n")
-        until(face, "window.spoken.includes('here again')")
+        wait_until(face, "window.spoken.includes('here again')")
         face.context.close()
 
 
@@ -256,5 +256,5 @@ def test_slow_face_delays_nobody(server: PageServer, open_page: OpenPage) -> Non
     slow.context.new_cdp_session(slow).send("Emulation.setCPUThrottlingRate", {"rate": 20})
     server.run(ASKS)
     option(quick, "Yes").click()
-    expect(said(quick)).to_have_text("She says Yes")
-    expect(said(slow)).to_have_text("She says Yes")
+    expect(last_statement(quick)).to_have_text("She says Yes")
+    expect(last_statement(slow)).to_have_text("She says Yes")

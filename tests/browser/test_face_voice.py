@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Page, expect
 
-from faces import ASKS, HEARING, MUTE, SPEAKING, TWICE, face_of, option, said, until
+from faces import ASKS, HEARING, MUTE, SPEAKING, TWICE, face_of, last_statement, option, wait_until
 from pageserver import PageServer
 from viewing import OpenPage
 
@@ -42,9 +42,9 @@ def test_muting_is_remembered(server: PageServer, open_page: OpenPage) -> None:
     assert face.evaluate("window.spoken") == []
     aloud.click()
     face.keyboard.press("1")
-    expect(said(face)).to_have_text("She says Yes")
+    expect(last_statement(face)).to_have_text("She says Yes")
     expect(aloud).to_be_checked()
-    until(face, "window.spoken.includes('She says Yes')")
+    wait_until(face, "window.spoken.includes('She says Yes')")
 
 
 def test_answer_ends_the_spoken_question(server: PageServer, open_page: OpenPage) -> None:
@@ -53,7 +53,7 @@ def test_answer_ends_the_spoken_question(server: PageServer, open_page: OpenPage
     expect(option(face, "Yes")).to_be_enabled()
     assert face.evaluate("window.hushed") == 0
     option(face, "Yes").click()
-    until(face, "window.hushed === 1")
+    wait_until(face, "window.hushed === 1")
 
 
 def test_face_asks_for_a_touch_to_turn_on_the_sound(server: PageServer, open_page: OpenPage) -> None:
@@ -73,7 +73,7 @@ def test_a_browser_without_a_voice_still_shows_all(server: PageServer, open_page
     expect(face.locator("#hint")).to_be_hidden()
     server.run(ASKS)
     option(face, "Yes").click()
-    expect(said(face)).to_have_text("She says Yes")
+    expect(last_statement(face)).to_have_text("She says Yes")
 
 
 # --- answers by voice, with a stand-in for the browser's speech recognition
@@ -94,7 +94,7 @@ def test_face_listens_only_after_it_is_switched_on(server: PageServer, open_page
     assert face.evaluate("window.listening.length") == 0
     voice.click()
     expect(voice).to_be_checked()
-    until(face, "window.listening.length === 1")
+    wait_until(face, "window.listening.length === 1")
     face.reload()
     expect(voice).not_to_be_checked()
     expect(option(face, "Yes")).to_be_enabled()
@@ -109,7 +109,7 @@ def test_the_robot_does_not_listen_to_itself(server: PageServer, open_page: Open
     expect(face.locator("body.speaks")).to_be_visible()
     assert face.evaluate("window.listening.length") == 0
     face.evaluate("window.end()")
-    until(face, "window.listening.length === 1")
+    wait_until(face, "window.listening.length === 1")
     expect(face.locator("body.speaks")).to_be_hidden()
 
 
@@ -117,7 +117,7 @@ def test_a_spoken_answer_is_shown_before_it_is_taken(server: PageServer, open_pa
     face = open_hearing_face(server, open_page)
     face.get_by_role("switch", name="Answer by voice").click()
     server.run(ASKS)
-    until(face, "window.listening.length === 1")
+    wait_until(face, "window.listening.length === 1")
     face.evaluate("hear('I would rather have coffee')")
     expect(face.locator("#heard-text")).to_contain_text("which is not one of the answers")
     expect(face.locator("#take")).to_be_hidden()
@@ -129,11 +129,11 @@ def test_a_spoken_answer_is_shown_before_it_is_taken(server: PageServer, open_pa
     assert server.call("GET", "/api/face").data["question"] is not None
     face.get_by_role("button", name="No, listen again").click()
     expect(face.locator("#heard")).to_be_hidden()
-    until(face, "window.listening.length === 1")
+    wait_until(face, "window.listening.length === 1")
     face.evaluate("hear('No. Thank you!')")
     expect(face.locator("#heard-text")).to_contain_text("Is your answer “No, thank you”?")
     face.get_by_role("button", name="Yes, that is my answer").click()
-    expect(said(face)).to_have_text("She says No, thank you")
+    expect(last_statement(face)).to_have_text("She says No, thank you")
     assert face.evaluate("window.listening.length") == 0
 
 
@@ -141,7 +141,7 @@ def test_spoken_answer_counts_only_for_its_question(server: PageServer, open_pag
     face = open_hearing_face(server, open_page)
     face.get_by_role("switch", name="Answer by voice").click()
     server.run(TWICE)
-    until(face, "window.listening.length === 1")
+    wait_until(face, "window.listening.length === 1")
     face.evaluate("hear('yes')")
     expect(face.locator("#take")).to_be_visible()
     option(face, "No").click()
@@ -154,11 +154,11 @@ def test_face_reports_that_the_browser_may_not_listen(server: PageServer, open_p
     voice = face.get_by_role("switch", name="Answer by voice")
     voice.click()
     server.run(ASKS)
-    until(face, "window.listening.length === 1")
+    wait_until(face, "window.listening.length === 1")
     face.evaluate("fail('no-speech')")
     expect(voice).to_be_checked()
     face.evaluate("fail('not-allowed')")
     expect(face.locator("#ended")).to_have_text("The browser blocks the microphone. Please tap an answer.")
     expect(voice).not_to_be_checked()
     option(face, "Yes").click()
-    expect(said(face)).to_have_text("She says Yes")
+    expect(last_statement(face)).to_have_text("She says Yes")

@@ -14,7 +14,7 @@ from playwright.sync_api import Page, Route, expect
 
 from pageserver import PageServer
 from server import Fault, Server
-from viewing import DESK, PATIENCE, PHONE, TABLET, OpenPage, until
+from viewing import DESK, PATIENCE, PHONE, TABLET, OpenPage, wait_until
 
 TEA = """def task_program():
     get_all_rooms()
@@ -42,7 +42,7 @@ def type_and_check(page: Page, program: str) -> None:
     """Type a program that no earlier test has typed, and wait for its check."""
     mark = f"# {next(NUMBERS)}"
     write(page, f"{program}{mark}\n")
-    until(
+    wait_until(
         page,
         """async (mark) => {
             const now = await (await fetch("api/missions/current")).json();
@@ -256,7 +256,7 @@ def test_text_typed_just_before_a_click_is_checked_and_kept(server: PageServer, 
     page.keyboard.insert_text("# one more")
     button.evaluate("button => button.click()")
     expect(page.get_by_text("Checking your last edit first.")).to_be_visible()
-    until(
+    wait_until(
         page,
         "fetch('api/missions/current').then(a => a.json()).then(a => a.program.endsWith('# one more'))",
     )

@@ -83,7 +83,7 @@ def addresses(page: Page) -> list[str]:
 
 
 def test_the_links_are_printed_with_their_tokens(site: Site) -> None:
-    said = site.server.said
+    said = site.server.output
     assert f"{site.proxy.address}/?token={site.server.token}\n" in said
     assert f"{site.proxy.address}/face?token={site.server.face_token}\n" in said
 
@@ -164,5 +164,5 @@ def test_without_the_option_stop_says_how_to_start(tmp_path: Path, browser: Brow
         page.wait_for_load_state("networkidle")
         page.locator("#stop").click()
         expect(page.locator("#stop-told")).to_contain_text("--behind-proxy")
-        said = site.server.said
+        said = site.server.output
     assert said.count("use --behind-proxy") == 1

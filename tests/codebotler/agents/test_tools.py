@@ -1,4 +1,4 @@
-"""The tools of agents, by the SDK's own client: none approves, and a person always decides."""
+"""Agents call the tools through the SDK's own client; no tool approves, a person decides."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.web.console import Console
-from doubles import Answering, Several, raising
+from doubles import FakeModel, FakeRobot, fail_with
 from ended import cut, failed_mission, line_of
 
 WORLD = World((Room("hall"), Room("kitchen"), Room("vault")), "hall")
@@ -70,7 +70,7 @@ def gatekeeper(tmp_path: Path) -> Iterator[Gatekeeper]:
 
 
 class Agent:
-    """A client whose calls give their structured results."""
+    """A client whose calls return structured results."""
 
     def __init__(self, client: Client) -> None:
         self.client = client
@@ -93,7 +93,7 @@ def use(
     answer: ElicitationFnT | None = None,
     mode: str = "auto",
 ) -> None:
-    """Let an agent act, with a client that may ask its person."""
+    """Let an agent act through a client that may ask a person."""
 
     async def main() -> None:
         async with (
@@ -105,11 +105,11 @@ def use(
     asyncio.run(main())
 
 
-def answering(action: Any, *, approve: bool | None = None) -> tuple[ElicitationFnT, list[str]]:  # noqa: ANN401 - one of three
-    """A person who answers each question so, and the questions."""
+def make_person(action: Any, *, approve: bool | None = None) -> tuple[ElicitationFnT, list[str]]:  # noqa: ANN401 - one of three words
+    """Make a person who gives this answer, and the list of questions that were asked."""
     asked: list[str] = []
 
-    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - the SDK passes it
         asked.append(params.message)
         return ElicitResult(action=action, content=None if approve is None else {"approve": approve})
 
@@ -133,7 +133,7 @@ def session_of(gatekeeper: Gatekeeper) -> MissionSession:
     return session
 
 
-async def until(gatekeeper: Gatekeeper, holds: Callable[[SessionView], bool]) -> None:
+async def wait_until(gatekeeper: Gatekeeper, holds: Callable[[SessionView], bool]) -> None:
     assert await gatekeeper.console.notifier.until(lambda: holds(view_of(gatekeeper)), SOON)
 
 
@@ -195,7 +195,7 @@ def test_writing_needs_a_model(gatekeeper: Gatekeeper) -> None:
 
 
 @pytest.mark.slow
-def test_texts_that_are_no_unicode_do_not_keep_an_agent_from_stopping(gatekeeper: Gatekeeper) -> None:
+def test_lone_surrogates_do_not_keep_an_agent_from_stopping(gatekeeper: Gatekeeper) -> None:
     async def act(agent: Agent) -> None:
         program = "def task_program():\n    say('\\ud800')\n    raise ValueError('\\udfff')\n"
         assert "\\udfff" in (await agent.call("check_program", program=program))["problems"][0]
@@ -212,7 +212,7 @@ def test_the_sdk_leaves_our_log_alone(gatekeeper: Gatekeeper) -> None:
     assert logging.root.handlers == before
 
 
-# --- who approves
+# --- approval
 
 
 @pytest.mark.slow
@@ -246,7 +246,7 @@ def test_run_refuses_a_digest_of_another_program(gatekeeper: Gatekeeper) -> None
         assert first["digest"] != second["digest"]
         assert "another program" in await agent.fails("run_mission", digest=first["digest"])
         gatekeeper.console.edit(HELLO + "    say('a person wrote this')\n")
-        await until(gatekeeper, lambda view: view.may_be_approved)
+        await wait_until(gatekeeper, lambda view: view.may_be_approved)
         assert "another program" in await agent.fails("run_mission", digest=second["digest"])
         for wrong in ("", second["digest"][:-1], second["digest"].upper() + "é"):
             assert "another program" in await agent.fails("run_mission", digest=wrong)
@@ -259,7 +259,7 @@ def test_run_refuses_a_digest_of_another_program(gatekeeper: Gatekeeper) -> None
 @MODES
 def test_a_person_accepts_in_the_clients_dialog(gatekeeper: Gatekeeper, mode: str) -> None:
     gatekeeper.asks_client = True
-    answer, asked = answering("accept", approve=True)
+    answer, asked = make_person("accept", approve=True)
 
     async def act(agent: Agent) -> None:
         proposed = await agent.call("propose_mission", instruction="say hello", program=HELLO)
@@ -284,7 +284,7 @@ def test_only_an_explicit_yes_approves(
     gatekeeper: Gatekeeper, mode: str, action: str, *, ticked: bool | None, is_over: bool
 ) -> None:
     gatekeeper.asks_client = True
-    answer, asked = answering(action, approve=ticked)
+    answer, asked = make_person(action, approve=ticked)
 
     async def act(agent: Agent) -> None:
         proposed = await agent.call("propose_mission", program=HELLO)
@@ -299,7 +299,7 @@ def test_only_an_explicit_yes_approves(
 @MODES
 def test_an_accepted_form_without_content_does_not_approve(gatekeeper: Gatekeeper, mode: str) -> None:
     gatekeeper.asks_client = True
-    answer, _ = answering("accept")
+    answer, _ = make_person("accept")
 
     async def act(agent: Agent) -> None:
         proposed = await agent.call("propose_mission", program=HELLO)
@@ -310,7 +310,7 @@ def test_an_accepted_form_without_content_does_not_approve(gatekeeper: Gatekeepe
 
 
 def test_a_client_is_not_asked_unless_the_operator_allows_it(gatekeeper: Gatekeeper) -> None:
-    answer, asked = answering("accept", approve=True)
+    answer, asked = make_person("accept", approve=True)
 
     async def act(agent: Agent) -> None:
         proposed = await agent.call("propose_mission", program=HELLO)
@@ -328,10 +328,10 @@ def test_an_answer_does_not_approve_a_program_that_replaced_the_one_shown(
     gatekeeper.asks_client = True
     asked: list[str] = []
 
-    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - the SDK passes it
         asked.append(params.message)
         gatekeeper.console.edit(FAR)
-        await until(gatekeeper, lambda view: view.may_be_approved and view.program == FAR)
+        await wait_until(gatekeeper, lambda view: view.may_be_approved and view.program == FAR)
         return ElicitResult(action="accept", content={"approve": True})
 
     async def act(agent: Agent) -> None:
@@ -344,7 +344,7 @@ def test_an_answer_does_not_approve_a_program_that_replaced_the_one_shown(
 
 def test_a_program_too_long_for_a_dialog_is_approved_on_the_page_only(gatekeeper: Gatekeeper) -> None:
     gatekeeper.asks_client = True
-    answer, asked = answering("accept", approve=True)
+    answer, asked = make_person("accept", approve=True)
 
     async def act(agent: Agent) -> None:
         far = (
@@ -366,8 +366,8 @@ def test_the_dialog_names_each_room_that_a_program_may_enter(gatekeeper: Gatekee
 
 
 def test_problems_are_shown_to_the_person_and_a_contract_never_approves_them(gatekeeper: Gatekeeper) -> None:
-    gatekeeper.console.within = contract_from(anything(), SKILLS)
-    answer, asked = answering("cancel")
+    gatekeeper.console.within = contract_from(allow_all(), SKILLS)
+    answer, asked = make_person("cancel")
 
     async def act(agent: Agent) -> None:
         proposed = await agent.call("propose_mission", program=FAULTY)
@@ -376,7 +376,7 @@ def test_problems_are_shown_to_the_person_and_a_contract_never_approves_them(gat
         assert waiting["state"] == "checked"
         gatekeeper.asks_client = True
         await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
-        assert "PROBLEMS" in asked[0].split("\n\n")[1], "before all that the agent says"
+        assert "PROBLEMS" in asked[0].split("\n\n")[1], "problems come before the agent's own text"
         assert "cellar" in asked[0]
         broken = await agent.call("propose_mission", program="(")
         await agent.call("run_mission", digest=broken["digest"], seconds=0.05)
@@ -387,7 +387,7 @@ def test_problems_are_shown_to_the_person_and_a_contract_never_approves_them(gat
 
 @pytest.mark.slow
 def test_a_contract_given_at_the_start_approves(gatekeeper: Gatekeeper) -> None:
-    allowed = anything("say") | {"go_to": {"location": ["kitchen"]}}
+    allowed = allow_all("say") | {"go_to": {"location": ["kitchen"]}}
     gatekeeper.console.within = contract_from(allowed, SKILLS)
 
     async def act(agent: Agent) -> None:
@@ -411,11 +411,11 @@ def test_an_agent_neither_replaces_a_persons_mission_nor_runs_a_second_one(tmp_p
 
     async def act(agent: Agent) -> None:
         gatekeeper.console.begin(MissionOrder(program=FAR))
-        await until(gatekeeper, lambda view: view.may_be_approved)
+        await wait_until(gatekeeper, lambda view: view.may_be_approved)
         mine = view_of(gatekeeper).id
         assert "a person is working" in await agent.fails("propose_mission", program=HELLO)
         approve(gatekeeper)
-        await until(gatekeeper, lambda view: view.is_running)
+        await wait_until(gatekeeper, lambda view: view.is_running)
         await agent.fails("propose_mission", program=HELLO)
         assert (view_of(gatekeeper).id, view_of(gatekeeper).is_running) == (mine, True)
         stopped = await agent.call("stop")
@@ -423,7 +423,7 @@ def test_an_agent_neither_replaces_a_persons_mission_nor_runs_a_second_one(tmp_p
         proposed = await agent.call("propose_mission", program=FAR)
         running = asyncio.create_task(agent.call("run_mission", digest=proposed["digest"]))
         approve(gatekeeper)
-        await until(gatekeeper, lambda view: view.is_running)
+        await wait_until(gatekeeper, lambda view: view.is_running)
         assert "stop it first" in await agent.fails("propose_mission", program=HELLO)
         await agent.call("stop")
         await running
@@ -439,7 +439,7 @@ def test_a_second_client_stops_while_the_first_waits_and_sees_progress(tmp_path:
     async def act(agent: Agent) -> None:
         said: list[str] = []
 
-        async def hear(progress: float, total: float | None, message: str | None) -> None:  # noqa: ARG001 - as the SDK calls it
+        async def hear(progress: float, total: float | None, message: str | None) -> None:  # noqa: ARG001 - the SDK passes it
             said.append(message or "")
 
         proposed = await agent.call("propose_mission", program=FAR)
@@ -448,7 +448,7 @@ def test_a_second_client_stops_while_the_first_waits_and_sees_progress(tmp_path:
             agent.client.call_tool("run_mission", arguments, progress_callback=hear)
         )
         approve(gatekeeper)
-        await until(gatekeeper, lambda view: view.is_running and view.progress.is_driving)
+        await wait_until(gatekeeper, lambda view: view.is_running and view.progress.is_driving)
         async with Client(make_server(gatekeeper)) as other:
             stopped = await Agent(other).call("stop")
         ended = (await running).structured_content
@@ -470,9 +470,9 @@ def test_the_robot_stops_if_the_call_is_cancelled(tmp_path: Path, mode: str) -> 
         running = asyncio.create_task(agent.call("run_mission", digest=proposed["digest"]))
         await asyncio.sleep(0.05)
         approve(gatekeeper)
-        await until(gatekeeper, lambda view: view.is_running)
+        await wait_until(gatekeeper, lambda view: view.is_running)
         running.cancel()
-        await until(gatekeeper, lambda view: view.is_over)
+        await wait_until(gatekeeper, lambda view: view.is_over)
         assert view_of(gatekeeper).state is MissionState.STOPPED
         assert "cancelled" in view_of(gatekeeper).reason
 
@@ -500,12 +500,12 @@ def test_missions_and_their_logs_are_resources(gatekeeper: Gatekeeper) -> None:
 @pytest.mark.parametrize(
     "what", ["codebotler://missions", "codebotler://missions/last/log", "continue_mission"]
 )
-def test_past_missions_are_read_by_one_call_at_a_time_and_never_all(
+def test_one_call_at_a_time_reads_past_missions_and_only_recent_ones(
     gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     begun, go_on, asked = threading.Event(), threading.Event(), list[int | None]()
 
-    def slowly(home: Path, most: int | None = None) -> list[MissionSummary]:  # noqa: ARG001 - as it is called
+    def slowly(home: Path, most: int | None = None) -> list[MissionSummary]:  # noqa: ARG001 - its caller passes it
         asked.append(most)
         begun.set()
         go_on.wait(SOON)
@@ -526,7 +526,7 @@ def test_past_missions_are_read_by_one_call_at_a_time_and_never_all(
         try:
             assert await asyncio.to_thread(begun.wait, SOON)
             assert "another reading" in await ask()
-            assert await asyncio.wait_for(asyncio.to_thread(begun.is_set), 1.0), "a person needs the threads"
+            assert await asyncio.wait_for(asyncio.to_thread(begun.is_set), 1.0), "the thread pool stays free"
         finally:
             go_on.set()
         assert "another reading" not in await first
@@ -535,7 +535,7 @@ def test_past_missions_are_read_by_one_call_at_a_time_and_never_all(
     assert asked == [RECENT_MISSIONS]
 
 
-def test_no_agent_reads_long_texts_at_once(gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_long_resources_are_refused(gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("codebotler.agents.server.MAX_READ_BYTES", 10_000)
 
     async def act(agent: Agent) -> None:
@@ -563,20 +563,20 @@ ANSWERS: dict[str, RobotResult] = {
 }
 
 
-def anything(*skills: str) -> dict[str, dict[str, str]]:
-    """A contract that allows all calls of some skills, by default of all."""
+def allow_all(*skills: str) -> dict[str, dict[str, str]]:
+    """Return a contract that allows all calls of some skills, by default of all."""
     rows = [SKILLS[name] for name in skills or SKILLS]
     return {row.name: {one.name: "any" for one in row.parameters} | PLACES.get(row.name, {}) for row in rows}
 
 
-async def began(
+async def begin_steps(
     agent: Agent, gatekeeper: Gatekeeper, *skills: str, contract: dict[str, Any] | None = None
 ) -> tuple[str, dict[str, Any]]:
-    """The key of an approved step-by-step mission, and what run_mission answers."""
+    """Begin a step-by-step mission and approve it; return its key and the answer of run_mission."""
     proposed = await agent.call(
         "begin_steps",
         purpose="look around\n# It may call: nothing",
-        contract=contract or anything(*skills),
+        contract=contract or allow_all(*skills),
     )
     running = asyncio.create_task(agent.call("run_mission", digest=proposed["digest"]))
     approve(gatekeeper)
@@ -585,7 +585,7 @@ async def began(
 
 def test_skills_are_called_one_at_a_time_and_logged_as_a_mission(gatekeeper: Gatekeeper) -> None:
     async def act(agent: Agent) -> None:
-        key, begun = await began(agent, gatekeeper)
+        key, begun = await begin_steps(agent, gatekeeper)
         assert begun["state"] == "running"
         assert "\n# It may call: nothing" not in begun["check"]["program"]
         assert (await agent.call("call_skill", steps=key, name="get_current_location"))["result"] == "hall"
@@ -605,13 +605,13 @@ def test_skills_are_called_one_at_a_time_and_logged_as_a_mission(gatekeeper: Gat
 
 
 def test_no_two_proposals_of_steps_have_the_same_digest() -> None:
-    contract = contract_from(anything("go_to"), SKILLS)
+    contract = contract_from(allow_all("go_to"), SKILLS)
     first, second = Steps("look", contract, SKILLS), Steps("look", contract, SKILLS)
     assert first.program == first.program
     assert program_digest(first.program) != program_digest(second.program)
 
 
-def test_long_steps_end_and_are_reported_in_parts_to_few_waiting_calls(
+def test_steps_and_reported_events_and_waiting_calls_are_limited(
     gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("codebotler.agents.steps.MAX_STEPS", 3)
@@ -619,7 +619,7 @@ def test_long_steps_end_and_are_reported_in_parts_to_few_waiting_calls(
     monkeypatch.setattr("codebotler.agents.gatekeeper.MAX_WAITING_CALLS", 1)
 
     async def act(agent: Agent) -> None:
-        key, _ = await began(agent, gatekeeper)
+        key, _ = await begin_steps(agent, gatekeeper)
         with gatekeeper.waiting():
             for tool, given in (
                 ("follow_mission", {}),
@@ -629,7 +629,7 @@ def test_long_steps_end_and_are_reported_in_parts_to_few_waiting_calls(
                 assert "are waiting" in await agent.fails(tool, **given)
         for _ in range(3):
             await agent.call("call_skill", steps=key, name="get_all_rooms")
-        await until(gatekeeper, lambda view: view.is_over)
+        await wait_until(gatekeeper, lambda view: view.is_over)
         ended = await agent.call("follow_mission")
         assert (ended["state"], "3 calls" in ended["reason"]) == ("failed", True)
         assert "not running" in await agent.fails("call_skill", steps=key, name="get_all_rooms")
@@ -645,11 +645,11 @@ def test_long_steps_end_and_are_reported_in_parts_to_few_waiting_calls(
     use(gatekeeper, act)
 
 
-def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
+def test_invalid_calls_do_not_reach_the_robot(gatekeeper: Gatekeeper) -> None:
     async def act(agent: Agent) -> None:
         assert 'no skill "fly"' in await agent.fails("begin_steps", purpose="fly", contract={"fly": {}})
         assert 'no "text"' in await agent.fails("begin_steps", purpose="a", contract={"say": {"text": "any"}})
-        key, _ = await began(agent, gatekeeper, "go_to", "ask")
+        key, _ = await begin_steps(agent, gatekeeper, "go_to", "ask")
         for wrong in ({}, {"location": 3}, {"location": ["kitchen"]}, {"location": "kitchen", "more": 1}):
             assert "go_to" in await agent.fails("call_skill", steps=key, name="go_to", arguments=wrong)
         far = {"location": ["kitchen"] * 2_000}
@@ -671,11 +671,11 @@ def test_wrong_calls_reach_no_robot(gatekeeper: Gatekeeper) -> None:
 
 
 def test_a_question_is_asked_and_its_answer_is_one_of_the_options(tmp_path: Path) -> None:
-    robot = Answering(lambda skill, _: ANSWERS.get(skill))
+    robot = FakeRobot(lambda skill, _: ANSWERS.get(skill))
     gatekeeper = Gatekeeper(Console(robot, tmp_path, open_recorded))
 
     async def act(agent: Agent) -> None:
-        key, _ = await began(agent, gatekeeper, "ask")
+        key, _ = await begin_steps(agent, gatekeeper, "ask")
         question = {"person": "", "question": "Tea?", "options": ["no", "yes"]}
         assert (await agent.call("call_skill", steps=key, name="ask", arguments=question))["result"] == "yes"
         failed = await agent.call("call_skill", steps=key, name="ask", arguments=question | {"options": []})
@@ -689,14 +689,14 @@ def test_a_question_is_asked_and_its_answer_is_one_of_the_options(tmp_path: Path
 
 
 def test_a_robot_that_is_lost_ends_the_steps(tmp_path: Path) -> None:
-    robot = Answering(lambda skill, _: ANSWERS.get(skill))
+    robot = FakeRobot(lambda skill, _: ANSWERS.get(skill))
     gatekeeper = Gatekeeper(Console(robot, tmp_path, open_recorded))
 
     async def act(agent: Agent) -> None:
-        key, _ = await began(agent, gatekeeper)
-        robot.answer = raising(RobotLostError("its battery is empty"))
+        key, _ = await begin_steps(agent, gatekeeper)
+        robot.answer = fail_with(RobotLostError("its battery is empty"))
         assert "ended" in await agent.fails("call_skill", steps=key, name="say", arguments={"message": "a"})
-        await until(gatekeeper, lambda view: view.is_over)
+        await wait_until(gatekeeper, lambda view: view.is_over)
         report = await agent.call("follow_mission")
         assert (report["state"], "battery" in report["reason"]) == ("failed", True)
 
@@ -705,11 +705,11 @@ def test_a_robot_that_is_lost_ends_the_steps(tmp_path: Path) -> None:
 
 
 def test_steps_beyond_the_contract_of_the_start_need_a_person(gatekeeper: Gatekeeper) -> None:
-    gatekeeper.console.within, gatekeeper.asks_client = contract_from(anything("say"), SKILLS), True
-    answer, asked = answering("cancel")
+    gatekeeper.console.within, gatekeeper.asks_client = contract_from(allow_all("say"), SKILLS), True
+    answer, asked = make_person("cancel")
 
     async def act(agent: Agent) -> None:
-        proposed = await agent.call("begin_steps", purpose="look around", contract=anything("say", "go_to"))
+        proposed = await agent.call("begin_steps", purpose="look around", contract=allow_all("say", "go_to"))
         waiting = await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
         assert (waiting["state"], len(asked)) == ("checked", 1)
         assert "OutsideContract" in asked[0]
@@ -735,7 +735,7 @@ def test_a_contract_approves_nothing_that_a_person_has_changed(tmp_path: Path, c
         "rules: [{name: vault, says: Stay out of the vault., always: 'not tr.Exists(goto(\"vault\"))'}]\n"
     )
     gatekeeper = gatekeeper_at(tmp_path, rules=tuple(read_rules(tmp_path / "house.yaml")))
-    gatekeeper.console.within = contract_from(anything(), SKILLS)
+    gatekeeper.console.within = contract_from(allow_all(), SKILLS)
 
     async def act(agent: Agent) -> None:
         proposed = await agent.call("propose_mission", program=HELLO)
@@ -745,7 +745,7 @@ def test_a_contract_approves_nothing_that_a_person_has_changed(tmp_path: Path, c
             session.edit(HELLO.replace("hello", "bye"))
         else:
             session.switch_off("vault", "for the test")
-        await until(gatekeeper, lambda view: view.may_be_approved)
+        await wait_until(gatekeeper, lambda view: view.may_be_approved)
         digest = (await agent.call("follow_mission", seconds=0.05))["digest"]
         assert (digest == proposed["digest"]) == (change == "rule")
         waiting = await agent.call("run_mission", digest=digest, seconds=0.05)
@@ -756,11 +756,11 @@ def test_a_contract_approves_nothing_that_a_person_has_changed(tmp_path: Path, c
 
 
 def test_a_contract_does_not_approve_the_program_of_a_person(gatekeeper: Gatekeeper) -> None:
-    gatekeeper.console.within = contract_from(anything(), SKILLS)
+    gatekeeper.console.within = contract_from(allow_all(), SKILLS)
 
     async def act(agent: Agent) -> None:
         session = gatekeeper.console.begin(MissionOrder(program=HELLO, author="a person"))
-        await until(gatekeeper, lambda view: view.may_be_approved)
+        await wait_until(gatekeeper, lambda view: view.may_be_approved)
         waiting = await agent.call("run_mission", digest=session.view.digest, seconds=0.05)
         assert waiting["state"] == "checked"
 
@@ -779,7 +779,7 @@ def test_an_agent_does_not_replace_what_a_person_has_changed(tmp_path: Path, cha
             session.edit(HELLO.replace("hello", "bye"))
         else:
             session.switch_off("vault", "for the test")
-        await until(gatekeeper, lambda view: view.may_be_approved)
+        await wait_until(gatekeeper, lambda view: view.may_be_approved)
         await agent.fails("propose_mission", program=HELLO)
         assert gatekeeper.console.session is session
 
@@ -787,7 +787,7 @@ def test_an_agent_does_not_replace_what_a_person_has_changed(tmp_path: Path, cha
         use(gatekeeper, act)
 
 
-def test_an_agent_proposes_no_program_without_a_contract(gatekeeper: Gatekeeper) -> None:
+def test_a_program_too_long_for_a_contract_is_not_proposed(gatekeeper: Gatekeeper) -> None:
     async def act(agent: Agent) -> None:
         assert "shorten it" in await agent.fails("propose_mission", program=HELLO + "#" * 20_000)
         assert gatekeeper.console.session is None
@@ -806,7 +806,7 @@ def test_an_agent_checks_one_program_at_a_time(gatekeeper: Gatekeeper) -> None:
     use(gatekeeper, act)
 
 
-class Hanging(Several):
+class Hanging(FakeModel):
     """A model that never replies, until its request is cancelled."""
 
     def __init__(self) -> None:
@@ -851,7 +851,7 @@ def test_each_step_is_compared_with_the_contract(gatekeeper: Gatekeeper) -> None
     contract = {"go_to": {"location": ["kitchen"], "at most": 1}, "get_current_location": {}}
 
     async def act(agent: Agent) -> None:
-        key, begun = await began(agent, gatekeeper, contract=contract)
+        key, begun = await begin_steps(agent, gatekeeper, contract=contract)
         assert 'go to "kitchen"' in begun["check"]["contract"]
         assert "kitchen" in begun["check"]["program"]
         arguments = {"location": "Kitchen"}
@@ -868,13 +868,13 @@ def test_a_step_waits_for_approval_and_stop_ends_all(tmp_path: Path) -> None:
     gatekeeper = gatekeeper_at(tmp_path, speed=1.0)
 
     async def act(agent: Agent) -> None:
-        proposed = await agent.call("begin_steps", purpose="look around", contract=anything())
+        proposed = await agent.call("begin_steps", purpose="look around", contract=allow_all())
         arguments = {"steps": proposed["steps"], "name": "go_to", "arguments": {"location": "kitchen"}}
         assert "not running" in await agent.fails("call_skill", **arguments)
-        key, _ = await began(agent, gatekeeper)
+        key, _ = await begin_steps(agent, gatekeeper)
         arguments["steps"] = key
         moving = asyncio.create_task(agent.client.call_tool("call_skill", arguments))
-        await until(gatekeeper, lambda view: view.progress.is_driving)
+        await wait_until(gatekeeper, lambda view: view.progress.is_driving)
         waiting = asyncio.create_task(agent.client.call_tool("call_skill", arguments))
         stopped = await agent.call("stop")
         assert stopped["state"] == "stopped"
@@ -895,7 +895,7 @@ def test_house_rules_judge_each_step(tmp_path: Path) -> None:
     async def act(agent: Agent) -> None:
         assert (await agent.call("read_robot"))["house_rules"] == ["vault: Stay out of the vault."]
         for spelling in ("vault", " Vault "):
-            key, _ = await began(agent, gatekeeper)
+            key, _ = await begin_steps(agent, gatekeeper)
             await agent.call("call_skill", steps=key, name="go_to", arguments={"location": "kitchen"})
             await agent.fails("call_skill", steps=key, name="go_to", arguments={"location": spelling})
             ended = await agent.call("follow_mission")
@@ -910,11 +910,11 @@ def test_a_program_that_a_person_put_in_place_of_the_steps_runs_instead(tmp_path
     gatekeeper = gatekeeper_at(tmp_path, speed=1.0)
 
     async def act(agent: Agent) -> None:
-        proposed = await agent.call("begin_steps", purpose="look around", contract=anything())
+        proposed = await agent.call("begin_steps", purpose="look around", contract=allow_all())
         gatekeeper.console.edit(FAR)
-        await until(gatekeeper, lambda view: view.may_be_approved)
+        await wait_until(gatekeeper, lambda view: view.may_be_approved)
         approve(gatekeeper)
-        await until(gatekeeper, lambda view: view.progress.is_driving)
+        await wait_until(gatekeeper, lambda view: view.progress.is_driving)
         assert "not running" in await agent.fails("call_skill", steps=proposed["steps"], name="get_all_rooms")
         assert 'drives to "kitchen"' in (await agent.call("stop"))["events"]
 
@@ -925,7 +925,7 @@ def test_a_program_that_a_person_put_in_place_of_the_steps_runs_instead(tmp_path
 # --- the rest of a mission
 
 
-def left(home: Path, skill: str, event: str, instruction: str = "") -> Path:
+def leave_mission(home: Path, skill: str, event: str, instruction: str = "") -> Path:
     """Leave a mission of another process that ended at this event."""
     program = "def task_program():\n    say('hello')\n    go_to('cellar')\n"
     folder = failed_mission(home, program, WORLD, instruction)
@@ -935,7 +935,7 @@ def left(home: Path, skill: str, event: str, instruction: str = "") -> Path:
 
 @pytest.mark.slow
 def test_an_agent_proposes_the_rest_and_learns_what_was_done(gatekeeper: Gatekeeper, tmp_path: Path) -> None:
-    left(tmp_path, "say", "result")
+    leave_mission(tmp_path, "say", "result")
 
     async def act(agent: Agent) -> None:
         assert "program" in await agent.fails("continue_mission")
@@ -952,7 +952,7 @@ def test_an_agent_proposes_the_rest_and_learns_what_was_done(gatekeeper: Gatekee
 def test_no_model_is_asked_for_the_rest_unless_one_is_configured(
     gatekeeper: Gatekeeper, tmp_path: Path
 ) -> None:
-    left(tmp_path, "say", "result", "Say hello.")
+    leave_mission(tmp_path, "say", "result", "Say hello.")
 
     async def act(agent: Agent) -> None:
         assert "model" in await agent.fails("continue_mission")
@@ -976,10 +976,10 @@ def test_a_person_says_in_the_dialog_whether_a_step_happened(
     content: dict[str, Any] | None,
     steps: int | None,
 ) -> None:
-    mission = left(tmp_path, "say", "skill").name
+    mission = leave_mission(tmp_path, "say", "skill").name
     asked: list[str] = []
 
-    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - the SDK passes it
         asked.append(params.message)
         return ElicitResult(action=action, content=content)
 
@@ -997,7 +997,7 @@ def test_a_person_says_in_the_dialog_whether_a_step_happened(
 
 
 def test_without_a_dialog_a_person_must_answer_on_the_page(gatekeeper: Gatekeeper, tmp_path: Path) -> None:
-    left(tmp_path, "say", "skill")
+    leave_mission(tmp_path, "say", "skill")
 
     async def act(agent: Agent) -> None:
         assert gatekeeper.page in await agent.fails("continue_mission", program=HELLO)
@@ -1025,12 +1025,12 @@ def test_a_person_chooses_a_behaviour_in_the_dialog(
 ) -> None:
     asked: list[str] = []
 
-    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - the SDK passes it
         asked.append(params.message)
         return ElicitResult(action=action, content=content)
 
     robot = Simulated(WORLD, speed=None)
-    console = Console(robot, tmp_path, lambda _: Several([QUIET, HELLO]), candidates=2)
+    console = Console(robot, tmp_path, lambda _: FakeModel([QUIET, HELLO]), candidates=2)
     made = Gatekeeper(console, asks_client=True, writes=True, page="http://localhost:1/")
 
     async def act(agent: Agent) -> None:
@@ -1054,7 +1054,7 @@ def test_a_person_chooses_a_behaviour_in_the_dialog(
 
 def test_without_a_dialog_a_person_chooses_on_the_page(tmp_path: Path) -> None:
     robot = Simulated(WORLD, speed=None)
-    console = Console(robot, tmp_path, lambda _: Several([QUIET, HELLO]), candidates=2)
+    console = Console(robot, tmp_path, lambda _: FakeModel([QUIET, HELLO]), candidates=2)
     made = Gatekeeper(console, writes=True, page="http://localhost:1/")
 
     async def act(agent: Agent) -> None:
@@ -1065,7 +1065,7 @@ def test_without_a_dialog_a_person_chooses_on_the_page(tmp_path: Path) -> None:
         use(made, act)
 
 
-def test_a_call_that_was_approved_is_reported_however_many_wait(
+def test_an_approved_call_is_logged_even_if_too_many_wait(
     gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     gatekeeper.console.within = contract_from({"go_to": {"location": "any"}}, SKILLS)
@@ -1074,20 +1074,20 @@ def test_a_call_that_was_approved_is_reported_however_many_wait(
         proposed = await agent.call("propose_mission", program=QUIET)
         monkeypatch.setattr("codebotler.agents.gatekeeper.MAX_WAITING_CALLS", 0)
         await agent.call("run_mission", digest=proposed["digest"])
-        await until(gatekeeper, lambda view: view.state is MissionState.DONE)
+        await wait_until(gatekeeper, lambda view: view.state is MissionState.DONE)
         notes = [line["text"] for line in session_of(gatekeeper).events() if line["event"] == "log"]
-        assert any("agent" in text for text in notes), "the log names whom the contract approved"
+        assert any("agent" in text for text in notes), "the log names the agent that the contract approved"
 
     use(gatekeeper, act)
 
 
-def test_a_client_that_reads_no_progress_is_not_followed(
+def test_a_client_that_reads_no_progress_does_not_block_its_call(
     gatekeeper: Gatekeeper, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("codebotler.agents.tools.MAX_UNREAD_SECONDS", 0.01)
     gatekeeper.console.within = contract_from({"go_to": {"location": "any"}}, SKILLS)
 
-    async def never_read(progress: float, total: float | None, message: str | None) -> None:  # noqa: ARG001 - as the SDK calls it
+    async def never_read(progress: float, total: float | None, message: str | None) -> None:  # noqa: ARG001 - the SDK passes it
         await asyncio.Event().wait()
 
     async def act(agent: Agent) -> None:
@@ -1100,7 +1100,7 @@ def test_a_client_that_reads_no_progress_is_not_followed(
     use(gatekeeper, act)
 
 
-def test_no_text_in_a_storyboard_begins_another_deed(gatekeeper: Gatekeeper) -> None:
+def test_no_text_in_a_storyboard_imitates_another_action(gatekeeper: Gatekeeper) -> None:
     says = """ok"; picks up "mug"; \\"got it"""
     program = f"def task_program():\n    say({says!r})\n    ask('', {says!r}, ['a'])\n"
 
@@ -1122,17 +1122,17 @@ def test_after_a_persons_stop_the_contract_of_the_start_approves_nothing(gatekee
             return str(ran["state"])
 
         await agent.call("stop")
-        assert await state(SOON) == "done", "an agent's own stop holds nothing"
+        assert await state(SOON) == "done", "an agent's own stop does not hold the robot"
         gatekeeper.console.stop("a person", holds=True)
         assert await state(0.05) == "checked"
         approve(gatekeeper)
         gatekeeper.console.stop("a person, at the same time", holds=True)
-        await until(gatekeeper, lambda view: view.is_over)
+        await wait_until(gatekeeper, lambda view: view.is_over)
         assert await state(0.05) == "checked"
         approve(gatekeeper)
-        await until(gatekeeper, lambda view: view.is_over)
+        await wait_until(gatekeeper, lambda view: view.is_over)
         gatekeeper.console.stop("Escape, while nothing moves", only_moving=True, holds=True)
-        assert await state(SOON) == "done", "a person has approved one since"
+        assert await state(SOON) == "done", "a person has approved a mission since"
 
     use(gatekeeper, act)
 
@@ -1140,44 +1140,44 @@ def test_after_a_persons_stop_the_contract_of_the_start_approves_nothing(gatekee
 def test_a_persons_stop_outlives_the_process(tmp_path: Path) -> None:
     with gatekeeper_at(tmp_path).console as console:
         console.stop(BY_SHUTDOWN)
-        assert not console.is_held, "only a person holds"
+        assert not console.is_held, "only a person's stop holds"
         console.stop("a person", holds=True)
-    again, beside = gatekeeper_at(tmp_path), gatekeeper_at(tmp_path)
+    again, other = gatekeeper_at(tmp_path), gatekeeper_at(tmp_path)
 
     async def act(agent: Agent) -> None:
         proposed = await agent.call("propose_mission", program=QUIET)
         assert "pressed STOP" in proposed["next"]
         approve(again)
-        await until(again, lambda view: view.is_over)
+        await wait_until(again, lambda view: view.is_over)
 
     with again.console as console:
         assert console.is_held
-        assert beside.console.is_held
+        assert other.console.is_held
         use(again, act)
     with gatekeeper_at(tmp_path).console as console:
         assert not console.is_held
 
 
-def test_a_program_for_which_a_person_asked_is_not_an_agents(gatekeeper: Gatekeeper) -> None:
+def test_a_program_that_a_person_requested_is_not_the_agents(gatekeeper: Gatekeeper) -> None:
     gatekeeper.writes = True
 
     async def act(agent: Agent) -> None:
         await agent.call("propose_mission", instruction=next(iter(known_instructions(None))))
         session_of(gatekeeper).ask_again(repair=False)
-        await until(gatekeeper, lambda view: view.may_be_approved)
+        await wait_until(gatekeeper, lambda view: view.may_be_approved)
         assert not gatekeeper.approves_alone(session_of(gatekeeper))
         assert "person" in await agent.fails("propose_mission", program=QUIET)
 
     use(gatekeeper, act)
 
 
-def test_a_no_is_about_the_program_that_was_asked_about(gatekeeper: Gatekeeper) -> None:
+def test_a_no_counts_only_for_the_program_in_the_question(gatekeeper: Gatekeeper) -> None:
     gatekeeper.asks_client = True
 
-    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - the SDK passes it
         assert "No house rules are in force." in params.message
         session_of(gatekeeper).edit(HELLO)
-        await until(gatekeeper, lambda view: view.may_be_approved)
+        await wait_until(gatekeeper, lambda view: view.may_be_approved)
         return ElicitResult(action="decline")
 
     async def act(agent: Agent) -> None:
@@ -1193,19 +1193,19 @@ def test_a_late_yes_accepts_only_the_problems_of_its_own_question(tmp_path: Path
     gatekeeper.asks_client = True
 
     async def act(agent: Agent) -> None:
-        async def answer_later(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+        async def answer_later(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - the SDK passes it
             asked.append(params.message)
-            if len(asked) > 1:  # the second question, about the rule that is in force again
+            if len(asked) > 1:  # The second question is about the rule.
                 return ElicitResult(action="cancel")
             session_of(gatekeeper).edit(INTO_VAULT)
-            await until(gatekeeper, lambda view: view.may_be_approved and bool(view.problems))
+            await wait_until(gatekeeper, lambda view: view.may_be_approved and bool(view.problems))
             await agent.call("run_mission", digest=digest, seconds=0)
             return ElicitResult(action="accept", content={"approve": True})
 
         answers.append(answer_later)
         digest = (await agent.call("propose_mission", program=INTO_VAULT))["digest"]
         session_of(gatekeeper).switch_off(STAY_OUT.name, "a test")
-        await until(gatekeeper, lambda view: view.may_be_approved and not view.problems)
+        await wait_until(gatekeeper, lambda view: view.may_be_approved and not view.problems)
         await agent.fails("run_mission", digest=digest)
         assert view_of(gatekeeper).may_be_approved
         assert len(asked) == 2
@@ -1220,7 +1220,7 @@ def test_a_late_yes_accepts_only_the_problems_of_its_own_question(tmp_path: Path
         use(gatekeeper, act, answer=answer, mode="legacy")
 
 
-def test_a_skill_that_the_robot_lacks_is_refused_in_words() -> None:
+def test_a_skill_that_the_robot_lacks_raises_a_user_error() -> None:
     known = SKILLS.without({"get_all_rooms"})
     steps = Steps("Look around.", contract_from({"go_to": {"location": "any"}}, known), known)
     with pytest.raises(UserError):
@@ -1228,7 +1228,7 @@ def test_a_skill_that_the_robot_lacks_is_refused_in_words() -> None:
 
 
 def test_a_notice_for_people_outlives_an_agents_proposal(gatekeeper: Gatekeeper, tmp_path: Path) -> None:
-    left(tmp_path, "say", "result")
+    leave_mission(tmp_path, "say", "result")
     with gatekeeper.console:
         noticed = gatekeeper.console.interrupted
         assert noticed

@@ -1,4 +1,4 @@
-"""Agents over standard input and output, and over HTTP, in real processes."""
+"""Agents connect over standard input and output, and over HTTP, in real processes."""
 
 from __future__ import annotations
 
@@ -43,17 +43,17 @@ async def call(client: Client, tool: str, **arguments: Any) -> Any:  # noqa: ANN
     return result.structured_content
 
 
-# --- over HTTP, beside the page
+# --- over HTTP, next to the page
 
 
 class AgentServer(PageServer):
-    """`codebotler mcp --http`."""
+    """A process of `codebotler mcp --http`."""
 
     @property
     def agent_token(self) -> str:
         ends = time.monotonic() + SOON
-        while (found := re.search(r"Authorization: Bearer (\S+)\n", self.said)) is None:
-            assert time.monotonic() < ends, self.said
+        while (found := re.search(r"Authorization: Bearer (\S+)\n", self.output)) is None:
+            assert time.monotonic() < ends, self.output
             time.sleep(0.02)
         return found[1]
 
@@ -75,7 +75,7 @@ class AgentServer(PageServer):
         answer = self.call("POST", "/api/missions/current/approve", {"program": digest})
         assert answer.status == 200, answer.text
 
-    def until(self, state: str) -> None:
+    def wait_for(self, state: str) -> None:
         ends = time.monotonic() + SOON
         while (now := self.call("GET", "/api/robot").data["state"]) != state:
             assert time.monotonic() < ends, now
@@ -101,7 +101,7 @@ def test_all_tools_work_over_http(server: AgentServer, mode: str) -> None:
             assert server.token not in json.dumps(proposed)
             said: list[str | None] = []
 
-            async def hear(progress: float, total: float | None, message: str | None) -> None:  # noqa: ARG001 - as the SDK calls it
+            async def hear(progress: float, total: float | None, message: str | None) -> None:  # noqa: ARG001 - the SDK passes it
                 said.append(message)
 
             arguments = {"digest": proposed["digest"]}
@@ -130,13 +130,13 @@ def test_all_tools_work_over_http(server: AgentServer, mode: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_second_client_stops_what_the_first_runs(server: AgentServer) -> None:
+def test_a_second_client_stops_the_mission_of_the_first(server: AgentServer) -> None:
     async def main() -> None:
         async with asyncio.timeout(SOON), server.client() as first, server.client() as second:
             proposed = await call(first, "propose_mission", program=FAR)
             running = asyncio.create_task(call(first, "run_mission", digest=proposed["digest"]))
             await asyncio.to_thread(server.approve)
-            await asyncio.to_thread(server.until, "running")
+            await asyncio.to_thread(server.wait_for, "running")
             assert (await call(second, "stop"))["state"] == "stopped"
             assert (await running)["state"] == "stopped"
 
@@ -194,7 +194,7 @@ def test_no_stream_stays_open_without_a_call(server: AgentServer) -> None:
     ):
         with closing(http.client.HTTPConnection("127.0.0.1", server.port, timeout=SOON)) as connection:
             connection.request(method, "/mcp", text, {**headers, **more})
-            found.append(connection.getresponse().status)  # a stream would have no end to read
+            found.append(connection.getresponse().status)  # A stream would never end.
     assert found == [405, 404]
 
 
@@ -272,7 +272,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def variables(folder: Path) -> dict[str, str]:
+def environment(folder: Path) -> dict[str, str]:
     return {**os.environ, "CODEBOTLER_HOME": str(folder / "home")}
 
 
@@ -280,10 +280,10 @@ def variables(folder: Path) -> dict[str, str]:
 @pytest.mark.parametrize("mode", ["auto", "legacy"])
 def test_all_tools_work_over_stdio(folder: Path, mode: str) -> None:
     program, *arguments = command("--speed", "0")
-    started = StdioServerParameters(command=program, args=arguments, env=variables(folder), cwd=folder)
+    started = StdioServerParameters(command=program, args=arguments, env=environment(folder), cwd=folder)
     questions: list[str] = []
 
-    async def accept(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - as the SDK calls it
+    async def accept(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - the SDK passes it
         questions.append(params.message)
         return ElicitResult(action="accept", content={"approve": True})
 
@@ -316,16 +316,16 @@ def test_all_tools_work_over_stdio(folder: Path, mode: str) -> None:
     assert [summary.state for summary in read_missions(folder / "home")] == ["done", "done"]
 
 
-def lines(*messages: dict[str, Any]) -> bytes:
+def pack(*messages: dict[str, Any]) -> bytes:
     return b"".join(json.dumps(message).encode() + b"\n" for message in messages)
 
 
-def tool(number: int, name: str, **arguments: Any) -> dict[str, Any]:  # noqa: ANN401 - any arguments
+def request(number: int, name: str, **arguments: Any) -> dict[str, Any]:  # noqa: ANN401 - any arguments
     params = {"name": name, "arguments": arguments}
     return {"jsonrpc": "2.0", "id": number, "method": "tools/call", "params": params}
 
 
-NOISY = """
+NOISY_SKILLS = """
 import os
 from codebotler import Simulation, skill
 print("noise at the import")
@@ -336,7 +336,7 @@ def wave(sim: Simulation) -> None:
     \"\"\"Wave.\"\"\"
     print("noise of a skill")
 """
-BEGUN = lines(INITIALIZE, {"jsonrpc": "2.0", "method": "notifications/initialized"})
+HANDSHAKE = pack(INITIALIZE, {"jsonrpc": "2.0", "method": "notifications/initialized"})
 
 
 CLOSING = """
@@ -353,17 +353,17 @@ for number in numbers:
 
 @pytest.mark.slow
 def test_only_the_event_loop_closes_the_descriptors_of_the_streams() -> None:
-    # Descriptors that are closed twice may be those of a mission's files, which other threads have opened.
+    # A descriptor that is closed twice may by then be a file of a mission, which another thread has opened.
     subprocess.run([sys.executable, "-c", CLOSING], input=b"", stdout=subprocess.PIPE, check=True)
 
 
 @pytest.mark.slow
 def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path) -> None:
-    (folder / "skills.py").write_text(NOISY)
+    (folder / "skills.py").write_text(NOISY_SKILLS)
     with subprocess.Popen(
         command("--skills", "skills.py", "--speed", "0"),
         cwd=folder,
-        env=variables(folder),
+        env=environment(folder),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -371,8 +371,8 @@ def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path) -> None:
         assert running.stdin is not None
         assert running.stdout is not None
         program = "def task_program():\n    print('noise')\n    wave()\n"
-        running.stdin.write(BEGUN + b"not json\n" + lines(tool(2, "check_program", program=program)))
-        running.stdin.write(lines(tool(3, "propose_mission", program=program), tool(4, "no_such_tool")))
+        running.stdin.write(HANDSHAKE + b"not json\n" + pack(request(2, "check_program", program=program)))
+        running.stdin.write(pack(request(3, "propose_mission", program=program), request(4, "no_such_tool")))
         running.stdin.flush()
         answers: dict[object, Any] = {}
         while {1, 2, 3, 4} - {*answers}:
@@ -395,7 +395,7 @@ def test_a_running_robot_stops_with_the_server(folder: Path, ending: str) -> Non
     with subprocess.Popen(
         command(),
         cwd=folder,
-        env=variables(folder),
+        env=environment(folder),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -403,25 +403,25 @@ def test_a_running_robot_stops_with_the_server(folder: Path, ending: str) -> Non
         assert running.stdin is not None
         assert running.stdout is not None
         asking = {**INITIALIZE, "params": {**INITIALIZE["params"], "capabilities": {"elicitation": {}}}}  # type: ignore[dict-item]  # a dictionary
-        running.stdin.write(lines(asking, {"jsonrpc": "2.0", "method": "notifications/initialized"}))
-        running.stdin.write(lines(tool(2, "propose_mission", program=FAR)))
+        running.stdin.write(pack(asking, {"jsonrpc": "2.0", "method": "notifications/initialized"}))
+        running.stdin.write(pack(request(2, "propose_mission", program=FAR)))
         running.stdin.flush()
         while (message := json.loads(running.stdout.readline())).get("id") != 2:
             pass
         digest = message["result"]["structuredContent"]["digest"]
-        running.stdin.write(lines(tool(3, "run_mission", digest=digest)))
+        running.stdin.write(pack(request(3, "run_mission", digest=digest)))
         running.stdin.flush()
         while (message := json.loads(running.stdout.readline())).get("method") != "elicitation/create":
             pass
         result = {"action": "accept", "content": {"approve": True}}
-        running.stdin.write(lines({"jsonrpc": "2.0", "id": message["id"], "result": result}))
+        running.stdin.write(pack({"jsonrpc": "2.0", "id": message["id"], "result": result}))
         running.stdin.flush()
-        wait_for(folder, "running" if ending == "early signal" else "skill")
+        wait_for_event(folder, "running" if ending == "early signal" else "skill")
         if ending.endswith(("signal", "terminal")):
             running.send_signal(signal.SIGHUP if ending == "closed terminal" else signal.SIGTERM)
             running.wait(SOON)
         elif ending == "closed input, nothing read":
-            running.stdin.write(lines(*(tool(number, "read_robot") for number in range(4, 300))))
+            running.stdin.write(pack(*(request(number, "read_robot") for number in range(4, 300))))
         running.stdin.close()
         if ending != "closed input, nothing read":
             running.stdout.read()
@@ -430,7 +430,7 @@ def test_a_running_robot_stops_with_the_server(folder: Path, ending: str) -> Non
     assert summary.state == "stopped"
 
 
-def wait_for(folder: Path, event: str) -> None:
+def wait_for_event(folder: Path, event: str) -> None:
     """Wait until the log of a mission has an event or a state."""
     ends = time.monotonic() + SOON
     while f'": "{event}"' not in "".join(
@@ -441,11 +441,11 @@ def wait_for(folder: Path, event: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_person_who_starts_it_is_told_what_it_needs(folder: Path) -> None:
+def test_start_without_a_client_recommends_http(folder: Path) -> None:
     ended = subprocess.run(
         command(),
         cwd=folder,
-        env=variables(folder),
+        env=environment(folder),
         stdin=subprocess.DEVNULL,
         capture_output=True,
         check=False,

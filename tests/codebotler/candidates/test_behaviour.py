@@ -29,11 +29,11 @@ def ask(*options: str, room: str = START, to: str = "", question: str = "Tea?") 
     return Event("ask", question, to_options(options), answer=options[0], place=room, to=to)
 
 
-def seen(*events: Event) -> Behaviour:
+def observe(*events: Event) -> Behaviour:
     return behaviour_of(Outcome(Status.FINISHED, events), START, NAMES)
 
 
-def failed(status: Status, kind: str = "PickObjectNotFound") -> Behaviour:
+def observe_failure(status: Status, kind: str = "PickObjectNotFound") -> Behaviour:
     return behaviour_of(Outcome(status, (drive(START, "office 1"),), RunError(kind, "no mug")), START, NAMES)
 
 
@@ -70,7 +70,7 @@ def test_statements_with_different_claims_differ(one: str, other: str) -> None:
     assert claims_of(one, NAMES) != claims_of(other, NAMES)
 
 
-def test_words_for_anybody_yes_and_no_are_no_names() -> None:
+def test_yes_no_and_words_for_anybody_are_not_names() -> None:
     names = names_in([], [(ask("yes", "No", "black tea"), Event("check", "somebody"))])
     assert [match[0] for match in names.finditer("yes no somebody black tea black teas")] == [
         "black tea",
@@ -78,12 +78,12 @@ def test_words_for_anybody_yes_and_no_are_no_names() -> None:
     ]
 
 
-def test_plural_of_a_room_is_no_name_but_that_of_a_thing_is() -> None:
+def test_plural_of_a_thing_is_a_name_but_not_of_a_room() -> None:
     names = names_in(["lab", "lab 2"], [(Event("pick", "a mug"),)])
     assert [match[0] for match in names.finditer("the labs: lab, Lab 2; mugs")] == ["lab", "Lab 2", "mugs"]
 
 
-def test_runs_without_names_find_none() -> None:
+def test_pattern_without_names_matches_nothing() -> None:
     assert not names_in([], []).findall("a mug in the hall")
 
 
@@ -91,64 +91,64 @@ def test_order_of_visits_and_looks_does_not_count() -> None:
     there, back = drive(START, "office 1"), drive("office 1", START)
     look = Event("check", "mug", found=True, place="office 1")
     aside = drive(START, "office 2"), drive("office 2", START)
-    assert seen(there, look, back, *aside, say("2 mugs")) == seen(*aside, there, back, say("two mugs"))
+    assert observe(there, look, back, *aside, say("2 mugs")) == observe(*aside, there, back, say("two mugs"))
 
 
 def test_statements_between_two_drives_are_merged() -> None:
-    assert seen(say("There is a mug."), say("It has 2 handles.")) == seen(say("A mug\nwith 2 handles"))
-    assert seen(say("a mug"), drive(START, START), say("2")) == seen(say("a mug"), say("2"))
-    apart = seen(say("a mug"), drive(START, "office 1"), drive("office 1", START), say("2"))
-    assert apart != seen(say("a mug"), say("2"))
+    assert observe(say("There is a mug."), say("It has 2 handles.")) == observe(say("A mug\nwith 2 handles"))
+    assert observe(say("a mug"), drive(START, START), say("2")) == observe(say("a mug"), say("2"))
+    apart = observe(say("a mug"), drive(START, "office 1"), drive("office 1", START), say("2"))
+    assert apart != observe(say("a mug"), say("2"))
 
 
-def test_endless_talk_is_cut() -> None:
+def test_long_statements_are_truncated() -> None:
     talk = [say(f"no, at {number}, but there is no mug in office 1 and ") for number in range(5_000)]
     (statement,) = statements(tuple(talk))
     assert len(statement[1]) == MAX_STATEMENT_LENGTH
 
 
 def test_room_of_a_statement_counts() -> None:
-    assert seen(say("a mug")).differences(seen(say("a mug", "office 1"))) == {"said"}
+    assert observe(say("a mug")).differences(observe(say("a mug", "office 1"))) == {"said"}
 
 
 def test_a_greeting_differs_from_silence() -> None:
-    assert seen(say("Hello")).differences(seen()) == {"said"}
+    assert observe(say("Hello")).differences(observe()) == {"said"}
 
 
 def test_options_count_but_not_their_order_or_case_nor_the_question() -> None:
-    one = seen(ask("Yes", "no", to="person"))
-    assert one == seen(ask("no", "yes", to="", question="Would you like some tea?"))
-    assert one.differences(seen(ask("yes", "no", "maybe"))) == {"asked"}
-    assert one.differences(seen(ask("yes", "no", room="office 1"))) == {"asked"}
+    one = observe(ask("Yes", "no", to="person"))
+    assert one == observe(ask("no", "yes", to="", question="Would you like some tea?"))
+    assert one.differences(observe(ask("yes", "no", "maybe"))) == {"asked"}
+    assert one.differences(observe(ask("yes", "no", room="office 1"))) == {"asked"}
 
 
 def test_carried_things_count_with_their_rooms() -> None:
-    one = seen(Event("pick", "the mug", place="office 1"), Event("place", "mug", place=START))
-    assert one == seen(Event("pick", "mug", place="office 1"), Event("place", "the mug", place=START))
-    assert one.differences(seen(Event("pick", "mug", place="office 1"))) == {"moved"}
+    one = observe(Event("pick", "the mug", place="office 1"), Event("place", "mug", place=START))
+    assert one == observe(Event("pick", "mug", place="office 1"), Event("place", "the mug", place=START))
+    assert one.differences(observe(Event("pick", "mug", place="office 1"))) == {"moved"}
 
 
 def test_last_room_counts() -> None:
-    assert seen(drive(START, "office 1")).differences(seen()) == {"room"}
-    assert seen(drive(START, "office 1"), drive("office 1", START)) == seen()
+    assert observe(drive(START, "office 1")).differences(observe()) == {"room"}
+    assert observe(drive(START, "office 1"), drive("office 1", START)) == observe()
     lost = Event("goto", "attic", place=START)
-    assert seen(lost) == seen()
+    assert observe(lost) == observe()
 
 
 def test_endings_differ_and_have_no_last_room() -> None:
-    assert failed(Status.ROBOT_ERROR).ending == "PickObjectNotFound"
-    assert failed(Status.TIMEOUT) == failed(Status.TIMEOUT, "TimeoutError")
-    assert failed(Status.TIMEOUT).differences(failed(Status.ROBOT_ERROR)) == {"ending"}
-    assert failed(Status.KILLED).room == ""
+    assert observe_failure(Status.ROBOT_ERROR).ending == "PickObjectNotFound"
+    assert observe_failure(Status.TIMEOUT) == observe_failure(Status.TIMEOUT, "TimeoutError")
+    assert observe_failure(Status.TIMEOUT).differences(observe_failure(Status.ROBOT_ERROR)) == {"ending"}
+    assert observe_failure(Status.KILLED).room == ""
 
 
 def test_own_skills_count_by_kind_and_text() -> None:
-    one = seen(Event("wave", "left", more=("twice",)), Event("nod", ""))
-    assert one == seen(Event("nod", ""), Event("wave", "left", more=("twice",)))
-    assert one.differences(seen(Event("nod", ""), Event("wave", "left"))) == {"done"}
+    one = observe(Event("wave", "left", more=("twice",)), Event("nod", ""))
+    assert one == observe(Event("nod", ""), Event("wave", "left", more=("twice",)))
+    assert one.differences(observe(Event("nod", ""), Event("wave", "left"))) == {"done"}
 
 
-def test_who_is_asked_counts_where_candidates_name_different_people() -> None:
+def test_addressee_counts_where_candidates_name_different_people() -> None:
     alice, bob, anybody = (ask("yes", "no", to=name) for name in ("Alice", "the Bob", "person"))
     several = rooms_with_several([(alice,), (bob,), (anybody,)])
     assert several == {START}
@@ -157,4 +157,4 @@ def test_who_is_asked_counts_where_candidates_name_different_people() -> None:
         behaviour_of(Outcome(Status.FINISHED, (one,)), START, NAMES, several) for one in (alice, bob, anybody)
     ]
     assert len({*shown}) == 3
-    assert seen(alice) == seen(bob)
+    assert observe(alice) == observe(bob)

@@ -48,25 +48,25 @@ COFFEE = ASKS.format(who="person", question="Coffee or tea?", options='["Coffee"
 @pytest.fixture(scope="module")
 def worker() -> Iterator[Worker]:
     started = Worker()
-    cluster_candidates(started, [LOOKS], CheckSettings(), ROOMS)  # starts the processes
+    cluster_candidates(started, [LOOKS], CheckSettings(), ROOMS)  # This starts the processes.
     yield started
     started.close()
 
 
-def grouped(
+def cluster(
     worker: Worker, *programs: str, rooms: RoomMap | None = ROOMS, rules: tuple[Rule, ...] = ()
 ) -> CandidateClusters:
     return cluster_candidates(worker, programs, CheckSettings(house_rules=rules), rooms)
 
 
-def test_programs_that_do_the_same_are_together_and_the_largest_cluster_is_first(worker: Worker) -> None:
-    found = grouped(worker, GUESSES, LOOKS, LOOKS_TOO, LOOKS_TOO)
+def test_programs_that_do_the_same_share_a_cluster_and_the_largest_is_first(worker: Worker) -> None:
+    found = cluster(worker, GUESSES, LOOKS, LOOKS_TOO, LOOKS_TOO)
     assert [(one.size, one.programs) for one in found.clusters] == [(3, (LOOKS_TOO, LOOKS)), (1, (GUESSES,))]
     assert (found.total, found.rejected) == (4, 0)
 
 
 def test_each_cluster_has_a_run_for_each_world(worker: Worker) -> None:
-    first, second = grouped(worker, LOOKS, GUESSES).clusters
+    first, second = cluster(worker, LOOKS, GUESSES).clusters
     assert len(first.samples) == len(second.samples) == len(first.behaviours) == len(second.behaviours)
     assert [one.number for one in second.samples] == [*range(len(first.samples))]
     assert any(one != other for one, other in zip(first.behaviours, second.behaviours, strict=True))
@@ -74,7 +74,7 @@ def test_each_cluster_has_a_run_for_each_world(worker: Worker) -> None:
 
 
 def test_an_answer_does_not_depend_on_the_words_of_the_question(worker: Worker) -> None:
-    found = grouped(worker, TEA, COFFEE)
+    found = cluster(worker, TEA, COFFEE)
     assert [one.size for one in found.clusters] == [2]
     said = {claims for one in found.clusters[0].behaviours for _, claims in one.said}
     assert len(said) == 2, "both answers are tried"
@@ -83,12 +83,12 @@ def test_an_answer_does_not_depend_on_the_words_of_the_question(worker: Worker) 
 def test_further_worlds_try_facts_that_no_random_world_has(worker: Worker) -> None:
     options = [f"{number} cups" for number in range(12)]
     asks = f'def task_program():\n    say(ask("", "How many cups?", {options}))\n'
-    (found,) = grouped(worker, asks).clusters
+    (found,) = cluster(worker, asks).clusters
     assert len({one.said for one in found.behaviours}) == len(options)
 
 
 def test_rejected_candidates_are_dropped(worker: Worker) -> None:
-    found = grouped(worker, LOST, LOOKS, LOST)
+    found = cluster(worker, LOST, LOOKS, LOST)
     assert [one.programs for one in found.clusters] == [(LOOKS,)]
     assert found.rejected == 2
 
@@ -96,19 +96,19 @@ def test_rejected_candidates_are_dropped(worker: Worker) -> None:
 @pytest.mark.slow
 def test_house_rules_reject_candidates(worker: Worker) -> None:
     visits = 'def task_program():\n    go_to("lab")\n'
-    assert grouped(worker, visits, LOOKS).rejected == 0
-    assert grouped(worker, visits, LOOKS, rules=(NO_LAB,)).rejected == 1
+    assert cluster(worker, visits, LOOKS).rejected == 0
+    assert cluster(worker, visits, LOOKS, rules=(NO_LAB,)).rejected == 1
 
 
 def test_the_first_candidate_is_kept_if_all_are_rejected(worker: Worker) -> None:
-    found = grouped(worker, LOST, "def task_program(:", "")
+    found = cluster(worker, LOST, "def task_program(:", "")
     assert [(one.program, one.size) for one in found.clusters] == [(LOST, 1)]
     assert found.rejected == 2
 
 
 def test_without_a_map_all_programs_share_the_rooms_that_they_name(worker: Worker) -> None:
     drives = 'def task_program():\n    go_to("{}")\n    go_to(get_current_location())\n'
-    found = grouped(worker, drives.format("attic"), drives.format("the attic"), LOOKS, rooms=None)
+    found = cluster(worker, drives.format("attic"), drives.format("the attic"), LOOKS, rooms=None)
     assert sorted(one.size for one in found.clusters) == [1, 2]
 
 

@@ -25,7 +25,7 @@ def drive(start: str, end: str) -> Event:
 
 
 def cluster(size: int, name: str, *traces: Trace) -> CandidateCluster:
-    """Make a cluster from its run in each world. Each has a cup, and only the first one a mug."""
+    """Make a cluster from its run in each world. Every world has a cup, and only the first a mug."""
     outcomes = [Outcome(Status.FINISHED, trace) for trace in traces]
     samples = tuple(
         Sample(number, one, (CUP, NO_MUG if number else MUG)) for number, one in enumerate(outcomes)
@@ -33,7 +33,7 @@ def cluster(size: int, name: str, *traces: Trace) -> CandidateCluster:
     return CandidateCluster((name,), size, tuple(behaviour_of(one, "hall") for one in outcomes), samples)
 
 
-def asked(*clusters: CandidateCluster) -> ClarifyingQuestion:
+def ask_about(*clusters: CandidateCluster) -> ClarifyingQuestion:
     question = question_about(CandidateClusters(clusters))
     assert question is not None
     return question
@@ -52,80 +52,77 @@ def test_no_question_if_one_behaviour_dominates() -> None:
     assert question_about(CandidateClusters((cluster(5, "a", ONE), other))) is not None
 
 
-def test_the_world_has_the_most_different_options() -> None:
-    question = asked(cluster(2, "a", ONE, ONE), cluster(2, "b", TWO, ONE), cluster(1, "c", TWO, TWO))
+def test_question_uses_the_world_with_the_most_different_options() -> None:
+    question = ask_about(cluster(2, "a", ONE, ONE), cluster(2, "b", TWO, ONE), cluster(1, "c", TWO, TWO))
     assert (question.sample, [one.program for one in question.options]) == (0, ["a", "b"])
-    question = asked(cluster(2, "a", ONE, ONE), cluster(2, "b", TWO, TWO), cluster(1, "c", TWO, THREE))
+    question = ask_about(cluster(2, "a", ONE, ONE), cluster(2, "b", TWO, TWO), cluster(1, "c", TWO, THREE))
     assert (question.sample, [one.program for one in question.options]) == (1, ["a", "b", "c"])
 
 
-def test_there_are_at_most_three_options_and_the_largest_ones() -> None:
+def test_question_offers_at_most_the_three_largest_options() -> None:
     four = (say("4 mugs"),)
-    question = asked(*(cluster(4 - n, str(n), run) for n, run in enumerate([ONE, TWO, THREE, four])))
+    question = ask_about(*(cluster(4 - n, str(n), run) for n, run in enumerate([ONE, TWO, THREE, four])))
     assert [(one.program, one.size) for one in question.options] == [("0", 4), ("1", 3), ("2", 2)]
     assert question.total == 10
     assert "1 program " in question.left_out
-    assert not asked(cluster(2, "a", ONE), cluster(1, "b", TWO)).left_out
+    assert not ask_about(cluster(2, "a", ONE), cluster(1, "b", TWO)).left_out
 
 
 def test_a_shorter_storyboard_is_preferred() -> None:
     look = Event("check", "mug", found=True, place="hall")
-    assert asked(cluster(1, "a", (look, *ONE), ONE), cluster(1, "b", TWO, TWO)).sample == 1
+    assert ask_about(cluster(1, "a", (look, *ONE), ONE), cluster(1, "b", TWO, TWO)).sample == 1
 
 
 def test_a_world_in_which_the_most_frequent_behaviour_does_something_is_preferred() -> None:
     drives = (drive("hall", "lab"),)
-    assert asked(cluster(2, "a", drives, (*drives, *ONE)), cluster(1, "b", TWO, TWO)).sample == 1
+    assert ask_about(cluster(2, "a", drives, (*drives, *ONE)), cluster(1, "b", TWO, TWO)).sample == 1
 
 
-def test_what_a_person_cares_about_is_preferred() -> None:
+def test_difference_in_statements_is_preferred_to_one_in_own_skills() -> None:
     waves = (Event("wave", "left", place="hall"),)
-    assert asked(cluster(1, "a", waves, (*ONE, *ONE)), cluster(1, "b", (), TWO)).sample == 1
+    assert ask_about(cluster(1, "a", waves, (*ONE, *ONE)), cluster(1, "b", (), TWO)).sample == 1
 
 
-def test_nobody_is_met_in_a_world_in_which_another_option_finds_nobody() -> None:
+def test_world_where_options_disagree_about_people_in_a_room_is_avoided() -> None:
     met = Event("check", "Ann", found=True, place="hall")
     empty = Event("check", "person", found=False, place="hall")
-    question = asked(cluster(1, "a", (met, *ONE), ONE), cluster(1, "b", (empty, *TWO, *TWO), TWO))
+    question = ask_about(cluster(1, "a", (met, *ONE), ONE), cluster(1, "b", (empty, *TWO, *TWO), TWO))
     assert question.sample == 1
     elsewhere = replace(met, place="lab")
-    question = asked(cluster(1, "a", (elsewhere, *ONE), ONE), cluster(1, "b", (empty, *TWO, *TWO), ONE))
+    question = ask_about(cluster(1, "a", (elsewhere, *ONE), ONE), cluster(1, "b", (empty, *TWO, *TWO), ONE))
     assert question.sample == 0
 
 
 def test_only_facts_that_matter_are_shown() -> None:
     one, other = cluster(1, "a", ONE, ONE), cluster(1, "b", TWO, ONE)
-    assert asked(one, other).facts == (MUG.sentence,)
+    assert ask_about(one, other).facts == (MUG.sentence,)
     always = [cluster(1, name, run, run) for name, run in (("a", ONE), ("b", TWO))]
-    assert asked(*always).facts == (CUP.sentence, MUG.sentence), "all facts if the options differ everywhere"
+    assert ask_about(*always).facts == (CUP.sentence, MUG.sentence), "all facts if options always differ"
 
 
 def test_options_show_their_steps_in_the_world() -> None:
-    first, _ = asked(cluster(1, "a", ONE), cluster(1, "b", TWO)).options
+    first, _ = ask_about(cluster(1, "a", ONE), cluster(1, "b", TWO)).options
     assert [(step["kind"], step["text"]) for step in first.steps] == [("say", "1 mugs")]
 
 
-def described(*traces: Trace) -> list[str]:
+def describe(*traces: Trace) -> list[str]:
     made = [cluster(1, "a", trace) for trace in traces]
     return describe_differences([one.samples[0] for one in made], [one.behaviours[0] for one in made])
 
 
-def test_sentences_say_only_what_differs() -> None:
+def test_sentences_describe_only_differences() -> None:
     greets = drive("hall", "lab"), say("Hello", "lab"), drive("lab", "hall")
-    assert described((*greets, *ONE), greets) == [
-        'says "1 mugs" in hall',
-        "says nothing in hall",
-    ]
-    assert described((drive("hall", "lab"),), ()) == ["ends in lab", "stays where it is"]
+    assert describe((*greets, *ONE), greets) == ['says "1 mugs" in hall', "says nothing in hall"]
+    assert describe((drive("hall", "lab"),), ()) == ["ends in lab", "stays where it is"]
     both = ['says "1 mugs" in hall and ends in lab', "says nothing and stays where it is"]
-    assert described((drive("hall", "lab"), *ONE), ()) == both
+    assert describe((drive("hall", "lab"), *ONE), ()) == both
 
 
 def test_sentences_of_three_options_tell_all_of_them_apart() -> None:
     rooms = ["hall", *(f"room {number}" for number in range(5))]
     drives = map(drive, rooms, [*rooms[1:], "hall"])
     many = tuple(event for one in drives for event in (say("Hi", one.place), one))
-    sentences = described(many, (), (drive("hall", "lab"),))
+    sentences = describe(many, (), (drive("hall", "lab"),))
     assert len({*sentences}) == 3
 
 
@@ -133,17 +130,17 @@ def test_sentences_of_three_options_tell_all_of_them_apart() -> None:
     ("line", "program"), [("1", "a"), (" 2 \n", "b"), ("none", None), ("None of these.", None)]
 )
 def test_answers_choose_an_option_or_none(line: str, program: str | None) -> None:
-    question = asked(cluster(2, "a", ONE), cluster(1, "b", TWO))
+    question = ask_about(cluster(2, "a", ONE), cluster(1, "b", TWO))
     chosen = question.chosen(question.parse(line))
     assert (None if chosen is None else chosen.program) == program
 
 
 def test_you_decide_means_the_most_frequent_behaviour() -> None:
-    question = asked(cluster(2, "a", ONE), cluster(1, "b", TWO))
+    question = ask_about(cluster(2, "a", ONE), cluster(1, "b", TWO))
     assert question.chosen(question.parse("You decide")) == question.options[0]
 
 
 @pytest.mark.parametrize("line", ["", "0", "3", "-1", "yes", "1 2"])
-def test_other_lines_are_no_answers(line: str) -> None:
+def test_other_lines_are_rejected(line: str) -> None:
     with pytest.raises(UserError, match='write 1, 2, "none" or "you decide"'):
-        asked(cluster(2, "a", ONE), cluster(1, "b", TWO)).parse(line)
+        ask_about(cluster(2, "a", ONE), cluster(1, "b", TWO)).parse(line)

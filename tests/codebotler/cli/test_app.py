@@ -1,4 +1,4 @@
-"""The command line of CodeBotler: its help and version, and how `check` reads, says and ends."""
+"""The command line of CodeBotler shows its help and version, and checks programs."""
 
 import json
 import os
@@ -34,7 +34,7 @@ def codebotler(*arguments: str | Path, given: str = "") -> Ended:
     return command("codebotler", *arguments, given=given, environment=wide)
 
 
-def refused(*arguments: str | Path, given: str = "") -> Refusal:
+def refusal_of(*arguments: str | Path, given: str = "") -> Refusal:
     return command_line.refused(*arguments, name="codebotler", given=given)
 
 
@@ -57,14 +57,14 @@ def test_the_version() -> None:
     assert re.fullmatch(r"codebotler \d+\.\d+\.\d+\n", codebotler("--version")[1])
 
 
-def test_what_is_no_command_is_one_sentence() -> None:
-    assert "'dance'" in refused("dance").sentence
+def test_unknown_command_is_refused() -> None:
+    assert "'dance'" in refusal_of("dance").sentence
 
 
 # --- check
 
 
-def test_an_accepted_program(files: Path) -> None:
+def test_check_shows_the_steps_of_an_accepted_program(files: Path) -> None:
     status, out, err = codebotler("check", files / "good.py", "--world", files / "world.yaml")
     assert (status, err) == (0, "")
     first, ran, *rest = out.split("\n")
@@ -90,7 +90,7 @@ def test_a_rejected_program_shows_each_line_to_blame(files: Path) -> None:
     assert '"kitchn"  failed: ' in out
 
 
-def test_a_room_that_may_take_too_long_to_find_ends_the_command(files: Path) -> None:
+def test_slow_room_pattern_is_refused(files: Path) -> None:
     (files / "slow.yaml").write_text("robot: lab\nrooms:\n  - lab\n  - (a+)+$\n")
     status, _, err = codebotler("check", files / "good.py", "--world", files / "slow.yaml")
     assert status == 2
@@ -98,7 +98,7 @@ def test_a_room_that_may_take_too_long_to_find_ends_the_command(files: Path) -> 
     assert "too long" in err
 
 
-def test_guessed_rooms_are_said_to_be_guessed(files: Path) -> None:
+def test_output_says_that_rooms_are_guessed(files: Path) -> None:
     status, out, _ = codebotler("check", files / "bad.py")
     assert status == 1
     guessed = re.search(r'^rooms (.+): "kitchn", "start_loc"$', out, re.MULTILINE)
@@ -107,7 +107,7 @@ def test_guessed_rooms_are_said_to_be_guessed(files: Path) -> None:
     assert guessed[1] not in codebotler("check", files / "good.py", "--world", files / "world.yaml")[1]
 
 
-def test_json_for_machines(files: Path) -> None:
+def test_json_lists_problems_and_samples(files: Path) -> None:
     arguments = ("check", files / "bad.py", "--json", "--seed", "3", "--samples", "4")
     status, out, err = codebotler(*arguments)
     assert (status, err) == (1, "")
@@ -124,7 +124,7 @@ def test_the_robot_starts_where_the_world_says(files: Path) -> None:
     assert '1      said "hall"\n' in out
 
 
-def test_a_world_that_shows_a_problem_is_shown_or_else_one_in_which_all_goes_well(files: Path) -> None:
+def test_a_world_that_shows_the_problem_is_preferred(files: Path) -> None:
     lines = (
         "def task_program():",
         '    if ask("", "Tea?", ["Yes", "No"]) == "No":',
@@ -140,7 +140,7 @@ def test_a_world_that_shows_a_problem_is_shown_or_else_one_in_which_all_goes_wel
     assert both.index("→ No") < both.index("→ Yes")
 
 
-def test_a_connected_robot_is_checked_by_what_its_file_maps(files: Path) -> None:
+def test_programs_for_a_connected_robot_are_checked_against_its_file(files: Path) -> None:
     cellar = "{polygon: [[2, -1], [4, -1], [4, 1], [2, 1]]}"
     places = f"places: {{dock: {{x: 0, y: 0}}, cellar: {cellar}, lab: {{x: 6, y: 0}}}}\n"
     (files / "places.yaml").write_text(places)
@@ -155,7 +155,7 @@ def test_a_connected_robot_is_checked_by_what_its_file_maps(files: Path) -> None
     (files / "down.py").write_text("def task_program():\n    go_to('cellar')\n")
     (files / "talk.py").write_text("def task_program():\n    go_to('attic')\n    say('hello')\n")
     options = ("--connect", files / "robot.yaml", "--rules", files / "rules.yaml")
-    assert codebotler("check", files / "drive.py", *options)[0] == 0  # the robot finds its own way
+    assert codebotler("check", files / "drive.py", *options)[0] == 0  # The robot may avoid the cellar.
     assert codebotler("check", files / "down.py", *options)[0] == 1
     status, out, _ = codebotler("check", files / "talk.py", "--connect", files / "robot.yaml")
     assert status == 1
@@ -184,39 +184,39 @@ def test_standard_input_may_be_a_whole_reply(reply: str) -> None:
     assert (status, out.split("\n")[0]) == (0, "accepted: no problem in the program")
 
 
-def test_lines_on_standard_input_are_counted_as_they_stand() -> None:
+def test_blank_lines_on_standard_input_count() -> None:
     assert "line 5: NameError" in codebotler("check", "-", given="\n\n" + BAD)[1]
 
 
-def test_what_cannot_be_checked_is_refused_in_a_sentence(files: Path) -> None:
+def test_unusable_input_is_refused_in_one_sentence(files: Path) -> None:
     for path, fault in ((files / "gone.py", "No such file"), (files, "Is a directory")):
-        refusal = refused("check", path)
+        refusal = refusal_of("check", path)
         assert refusal.at == (str(path), None)
         assert fault in refusal.sentence
-    assert refused("check", "fetch me a mug").sentence.startswith("fetch me a mug: ")
-    assert "- for standard input" in refused("check", "").sentence
-    assert "standard input: " in refused("check", "-", given=" \n").sentence
+    assert refusal_of("check", "fetch me a mug").sentence.startswith("fetch me a mug: ")
+    assert "- for standard input" in refusal_of("check", "").sentence
+    assert "standard input: " in refusal_of("check", "-", given=" \n").sentence
     (files / "empty.py").write_text("\n")
-    refusal = refused("check", files / "empty.py")
+    refusal = refusal_of("check", files / "empty.py")
     assert refusal.at == (str(files / "empty.py"), None)
     assert "no program" in refusal.sentence
     (files / "bytes.py").write_bytes(b"def \xff")
-    assert "UTF-8" in refused("check", files / "bytes.py").sentence
-    assert refused("check", files / "good.py", "--world", files / "no.yaml").file == str(files / "no.yaml")
+    assert "UTF-8" in refusal_of("check", files / "bytes.py").sentence
+    assert refusal_of("check", files / "good.py", "--world", files / "no.yaml").file == str(files / "no.yaml")
     (files / "wrong.yaml").write_text("robot: hall\nrooms: [lab]\n")
-    refusal = refused("check", files / "good.py", "--world", files / "wrong.yaml")
+    refusal = refusal_of("check", files / "good.py", "--world", files / "wrong.yaml")
     assert refusal.at == (str(files / "wrong.yaml"), 1)
-    assert "samples" in refused("check", files / "good.py", "--samples", "0").sentence
+    assert "samples" in refusal_of("check", files / "good.py", "--samples", "0").sentence
 
 
-def test_what_a_terminal_would_obey_is_shown(files: Path) -> None:
+def test_control_characters_are_escaped(files: Path) -> None:
     (files / "odd.py").write_text('def task_program():\n    say("a\x1b[31mb")\n    go_to("\x1b[2J")\n')
     out = codebotler("check", files / "odd.py", "--world", files / "world.yaml")[1]
     assert "\x1b" not in out
     assert "\\x1b[2J" in out
 
 
-def test_windows_is_told_of_wsl_with_the_platform_patched(
+def test_error_on_windows_names_wsl(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "platform", "win32")
@@ -226,8 +226,8 @@ def test_windows_is_told_of_wsl_with_the_platform_patched(
     assert re.fullmatch(r"codebotler: .*\bWSL\n", capsys.readouterr().err)
 
 
-def test_models_that_can_be_asked_here(tmp_path: Path) -> None:
-    """Where a server of models happens to run on this machine, its models come first."""
+def test_usable_models_are_listed(tmp_path: Path) -> None:
+    """A server that happens to run on this machine puts its own models first in the list."""
     environment = {
         **os.environ,
         "ANTHROPIC_API_KEY": "sk-ant-none-of-yours",

@@ -12,7 +12,7 @@ from codebotler.core.errors import UserError
 from codebotler.models.recorded import open_recorded
 from codebotler.prompts import prompt_for
 from command_line import Ended, Refusal, command
-from doubles import Several
+from doubles import FakeModel
 from roboeval.suites.load import Suite
 
 SAYS = 'def task_program():\n    say("{} mugs")\n'
@@ -27,11 +27,11 @@ class Terminal:
         self, programs: Sequence[str], *lines: str, model: str = "several", later: Sequence[str] = ()
     ) -> None:
         self.rounds, self.lines, self.model = [programs, *[later] * bool(later)], list(lines), model
-        self.asked_models: list[Several] = []
+        self.asked_models: list[FakeModel] = []
         self.asked: list[str] = []
 
-    def open(self) -> Several:
-        model = Several(self.rounds[min(len(self.asked_models), len(self.rounds) - 1)])
+    def open(self) -> FakeModel:
+        model = FakeModel(self.rounds[min(len(self.asked_models), len(self.rounds) - 1)])
         model.name = self.model
         self.asked_models.append(model)
         return model
@@ -44,7 +44,7 @@ class Terminal:
         self.asked.append(question)
         return self.lines.pop(0)
 
-    def chosen(self, *, asks: bool = True) -> str | None:
+    def choose(self, *, asks: bool = True) -> str | None:
         ask, count = self.read if asks else None, len(self.rounds[0])
         return choose_candidate(
             self.open, prompt_for, "Count the mugs.", CheckSettings(), count=count, ask=ask
@@ -53,19 +53,19 @@ class Terminal:
 
 def test_without_a_terminal_the_largest_cluster_is_taken(capsys: pytest.CaptureFixture[str]) -> None:
     person = Terminal([TWO, ONE, ONE])
-    assert person.chosen(asks=False) == ONE
+    assert person.choose(asks=False) == ONE
     assert "2 of 3 programs" in capsys.readouterr().err
 
 
 def test_nothing_is_asked_if_all_do_the_same() -> None:
     person = Terminal([ONE, ONE])
-    assert person.chosen() == ONE
+    assert person.choose() == ONE
     assert person.asked == []
 
 
 def test_the_person_chooses_an_option(capsys: pytest.CaptureFixture[str]) -> None:
     person = Terminal([ONE, ONE, TWO], "5\n", "2\n")
-    assert person.chosen() == TWO
+    assert person.choose() == TWO
     assert len(person.asked) == 2, "the question is repeated after an unusable line"
     shown = capsys.readouterr()
     assert 'says "2 mugs"' in shown.err
@@ -74,43 +74,43 @@ def test_the_person_chooses_an_option(capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_none_of_these_adds_a_sentence_for_a_second_round() -> None:
     person = Terminal([ONE, TWO], "none\n", "Only clean ones.\n", "1\n", later=[THREE, FOUR])
-    assert person.chosen() == THREE
+    assert person.choose() == THREE
     assert "did not mean a robot that" in person.asked_models[1].prompts[0].messages[-1].text
     assert person.instructions == ["Count the mugs.", "Count the mugs. Only clean ones."]
 
 
 def test_there_is_no_third_round() -> None:
     person = Terminal([ONE, TWO], "none\n", "Only clean ones.\n", "none\n", later=[THREE, FOUR])
-    assert person.chosen() is None
+    assert person.choose() is None
     assert len(person.instructions) == 2
 
 
-def test_what_was_not_meant_is_not_taken_again() -> None:
+def test_rejected_behaviour_is_not_taken_again() -> None:
     with pytest.raises(UserError, match="not meant"):
-        Terminal([ONE, TWO], "none\n", "Only clean ones.\n").chosen()
+        Terminal([ONE, TWO], "none\n", "Only clean ones.\n").choose()
 
 
-def test_nobody_writes_a_sentence_for_a_recorded_model(capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_sentence_is_requested_for_a_recorded_model(capsys: pytest.CaptureFixture[str]) -> None:
     person = Terminal([ONE, TWO], "none\n", model="recorded:careful")
-    assert person.chosen() is None
+    assert person.choose() is None
     assert len(person.instructions) == 1
     assert "recorded model" in capsys.readouterr().err
 
 
 def test_the_person_may_give_up() -> None:
     person = Terminal([ONE, TWO], "none\n", "\n")
-    assert person.chosen() is None
+    assert person.choose() is None
     assert len(person.instructions) == 1
 
 
-def test_the_end_of_the_input_is_no_answer() -> None:
+def test_end_of_input_is_not_an_answer() -> None:
     with pytest.raises(UserError, match="you decide"):
-        Terminal([ONE, TWO], "").chosen()
+        Terminal([ONE, TWO], "").choose()
 
 
 def test_replies_without_a_program_do_not_count() -> None:
-    assert Terminal(["", "", ONE]).chosen() == ONE
-    assert Terminal(["", ""]).chosen() is None
+    assert Terminal(["", "", ONE]).choose() == ONE
+    assert Terminal(["", ""]).choose() is None
 
 
 def test_nobody_is_asked_without_a_terminal() -> None:
@@ -121,7 +121,7 @@ def codebotler(*words: str, cwd: Path) -> Ended:
     return command("codebotler", *words, cwd=cwd)
 
 
-def refused(*words: str | Path) -> Refusal:
+def refusal_of(*words: str | Path) -> Refusal:
     return command_line.refused(*words, name="codebotler")
 
 
@@ -146,11 +146,11 @@ def test_run_runs_the_chosen_program(tmp_path: Path) -> None:
     assert "stapler" in ended.out
 
 
-def test_candidates_of_a_program_make_no_sense(tmp_path: Path) -> None:
+def test_candidates_need_an_instruction(tmp_path: Path) -> None:
     (tmp_path / "program.py").write_text(ONE)
-    assert "instruction" in refused("run", tmp_path / "program.py", "--candidates", "3").sentence
+    assert "instruction" in refusal_of("run", tmp_path / "program.py", "--candidates", "3").sentence
 
 
 @pytest.mark.parametrize("more", [("--retries", "1"), ("--repair",)])
 def test_candidates_and_repairs_exclude_each_other(more: tuple[str, ...]) -> None:
-    assert "--candidates" in refused("generate", STAPLER, "--candidates", "3", *more).sentence
+    assert "--candidates" in refusal_of("generate", STAPLER, "--candidates", "3", *more).sentence

@@ -1,4 +1,4 @@
-"""Contracts on the command line: shown, saved, and required."""
+"""Commands show, save and require contracts."""
 
 import json
 from pathlib import Path
@@ -45,7 +45,7 @@ def test_a_program_beyond_a_saved_contract_is_rejected(folder: Path) -> None:
     other = command("codebotler", "check", "fetch.py", *world, "--within", "c.yaml", "--json", cwd=folder)
     assert (same.status, other.status) == (0, 1)
     problems = [problem["kind"] for problem in json.loads(other.out)["problems"]]
-    assert problems == ["OutsideContract"] * 3  # another room, and two skills
+    assert problems == ["OutsideContract"] * 3  # It enters another room and uses two other skills.
 
 
 def test_a_mission_stays_within_a_contract(folder: Path) -> None:
@@ -63,7 +63,7 @@ def test_a_mission_stays_within_a_contract(folder: Path) -> None:
 
 def test_a_contract_is_never_written_over_another_file(folder: Path) -> None:
     (folder / "c.yaml").write_text("mine")
-    told = refused(
+    refusal = refused(
         "check",
         "greet.py",
         "--world",
@@ -73,11 +73,11 @@ def test_a_contract_is_never_written_over_another_file(folder: Path) -> None:
         name="codebotler",
         cwd=folder,
     )
-    assert told.file == "c.yaml"
+    assert refusal.file == "c.yaml"
     assert (folder / "c.yaml").read_text() == "mine"
 
 
 def test_a_contract_for_other_skills_is_refused(folder: Path) -> None:
     (folder / "c.yaml").write_text("version: 1\nskills:\n  fly: {}\n")
-    told = refused("check", "greet.py", "--within", "c.yaml", name="codebotler", cwd=folder)
-    assert told.at == ("c.yaml", 3)
+    refusal = refused("check", "greet.py", "--within", "c.yaml", name="codebotler", cwd=folder)
+    assert refusal.at == ("c.yaml", 3)

@@ -1,4 +1,4 @@
-"""codebotler generate as a person meets it: the program on stdout and nothing else."""
+"""`codebotler generate` prints the program on standard output, and nothing else there."""
 
 import json
 import os
@@ -24,7 +24,7 @@ WORLD = "robot: start_loc\nrooms: [start_loc, kitchen]\n"
 
 
 def codebotler(*arguments: str | Path, cwd: Path | None = None, before: str = "", after: str = "") -> Ended:
-    """Run a command, in a process of its own where something of bash stands before or after it."""
+    """Run a command, in a process of its own if shell code comes before or after it."""
     variables = {**os.environ, "OPENAI_API_KEY": KEY, "COLUMNS": "100"}
     if before or after:
         name, words = "codebotler", arguments
@@ -32,7 +32,7 @@ def codebotler(*arguments: str | Path, cwd: Path | None = None, before: str = ""
     return command("codebotler", *arguments, cwd=cwd, environment=variables)
 
 
-def refused(*arguments: str | Path, cwd: Path | None = None, lines: int = 1) -> Refusal:
+def refusal_of(*arguments: str | Path, cwd: Path | None = None, lines: int = 1) -> Refusal:
     return command_line.refused("generate", *arguments, name="codebotler", cwd=cwd, lines=lines)
 
 
@@ -40,11 +40,11 @@ def instruction(suite: Suite) -> str:
     return suite.tasks["StaplerDelivery"].prompts[0]
 
 
-def lost_at_first(request: Request) -> str:
+def answer_wrong_first(request: Request) -> str:
     return LOST if request.body["seed"] == 0 else FINE
 
 
-def written(server: Server, *more: str, cwd: Path) -> Ended:
+def generate(server: Server, *more: str, cwd: Path) -> Ended:
     (cwd / "world.yaml").write_text(WORLD)
     model = ("--model", "openai:tiny", "--base-url", server.url, "--seed", "0", "--world", "world.yaml")
     return codebotler("generate", "Go to the kitchen.", *model, *more, cwd=cwd)
@@ -63,33 +63,35 @@ def test_a_recorded_program_goes_through_a_pipe_into_the_check(tmp_path: Path, p
     assert piped.out.startswith("accepted: no problem in the program")
 
 
-def test_an_instruction_that_nobody_recorded() -> None:
-    refusal = refused("Bring me the moon.", lines=5)
+def test_unrecorded_instruction_is_refused() -> None:
+    refusal = refusal_of("Bring me the moon.", lines=5)
     assert "recorded:careful" in refusal.sentence
     assert '"Bring me the moon."' in refusal.sentence
     assert "\nfor other instructions, " in refusal.sentence
 
 
-def test_instructions_that_are_offered_instead_are_whole_and_fit_the_world(tmp_path: Path) -> None:
+def test_suggested_instructions_are_whole_and_fit_the_world(tmp_path: Path) -> None:
     office = tmp_path / "office.yaml"
     office.write_text(OFFICE.read_text())
-    refusal = refused("Go to the lobby, and tell me how many people are there.", "--world", office, lines=5)
+    refusal = refusal_of(
+        "Go to the lobby, and tell me how many people are there.", "--world", office, lines=5
+    )
     _, *offered, _ = refusal.sentence.splitlines()
     known = open_recorded("recorded").replies
     assert {text.strip() for text in offered} <= known.keys()
     assert not any("lobby" in text.lower() for text in offered)
     (tmp_path / "hall.yaml").write_text("robot: hall\nrooms: [hall]\n")
-    assert len(refused("Go.", "--world", tmp_path / "hall.yaml", lines=2).sentence.splitlines()) == 2
+    assert len(refusal_of("Go.", "--world", tmp_path / "hall.yaml", lines=2).sentence.splitlines()) == 2
 
 
 @pytest.mark.parametrize("instruction", ["", "  \n"])
-def test_no_instruction(instruction: str) -> None:
-    assert "instruction is empty" in refused(instruction).sentence
+def test_empty_instruction_is_refused(instruction: str) -> None:
+    assert "instruction is empty" in refusal_of(instruction).sentence
 
 
 def test_a_program_with_problems_is_printed_with_status_1(tmp_path: Path) -> None:
-    with Server(answer=lost_at_first) as server:
-        ended = written(server, cwd=tmp_path)
+    with Server(answer=answer_wrong_first) as server:
+        ended = generate(server, cwd=tmp_path)
     assert ended.status == 1
     assert ended.out == "def task_program():\n    go_to('the moon')\n"
     _, problem = ended.err.splitlines()
@@ -97,16 +99,16 @@ def test_a_program_with_problems_is_printed_with_status_1(tmp_path: Path) -> Non
     assert len(server.requests) == 1
 
 
-def test_rejection_sampling_asks_again_and_tells_of_both_attempts(tmp_path: Path) -> None:
-    with Server(answer=lost_at_first) as server:
-        ended = written(server, "--retries", "3", cwd=tmp_path)
+def test_rejection_sampling_asks_again_and_reports_both_attempts(tmp_path: Path) -> None:
+    with Server(answer=answer_wrong_first) as server:
+        ended = generate(server, "--retries", "3", cwd=tmp_path)
     assert ended.status == 0
     assert ended.out == "def task_program():\n    go_to('kitchen')\n"
-    told = ended.err.splitlines()
-    assert re.match("attempt 1 of 4 .*problem", told[0])
-    assert re.match('  line 2: GoToInvalidLocation: .*"the moon"', told[1])
-    assert re.match("attempt 2 of 4 .*accepted", told[2])
-    assert len(told) == 3
+    lines = ended.err.splitlines()
+    assert re.match("attempt 1 of 4 .*problem", lines[0])
+    assert re.match('  line 2: GoToInvalidLocation: .*"the moon"', lines[1])
+    assert re.match("attempt 2 of 4 .*accepted", lines[2])
+    assert len(lines) == 3
     first, second = server.requests
     assert first.body["messages"] == second.body["messages"]
     assert "kitchen" in json.dumps(first.body["messages"][-1])
@@ -114,8 +116,8 @@ def test_rejection_sampling_asks_again_and_tells_of_both_attempts(tmp_path: Path
 
 
 def test_a_repair_carries_the_program_and_the_problem_in_words(tmp_path: Path) -> None:
-    with Server(answer=lost_at_first) as server:
-        ended = written(server, "--repair", cwd=tmp_path)
+    with Server(answer=answer_wrong_first) as server:
+        ended = generate(server, "--repair", cwd=tmp_path)
     assert (ended.status, len(server.requests)) == (0, 2)
     said = json.dumps(server.requests[1].body["messages"][-2:])
     assert "go_to('the moon')" in said
@@ -123,16 +125,16 @@ def test_a_repair_carries_the_program_and_the_problem_in_words(tmp_path: Path) -
     assert len(server.requests[1].body["messages"]) == len(server.requests[0].body["messages"]) + 2
 
 
-def test_retries_end(tmp_path: Path) -> None:
+def test_retries_are_limited(tmp_path: Path) -> None:
     with Server(answer=lambda _: LOST) as server:
-        ended = written(server, "--retries", "2", cwd=tmp_path)
+        ended = generate(server, "--retries", "2", cwd=tmp_path)
     assert (ended.status, len(server.requests)) == (1, 3)
     assert re.match("attempt 3 of 3 .*problem", ended.err.splitlines()[-2])
 
 
 def test_a_refused_key_is_one_sentence(tmp_path: Path) -> None:
     with Server(fault=lambda _: Fault.UNAUTHORIZED) as server:
-        ended = written(server, cwd=tmp_path)
+        ended = generate(server, cwd=tmp_path)
     assert (ended.status, ended.out, ended.err.count("\n")) == (2, "", 1)
     assert "401" in ended.err
     assert KEY not in ended.err
@@ -155,14 +157,14 @@ def test_the_prompt_is_shown_without_a_key_or_a_server() -> None:
         ("recorded:lazy", ['"recorded:lazy"', "recorded:careful or "]),
     ],
 )
-def test_no_prompt_is_shown_for_a_model_that_is_none(model: str, named: list[str]) -> None:
-    refusal = refused("Go to the kitchen.", "--model", model, "--show-prompt")
+def test_no_prompt_is_shown_for_an_unknown_model(model: str, named: list[str]) -> None:
+    refusal = refusal_of("Go to the kitchen.", "--model", model, "--show-prompt")
     assert all(name in refusal.sentence for name in named), refusal
 
 
-def test_a_world_that_is_none(tmp_path: Path) -> None:
+def test_invalid_world_is_refused(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text("rooms: 3\n")
-    assert refused("Go.", "--world", "world.yaml", cwd=tmp_path).file == "world.yaml"
+    assert refusal_of("Go.", "--world", "world.yaml", cwd=tmp_path).file == "world.yaml"
 
 
 @pytest.mark.parametrize(
@@ -176,11 +178,11 @@ def test_a_world_that_is_none(tmp_path: Path) -> None:
     ],
     ids=lambda value: value.name if isinstance(value, Fault) else "",
 )
-def test_a_reply_without_a_program_is_said_and_nothing_is_printed(
+def test_reply_without_a_program_is_reported_and_nothing_is_printed(
     fault: Fault, words: str, tmp_path: Path
 ) -> None:
     with Server(fault=lambda _: fault) as server:
-        ended = written(server, cwd=tmp_path)
+        ended = generate(server, cwd=tmp_path)
     assert (ended.status, ended.out) == (1, "")
     assert ended.err.startswith(words)
     assert "SyntaxError" not in ended.err
@@ -188,8 +190,8 @@ def test_a_reply_without_a_program_is_said_and_nothing_is_printed(
 
 def test_a_reply_that_was_cut_off_names_the_option_that_helps(tmp_path: Path) -> None:
     with Server(answer=lambda _: FINE, limits=True) as server:
-        ended = written(server, "--max-tokens", "8", cwd=tmp_path)
-        mended = written(server, "--max-tokens", "32", cwd=tmp_path)
+        ended = generate(server, "--max-tokens", "8", cwd=tmp_path)
+        mended = generate(server, "--max-tokens", "32", cwd=tmp_path)
     assert (ended.status, ended.out) == (1, "")
     assert ended.err.startswith("The reply was cut off at 8 tokens. --max-tokens 32 ")
     assert (mended.status, mended.err) == (0, "")
@@ -199,7 +201,7 @@ def test_a_reply_that_was_cut_off_names_the_option_that_helps(tmp_path: Path) ->
 def test_a_reply_without_a_program_is_asked_for_again(*, repair: bool, tmp_path: Path) -> None:
     with Server(answer=lambda _: FINE) as server:
         server.faults.append(Fault.WITHOUT_CODE)
-        ended = written(server, "--retries", "1", *["--repair"] * repair, cwd=tmp_path)
+        ended = generate(server, "--retries", "1", *["--repair"] * repair, cwd=tmp_path)
     assert (ended.status, len(server.requests)) == (0, 2)
     assert ended.out == "def task_program():\n    go_to('kitchen')\n"
     assert ended.err.splitlines()[0] == "attempt 1 of 2: The reply holds no code."

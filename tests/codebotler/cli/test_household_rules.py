@@ -1,4 +1,4 @@
-"""The example rules for a household: which plans they stop, and by which rule."""
+"""Each example rule for a household stops its plan, and no plan that only looks like it."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_a_review_of_each_household_rule_finds_examples_and_no_mistake() -> None
     skills = skills_from(EXAMPLES / "skills" / "household.py")
     rules = read_rules(EXAMPLES / "rules" / "household.yaml", skills)
     world = read_world(EXAMPLES / "worlds" / "kitchen.yaml", skills)
-    for rule in rules:  # pairs take half a minute
+    for rule in rules:  # All pairs would take half a minute.
         (review,) = review_rules([rule], world)
         assert not review.warnings
         assert review.keeps

@@ -1,4 +1,4 @@
-"""Options that say how a model is asked, in each command that asks one."""
+"""Options set how a model is asked, in each command that asks one."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,7 @@ from command_line import command, roboeval
 from server import Server
 
 
-def test_nothing_named_is_the_default() -> None:
+def test_no_options_give_the_default_settings() -> None:
     assert model_settings() == SamplingSettings()
 
 
@@ -22,7 +22,7 @@ def test_settings_of_the_paper_have_its_limit() -> None:
     assert model_settings(settings="paper", max_tokens=9).max_tokens == 9
 
 
-def test_what_is_left_out_is_none() -> None:
+def test_omitted_settings_are_none() -> None:
     settings = model_settings(no_temperature=True, top_p=0.5, extra_body='{"top_k": 20}')
     assert (settings.temperature, settings.top_p, settings.extra_body) == (None, 0.5, {"top_k": 20})
 

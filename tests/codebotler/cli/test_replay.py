@@ -1,4 +1,4 @@
-"""Many programs and logs under house rules: what the rules would have stopped, and when."""
+"""`codebotler replay` shows what house rules would have stopped in programs and logs, and when."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ robot: hall
 rooms: [hall, vault, office]
 people: {office: [{name: Ann, answers: ["no"]}]}
 """
-CAUGHT = "try:\n        say('la la')\n    except Exception:\n        say('done')"
+CATCH = "try:\n        say('la la')\n    except Exception:\n        say('done')"
 BODIES = {
     "before": "say('done')\n    go_to('vault')",
     "late": "go_to('office')\n    ask('Ann', 'Tea?', ['yes', 'no'])\n    say('done')",
@@ -46,7 +46,7 @@ BODIES = {
     "kept": "say('done')",
     "failed": "pick('mug')\n    go_to('vault')",
     "endless": "while True:\n        say('done')",
-    "refused": CAUGHT,
+    "refused": CATCH,
     "wild": "getattr(str, 'upper')\n    go_to('vault')",
     "wrong": "say('done'",
 }
@@ -117,7 +117,7 @@ def test_the_table_ends_with_numbers_for_each_rule(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_without_a_world_programs_run_where_they_believe_to_be(folder: Path) -> None:
+def test_without_a_world_programs_run_in_the_rooms_they_name(folder: Path) -> None:
     found = effects(folder, "plans/failed.py", "plans/kept.py")
     assert found["failed"][:4] == ("stopped", "vault", "before", 3)
     assert found["kept"] == EFFECTS["kept"]
@@ -138,26 +138,26 @@ def event(kind: str, /, **data: object) -> dict[str, object]:
     return {"time": 1.0, "clock": 0.0, "event": kind, **data}
 
 
-def called(skill: str, end: str = "result", result: str | None = None, **given: object) -> list[LogLine]:
+def call_lines(skill: str, end: str = "result", result: str | None = None, **given: object) -> list[LogLine]:
     call = event("skill", number=1, skill=skill, line=7, arguments=given)
     return [call, event(end, number=1, skill=skill, result=result)]
 
 
-TO_OFFICE = called("go_to", location="office")
-TO_VAULT = called("go_to", location="vault")
-FAILED = called("go_to", "cancelled", location="office")
-ASKED = called("ask", result="no", person="", question="Tea?", options=["yes", "no"])
-PICKED = called("pick", obj="mug")
-SAID = called("say", message="done")
-SUNG = [event("rule", rule="x", says="X.", formula="x", what=["say", "la la"], prevented=True, line=3)]
-ENDED = [event("state", state="done")]
+TO_OFFICE = call_lines("go_to", location="office")
+TO_VAULT = call_lines("go_to", location="vault")
+FAILURE = call_lines("go_to", "cancelled", location="office")
+QUESTION = call_lines("ask", result="no", person="", question="Tea?", options=["yes", "no"])
+PICK = call_lines("pick", obj="mug")
+SAY = call_lines("say", message="done")
+SONG = [event("rule", rule="x", says="X.", formula="x", what=["say", "la la"], prevented=True, line=3)]
+END = [event("state", state="done")]
 LOGS = {
-    "kept": (SAID + TO_OFFICE + PICKED + ENDED, ("finished", "", "", None, "")),
-    "before": (SAID + TO_VAULT + ENDED, ("stopped", "vault", "before", 7, 'going to "vault"')),
-    "late": (ASKED + SAID + ENDED, ("stopped", "no-means-no", "late", 7, 'the answer "no" to "Tea?"')),
-    "at-end": (TO_OFFICE + ENDED, ("finished", "report", "at the end", None, "")),
-    "prevented": (SAID + SUNG + ENDED, ("stopped", "hush", "before", 3, 'saying "la la"')),
-    "stopped": ([*FAILED, event("state", state="stopped", line=7)], ("stopped", "", "", 7, "")),
+    "kept": (SAY + TO_OFFICE + PICK + END, ("finished", "", "", None, "")),
+    "before": (SAY + TO_VAULT + END, ("stopped", "vault", "before", 7, 'going to "vault"')),
+    "late": (QUESTION + SAY + END, ("stopped", "no-means-no", "late", 7, 'the answer "no" to "Tea?"')),
+    "at-end": (TO_OFFICE + END, ("finished", "report", "at the end", None, "")),
+    "prevented": (SAY + SONG + END, ("stopped", "hush", "before", 3, 'saying "la la"')),
+    "stopped": ([*FAILURE, event("state", state="stopped", line=7)], ("stopped", "", "", 7, "")),
 }
 
 
@@ -168,10 +168,10 @@ def test_logs_are_judged_without_running_anything(folder: Path) -> None:
     assert effects(folder, "mission") == {name: effect for name, (_, effect) in LOGS.items()}
 
 
-def test_a_rule_about_a_room_sees_where_the_log_says_the_robot_was(folder: Path) -> None:
+def test_a_rule_about_a_room_uses_the_positions_in_the_log(folder: Path) -> None:
     rule = 'not tr.Exists(at("office", say(".*")))'
     (folder / "rules.yaml").write_text(f"rules: [{{name: quiet, says: Hush., always: '{rule}'}}]")
-    for name, lines in {"there": TO_OFFICE + SAID, "here": FAILED + SAID, "map": SAID}.items():
+    for name, lines in {"there": TO_OFFICE + SAY, "here": FAILURE + SAY, "map": SAY}.items():
         (folder / f"{name}.jsonl").write_bytes(b"".join(map(to_line, lines)))
     there = {"name": "office", "footprint": [[0, 0], [1, 0], [1, 1]], "stand_at": [0, 0]}
     with (folder / "map.jsonl").open("ab") as file:
@@ -190,8 +190,8 @@ def test_leaving_rules_are_judged_before_drives_in_a_log(folder: Path) -> None:
     kept_back = event(
         "rule", rule="x", says="X.", formula="x", what=["goto", "office"], prevented=True, line=3
     )
-    for name, lines in {"did": TO_OFFICE, "tried": [kept_back], "kept": SAID + TO_OFFICE, "end": []}.items():
-        (folder / f"{name}.jsonl").write_bytes(b"".join(map(to_line, [*lines, *ENDED])))
+    for name, lines in {"did": TO_OFFICE, "tried": [kept_back], "kept": SAY + TO_OFFICE, "end": []}.items():
+        (folder / f"{name}.jsonl").write_bytes(b"".join(map(to_line, [*lines, *END])))
     found = effects(folder, "did.jsonl", "tried.jsonl", "kept.jsonl", "end.jsonl")
     assert {name: effect[1:3] for name, effect in found.items()} == {
         "did": ("bye", "before"),
@@ -209,7 +209,7 @@ def test_own_skills_in_a_log_are_judged_by_their_own_names(folder: Path) -> None
     rule = 'not tr.AtLeast(pour("tea"), 2)'
     (folder / "rules.yaml").write_text(f"rules: [{{name: one, says: Once., always: '{rule}'}}]")
     failed = [event("error", number=1, skill="pour", kind="Spilled", message="spilled")]
-    lines = [called("pour", what="tea")[0], *failed, *called("pour", what="tea")]
+    lines = [call_lines("pour", what="tea")[0], *failed, *call_lines("pour", what="tea")]
     (folder / "pour.jsonl").write_bytes(b"".join(map(to_line, lines)))
     assert effects(folder, "pour.jsonl", "--skills", "own.py")["pour"][:3] == ("stopped", "one", "before")
 
@@ -233,8 +233,8 @@ def test_a_mission_is_judged_like_its_program(folder: Path) -> None:
         ("empty.py", b"", None),
         ("latin.py", b"say('\xe9')", 1),
         ("text.jsonl", b"hello\n", 1),
-        ("own.jsonl", to_line(called("pour")[0]), None),
-        ("old.jsonl", to_line(called("say", message="a", volume=3)[0]), None),
+        ("own.jsonl", to_line(call_lines("pour")[0]), None),
+        ("old.jsonl", to_line(call_lines("say", message="a", volume=3)[0]), None),
         ("map.jsonl", to_line(event("map", rooms=[{}], robot="hall")), None),
     ],
 )
@@ -257,21 +257,21 @@ def test_a_file_that_cannot_be_read_is_a_row(
         (["plans", "--rules", "gone.yaml"], "gone.yaml"),
     ],
 )
-def test_what_cannot_be_replayed_is_refused(folder: Path, arguments: list[str], file: str | None) -> None:
+def test_unusable_arguments_are_refused(folder: Path, arguments: list[str], file: str | None) -> None:
     (folder / "home").mkdir()
     assert refused("replay", *arguments, name="codebotler", cwd=folder).file == file
 
 
 @pytest.mark.slow
-def test_ctrl_c_ends_it_at_once(folder: Path) -> None:
+def test_ctrl_c_ends_replay_at_once(folder: Path) -> None:
     for number in range(40):
-        body = f"n = {number}\n    while True:\n        sum(range(10**7))"  # few ticks, much time
+        body = f"n = {number}\n    while True:\n        sum(range(10**7))"  # Each tick takes long.
         (folder / "plans" / f"{number}.py").write_text(f"def task_program():\n    {body}\n")
     arguments = ("replay", "plans", "--rules", "rules.yaml")
     with Forked("codebotler", *arguments, cwd=folder, environment=os.environ) as process:
         threads = Path(f"/proc/{process.pid}/task")
         while not any(children.read_text() for children in threads.glob("*/children")):
-            time.sleep(0.01)  # until the engine has started
+            time.sleep(0.01)  # Wait until the engine has started.
         process.send_signal(signal.SIGINT)
         _, err = process.communicate()
     assert (process.returncode, err) == (130, "codebotler: stopped\n")

@@ -1,4 +1,4 @@
-"""House rules on the command line: shown, and in force for every command that takes them."""
+"""House rules are shown on the command line, and bind every command that takes them."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def test_rules_are_shown_with_examples(files: Path) -> None:
     assert "knock  Knock before you enter an office.\n" in ended.out
     assert '  keeps it\n    1  says "knock"\n    2  drives to "office"\n' in ended.out
     assert '  breaks it\n    1  drives to "vault"\n' in ended.out
-    told = json.loads(codebotler(files, "rules", "rules.yaml", "--json").out)
-    assert [(rule["name"], rule["breaks"][0]["text"], rule["warnings"]) for rule in told] == [
+    rules = json.loads(codebotler(files, "rules", "rules.yaml", "--json").out)
+    assert [(rule["name"], rule["breaks"][0]["text"], rule["warnings"]) for rule in rules] == [
         ("vault", "vault", []),
         ("knock", "office", []),
     ]
@@ -61,11 +61,11 @@ def test_rules_are_shown_with_examples(files: Path) -> None:
 def test_a_program_that_breaks_a_rule_is_rejected_and_not_run(files: Path, named: str) -> None:
     more = ["--rules", "rules.yaml"] if named == "option" else []
     variables = {} if more else {"CODEBOTLER_RULES": "rules.yaml"}
-    told = 'line 3: RuleViolation: the rule "vault" forbids going to "vault": Never go into the vault'
+    sentence = 'line 3: RuleViolation: the rule "vault" forbids going to "vault": Never go into the vault'
     for arguments in (["check", "sly.py"], ["run", "sly.py", "--yes", "--speed", "0"]):
         ended = codebotler(files, *arguments, "--world", "world.yaml", *more, **variables)
         assert ended.status == 1
-        assert told in " ".join(ended.out.split())
+        assert sentence in " ".join(ended.out.split())
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_a_room_that_a_rule_names_and_the_world_lacks_is_refused(files: Path, ar
     assert re.search(r'typo.yaml, line 5: the rule "vault" names the room "valut".*"vault"', ended.err)
 
 
-def test_a_rule_ends_a_program_that_runs_all_the_same(files: Path) -> None:
+def test_a_rule_ends_a_program_that_runs_despite_problems(files: Path) -> None:
     force = ("--yes", "--despite-problems", "--speed", "0", "--rules", "rules.yaml")
     ended = codebotler(files, "run", "sly.py", "--world", "world.yaml", *force)
     assert ended.status == 1
@@ -91,7 +91,7 @@ def test_a_rule_ends_a_program_that_runs_all_the_same(files: Path) -> None:
     assert 'the rule "vault" prevented going to "vault"' in shown.out
 
 
-def test_a_model_is_told_the_rules(files: Path) -> None:
+def test_prompt_lists_the_rules(files: Path) -> None:
     ended = codebotler(files, "generate", "Say hello", "--show-prompt", "--rules", "rules.yaml")
     assert "- Never go into the vault.\n- Knock before you enter an office." in ended.out
     plain = codebotler(files, "generate", "Say hello", "--show-prompt")
@@ -135,7 +135,7 @@ def test_a_rule_that_other_words_for_a_room_evade_is_refused_at_start(
     assert "Traceback" not in ended.err
 
 
-def test_a_skill_inside_which_rules_do_not_see_is_named(files: Path) -> None:
+def test_warning_names_a_skill_whose_steps_rules_do_not_see(files: Path) -> None:
     (files / "own.py").write_text(
         "from codebotler import Simulation, skill\n@skill\ndef tour(sim: Simulation) -> None:\n"
         "    'Tour.'\n    sim.drive('hall')\n"
@@ -161,7 +161,7 @@ rules:
 """
 
 
-def test_a_rule_about_where_the_robot_is_holds_on_the_way(files: Path) -> None:
+def test_a_rule_about_the_robots_position_holds_on_the_way(files: Path) -> None:
     (files / "inside.yaml").write_text(NEVER_INSIDE)
     (files / "through.py").write_text(THROUGH)
     (files / "office.yaml").write_text(OFFICE.read_text())
@@ -181,7 +181,7 @@ def test_rules_that_name_no_destination_need_no_note_about_goto(files: Path) -> 
     assert codebotler(files, "rules", "silent.yaml").err == ""
 
 
-def test_goto_is_said_to_be_about_destinations_until_a_rule_is_about_poses(files: Path) -> None:
+def test_note_about_destinations_is_shown_unless_a_rule_is_about_poses(files: Path) -> None:
     (files / "inside.yaml").write_text(NEVER_INSIDE)
     assert "destinations" in codebotler(files, "rules", "rules.yaml").err
     shown = codebotler(files, "rules", "inside.yaml", "--json")
@@ -190,7 +190,7 @@ def test_goto_is_said_to_be_about_destinations_until_a_rule_is_about_poses(files
 
 
 @pytest.mark.parametrize("room", ["printer room 9", "^lab$", "lab 3"])
-def test_a_pose_counts_by_the_name_that_the_world_has(files: Path, room: str) -> None:
+def test_a_rule_about_poses_must_name_a_room_of_the_world(files: Path, room: str) -> None:
     (files / "inside.yaml").write_text(NEVER_INSIDE.replace('"printer room 2"', f'"{room}"'))
     (files / "labs.yaml").write_text("robot: hall\nrooms: [hall, 'lab [0-9]']\n")
     ended = codebotler(files, "check", "sly.py", "--world", "labs.yaml", "--rules", "inside.yaml")

@@ -1,4 +1,4 @@
-"""The commands around missions: they check, ask, run, are stopped and killed, and show it all again."""
+"""The commands around missions check, ask, run and stop programs, and show past missions."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def variables(folder: Path) -> dict[str, str]:
 Process = Forked | subprocess.Popen[str]
 
 
-def started(folder: Path, *arguments: str | Path, wrapper: Sequence[str] = ()) -> Process:
-    """A command in a process of its own, to which signals can be sent."""
+def start(folder: Path, *arguments: str | Path, wrapper: Sequence[str] = ()) -> Process:
+    """Start a command in a process of its own, to which signals can be sent."""
     if not wrapper:
         return Forked("codebotler", *arguments, cwd=folder, environment=variables(folder))
     return subprocess.Popen(
@@ -73,22 +73,22 @@ def started(folder: Path, *arguments: str | Path, wrapper: Sequence[str] = ()) -
     )
 
 
-def ended(folder: Path, *arguments: str | Path, given: str = "") -> Ended:
+def call(folder: Path, *arguments: str | Path, given: str = "") -> Ended:
     return command("codebotler", *arguments, cwd=folder, given=given, environment=variables(folder))
 
 
 def run(folder: Path, *arguments: str | Path, given: str = "") -> Ended:
-    return ended(folder, "run", *arguments, "--world", "world.yaml", "--speed", "0", given=given)
+    return call(folder, "run", *arguments, "--world", "world.yaml", "--speed", "0", given=given)
 
 
 def states(folder: Path) -> list[str]:
-    status, out, _ = ended(folder, "missions", "--json")
+    status, out, _ = call(folder, "missions", "--json")
     assert status == 0
     return [mission["state"] for mission in json.loads(out)]
 
 
-def shown(out: str) -> list[str]:
-    """What was printed while the robot worked, without times."""
+def story_lines(out: str) -> list[str]:
+    """Return the lines printed while the robot worked, without times."""
     _, _, story = out.partition("running on the robot simulated\n")
     return [re.sub(r"^ *([\d.]+ s  )?", "", line) for line in story.splitlines()]
 
@@ -100,7 +100,7 @@ def test_program_is_checked_then_run(folder: Path) -> None:
     status, out, err = run(folder, "good.py", "--yes")
     assert (status, err) == (0, "")
     assert out.startswith("accepted: no problem in good.py\n")
-    drives = [line for line in shown(out) if not line.startswith("at (")]
+    drives = [line for line in story_lines(out) if not line.startswith("at (")]
     assert drives[:6] == [
         'drives to "kitchen"',
         'looks for "mug"',
@@ -121,7 +121,7 @@ def test_person_is_asked(folder: Path, answer: str, status: int) -> None:
     assert states(folder) == [["done", "stopped"][status]]
 
 
-def test_program_with_problems_is_not_run_without_a_word_about_them(folder: Path) -> None:
+def test_program_with_problems_runs_only_with_despite_problems(folder: Path) -> None:
     status, out, err = run(folder, "bad.py", "--yes")
     assert status == 1
     assert re.search('line 2: GoToInvalidLocation: .*"cellar"', out)
@@ -129,21 +129,21 @@ def test_program_with_problems_is_not_run_without_a_word_about_them(folder: Path
     assert "running on" not in out
     status, out, _ = run(folder, "bad.py", "--yes", "--despite-problems")
     assert status == 1
-    drives, *said = shown(out)[:3]
+    drives, *said = story_lines(out)[:3]
     assert drives == 'drives to "cellar"'
     assert re.match('GoToInvalidLocation: .*"cellar"', said[0])
     assert re.match(r'failed .*\bline 2: GoToInvalidLocation: .*"cellar"', said[1])
     assert states(folder) == ["failed", "failed"]
 
 
-def test_rooms_that_the_robot_does_not_know_are_told_before_it_moves(folder: Path) -> None:
+def test_warning_names_unknown_rooms_before_the_robot_moves(folder: Path) -> None:
     (folder / "careful.py").write_text(
         'def task_program():\n    try:\n        go_to("kitchn")\n    except Exception:\n        say("oh")\n'
     )
     status, out, err = run(folder, "careful.py", "--yes")
     assert status == 0
     assert re.search('before the robot moves: .*"kitchn".*"kitchen"', err)
-    assert shown(out)[1] == 'drives to "kitchn"'  # after the same warning in the log
+    assert story_lines(out)[1] == 'drives to "kitchn"'  # The log repeats the warning first.
 
 
 def test_instruction_becomes_a_program_and_is_run(folder: Path, paper: Suite) -> None:
@@ -155,21 +155,21 @@ def test_instruction_becomes_a_program_and_is_run(folder: Path, paper: Suite) ->
     assert "accepted: " in out
     program = "".join(line.removeprefix("    ") for line in out.splitlines(keepends=True)[:40])
     assert open_recorded("recorded:careful").solution(instruction, 0).program in program
-    status, out, _ = ended(folder, "missions", "last", "--json")
+    status, out, _ = call(folder, "missions", "last", "--json")
     mission = json.loads(out)
     assert (mission["instruction"], mission["model"]) == (instruction, "recorded:careful")
 
 
-def test_what_does_not_parse_is_not_run_whatever_is_said(folder: Path) -> None:
+def test_program_with_a_syntax_error_never_runs(folder: Path) -> None:
     (folder / "odd.py").write_text("def task_program(:\n")
     status, _, err = run(folder, "odd.py", "--yes", "--despite-problems")
     assert (status, err) == (1, "not run because of problems\n")
     assert "running" not in states(folder)
 
 
-def test_program_on_standard_input(folder: Path) -> None:
+def test_program_is_read_from_standard_input(folder: Path) -> None:
     status, out, _ = run(folder, "-", "--yes", given=GOOD)
-    assert (status, "done" in shown(out)) == (0, True)
+    assert (status, "done" in story_lines(out)) == (0, True)
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_program_on_standard_input(folder: Path) -> None:
         (["no such thing", "--yes"], ["recorded:careful", '"no such thing"', "\nfor other instructions, "]),
     ],
 )
-def test_what_cannot_be_run_is_said_in_a_sentence(
+def test_unusable_arguments_are_refused_in_one_sentence(
     folder: Path, arguments: list[str], named: list[str]
 ) -> None:
     status, out, err = run(folder, *arguments)
@@ -195,12 +195,12 @@ def test_what_cannot_be_run_is_said_in_a_sentence(
 
 def test_without_a_world_the_robot_works_in_the_office_of_the_examples(folder: Path) -> None:
     (folder / "tea.py").write_text('def task_program():\n    go_to("alice\'s office")\n')
-    status, out, err = ended(folder, "run", "tea.py", "--yes", "--speed", "0")
+    status, out, err = call(folder, "run", "tea.py", "--yes", "--speed", "0")
     assert (status, "example office" in err, "--world FILE" in err) == (0, True, True)
     assert 'drives to "alice\'s office"' in out
 
 
-def test_one_course_is_shown_or_all_of_them(folder: Path) -> None:
+def test_one_outcome_is_shown_or_all_of_them(folder: Path) -> None:
     one = run(folder, "good.py", "--yes")[1].partition("running on")[0]
     assert one.count("what the robot would do") == 1
     assert "1 of 2 different outcomes; --all" in one
@@ -211,24 +211,24 @@ def test_one_course_is_shown_or_all_of_them(folder: Path) -> None:
 
 def test_a_typed_program_is_listed_by_its_first_steps(folder: Path) -> None:
     run(folder, "good.py", "--yes")
-    assert 'typed: go_to("kitchen") if is_in_room("mug"):' in ended(folder, "missions")[1]
+    assert 'typed: go_to("kitchen") if is_in_room("mug"):' in call(folder, "missions")[1]
 
 
 @pytest.mark.slow
 def test_feedback_comes_while_the_robot_drives(folder: Path) -> None:
-    process = started(folder, "run", "good.py", "--yes", "--world", "world.yaml", "--speed", "5")
-    with stopping(process):
+    process = start(folder, "run", "good.py", "--yes", "--world", "world.yaml", "--speed", "5")
+    with kill_at_end(process):
         read_until(process, "at (")
         assert process.poll() is None
         out, _ = process.communicate(timeout=60)
     assert "says" in out
 
 
-# --- the stop
+# --- stop
 
 
 @contextlib.contextmanager
-def stopping(process: Process) -> Iterator[None]:
+def kill_at_end(process: Process) -> Iterator[None]:
     try:
         yield
     finally:
@@ -252,10 +252,10 @@ def read_until(process: Process, text: str) -> str:
     raise AssertionError((lines, *process.communicate()))
 
 
-def driving(folder: Path, *wrapper: str) -> Process:
-    """A tool whose robot is on its way."""
+def start_driving(folder: Path, *wrapper: str) -> Process:
+    """Start a mission, and wait until its robot drives."""
     arguments = ("far.py", "--yes", "--despite-problems", "--world", "world.yaml", "--speed", "1")
-    process = started(folder, "run", *arguments, wrapper=wrapper)
+    process = start(folder, "run", *arguments, wrapper=wrapper)
     read_until(process, "at (")
     return process
 
@@ -270,8 +270,8 @@ def driving(folder: Path, *wrapper: str) -> Process:
     ],
 )
 def test_signal_stops_the_robot(folder: Path, signals: Sequence[int], status: int) -> None:
-    process = driving(folder)
-    with stopping(process):
+    process = start_driving(folder)
+    with kill_at_end(process):
         family = children_of(process.pid)
         for number in signals:
             process.send_signal(number)
@@ -288,8 +288,8 @@ def test_signal_stops_the_robot(folder: Path, signals: Sequence[int], status: in
 
 @pytest.mark.slow
 def test_mission_outlives_its_terminal_with_nohup(folder: Path) -> None:
-    process = driving(folder, "nohup")
-    with stopping(process):
+    process = start_driving(folder, "nohup")
+    with kill_at_end(process):
         process.send_signal(signal.SIGHUP)
         read_until(process, "at (")
         process.send_signal(signal.SIGINT)
@@ -299,8 +299,8 @@ def test_mission_outlives_its_terminal_with_nohup(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_ctrl_c_at_the_question_ends_it(folder: Path) -> None:
-    process = started(folder, "run", "good.py", "--world", "world.yaml")
-    with stopping(process):
+    process = start(folder, "run", "good.py", "--world", "world.yaml")
+    with kill_at_end(process):
         assert process.stderr is not None
         said = ""
         while not said.endswith("[y/N] ") and (letter := process.stderr.read(1)):
@@ -312,9 +312,9 @@ def test_ctrl_c_at_the_question_ends_it(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_tool_that_is_killed_leaves_a_mission_that_was_interrupted(folder: Path) -> None:
-    process = driving(folder)
-    with stopping(process):
+def test_killed_tool_leaves_an_interrupted_mission(folder: Path) -> None:
+    process = start_driving(folder)
+    with kill_at_end(process):
         family = children_of(process.pid)
         process.kill()
         process.wait(30)
@@ -323,29 +323,29 @@ def test_tool_that_is_killed_leaves_a_mission_that_was_interrupted(folder: Path)
     assert status == 0
     assert re.match(r"mission \d{8}-\d{6} .*interrupted.* go_to\(\"\w+\"\), at .*simulated.*\n", err)
     assert states(folder) == ["interrupted", "done"]
-    status, out, err = ended(folder, "missions")
+    status, out, err = call(folder, "missions")
     assert (status, err) == (0, "")
     assert "interrupted" in out
 
 
 @pytest.mark.slow
-def test_mission_that_cannot_be_closed_keeps_nobody_from_anything(folder: Path) -> None:
-    process = driving(folder)
-    with stopping(process):
+def test_mission_that_cannot_be_closed_blocks_no_command(folder: Path) -> None:
+    process = start_driving(folder)
+    with kill_at_end(process):
         process.kill()
         process.wait(30)
     (left,) = (folder / "home" / "missions").iterdir()
-    (left / "mission.json.new").mkdir()  # as if nothing could be written there, also for root
-    status, out, err = ended(folder, "missions")
+    (left / "mission.json.new").mkdir()  # This folder prevents writing, even for root.
+    status, out, err = call(folder, "missions")
     assert (status, err.count("\n")) == (0, 1)
     assert re.match(rf"mission {left.name} .*interrupted.*closed: {left}", err)
     assert left.name in out
-    assert ended(folder, "missions", "last", "--json")[0] == 0
+    assert call(folder, "missions", "last", "--json")[0] == 0
     assert run(folder, "good.py", "--yes")[0] == 0
 
 
 @pytest.mark.parametrize("what", ["home", "home/missions"])
-def test_home_that_is_no_folder_is_said(folder: Path, what: str) -> None:
+def test_home_that_is_not_a_folder_is_refused(folder: Path, what: str) -> None:
     (folder / what).parent.mkdir(exist_ok=True)
     (folder / what).touch()
     for arguments in (
@@ -353,25 +353,25 @@ def test_home_that_is_no_folder_is_said(folder: Path, what: str) -> None:
         ["missions", "last"],
         ["run", "good.py", "--yes", "--world", "world.yaml"],
     ):
-        status, out, err = ended(folder, *arguments)
+        status, out, err = call(folder, *arguments)
         assert (status, out, err.count("\n")) == (2, "", 1)
         assert "home/missions: " in err
         assert "CODEBOTLER_HOME" in err
 
 
 @pytest.mark.slow
-def test_home_that_cannot_be_made_is_said(folder: Path) -> None:
+def test_home_that_cannot_be_created_is_refused(folder: Path) -> None:
     words = ("run", "good.py", "--yes", "--world", "world.yaml")
-    process = started(folder, *words, wrapper=["env", "CODEBOTLER_HOME=/sys/home"])
+    process = start(folder, *words, wrapper=["env", "CODEBOTLER_HOME=/sys/home"])
     _, err = process.communicate("", timeout=60)
     assert process.returncode == 2
     assert re.fullmatch(r"codebotler: /sys/home/\w+: .*CODEBOTLER_HOME\n", err)
 
 
 @pytest.mark.slow
-def test_two_tools_on_one_robot(folder: Path) -> None:
-    process = driving(folder)
-    with stopping(process):
+def test_second_tool_cannot_use_a_reserved_robot(folder: Path) -> None:
+    process = start_driving(folder)
+    with kill_at_end(process):
         status, out, err = run(folder, "good.py", "--yes")
         assert (status, out) == (1, "")
         assert f"another tool (process {process.pid}, since " in err
@@ -383,9 +383,9 @@ def test_two_tools_on_one_robot(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_reader_who_leaves_stops_the_robot(folder: Path) -> None:
-    process = driving(folder)
-    with stopping(process):
+def test_closed_output_pipe_stops_the_robot(folder: Path) -> None:
+    process = start_driving(folder)
+    with kill_at_end(process):
         assert process.stdout is not None
         process.stdout.close()
         process.stdout = None
@@ -395,16 +395,16 @@ def test_reader_who_leaves_stops_the_robot(folder: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("closed", "status"), [("0<&-", 1), ("1>&-", 0), ("2>&-", 0), ("0<&- 1>&- 2>&-", 1)])
-def test_closed_stream_leads_nowhere(folder: Path, closed: str, status: int) -> None:
+def test_closed_standard_streams_raise_no_traceback(folder: Path, closed: str, status: int) -> None:
     arguments = ("run", "good.py", "--world", "world.yaml", "--speed", "0")
-    process = started(folder, *arguments, wrapper=("sh", "-c", f'exec "$0" "$@" {closed}'))
+    process = start(folder, *arguments, wrapper=("sh", "-c", f'exec "$0" "$@" {closed}'))
     _, err = process.communicate("y\n", timeout=60)
     assert process.returncode == status
     assert "Traceback" not in err
     assert states(folder) == [["done", "stopped"][status]]
 
 
-def test_home_that_nobody_knows_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unknown_home_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("CODEBOTLER_HOME", "XDG_STATE_HOME", "HOME"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(os, "getuid", lambda: 2**31 - 7)
@@ -416,32 +416,32 @@ def test_home_that_nobody_knows_is_said(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_missions_are_listed_and_shown(folder: Path) -> None:
-    status, out, err = ended(folder, "missions")
+    status, out, err = call(folder, "missions")
     assert (status, "no missions" in out, err) == (0, True, "")
-    assert ended(folder, "missions", "--json") == (0, "[]\n", "")
+    assert call(folder, "missions", "--json") == (0, "[]\n", "")
     run(folder, "good.py", "--yes")
-    _, out, _ = ended(folder, "missions")
+    _, out, _ = call(folder, "missions")
     (line,) = out.splitlines()
     name, state, robot, *_ = line.split()
     assert (state, robot) == ("done", "simulated")
-    status, out, _ = ended(folder, "missions", name)
+    status, out, _ = call(folder, "missions", name)
     assert status == 0
     assert 'go_to("kitchen")' in out
     assert 'picks up "mug"' in out
-    _, out, _ = ended(folder, "missions", name, "--json")
+    _, out, _ = call(folder, "missions", name, "--json")
     data = json.loads(out)
     assert (data["id"], data["events"][-1]["state"]) == (name, "done")
 
 
 @pytest.mark.parametrize("seconds", ["1e300", "999_999.94", "1_000_000", "5"])
-def test_times_take_little_room_however_long_a_program_sleeps(folder: Path, seconds: str) -> None:
+def test_times_stay_short_however_long_a_program_sleeps(folder: Path, seconds: str) -> None:
     (folder / "long.py").write_text(f"def task_program():\n    time.sleep({seconds})\n    say('late')\n")
     status, out, _ = run(folder, "long.py", "--yes", "--despite-problems")
     assert status == 0
     (line,) = (line for line in out.splitlines() if line.endswith('says "late"'))
     time = f"{float(seconds):.1f}" if float(seconds) < 1e6 else f"{float(seconds):.1e}"
     assert line == f'{time:>8} s  says "late"'
-    _, out, _ = ended(folder, "missions", "last")
+    _, out, _ = call(folder, "missions", "last")
     assert max(map(len, out.splitlines())) < 100
     assert f"{time} s" in out
 
@@ -450,13 +450,13 @@ def test_long_lines_of_programs_are_shown_whole(folder: Path) -> None:
     line = f"    say({'long ' * 40!r})"
     (folder / "long.py").write_text(f"def task_program():\n{line}\n")
     run(folder, "long.py", "--yes")
-    assert f"    {line}\n" in ended(folder, "missions", "last")[1]
+    assert f"    {line}\n" in call(folder, "missions", "last")[1]
 
 
 def test_mission_is_written_as_mcap(folder: Path) -> None:
     run(folder, "good.py", "--yes")
     for clock in ("wall", "robot"):
-        status, out, err = ended(folder, "missions", "--mcap", "one.mcap", "--clock", clock)
+        status, out, err = call(folder, "missions", "--mcap", "one.mcap", "--clock", clock)
         assert (status, out) == (0, "")
         assert err.startswith("wrote ")
         with (folder / "one.mcap").open("rb") as file:
@@ -467,19 +467,19 @@ def test_mission_is_written_as_mcap(folder: Path) -> None:
 
 def test_mcap_that_cannot_be_written_is_named(folder: Path) -> None:
     run(folder, "good.py", "--yes")
-    status, _, err = ended(folder, "missions", "last", "--mcap", "/nowhere/one.mcap")
+    status, _, err = call(folder, "missions", "last", "--mcap", "/nowhere/one.mcap")
     assert (status, err) == (2, "codebotler: /nowhere: No such file or directory\n")
     program = (folder / "good.py").read_bytes()
-    status, _, err = ended(folder, "missions", "last", "--mcap", "good.py")
+    status, _, err = call(folder, "missions", "last", "--mcap", "good.py")
     assert status == 2
     assert err.startswith("codebotler: good.py: ")
     assert "unexpected content" in err
     assert (folder / "good.py").read_bytes() == program
 
 
-def test_mission_tells_each_state_once(folder: Path) -> None:
+def test_log_shows_each_state_once(folder: Path) -> None:
     run(folder, "good.py", "--yes")
-    _, out, _ = ended(folder, "missions", "last")
+    _, out, _ = call(folder, "missions", "last")
     assert out.count("program written") == 1
 
 
@@ -492,27 +492,27 @@ def test_mission_tells_each_state_once(folder: Path) -> None:
         (["last", "--clock", "sun"], ['"sun"', "wall or robot"]),
     ],
 )
-def test_what_missions_cannot_show_is_said_in_a_sentence(
+def test_unusable_options_of_missions_are_refused(
     folder: Path, arguments: list[str], named: list[str]
 ) -> None:
-    status, out, err = ended(folder, "missions", *arguments)
+    status, out, err = call(folder, "missions", *arguments)
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert all(name in err for name in named), err
     assert not (folder / "x.mcap").exists()
 
 
-def test_robots_are_listed_with_what_is_missing(folder: Path) -> None:
-    status, out, err = ended(folder, "robots")
+def test_robots_are_listed_with_missing_requirements(folder: Path) -> None:
+    status, out, err = call(folder, "robots")
     assert (status, err) == (0, "")
     assert re.search(r"^sim +works", out, re.MULTILINE)
-    _, out, _ = ended(folder, "robots", "--json")
+    _, out, _ = call(folder, "robots", "--json")
     kinds = json.loads(out)
     assert [kind["name"] for kind in kinds] == ["sim", "pyrobosim", "ros1", "rosbridge", "ros2"]
     assert all(kind["works"] or kind["missing"] for kind in kinds)
 
 
-def test_robots_are_judged_by_the_python_that_is_named(folder: Path) -> None:
-    status, out, err = ended(folder, "robots", "--json", "--ros-python", sys.executable)
+def test_robots_are_checked_with_the_given_python(folder: Path) -> None:
+    status, out, err = call(folder, "robots", "--json", "--ros-python", sys.executable)
     assert (status, err) == (0, "")
     missing = {kind["name"]: kind["missing"] for kind in json.loads(out)}
     for name, package in (("ros1", "rospy"), ("ros2", "rclpy")):
@@ -520,13 +520,13 @@ def test_robots_are_judged_by_the_python_that_is_named(folder: Path) -> None:
         assert package in missing[name]
 
 
-def test_an_instruction_for_which_a_model_writes_no_program(folder: Path) -> None:
+def test_mission_fails_if_the_model_writes_no_program(folder: Path) -> None:
     with Server(fault=lambda _: Fault.REFUSAL) as server:
         model = ("--model", "openai-chat:tiny", "--base-url", server.url)
         refused = run(folder, "Go to the kitchen.", *model, "--yes")
     assert (refused.status, refused.out) == (1, "")
     assert refused.err.splitlines()[0] == "The model refused: I can't help with weapons."
-    (mission,) = json.loads(ended(folder, "missions", "--json").out)
+    (mission,) = json.loads(call(folder, "missions", "--json").out)
     assert (mission["state"], mission["reason"]) == (
         "failed",
         "The model refused: I can't help with weapons.",

@@ -1,4 +1,4 @@
-"""Several programs for one prompt: other samples, of which none is checked."""
+"""Each candidate for a prompt is another sample of the model, and none is checked."""
 
 import asyncio
 
@@ -38,7 +38,7 @@ def test_the_model_is_closed_after_an_error() -> None:
 def test_a_reply_without_a_program_is_described() -> None:
     class Refusing(Scripted):
         async def reply(self, *given: object, **named: object) -> Reply:
-            found = await super().reply(*given, **named)  # type: ignore[arg-type] # as given
+            found = await super().reply(*given, **named)  # type: ignore[arg-type] # passed on
             return Reply("No.", "", found.usage, None, "stop", no_program="refusal")
 
     (attempt,) = asyncio.run(gather_candidates(Refusing(), PROMPT, 1))

@@ -1,4 +1,4 @@
-"""Asking again: as often as allowed, as another sample, and with the problems for a repair."""
+"""A rejected program is requested again: a few times, as another sample, or as a repair."""
 
 import asyncio
 from collections.abc import Callable
@@ -16,7 +16,7 @@ PROMPT = prompt_for("Say hello.")
 
 @dataclass
 class Scripted:
-    """A model that says its lines; the number of a sample chooses the line."""
+    """A model that replies with its lines; the number of a sample chooses the line."""
 
     lines: list[str]
     asked: list[tuple[Prompt, int]] = field(default_factory=list)
@@ -33,26 +33,26 @@ class Scripted:
     async def close(self) -> None: ...
 
 
-def no_bad_word(program: str) -> list[str]:
+def find_bad_words(program: str) -> list[str]:
     return [f"line 1 says {program}"] if "bad" in program else []
 
 
-def made(model: Scripted, tried: Callable[[Attempt], None] = lambda _: None, **how: object) -> Generation:
-    return asyncio.run(write_program(model, PROMPT, no_bad_word, on_attempt=tried, **how))  # type: ignore[arg-type] # how
+def generate(model: Scripted, hear: Callable[[Attempt], None] = lambda _: None, **how: object) -> Generation:
+    return asyncio.run(write_program(model, PROMPT, find_bad_words, on_attempt=hear, **how))  # type: ignore[arg-type] # how
 
 
-def test_a_program_that_is_accepted_is_asked_for_once() -> None:
+def test_accepted_program_is_requested_once() -> None:
     model = Scripted(["good", "better"])
-    assert made(model, retries=5).program == "good"
+    assert generate(model, retries=5).program == "good"
     assert model.asked == [(PROMPT, 0)]
 
 
-def test_a_rejected_one_is_asked_for_again_as_another_sample_of_the_same_prompt() -> None:
+def test_rejected_program_is_requested_again_as_another_sample() -> None:
     model = Scripted(["bad 0", "bad 1", "good"])
-    made_of_three = made(model, retries=2)
-    assert made_of_three.program == "good"
-    assert made_of_three.problems == ()
-    assert [attempt.problems for attempt in made_of_three.attempts] == [
+    generation = generate(model, retries=2)
+    assert generation.program == "good"
+    assert generation.problems == ()
+    assert [attempt.problems for attempt in generation.attempts] == [
         ("line 1 says bad 0",),
         ("line 1 says bad 1",),
         (),
@@ -63,7 +63,7 @@ def test_a_rejected_one_is_asked_for_again_as_another_sample_of_the_same_prompt(
 @pytest.mark.parametrize("retries", [0, 1, 3])
 def test_no_more_requests_than_allowed(retries: int) -> None:
     model = Scripted([f"bad {n}" for n in range(9)])
-    rejected = made(model, retries=retries)
+    rejected = generate(model, retries=retries)
     assert [number for _, number in model.asked] == list(range(1 + retries))
     assert rejected.program == f"bad {retries}"
     assert rejected.problems == (f"line 1 says bad {retries}",)
@@ -71,7 +71,7 @@ def test_no_more_requests_than_allowed(retries: int) -> None:
 
 def test_a_repair_carries_the_last_program_and_its_problems() -> None:
     model = Scripted(["bad 0", "bad 1", "good"])
-    made(model, retries=2, repair=True)
+    generate(model, retries=2, repair=True)
     (first, _), (second, _), (third, _) = model.asked
     assert first == PROMPT
     assert second == PROMPT.after("bad 0", ["line 1 says bad 0"])
@@ -85,9 +85,9 @@ def test_without_a_check_the_first_program_is_taken() -> None:
     assert len(generation.attempts) == 1
 
 
-def test_attempts_are_told_as_they_end_also_where_a_later_one_fails() -> None:
-    told: list[Attempt] = []
+def test_attempts_are_reported_at_once_even_if_a_later_one_fails() -> None:
+    attempts: list[Attempt] = []
     with pytest.raises(ModelError, match="the script is over"):
-        made(Scripted(["bad 0", "bad 1"]), told.append, retries=5)
-    assert [attempt.reply.program for attempt in told] == ["bad 0", "bad 1"]
-    assert told[0].problems == ("line 1 says bad 0",)
+        generate(Scripted(["bad 0", "bad 1"]), attempts.append, retries=5)
+    assert [attempt.reply.program for attempt in attempts] == ["bad 0", "bad 1"]
+    assert attempts[0].problems == ("line 1 says bad 0",)

@@ -1,4 +1,4 @@
-"""Replies without a program: what is said about them, and how a model is asked again."""
+"""A reply without a program is described in a sentence, and the model is asked again."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ class Scripted:
     async def close(self) -> None: ...
 
 
-def made(model: Scripted, *, retries: int, repair: bool) -> Generation:
+def generate(model: Scripted, *, retries: int, repair: bool) -> Generation:
     checked: list[str] = []
 
     def problems_of(program: str) -> list[str]:
         checked.append(program)
-        assert program == PROGRAM, "nothing else is checked"
+        assert program == PROGRAM, "only programs are checked"
         return []
 
     return asyncio.run(write_program(model, PROMPT, problems_of, retries=retries, repair=repair))
@@ -85,7 +85,7 @@ def test_a_refusal_is_quoted_and_kept_short() -> None:
 def test_a_reply_without_a_program_is_not_checked_and_asked_for_again(*, repair: bool) -> None:
     prose = make_reply("I am afraid that I cannot do that.", Usage(), 0.0, "stop")
     model = Scripted([prose, reply(PROGRAM, None)])
-    generation = made(model, retries=1, repair=repair)
+    generation = generate(model, retries=1, repair=repair)
     first, last = generation.attempts
     assert first.programless is not None
     assert first.problems == (first.programless.sentence,)
@@ -103,7 +103,7 @@ def test_a_repair_after_no_program_adds_to_the_request_alone() -> None:
 
 
 def test_a_last_reply_without_a_program_leaves_none() -> None:
-    generation = made(Scripted([reply("", "empty")]), retries=0, repair=False)
+    generation = generate(Scripted([reply("", "empty")]), retries=0, repair=False)
     assert generation.program == ""
     assert generation.programless is not None
     assert generation.problems == (generation.programless.sentence,)

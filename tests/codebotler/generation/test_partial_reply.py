@@ -1,4 +1,4 @@
-"""A reply on the page while it arrives: text until code begins."""
+"""A reply that is still arriving is split into text and code."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ CODE = "def task_program():\n    say('hello')\n"
         (f"Let me see.\n{CODE}</think>\nNow:\n", f"Let me see.\n{CODE}</think>\nNow:\n", ""),
     ],
 )
-def test_text_and_code_of_what_has_arrived(reply: str, text: str, code: str) -> None:
+def test_partial_reply_is_split_into_text_and_code(reply: str, text: str, code: str) -> None:
     found = split_partial(reply)
     assert (found.text, found.code) == (text, code)
 
 
-def test_a_long_reply_is_read_in_no_time() -> None:
+def test_long_reply_is_split_quickly() -> None:
     began = time.process_time()
     split_partial(("Let me think about it. " * 20 + "\n") * 1_000)
     split_partial(" " * 200_000)

@@ -1,4 +1,4 @@
-"""A contract while a robot moves: the robot is told no call that the contract does not allow."""
+"""A mission sends the robot no call that its contract does not allow."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.simulator.guard.contract import Contract, SkillBound
 from codebotler.simulator.guard.house_rule import UNKNOWN_ROOM
 from codebotler.simulator.worlds.room_map import RoomMap
-from doubles import Answering
+from doubles import FakeRobot
 
 ROOMS = RoomMap(("hall", "kitchen", "the vault", "café"), "hall", plain=True)
 HOUSE = World((Room("hall"), Room("kitchen", ("mug", "plate")), Room("vault")), "hall")
@@ -55,7 +55,7 @@ ALLOWED = Contract(
 )
 
 
-def ran(
+def run(
     folder: Path, robot: Robot, program: str, contract: Contract = ALLOWED, *, place: str = "hall"
 ) -> tuple[Mission, list[LogLine]]:
     mission = Mission(folder, robot.name)
@@ -88,18 +88,18 @@ def ran(
         "is_in_room('mug')",
     ],
 )
-def test_the_robot_is_not_told_what_the_contract_does_not_allow(tmp_path: Path, call: str) -> None:
-    robot = Answering()
-    mission, lines = ran(tmp_path, robot, STUBBORN.format(call))
+def test_calls_beyond_the_contract_do_not_reach_the_robot(tmp_path: Path, call: str) -> None:
+    robot = FakeRobot()
+    mission, lines = run(tmp_path, robot, STUBBORN.format(call))
     assert (mission.state, mission.summary.reason) == (
         MissionState.STOPPED,
         "stopped by rule approved contract",
     )
     assert robot.done == ["kitchen"]
     assert robot.cancels
-    (told,) = [line for line in lines if line["event"] == "rule"]
-    assert (told["rule"], told["prevented"], told["line"]) == ("approved contract", True, 6)
-    assert told["why"]
+    (violation,) = [line for line in lines if line["event"] == "rule"]
+    assert (violation["rule"], violation["prevented"], violation["line"]) == ("approved contract", True, 6)
+    assert violation["why"]
     (approved,) = [line["contracts"] for line in lines if line["event"] == "contract"]
     assert approved == [contract_data(ALLOWED)]
 
@@ -114,13 +114,13 @@ def task_program():
     say("there are 2 mugs")
     ask("Ann", "Tea?", ["no"])
 """
-    robot = Answering(lambda skill, _: "no" if skill == "ask" else None)
-    mission, _ = ran(tmp_path, robot, program)
+    robot = FakeRobot(lambda skill, _: "no" if skill == "ask" else None)
+    mission, _ = run(tmp_path, robot, program)
     assert mission.state is MissionState.DONE
 
 
-def test_all_contracts_count(tmp_path: Path) -> None:
-    robot = Answering()
+def test_every_contract_bounds_the_mission(tmp_path: Path) -> None:
+    robot = FakeRobot()
     mission = Mission(tmp_path, robot.name)
     mission.draft("def task_program():\n    go_to('kitchen')\n    go_to('hall')\n")
     mission.check([])
@@ -133,8 +133,8 @@ def test_all_contracts_count(tmp_path: Path) -> None:
 
 
 def test_a_call_too_many_stops_the_mission(tmp_path: Path) -> None:
-    robot = Answering()
-    mission, _ = ran(
+    robot = FakeRobot()
+    mission, _ = run(
         tmp_path, robot, "def task_program():\n    go_to('kitchen')\n    pick('mug')\n    pick('mug')\n"
     )
     assert mission.state is MissionState.STOPPED
@@ -157,24 +157,24 @@ def task_program():
     except Exception:
         pick("mug")
 """
-    mission, _ = ran(tmp_path, Answering(answer), program)
+    mission, _ = run(tmp_path, FakeRobot(answer), program)
     assert mission.state is MissionState.DONE
 
 
-def test_a_robot_that_does_not_say_where_it_is_picks_up_nothing(tmp_path: Path) -> None:
+def test_a_robot_without_a_known_position_picks_up_nothing(tmp_path: Path) -> None:
     def answer(skill: str, _text: str) -> RobotResult:
         if skill == "get_current_location":
             raise RobotError("Unknown", "the robot has not found its place yet")
         return None
 
-    robot = Answering(answer)
-    _, lines = ran(tmp_path, robot, "def task_program():\n    pick('mug')\n", place="")
-    (told,) = [line for line in lines if line["event"] == "rule"]
-    assert told["why"] == UNKNOWN_ROOM
+    robot = FakeRobot(answer)
+    _, lines = run(tmp_path, robot, "def task_program():\n    pick('mug')\n", place="")
+    (violation,) = [line for line in lines if line["event"] == "rule"]
+    assert violation["why"] == UNKNOWN_ROOM
     assert robot.done == []
 
 
-def led(
+def start_session(
     tmp_path: Path, program: str, *edits: str, within: Contract | None = None
 ) -> tuple[MissionSession, SessionView]:
     session = MissionSession(
@@ -194,7 +194,7 @@ def led(
 
 
 def test_a_session_runs_the_program_within_its_own_contract(tmp_path: Path) -> None:
-    session, view = led(tmp_path, FETCH)
+    session, view = start_session(tmp_path, FETCH)
     session.approve(view.digest)
     assert session.wait_until(lambda _: False).state is MissionState.DONE
     assert view.contract is not None
@@ -202,7 +202,7 @@ def test_a_session_runs_the_program_within_its_own_contract(tmp_path: Path) -> N
 
 
 def test_a_session_compares_an_edited_program_with_the_last_one(tmp_path: Path) -> None:
-    session, view = led(tmp_path, FETCH, FETCH.replace("place('mug')", "say('here')"))
+    session, view = start_session(tmp_path, FETCH, FETCH.replace("place('mug')", "say('here')"))
     session.stop("the test")
     assert view.contract is not None
     assert view.earlier is not None
@@ -210,7 +210,7 @@ def test_a_session_compares_an_edited_program_with_the_last_one(tmp_path: Path) 
 
 
 def test_a_session_refuses_a_program_beyond_the_contract_of_its_start(tmp_path: Path) -> None:
-    session, view = led(tmp_path, FETCH, within=ALLOWED)
+    session, view = start_session(tmp_path, FETCH, within=ALLOWED)
     assert [problem.split(":")[0] for problem in view.problems] == ["OutsideContract"]
     with pytest.raises(MissionError):
         session.approve(view.digest)
@@ -218,10 +218,10 @@ def test_a_session_refuses_a_program_beyond_the_contract_of_its_start(tmp_path: 
     assert session.wait_until(lambda _: False).state is MissionState.STOPPED
 
 
-def test_the_answers_of_a_robot_do_not_leave_the_contract(tmp_path: Path) -> None:
-    told: dict[str, RobotResult] = {"get_all_rooms": ["hall", "the vault"], "get_current_location": "hall"}
-    robot = Answering(lambda skill, _: told.get(skill))
+def test_answers_of_the_robot_do_not_widen_the_contract(tmp_path: Path) -> None:
+    answers: dict[str, RobotResult] = {"get_all_rooms": ["hall", "the vault"], "get_current_location": "hall"}
+    robot = FakeRobot(lambda skill, _: answers.get(skill))
     program = "def task_program():\n    for room in get_all_rooms():\n        go_to(room)\n"
-    mission, _ = ran(tmp_path, robot, program)
+    mission, _ = run(tmp_path, robot, program)
     assert mission.state is MissionState.STOPPED
     assert "the vault" not in robot.done

@@ -1,4 +1,4 @@
-"""Rules about where the robot is: in simulation, while it moves, and refused where that is not known."""
+"""Rules about the robot's position hold in simulation and on robots, or are refused at the start."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.robot import SimulatedRobot
 from codebotler.simulator.worlds.room_map import RoomMap
-from doubles import Answering
+from doubles import FakeRobot
 
 WORLD = read_world(OFFICE)
 MAP = RoomMap.of(WORLD)
@@ -55,7 +55,7 @@ def rule(formula: str, *, name: str = "house") -> Rule:
 NEVER = rule('not tr.Exists(inside("printer room 2"))', name="never")
 
 
-def ran(folder: Path, robot: Robot, program: str, *rules: Rule) -> tuple[Mission, list[LogLine]]:
+def run(folder: Path, robot: Robot, program: str, *rules: Rule) -> tuple[Mission, list[LogLine]]:
     mission = Mission(folder, robot.name)
     mission.draft(program)
     mission.check([])
@@ -66,10 +66,10 @@ def ran(folder: Path, robot: Robot, program: str, *rules: Rule) -> tuple[Mission
     return mission, [json.loads(line) for line in (mission.folder / EVENTS_FILE).read_text().splitlines()]
 
 
-# --- the way
+# --- rooms along a line
 
 
-def test_a_straight_way_enters_the_rooms_that_it_crosses_in_order() -> None:
+def test_straight_line_enters_the_rooms_that_it_crosses_in_order() -> None:
     way = [*rooms_along(WORLD.rooms, (2, 3), (12, 3))]
     assert way == [("printer room 1",), (), ("printer room 2",), (), ("printer room 3",)]
     assert [*rooms_along(WORLD.rooms, (12, 3), (2, 3))] == way[::-1]
@@ -85,7 +85,7 @@ def test_a_room_may_be_entered_twice_and_lie_within_another() -> None:
     assert [*rooms_along([legs, zone], (0.5, 0.5), (0.5, 2))] == [("u",), ("u", "zone")]
 
 
-def test_a_way_that_touches_a_corner_enters_nothing() -> None:
+def test_line_that_touches_a_corner_enters_no_room() -> None:
     square = Room("square", footprint=((1, 0), (2, 0), (2, 1), (1, 1)))
     assert {*rooms_along([square], (0, 0), (2, 2))} == {()}
 
@@ -102,7 +102,7 @@ def test_the_check_finds_a_drive_through_a_room(program: str, line: int | None) 
 
 
 def test_a_world_without_footprints_has_those_of_the_grid() -> None:
-    world = World(tuple(map(Room, ("a", "b", "c", "d", "e"))), "a")  # a, c and e stand in a row
+    world = World(tuple(map(Room, ("a", "b", "c", "d", "e"))), "a")  # Rooms a, c and e are in one row.
     program = "def task_program():\n    go_to('e')\n"
     for room, problems in (("c", 1), ("b", 0)):
         never = rule(f'not tr.Exists(inside("^{room}$"))')
@@ -114,7 +114,7 @@ def test_without_a_map_only_the_ends_of_drives_count() -> None:
     assert check(THROUGH, house_rules=[rule('not tr.Exists(inside("room 3"))')]).problems
 
 
-def driven(formula: str, *rooms: str) -> None:
+def drive(formula: str, *rooms: str) -> None:
     one = SimulatedRobot(WORLD, AS_WRITTEN, guard=RuleGuard([rule(formula)], MAP))
     for room in rooms:
         one.perform("go_to", [room])
@@ -138,9 +138,9 @@ def test_formulas_may_count_and_order_rooms(formula: str, *, is_broken: bool) ->
     rooms = "printer room 1", "printer room 3", "printer room 2"
     if is_broken:
         with pytest.raises(RuleViolationError):
-            driven(formula, *rooms)
+            drive(formula, *rooms)
     else:
-        driven(formula, *rooms)
+        drive(formula, *rooms)
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_a_skill_of_a_user_drives_through_rooms_too(tmp_path: Path) -> None:
     one = SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([NEVER], MAP))
     with pytest.raises(RuleViolationError):
         one.perform("tour", [])
-    all_rooms = rule('not tr.Exists(check("mug")) or tr.Count(inside(".*"), 6)')  # judged before and after
+    all_rooms = rule('not tr.Exists(check("mug")) or tr.Count(inside(".*"), 6)')  # It is judged twice.
     SimulatedRobot(WORLD, AS_WRITTEN, skills, guard=RuleGuard([all_rooms], MAP)).perform("tour", [])
 
 
@@ -198,12 +198,12 @@ def test_a_robot_is_stopped_where_its_pose_enters_a_forbidden_room(
 ) -> None:
     robot: Robot = Simulated(WORLD, speed=speed)
     if wrapped:
-        robot = with_face(robot) if wrapped == "face" else spelling(robot)
+        robot = with_face(robot) if wrapped == "face" else with_spelling(robot)
     assert robot.has_pose
-    mission, lines = ran(tmp_path, robot, THROUGH, NEVER)
+    mission, lines = run(tmp_path, robot, THROUGH, NEVER)
     assert (mission.state, mission.summary.line) == (MissionState.STOPPED, 3)
-    (told,) = [line for line in lines if line["event"] == "rule"]
-    assert (told["rule"], told["what"], told["prevented"]) == ("never", ["inside", "printer room 2"], False)
+    (row,) = [line for line in lines if line["event"] == "rule"]
+    assert (row["rule"], row["what"], row["prevented"]) == ("never", ["inside", "printer room 2"], False)
     assert [line["arguments"] for line in lines if line["event"] == "skill"][-1] == {
         "location": "printer room 3"
     }
@@ -212,33 +212,33 @@ def test_a_robot_is_stopped_where_its_pose_enters_a_forbidden_room(
 
 def test_the_first_drive_is_judged_from_where_the_robot_stands(tmp_path: Path) -> None:
     program = "def task_program():\n    go_to('printer room 3')\n"
-    mission, _ = ran(tmp_path, Simulated(WORLD, speed=None), program, NEVER)
+    mission, _ = run(tmp_path, Simulated(WORLD, speed=None), program, NEVER)
     assert mission.state is MissionState.STOPPED
 
 
 def test_a_robot_that_goes_around_is_not_stopped(tmp_path: Path) -> None:
-    mission, _ = ran(tmp_path, Simulated(WORLD, speed=None), AROUND, NEVER)
+    mission, _ = run(tmp_path, Simulated(WORLD, speed=None), AROUND, NEVER)
     assert mission.state is MissionState.DONE
 
 
-def test_the_robot_stands_still_before_the_rule_is_logged(tmp_path: Path) -> None:
+def test_robot_stops_before_the_rule_is_logged(tmp_path: Path) -> None:
     class Noting(Simulated):
         def cancel(self) -> None:
             logged.append((next(tmp_path.glob("missions/*")) / EVENTS_FILE).read_text())
             super().cancel()
 
     logged: list[str] = []
-    ran(tmp_path, Noting(WORLD, speed=None), THROUGH, NEVER)
+    run(tmp_path, Noting(WORLD, speed=None), THROUGH, NEVER)
     assert '"event": "rule"' not in logged[0]
     assert '"event": "rule"' in logged[-1]
 
 
-# --- refused at the start
+# --- refusal at the start
 
 
-def knowing(*, has_pose: bool, rooms: tuple[str, ...] = ("hall", "vault")) -> Answering:
-    told = {"get_all_rooms": [*rooms], "get_current_location": "hall"}
-    robot = Answering(lambda skill, _: told.get(skill))  # type: ignore[arg-type, return-value]  # of these skills
+def make_robot(*, has_pose: bool, rooms: tuple[str, ...] = ("hall", "vault")) -> FakeRobot:
+    answers = {"get_all_rooms": [*rooms], "get_current_location": "hall"}
+    robot = FakeRobot(lambda skill, _: answers.get(skill))  # type: ignore[arg-type, return-value]  # of these skills
     robot.has_pose = has_pose
     return robot
 
@@ -259,7 +259,7 @@ VAULT = rule('not tr.Exists(inside("vault"))')
 def test_a_rule_that_cannot_be_enforced_is_refused_before_anything_moves(
     tmp_path: Path, *, has_pose: bool, world: World | None, word: str
 ) -> None:
-    robot = knowing(has_pose=has_pose)
+    robot = make_robot(has_pose=has_pose)
     session = MissionSession(
         robot,
         tmp_path,
@@ -282,16 +282,16 @@ def test_a_rule_that_cannot_be_enforced_is_refused_before_anything_moves(
 
 
 def test_a_robot_without_a_list_of_rooms_has_no_footprints() -> None:
-    robot = knowing(has_pose=True)
+    robot = make_robot(has_pose=True)
     with pytest.raises(NotReadyError, match="footprint"):
         expect_poses([VAULT], robot, None)
     expect_poses([rule('not tr.Exists(goto("vault"))')], robot, None)
 
 
-def test_only_the_robot_that_drives_straight_is_checked_along_straight_ways() -> None:
+def test_check_assumes_straight_drives_only_for_the_simulated_robot() -> None:
     remarks: list[str] = []
     straight, _ = ask_rooms(Simulated(WORLD, speed=None), remarks.append, WORLD)
-    other, _ = ask_rooms(knowing(has_pose=True, rooms=tuple(MAP.rooms)), remarks.append, WORLD)
+    other, _ = ask_rooms(make_robot(has_pose=True, rooms=tuple(MAP.rooms)), remarks.append, WORLD)
     assert straight is not None
     assert other is not None
     assert check(THROUGH, room_map=straight, house_rules=[NEVER]).problems
@@ -303,26 +303,26 @@ def test_only_the_robot_that_drives_straight_is_checked_along_straight_ways() ->
     assert in_grid.plan[0].footprint == laid_out(World((Room("hall"),), "hall")).rooms[0].footprint
 
 
-# --- poses that a robot tells at any time, also between skills
+# --- poses that arrive at any time, also between skills
 
 
-class Followed(Simulated):
-    """A robot that somebody else pushes from pose to pose, once the program has begun."""
+class PushedRobot(Simulated):
+    """A robot that is pushed from pose to pose once the program has begun."""
 
     def __init__(self, *poses: Point | None) -> None:
         super().__init__(WORLD, speed=20.0)
         self.poses = poses
 
-    def watch(self, told: Callable[[Point | None], None]) -> bool:
+    def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
         def push() -> None:
             for pose in self.poses:
-                told(pose)
+                on_pose(pose)
 
         threading.Thread(target=push, daemon=True).start()
         return True
 
 
-def spelling(robot: Robot) -> Robot:
+def with_spelling(robot: Robot) -> Robot:
     return SpellingRobot(robot)
 
 
@@ -331,16 +331,16 @@ def with_face(robot: Robot) -> Robot:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("around", [spelling, with_face])
+@pytest.mark.parametrize("around", [with_spelling, with_face])
 def test_a_pose_is_judged_also_while_no_skill_is_performed(
     tmp_path: Path, around: Callable[[Robot], Robot]
 ) -> None:
-    mission, lines = ran(tmp_path, around(Followed((2.0, 3.0), (7.0, 3.0))), SLEEPS, NEVER)
+    mission, lines = run(tmp_path, around(PushedRobot((2.0, 3.0), (7.0, 3.0))), SLEEPS, NEVER)
     assert mission.state is MissionState.STOPPED
     assert [line["what"][:2] for line in lines if line["event"] == "rule"] == [["inside", "printer room 2"]]
 
 
-def test_a_broken_rule_is_logged_where_the_mission_ends_before_its_stop_returns(
+def test_a_broken_rule_is_logged_even_if_the_mission_ends_before_its_stop_returns(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def stop_late(worker: Worker) -> None:
@@ -350,20 +350,20 @@ def test_a_broken_rule_is_logged_where_the_mission_ends_before_its_stop_returns(
     stop, ended = Worker.stop, threading.Event()
     monkeypatch.setattr(Worker, "stop", stop_late)
     monkeypatch.setattr(Mission, "__exit__", lambda *_: ended.set())
-    mission, lines = ran(tmp_path, Followed((2.0, 3.0), (7.0, 3.0)), SLEEPS, NEVER)
+    mission, lines = run(tmp_path, PushedRobot((2.0, 3.0), (7.0, 3.0)), SLEEPS, NEVER)
     assert mission.state is MissionState.STOPPED
     assert [line["what"][:2] for line in lines if line["event"] == "rule"] == [["inside", "printer room 2"]]
 
 
-def test_robot_that_moves_without_telling_where_is_stopped_and_lost(tmp_path: Path) -> None:
-    mission, lines = ran(tmp_path, Followed((2.0, 3.0), None), SLEEPS, NEVER)
+def test_robot_whose_pose_becomes_unknown_is_stopped_and_lost(tmp_path: Path) -> None:
+    mission, lines = run(tmp_path, PushedRobot((2.0, 3.0), None), SLEEPS, NEVER)
     assert mission.state is MissionState.FAILED
     assert not [line for line in lines if line["event"] == "rule"]
 
 
-def test_poses_are_not_asked_for_where_no_rule_is_about_them(tmp_path: Path) -> None:
+def test_poses_are_ignored_unless_a_rule_is_about_them(tmp_path: Path) -> None:
     short = "def task_program():\n    say('hello')\n"
-    mission, _ = ran(tmp_path, Followed((2.0, 3.0), None), short, rule('not tr.Exists(goto("vault"))'))
+    mission, _ = run(tmp_path, PushedRobot((2.0, 3.0), None), short, rule('not tr.Exists(goto("vault"))'))
     assert mission.state is MissionState.DONE
 
 
@@ -412,7 +412,7 @@ def test_other_rules_have_no_keepout_mask(formula: str) -> None:
         assert keepout_messages([one], WORLD.rooms)[0]["data"] == [0]
 
 
-def test_a_pose_is_no_event_of_a_trace() -> None:
+def test_violation_names_the_room_and_the_carried_thing() -> None:
     guard = RuleGuard([NEVER], MAP)
     guard.moved((2, 3), (4.5, 3), "")
     with pytest.raises(RuleViolationError) as caught:

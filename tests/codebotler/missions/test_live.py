@@ -1,4 +1,4 @@
-"""What a program meets that runs on a robot: answers and errors as in the simulator, until a stop."""
+"""A program on a robot gets the simulator's answers and errors, until a stop."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.simulator.engine import run
 from codebotler.simulator.settings import PAPER_SETTINGS
 from codebotler.simulator.worker import Worker
-from doubles import Answering, giving, raising
+from doubles import FakeRobot, fail_with, replay
 from roboeval.suites.load import Suite
 
 FOUND = True
@@ -38,9 +38,9 @@ class Notes(list[tuple[str, dict[str, object]]]):
         return [event for event, _ in self]
 
 
-def live(answer: Callable[[str, str], RobotResult] = lambda *_: None) -> tuple[LiveRobot, Notes]:
+def live_robot(answer: Callable[[str, str], RobotResult] = lambda *_: None) -> tuple[LiveRobot, Notes]:
     notes = Notes()
-    return LiveRobot(Answering(answer), notes, place="hall"), notes
+    return LiveRobot(FakeRobot(answer), notes, place="hall"), notes
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def worker() -> Iterator[Worker]:
     worker.close()
 
 
-# --- the same as in the simulator
+# --- agreement with the simulator
 
 
 @pytest.mark.slow
@@ -74,10 +74,10 @@ def test_reference_programs_leave_the_simulators_traces(
         assert found.trace == outcome.trace
 
 
-def test_a_question_without_options_is_named_wherever_its_text_stands() -> None:
+def test_error_quotes_a_question_without_options() -> None:
     given = (Parameter("choices", ValueType(is_list=True), is_options=True), Parameter("title"))
     row = Skill("choose", given, TEXT_TYPE, "Let somebody choose.", Recording("choose", "title", "choices"))
-    answering = Answering()
+    answering = FakeRobot()
     answering.skills = SKILLS.with_skill(row)
     robot = LiveRobot(answering, Notes())
     with pytest.raises(RobotError, match='the question "A drink\\?" offers no options'):
@@ -118,8 +118,8 @@ def test_errors_reach_the_program_as_in_the_simulator(
 # --- events
 
 
-def test_events_tell_what_was_asked_and_what_came_of_it() -> None:
-    robot, _ = live(giving(None, FOUND, "Yes", None))
+def test_trace_records_calls_and_their_results() -> None:
+    robot, _ = live_robot(replay(None, FOUND, "Yes", None))
     robot.perform("go_to", [" kitchen "])
     robot.perform("is_in_room", ["mug"])
     assert robot.perform("ask", ["ann", "Tea?", OPTIONS]) == 0
@@ -133,8 +133,8 @@ def test_events_tell_what_was_asked_and_what_came_of_it() -> None:
     assert [event.place for event in robot.trace] == ["hall", "kitchen", "kitchen", "kitchen"]
 
 
-def test_everything_is_taken_down_in_order() -> None:
-    robot, notes = live(giving(None, "Yes"))
+def test_notes_list_everything_in_order() -> None:
+    robot, notes = live_robot(replay(None, "Yes"))
     robot.perform("say", ["hello"])
     robot.line = 3
     robot.sleep_until(5)
@@ -156,7 +156,7 @@ def test_everything_is_taken_down_in_order() -> None:
 
 
 def test_clock_begins_with_the_first_skill() -> None:
-    robot, _ = live()
+    robot, _ = live_robot()
     robot.robot.clock.wait(100)
     assert robot.now == 0
     robot.sleep_until(7)
@@ -165,12 +165,12 @@ def test_clock_begins_with_the_first_skill() -> None:
 
 @pytest.mark.parametrize(("said", "position"), [("Yes", 0), (" no ", 1), ("NO", 1), ("yes ", 0)])
 def test_answer_is_the_option_of_that_text(said: str, position: int) -> None:
-    robot, _ = live(giving(said))
+    robot, _ = live_robot(replay(said))
     assert robot.perform("ask", ["ann", "Tea?", OPTIONS]) == position
 
 
 def test_answer_that_was_not_offered_is_an_error() -> None:
-    robot, notes = live(giving("Perhaps"))
+    robot, notes = live_robot(replay("Perhaps"))
     with pytest.raises(RobotError, match="Perhaps") as error:
         robot.perform("ask", ["ann", "Tea?", OPTIONS])
     assert error.value.kind == "AskInvalidOptions"
@@ -178,15 +178,15 @@ def test_answer_that_was_not_offered_is_an_error() -> None:
     assert robot.trace == (Event("ask", "Tea?", OPTIONS),)
 
 
-def test_robots_own_words_are_kept() -> None:
-    robot, notes = live(raising(RobotError("GoToInvalidLocation", "the door is shut")))
+def test_errors_keep_the_robots_own_words() -> None:
+    robot, notes = live_robot(fail_with(RobotError("GoToInvalidLocation", "the door is shut")))
     with pytest.raises(RobotError, match="the door is shut"):
         robot.perform("go_to", ["kitchen"])
     assert notes.kinds == ["skill", "feedback", "error"]
     assert robot.trace == (Event("goto", "kitchen"),)
     with pytest.raises(RobotError):
         robot.perform("pick", ["mug"])
-    assert robot.trace == (Event("goto", "kitchen"),), "what was not picked up is no event"
+    assert robot.trace == (Event("goto", "kitchen"),), "a failed pick is not an event"
 
 
 @pytest.mark.parametrize(
@@ -203,46 +203,46 @@ def test_robots_own_words_are_kept() -> None:
 def test_answer_that_the_skill_does_not_have_loses_the_robot(
     skill: str, arguments: list[str], answer: RobotResult
 ) -> None:
-    robot, _ = live(giving(answer))
+    robot, _ = live_robot(replay(answer))
     with pytest.raises(RobotLostError, match=f"answered {skill} with"):
         robot.perform(skill, arguments)
 
 
-def test_ninth_skill_needs_nothing_here() -> None:
+def test_own_skill_is_performed_and_noted() -> None:
     row = Skill("measure", (Parameter("what"),), TEXT_TYPE, "Measure.", Recording("measure", "what"))
-    robot, notes = live(giving("20 degrees"))
+    robot, notes = live_robot(replay("20 degrees"))
     robot.skills = SKILLS.with_skill(row)
     assert robot.perform("measure", ["the air"]) == "20 degrees"
     assert robot.trace == (Event("measure", "the air"),)
     assert notes.kinds == ["skill", "feedback", "result"]
 
 
-def test_call_in_words() -> None:
+def test_call_is_written_in_words() -> None:
     assert written_call("ask", ["ann", "Tea?", ("Yes", "No")]) == 'ask("ann", "Tea?", ["Yes", "No"])'
 
 
-# --- the stop
+# --- stop
 
 
 def test_nothing_starts_after_a_stop() -> None:
-    robot, notes = live()
+    robot, notes = live_robot()
     robot.stop()
     with pytest.raises(StoppedError):
         robot.perform("say", ["hello"])
     with pytest.raises(StoppedError):
         robot.sleep_until(3600)
     assert (notes, robot.trace) == ([], ())
-    assert isinstance(robot.robot, Answering)
+    assert isinstance(robot.robot, FakeRobot)
     assert robot.robot.cancels == 1
-    assert not robot.robot.clock.wait(1), "who sleeps wakes up"
+    assert not robot.robot.clock.wait(1), "a sleeping program wakes up"
 
 
-def test_robot_that_answers_after_a_stop_is_not_believed() -> None:
+def test_answer_after_a_stop_is_ignored() -> None:
     def answer(_skill: str, _first: str) -> RobotResult:
         robot.stop()
         return True
 
-    robot, notes = live(answer)
+    robot, notes = live_robot(answer)
     with pytest.raises(StoppedError):
         robot.perform("is_in_room", ["mug"])
     assert notes.kinds == ["skill", "feedback", "late"]
@@ -253,19 +253,19 @@ def test_error_after_a_stop_does_not_reach_the_program() -> None:
         robot.stop()
         raise RobotError("GoToInvalidLocation", "the goal was cancelled")
 
-    robot, _ = live(answer)
+    robot, _ = live_robot(answer)
     with pytest.raises(StoppedError):
         robot.perform("go_to", ["kitchen"])
 
 
-def test_somebody_else_who_stops_the_robot_ends_the_mission() -> None:
-    robot, notes = live(raising(CancelledError()))
+def test_stop_by_another_client_ends_the_mission() -> None:
+    robot, notes = live_robot(fail_with(CancelledError()))
     with pytest.raises(RobotLostError, match="another client"):
         robot.perform("go_to", ["kitchen"])
     assert notes.kinds == ["skill", "feedback", "cancelled"]
 
 
-def test_feedback_that_cannot_be_taken_down_stops_the_robot() -> None:
+def test_feedback_that_cannot_be_noted_stops_the_robot() -> None:
     class FullError(OSError):
         pass
 
@@ -273,7 +273,7 @@ def test_feedback_that_cannot_be_taken_down_stops_the_robot() -> None:
         if event == "feedback":
             raise FullError
 
-    machine = Answering()
+    machine = FakeRobot()
     robot = LiveRobot(machine, note)
     with pytest.raises(FullError):
         robot.perform("say", ["hello"])

@@ -1,4 +1,4 @@
-"""Missions as MCAP: every event is a message that its schema allows, timed by one clock or the other."""
+"""Missions are exported as MCAP: each event is a message that fits its schema and has a time."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ PROGRAM = """def task_program():
     except Exception as error:
         say(str(error))
 """
-PLAIN: dict[str, type | tuple[type, ...]] = {
+JSON_TYPES: dict[str, type | tuple[type, ...]] = {
     "string": str,
     "number": (int, float),
     "integer": int,
@@ -64,7 +64,7 @@ def mission(tmp_path_factory: pytest.TempPathFactory) -> tuple[MissionSummary, l
 
 
 def read(data: bytes) -> list[tuple[str, dict[str, Any], dict[str, Any], int]]:
-    """Topic, schema, message and time of each message."""
+    """Return topic, schema, data and time of each message."""
     found = []
     for schema, channel, message in make_reader(io.BytesIO(data)).iter_messages():
         assert schema is not None
@@ -73,7 +73,7 @@ def read(data: bytes) -> list[tuple[str, dict[str, Any], dict[str, Any], int]]:
     return found
 
 
-def written(mission: tuple[MissionSummary, list[LogLine]], clock: TimeSource = "wall") -> bytes:
+def encode(mission: tuple[MissionSummary, list[LogLine]], clock: TimeSource = "wall") -> bytes:
     file = io.BytesIO()
     write_mcap(file, *mission, clock=clock)
     return file.getvalue()
@@ -83,35 +83,35 @@ def messages_on(topic: str, data: bytes) -> list[dict[str, Any]]:
     return [message for found, _, message, _ in read(data) if found == topic]
 
 
-def fits(value: object, schema: dict[str, Any]) -> bool:
-    """Whether a value is as its schema says, with nothing that it leaves out."""
+def is_valid(value: object, schema: dict[str, Any]) -> bool:
+    """Return whether a value fits its schema, which must describe every field."""
     if isinstance(value, dict):
         return schema["type"] == "object" and all(
-            name in schema["properties"] and fits(one, schema["properties"][name])
+            name in schema["properties"] and is_valid(one, schema["properties"][name])
             for name, one in value.items()
         )
     if isinstance(value, list):
-        return schema["type"] == "array" and all(fits(one, schema["items"]) for one in value)
-    return isinstance(value, PLAIN[schema["type"]])
+        return schema["type"] == "array" and all(is_valid(one, schema["items"]) for one in value)
+    return isinstance(value, JSON_TYPES[schema["type"]])
 
 
 def test_every_event_of_a_skill_is_a_message_of_its_topic(
     mission: tuple[MissionSummary, list[LogLine]],
 ) -> None:
-    messages = [(topic, m) for topic, _, m, _ in read(written(mission)) if topic.startswith("/skill/")]
+    messages = [(topic, m) for topic, _, m, _ in read(encode(mission)) if topic.startswith("/skill/")]
     events = [line for line in mission[1] if "skill" in line]
     assert [(topic, m["event"], m["number"]) for topic, m in messages] == [
         (f"/skill/{line['skill']}", line["event"], line["number"]) for line in events
     ]
-    asked = messages_on("/skill/ask", written(mission))
+    asked = messages_on("/skill/ask", encode(mission))
     assert asked[0]["arguments"] == {"person": "ann", "question": "Tea?", "options": ["No", "Yes"]}
     assert [m.get("result") for m in asked] == [None, "Yes"]
 
 
-def test_every_message_is_as_its_schema_says(mission: tuple[MissionSummary, list[LogLine]]) -> None:
+def test_every_message_fits_its_schema(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     topics = {}
-    for topic, schema, message, _ in read(written(mission)):
-        assert fits(message, schema), (topic, message)
+    for topic, schema, message, _ in read(encode(mission)):
+        assert is_valid(message, schema), (topic, message)
         topics[topic] = schema["properties"]
     asked = topics["/skill/ask"]["arguments"]["properties"]
     assert asked["options"] == {"type": "array", "items": {"type": "string"}}
@@ -124,8 +124,7 @@ def test_log_lines_have_a_level_and_the_line_of_the_program(
     mission: tuple[MissionSummary, list[LogLine]],
 ) -> None:
     found = [
-        (m["level"], m["file"], m["line"], m["message"])
-        for m in messages_on("/mission/log", written(mission))
+        (m["level"], m["file"], m["line"], m["message"]) for m in messages_on("/mission/log", encode(mission))
     ]
     assert (LEVELS["INFO"], "", 0, "a word") in found
     assert (LEVELS["INFO"], "program.py", 2, 'drives to "kitchen"') in found
@@ -133,7 +132,7 @@ def test_log_lines_have_a_level_and_the_line_of_the_program(
 
 
 def test_pose_and_frame_follow_the_robot_on_its_map(mission: tuple[MissionSummary, list[LogLine]]) -> None:
-    data = written(mission)
+    data = encode(mission)
     poses = messages_on("/robot/pose", data)
     places = [(p["pose"]["position"]["x"], p["pose"]["position"]["y"]) for p in poses]
     assert (places[0], places[-1]) == (HALL.stand_at, KITCHEN.stand_at)
@@ -158,7 +157,7 @@ def test_robot_without_a_map_has_the_poses_that_it_reports(
         }
         for x, y in ((1, 1), (1, 1), (1, 4))
     ]
-    data = written((mission[0], lines))
+    data = encode((mission[0], lines))
     poses = [m["pose"] for m in messages_on("/robot/pose", data)]
     assert [p["position"] for p in poses] == [{"x": 1.0, "y": 1.0, "z": 0.0}, {"x": 1.0, "y": 4.0, "z": 0.0}]
     quarter_turn = {"x": 0.0, "y": 0.0, "z": pytest.approx(0.5**0.5), "w": pytest.approx(0.5**0.5)}
@@ -167,7 +166,7 @@ def test_robot_without_a_map_has_the_poses_that_it_reports(
 
 
 def test_rooms_are_outlines_with_names(mission: tuple[MissionSummary, list[LogLine]]) -> None:
-    (update,) = messages_on("/rooms", written(mission))
+    (update,) = messages_on("/rooms", encode(mission))
     entities = {entity["id"]: entity for entity in update["entities"]}
     assert {(entity["frame_id"], entity["texts"][0]["text"]) for entity in entities.values()} == {
         ("map", "hall"),
@@ -180,7 +179,7 @@ def test_rooms_are_outlines_with_names(mission: tuple[MissionSummary, list[LogLi
 def test_foxglove_knows_every_field_of_its_messages(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     json_format = pytest.importorskip("google.protobuf.json_format", reason="of a package for tests")
     seen = set()
-    for schema, _, message in make_reader(io.BytesIO(written(mission))).iter_messages():
+    for schema, _, message in make_reader(io.BytesIO(encode(mission))).iter_messages():
         assert schema is not None
         if schema.name.startswith("foxglove."):
             name = schema.name.removeprefix("foxglove.")
@@ -191,7 +190,7 @@ def test_foxglove_knows_every_field_of_its_messages(mission: tuple[MissionSummar
 
 
 def with_protobuf_times(value: object) -> object:
-    """The same message, with times as protobuf writes them in JSON."""
+    """Return the message with times as protobuf writes them in JSON."""
     if isinstance(value, list):
         return [*map(with_protobuf_times, value)]
     if not isinstance(value, dict):
@@ -199,16 +198,16 @@ def with_protobuf_times(value: object) -> object:
     if value.keys() == {"sec", "nsec"}:
         seconds, nanoseconds = value["sec"], value["nsec"]
         moment = f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{nanoseconds:09}Z"
-        return moment if seconds else f"{seconds}.{nanoseconds:09}s"  # only durations begin at 0
+        return moment if seconds else f"{seconds}.{nanoseconds:09}s"  # Only durations have 0 seconds.
     return {name: with_protobuf_times(one) for name, one in value.items()}
 
 
 def test_messages_are_timed_by_either_clock(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     summary, events = mission
     began = round(summary.created * 1e9)
-    wall = [time for topic, *_, time in read(written(mission, "wall")) if topic.startswith("/skill/")]
+    wall = [time for topic, *_, time in read(encode(mission, "wall")) if topic.startswith("/skill/")]
     robot = [
-        time - began for topic, *_, time in read(written(mission, "robot")) if topic.startswith("/skill/")
+        time - began for topic, *_, time in read(encode(mission, "robot")) if topic.startswith("/skill/")
     ]
     skills = [line for line in events if "skill" in line]
     assert wall == [round(line["time"] * 1e9) for line in skills]
@@ -217,7 +216,7 @@ def test_messages_are_timed_by_either_clock(mission: tuple[MissionSummary, list[
 
 
 def test_program_and_instruction_are_in_the_file(mission: tuple[MissionSummary, list[LogLine]]) -> None:
-    reader = make_reader(io.BytesIO(written(mission)))
+    reader = make_reader(io.BytesIO(encode(mission)))
     (program,) = reader.iter_attachments()
     assert (program.name, program.media_type, program.data.decode()) == (
         "program.py",
@@ -230,7 +229,7 @@ def test_program_and_instruction_are_in_the_file(mission: tuple[MissionSummary, 
 
 
 def events_of_skill(skill: str, *calls: tuple[dict[str, object], object]) -> list[LogLine]:
-    """The events of calls of a skill, each with its arguments and its result."""
+    """Make the events of calls of a skill, each with its arguments and its result."""
     lines: list[LogLine] = []
     for number, (arguments, result) in enumerate(calls, 1):
         which: LogLine = {"time": float(number), "clock": 0.0, "number": number, "skill": skill}
@@ -241,7 +240,7 @@ def events_of_skill(skill: str, *calls: tuple[dict[str, object], object]) -> lis
 
 def test_own_skills_keep_names_arguments_and_results(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     given = {"event": "party", "coats": 2, "colours": ["red", "blue"], "is_wet": True, "text": "hi"}
-    data = written((mission[0], events_of_skill("paint", (given, [0.5, 1]))))
+    data = encode((mission[0], events_of_skill("paint", (given, [0.5, 1]))))
     called, ended = messages_on("/skill/paint", data)
     assert (called["event"], called["arguments"]) == ("skill", given)
     assert (ended["event"], ended["result"]) == ("result", [0.5, 1])
@@ -259,9 +258,9 @@ def test_own_skills_keep_names_arguments_and_results(mission: tuple[MissionSumma
 def test_values_without_a_common_type_are_texts(mission: tuple[MissionSummary, list[LogLine]]) -> None:
     calls: list[tuple[dict[str, object], object]]
     calls = [({"to": "door", "at": 1}, math.inf), ({"to": 3, "at": 0.5}, 2.5), ({"to": [], "at": 2}, None)]
-    data = written((mission[0], events_of_skill("turn", *calls)))
+    data = encode((mission[0], events_of_skill("turn", *calls)))
     for _, schema, message, _ in read(data):
-        assert fits(message, schema)
+        assert is_valid(message, schema)
     messages = messages_on("/skill/turn", data)
     assert [m["arguments"] for m in messages if "arguments" in m] == [
         {"to": "door", "at": 1},
@@ -273,34 +272,32 @@ def test_values_without_a_common_type_are_texts(mission: tuple[MissionSummary, l
 
 
 def test_any_text_and_any_time_can_be_written(mission: tuple[MissionSummary, list[LogLine]]) -> None:
-    odd = replace(mission[0], instruction="go \udcff there", reason="\ud800", program="say('\ud800')")
+    summary = replace(mission[0], instruction="go \udcff there", reason="\ud800", program="say('\ud800')")
     line: LogLine = {"time": 1.0, "clock": 1e300, "event": "log", "text": "\ud800"}
-    ((topic, _, message, time),) = read(written((odd, [line]), "robot"))
+    ((topic, _, message, time),) = read(encode((summary, [line]), "robot"))
     assert (topic, message["message"]) == ("/mission/log", "\\ud800")
     assert time < 2**63
-    (about,) = make_reader(io.BytesIO(written((odd, [line])))).iter_metadata()
+    (about,) = make_reader(io.BytesIO(encode((summary, [line])))).iter_metadata()
     assert about.metadata["instruction"] == "go \\udcff there"
 
 
-def test_link_and_pipe_stay_what_they_are(
-    mission: tuple[MissionSummary, list[LogLine]], tmp_path: Path
-) -> None:
+def test_export_keeps_links_and_pipes(mission: tuple[MissionSummary, list[LogLine]], tmp_path: Path) -> None:
     link, pipe = tmp_path / "link.mcap", tmp_path / "pipe"
     link.symlink_to("mission.mcap")
     export_mcap(link, *mission, "wall")
     assert link.is_symlink()
-    assert (tmp_path / "mission.mcap").read_bytes() == written(mission)
+    assert (tmp_path / "mission.mcap").read_bytes() == encode(mission)
     os.mkfifo(pipe)
     with ThreadPoolExecutor(1) as reader:
         got = reader.submit(pipe.read_bytes)
         export_mcap(pipe, *mission, "wall")
-        assert got.result(30) == written(mission)
+        assert got.result(30) == encode(mission)
     assert pipe.is_fifo()
     read, write = os.pipe()
     export_mcap(Path(f"/dev/fd/{write}"), *mission, "wall")
     os.close(write)
     with os.fdopen(read, "rb") as output:
-        assert output.read() == written(mission)
+        assert output.read() == encode(mission)
 
 
 def test_file_is_written_whole_or_not_at_all(
@@ -308,7 +305,7 @@ def test_file_is_written_whole_or_not_at_all(
 ) -> None:
     path = tmp_path / "mission.mcap"
     export_mcap(path, *mission, "wall")
-    assert path.read_bytes() == written(mission)
+    assert path.read_bytes() == encode(mission)
     before = path.read_bytes()
     with pytest.raises(KeyError):
         export_mcap(path, mission[0], [{"event": "state"}], "wall")

@@ -1,4 +1,4 @@
-"""Missions: their states, what they write, and that a stop ends what the robot does, whatever goes on."""
+"""Missions go through their states, log every event, and end at once when they are stopped."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.simulator import ledger
 from codebotler.simulator.pool import SHARED_POOL
 from codebotler.simulator.worker import Worker
-from doubles import Answering, giving, raising
+from doubles import FakeRobot, fail_with, replay
 from processes import are_gone, children_of
 
 HELLO = "def task_program():\n    say('hello')\n    say('bye')\n"
@@ -57,24 +57,26 @@ def home(tmp_path: Path) -> Path:
     return tmp_path / "home"
 
 
-def ready(home: Path, program: str = HELLO, told: Callable[[LogLine], None] = lambda _: None) -> Mission:
-    """A mission that is approved."""
-    mission = Mission(home, "answering", on_event=told)
+def prepare(
+    home: Path, program: str = HELLO, on_event: Callable[[LogLine], None] = lambda _: None
+) -> Mission:
+    """Make a mission and approve it."""
+    mission = Mission(home, "answering", on_event=on_event)
     mission.draft(program)
     mission.check([])
     mission.approve()
     return mission
 
 
-def done(home: Path, robot: Robot, program: str = HELLO) -> Mission:
-    """A mission that has ended."""
-    with Reservation(robot, home) as reserved, ready(home, program) as mission:
+def run_to_end(home: Path, robot: Robot, program: str = HELLO) -> Mission:
+    """Run a mission to its end."""
+    with Reservation(robot, home) as reserved, prepare(home, program) as mission:
         mission.run(reserved)
     return mission
 
 
 def kinds(mission: Mission) -> list[str]:
-    """What its events tell, in order: a state by its name."""
+    """List the kinds of a mission's events; a state counts by its name."""
     return [
         line["state"] if line["event"] == "state" else line["event"] for line in read_events(mission.folder)
     ]
@@ -84,8 +86,8 @@ def kinds(mission: Mission) -> list[str]:
 
 
 def test_mission_goes_through_its_states_and_writes_all_that_happens(home: Path) -> None:
-    robot = Answering()
-    mission = done(home, robot)
+    robot = FakeRobot()
+    mission = run_to_end(home, robot)
     before = ["drafting", "drafting", "checked", "approved", "running"]
     said = ["skill", "feedback", "result"]
     assert kinds(mission) == [*before, *said, *said, "done"]
@@ -97,17 +99,17 @@ def test_mission_goes_through_its_states_and_writes_all_that_happens(home: Path)
     assert [event.text for event in mission.trace] == ["hello", "bye"]
 
 
-def test_each_event_is_on_the_disk_before_it_is_told(home: Path) -> None:
-    told: list[int] = []
+def test_each_event_is_on_the_disk_before_a_listener_hears_it(home: Path) -> None:
+    calls: list[int] = []
 
     def count(line: LogLine) -> None:
         assert read_events(home / "missions" / mission.id)[-1] == json.loads(json.dumps(line))
-        told.append(1)
+        calls.append(1)
 
-    with Reservation(Answering(), home) as reserved, ready(home) as mission:
+    with Reservation(FakeRobot(), home) as reserved, prepare(home) as mission:
         mission.on_event = count
         mission.run(reserved)
-    assert len(told) == 8
+    assert len(calls) == 8
 
 
 STEP: dict[str, Callable[[Mission, Reservation], object]] = {
@@ -134,7 +136,7 @@ STEP: dict[str, Callable[[Mission, Reservation], object]] = {
     ],
 )
 def test_illegal_steps_are_refused_with_a_sentence(home: Path, before: list[str], refused: list[str]) -> None:
-    with Reservation(Answering(), home) as reserved, Mission(home, "answering") as mission:
+    with Reservation(FakeRobot(), home) as reserved, Mission(home, "answering") as mission:
         for step in before:
             STEP[step](mission, reserved)
         state, events = mission.state, read_events(mission.folder)
@@ -148,8 +150,8 @@ def test_illegal_steps_are_refused_with_a_sentence(home: Path, before: list[str]
 def test_running_mission_can_only_be_stopped(home: Path) -> None:
     with (
         Reservation(Simulated(WORLD), home) as reserved,
-        ready(home) as mission,
-        running(mission, reserved, until="skill"),
+        prepare(home) as mission,
+        run_in_thread(mission, reserved, until="skill"),
     ):
         for step in ("draft", "check", "approve", "fail", "run"):
             with pytest.raises(MissionError, match="is running"):
@@ -158,7 +160,7 @@ def test_running_mission_can_only_be_stopped(home: Path) -> None:
     assert mission.state is MissionState.STOPPED
 
 
-def test_program_with_problems_needs_a_word_about_them(home: Path) -> None:
+def test_program_with_problems_needs_explicit_approval(home: Path) -> None:
     with Mission(home, "answering") as mission:
         mission.draft(HELLO)
         mission.check(["line 2: there is nobody"])
@@ -177,7 +179,7 @@ def test_program_with_problems_needs_a_word_about_them(home: Path) -> None:
         (ValueError("odd"), "failed", "odd"),
     ],
 )
-def test_mission_that_is_left_has_ended(
+def test_leaving_the_context_ends_the_mission(
     home: Path, error: BaseException | None, state: str, reason: str
 ) -> None:
     mission = Mission(home, "answering")
@@ -190,7 +192,7 @@ def test_mission_that_is_left_has_ended(
     assert re.fullmatch(reason, summary.reason)
 
 
-def test_every_state_but_the_ends_has_a_way_out() -> None:
+def test_every_state_but_final_ones_has_a_successor() -> None:
     ends = set(MissionState) - set(NEXT_STATES)
     assert ends == {MissionState.DONE, MissionState.FAILED, MissionState.STOPPED, MissionState.INTERRUPTED}
     assert all(NEXT_STATES.values())
@@ -202,20 +204,20 @@ def test_every_state_but_the_ends_has_a_way_out() -> None:
 @pytest.mark.parametrize(
     ("program", "answer", "reason", "line"),
     [
-        ("def task_program(:\n", giving(), "SyntaxError", 1),
-        ("def task_program():\n    say(helo)\n", giving(), "NameError", 2),
-        (HELLO, raising(RobotError("SayMute", "it is mute")), "SayMute: it is mute", 2),
-        (HELLO, raising(RobotLostError("its server died")), "the robot was lost: its server died", None),
-        (HELLO, raising(ValueError("odd")), "ValueError: odd", None),
-        (HELLO, giving("Hi"), "the robot was lost: .* say .*'Hi'", None),
-        ("def task_program():\n    while True: pass\n", giving(), "TimeoutError", 2),
+        ("def task_program(:\n", replay(), "SyntaxError", 1),
+        ("def task_program():\n    say(helo)\n", replay(), "NameError", 2),
+        (HELLO, fail_with(RobotError("SayMute", "it is mute")), "SayMute: it is mute", 2),
+        (HELLO, fail_with(RobotLostError("its server died")), "the robot was lost: its server died", None),
+        (HELLO, fail_with(ValueError("odd")), "ValueError: odd", None),
+        (HELLO, replay("Hi"), "the robot was lost: .* say .*'Hi'", None),
+        ("def task_program():\n    while True: pass\n", replay(), "TimeoutError", 2),
     ],
 )
 def test_mission_that_fails_says_why(
     home: Path, program: str, answer: Callable[[str, str], RobotResult], reason: str, line: int | None
 ) -> None:
-    robot = Answering(answer)
-    mission = done(home, robot, program)
+    robot = FakeRobot(answer)
+    mission = run_to_end(home, robot, program)
     summary = MissionSummary.read(mission.folder)
     assert (summary.state, summary.line) == ("failed", line)
     assert re.match(reason, summary.reason)
@@ -224,35 +226,35 @@ def test_mission_that_fails_says_why(
 
 
 def test_robot_does_not_go_on_when_the_mission_fails_from_within(home: Path) -> None:
-    robot = Answering(raising(ValueError("odd")))
-    done(home, robot)
+    robot = FakeRobot(fail_with(ValueError("odd")))
+    run_to_end(home, robot)
     assert robot.cancels == 1
 
 
-def test_program_can_catch_what_the_robot_cannot_do(home: Path) -> None:
+def test_program_can_catch_an_error_of_the_robot(home: Path) -> None:
     program = "def task_program():\n    try: go_to('moon')\n    except Exception as e: say(str(e))\n"
     robot = Simulated(WORLD, speed=None)
-    mission = done(home, robot, program)
+    mission = run_to_end(home, robot, program)
     assert mission.state is MissionState.DONE
     said, error = (event.text for event in mission.trace)
     assert said == "moon"
     assert '"moon"' in error
 
 
-# --- the stop
+# --- stop
 
 
 @contextmanager
-def running(mission: Mission, reserved: Reservation, until: str) -> Iterator[None]:
-    """Run a mission on another thread; go on when an event has happened, and wait for the end on leaving."""
+def run_in_thread(mission: Mission, reserved: Reservation, until: str) -> Iterator[None]:
+    """Run a mission on another thread; enter after an event, and wait for the end on leaving."""
     happened = threading.Event()
     thread = threading.Thread(target=mission.run, args=(reserved,))
 
-    def told(line: LogLine) -> None:
+    def hear(line: LogLine) -> None:
         if line["event"] == until:
             happened.set()
 
-    mission.on_event = told
+    mission.on_event = hear
     thread.start()
     assert happened.wait(30)
     yield
@@ -275,10 +277,10 @@ def running(mission: Mission, reserved: Reservation, until: str) -> Iterator[Non
         ),
     ],
 )
-def test_stop_ends_whatever_goes_on(home: Path, program: str, until: str) -> None:
+def test_stop_ends_every_activity(home: Path, program: str, until: str) -> None:
     before = children_of(os.getpid())
-    with Reservation(Simulated(WORLD), home) as reserved, ready(home, program) as mission:
-        with running(mission, reserved, until):
+    with Reservation(Simulated(WORLD), home) as reserved, prepare(home, program) as mission:
+        with run_in_thread(mission, reserved, until):
             began = time.monotonic()
             mission.stop("the test")
         assert time.monotonic() - began < 5
@@ -289,26 +291,26 @@ def test_stop_ends_whatever_goes_on(home: Path, program: str, until: str) -> Non
     assert are_gone(children_of(os.getpid()) - before)
 
 
-def test_order_of_a_stop_is_that_the_robot_is_told_first(home: Path) -> None:
-    """Nothing slow, such as a terminal that takes no more, may come between."""
+def test_stop_cancels_the_robot_before_anything_else(home: Path) -> None:
+    """A slow listener, like a blocked terminal, must not delay the robot's stop."""
     order: list[str] = []
     may_go_on, blocked = threading.Event(), threading.Event()
 
-    class Telling(Answering):
+    class RecordingRobot(FakeRobot):
         def cancel(self) -> None:
             super().cancel()
             order.append("robot")
 
-    def told(line: LogLine) -> None:
+    def hear(line: LogLine) -> None:
         if line["event"] == "skill":
             blocked.set()
             assert may_go_on.wait(30)
         if line["event"] == "stop":
             order.append("written")
 
-    robot = Telling()
-    with Reservation(robot, home) as reserved, ready(home) as mission, ThreadPoolExecutor(2) as threads:
-        mission.on_event = told
+    robot = RecordingRobot()
+    with Reservation(robot, home) as reserved, prepare(home) as mission, ThreadPoolExecutor(2) as threads:
+        mission.on_event = hear
         running = threads.submit(mission.run, reserved)
         assert blocked.wait(30)
         stopping = threads.submit(mission.stop)
@@ -323,19 +325,19 @@ def test_order_of_a_stop_is_that_the_robot_is_told_first(home: Path) -> None:
     assert robot.done == []
 
 
-def test_stop_is_written_even_if_the_robot_has_ended_before_it_is_back(home: Path) -> None:
-    asked, told, has_ended = threading.Event(), threading.Event(), threading.Event()
+def test_stop_is_logged_even_if_the_mission_ends_before_cancel_returns(home: Path) -> None:
+    asked, is_cancelled, has_ended = threading.Event(), threading.Event(), threading.Event()
 
-    class Slow(Answering):
+    class Slow(FakeRobot):
         def cancel(self) -> None:
             super().cancel()
-            if not told.is_set():
-                told.set()
+            if not is_cancelled.is_set():
+                is_cancelled.set()
                 assert has_ended.wait(30)
 
     def answer(_skill: str, _first: str) -> RobotResult:
         asked.set()
-        assert told.wait(30)
+        assert is_cancelled.wait(30)
         return None
 
     def hear(line: LogLine) -> None:
@@ -344,7 +346,7 @@ def test_stop_is_written_even_if_the_robot_has_ended_before_it_is_back(home: Pat
 
     with (
         Reservation(Slow(answer), home) as reserved,
-        ready(home) as mission,
+        prepare(home) as mission,
         ThreadPoolExecutor(1) as threads,
     ):
         mission.on_event = hear
@@ -370,11 +372,11 @@ def test_robot_that_answers_after_a_stop_starts_nothing_more(home: Path, result:
             raise result
         return None
 
-    robot = Answering(answer)
+    robot = FakeRobot(answer)
     with (
         Reservation(robot, home) as reserved,
-        ready(home) as mission,
-        running(mission, reserved, "skill"),
+        prepare(home) as mission,
+        run_in_thread(mission, reserved, "skill"),
     ):
         assert asked.wait(30)
         mission.stop()
@@ -384,7 +386,7 @@ def test_robot_that_answers_after_a_stop_starts_nothing_more(home: Path, result:
     assert kinds(mission).count("skill") == 1
 
 
-def test_robot_that_does_not_confirm_a_stop_is_told_of(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unconfirmed_stop_fails_the_mission(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "STOP_GRACE_SECONDS", 0.3)
     asked, may_answer = threading.Event(), threading.Event()
 
@@ -393,36 +395,34 @@ def test_robot_that_does_not_confirm_a_stop_is_told_of(home: Path, monkeypatch: 
         may_answer.wait(60)
         return None
 
-    robot = Answering(never)
-    with Reservation(robot, home) as reserved, ready(home) as mission:
-        with running(mission, reserved, "skill"):
+    robot = FakeRobot(never)
+    with Reservation(robot, home) as reserved, prepare(home) as mission:
+        with run_in_thread(mission, reserved, "skill"):
             assert asked.wait(30)
             mission.stop()
         summary = MissionSummary.read(mission.folder)
         assert (summary.state, summary.reason) == ("failed", UNCONFIRMED_STOP)
         assert mission.stuck is not None
     before = read_events(mission.folder)
-    told: list[LogLine] = []
-    mission.on_event = told.append
+    late_lines: list[LogLine] = []
+    mission.on_event = late_lines.append
     may_answer.set()
     threads = [thread for thread in threading.enumerate() if thread.name == mission.id]
     for thread in threads:
         thread.join(30)
     assert threads
     assert mission.stuck in threads
-    assert read_events(mission.folder) == before, "what comes after the end is not written"
-    assert told == [], "nor told"
+    assert read_events(mission.folder) == before, "nothing is logged after the end"
+    assert late_lines == [], "listeners hear nothing after the end"
     assert robot.done == ["hello"]
 
 
 @pytest.mark.slow
-def test_robot_that_cannot_even_be_told_to_stop_is_told_of(
-    home: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_robot_whose_cancel_blocks_fails_the_mission(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "STOP_GRACE_SECONDS", 0.3)
     may_go_on = threading.Event()
 
-    class Blocked(Answering):
+    class Blocked(FakeRobot):
         def cancel(self) -> None:
             may_go_on.wait(60)
 
@@ -432,10 +432,10 @@ def test_robot_that_cannot_even_be_told_to_stop_is_told_of(
 
     with (
         Reservation(Blocked(answer), home) as reserved,
-        ready(home) as mission,
+        prepare(home) as mission,
         ThreadPoolExecutor(1) as threads,
     ):
-        with running(mission, reserved, "skill"):
+        with run_in_thread(mission, reserved, "skill"):
             stopping = threads.submit(mission.stop)
         assert (mission.summary.state, mission.summary.reason) == ("failed", UNCONFIRMED_STOP)
         may_go_on.set()
@@ -443,22 +443,22 @@ def test_robot_that_cannot_even_be_told_to_stop_is_told_of(
 
 
 @pytest.mark.slow
-def test_skill_without_an_end_goes_on_until_the_stop(home: Path) -> None:
+def test_endless_skill_runs_until_the_stop(home: Path) -> None:
     program = "def task_program(): go_to('kitchen')"
     with (
         Reservation(Simulated(WORLD, speed=1e-6), home) as reserved,
-        ready(home, program) as mission,
-        running(mission, reserved, until="skill"),
+        prepare(home, program) as mission,
+        run_in_thread(mission, reserved, until="skill"),
     ):
         mission.stop()
     assert kinds(mission)[-1] == "stopped"
     assert "cancelled" in kinds(mission)
 
 
-def test_stop_may_come_again(home: Path) -> None:
+def test_second_stop_cancels_again_and_keeps_the_first_reason(home: Path) -> None:
     asked = threading.Event()
 
-    class Slow(Answering):
+    class Slow(FakeRobot):
         def cancel(self) -> None:
             super().cancel()
             if self.cancels > 1:
@@ -469,8 +469,8 @@ def test_stop_may_come_again(home: Path) -> None:
         return None
 
     robot = Slow(answer)
-    with Reservation(robot, home) as reserved, ready(home) as mission:
-        with running(mission, reserved, "skill"):
+    with Reservation(robot, home) as reserved, prepare(home) as mission:
+        with run_in_thread(mission, reserved, "skill"):
             mission.stop("one")
             mission.stop("two")
         assert mission.summary.reason == "stopped by one"
@@ -478,24 +478,24 @@ def test_stop_may_come_again(home: Path) -> None:
 
 
 @pytest.mark.slow
-def test_stop_is_written_even_where_its_end_comes_first(home: Path) -> None:
+def test_stop_is_logged_even_if_the_mission_ends_first(home: Path) -> None:
     class Quick(Simulated):
         def cancel(self) -> None:
             super().cancel()
             if threading.current_thread() is threading.main_thread():
                 assert mission._is_over.wait(30)
 
-    with Reservation(Quick(WORLD), home) as reserved, ready(home, STUBBORN) as mission:
-        with running(mission, reserved, "feedback"):
+    with Reservation(Quick(WORLD), home) as reserved, prepare(home, STUBBORN) as mission:
+        with run_in_thread(mission, reserved, "feedback"):
             mission.stop("the test")
         assert kinds(mission)[-5:] == ["feedback", "cancelled", "stop", "stopping", "stopped"]
 
 
 @pytest.mark.filterwarnings(
     "ignore::pytest.PytestUnhandledThreadExceptionWarning"
-)  # the robot's, on its thread
-def test_robot_that_breaks_at_a_stop_is_told_of(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Breaks(Answering):
+)  # The robot raises on its own thread.
+def test_error_in_cancel_counts_as_an_unconfirmed_stop(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Breaks(FakeRobot):
         def cancel(self) -> None:
             raise TypeError("no such motor")
 
@@ -508,23 +508,21 @@ def test_robot_that_breaks_at_a_stop_is_told_of(home: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(module, "STOP_GRACE_SECONDS", 0.3)
     may_answer = threading.Event()
-    with Reservation(Breaks(never), home) as reserved, ready(home) as mission:
-        with running(mission, reserved, "skill"), pytest.raises(TypeError, match="no such motor"):
+    with Reservation(Breaks(never), home) as reserved, prepare(home) as mission:
+        with run_in_thread(mission, reserved, "skill"), pytest.raises(TypeError, match="no such motor"):
             mission.stop()
         assert mission.summary.reason == UNCONFIRMED_STOP
 
 
-def test_stop_before_it_runs_ends_it(home: Path) -> None:
-    with Reservation(Answering(), home) as reserved, ready(home) as mission:
+def test_stop_before_the_run_ends_the_mission(home: Path) -> None:
+    with Reservation(FakeRobot(), home) as reserved, prepare(home) as mission:
         mission.stop("the test")
         with pytest.raises(MissionError, match="is stopped"):
             mission.run(reserved)
     assert "by the test before it ran" in mission.summary.reason
 
 
-def test_stop_just_before_the_program_begins_lets_it_not_begin(
-    home: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_stop_just_before_the_program_prevents_its_start(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[str] = []
 
     class Slow(Worker):
@@ -537,7 +535,7 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
             return super().run_live(source, robot)
 
     monkeypatch.setattr(module, "Worker", Slow)
-    with Reservation(Answering(), home) as reserved, ready(home) as mission:
+    with Reservation(FakeRobot(), home) as reserved, prepare(home) as mission:
         assert mission.run(reserved) is MissionState.STOPPED
     assert begun == []
     assert "by the test" in mission.summary.reason
@@ -546,7 +544,7 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
 @pytest.mark.slow
 def test_stop_at_any_moment_ends_as_stopped(home: Path) -> None:
     for number in range(8):
-        with Reservation(Answering(), home) as reserved, ready(home, STUBBORN) as mission:
+        with Reservation(FakeRobot(), home) as reserved, prepare(home, STUBBORN) as mission:
             threading.Timer(0.25 * number, mission.stop).start()
             state = MissionState.STOPPED
             while mission.state is MissionState.APPROVED:
@@ -567,7 +565,7 @@ def test_interrupted_run_stops_the_robot(home: Path, monkeypatch: pytest.MonkeyP
             raise KeyboardInterrupt
 
     driving = threading.Event()
-    with Reservation(robot, home) as reserved, ready(home, STUBBORN) as mission:
+    with Reservation(robot, home) as reserved, prepare(home, STUBBORN) as mission:
         mission.on_event = lambda line: driving.set() if line["event"] == "feedback" else None
         monkeypatch.setattr(mission.stop_button, "ended", Interrupted())
         with pytest.raises(KeyboardInterrupt):
@@ -579,8 +577,8 @@ def test_interrupted_run_stops_the_robot(home: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_events_that_cannot_be_written_stop_the_robot(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = Answering()
-    with Reservation(robot, home) as reserved, ready(home) as mission:
+    robot = FakeRobot()
+    with Reservation(robot, home) as reserved, prepare(home) as mission:
         real = os.write
 
         def full(file: int, data: bytes) -> int:
@@ -599,20 +597,20 @@ def test_events_that_cannot_be_written_stop_the_robot(home: Path, monkeypatch: p
     assert left.state == "interrupted"
 
 
-def test_what_watches_may_break_and_the_robot_stops(home: Path) -> None:
-    def told(line: LogLine) -> None:
+def test_failing_listener_stops_the_robot(home: Path) -> None:
+    def hear(line: LogLine) -> None:
         if line["event"] == "result":
             raise BrokenPipeError
 
-    robot = Answering()
-    with Reservation(robot, home) as reserved, ready(home) as mission:
-        mission.on_event = told
+    robot = FakeRobot()
+    with Reservation(robot, home) as reserved, prepare(home) as mission:
+        mission.on_event = hear
         mission.run(reserved)
     assert mission.state is MissionState.FAILED
     assert robot.done == ["hello"]
 
 
-def test_missions_of_one_second_have_names_of_their_own(home: Path) -> None:
+def test_missions_of_the_same_second_have_different_names(home: Path) -> None:
     with Mission(home, "a") as one, Mission(home, "b") as two, Mission(home, "c") as three:
         ids = [one.id, two.id, three.id]
     assert len(set(ids)) == 3
@@ -625,13 +623,13 @@ LONG_NAME = f"20260101-000000-{'1' * 400}"
 
 
 @pytest.mark.parametrize("name", ["", "..", "../..", "20260101-000000", LONG_NAME, "/", "last"])
-def test_mission_that_is_not_there_is_said_so(home: Path, name: str) -> None:
+def test_unknown_mission_is_refused(home: Path, name: str) -> None:
     (home / "missions").mkdir(parents=True)
     with pytest.raises(UserError, match=f'"{name}"' if name else "no mission"):
         find_mission(home, name)
 
 
-def test_summary_is_written_whole_or_not(home: Path) -> None:
+def test_summary_is_written_whole_or_not_at_all(home: Path) -> None:
     with Mission(home, "a") as mission:
         before = (mission.folder / SUMMARY_FILE).read_text()
         (mission.folder / f"{SUMMARY_FILE}.new").mkdir()
@@ -647,9 +645,9 @@ def test_summary_is_written_whole_or_not(home: Path) -> None:
 def test_robot_is_on_one_mission_at_a_time(home: Path) -> None:
     with (
         Reservation(Simulated(WORLD), home) as reserved,
-        ready(home) as one,
-        ready(home) as two,
-        running(one, reserved, until="skill"),
+        prepare(home) as one,
+        prepare(home) as two,
+        run_in_thread(one, reserved, until="skill"),
     ):
         with pytest.raises(NotReadyError, match="already run a mission"):
             two.run(reserved)
@@ -663,18 +661,18 @@ def test_robot_is_on_one_mission_at_a_time(home: Path) -> None:
 
 
 def test_robots_at_other_addresses_do_not_exclude_each_other(home: Path) -> None:
-    one, two = Answering(), Answering()
+    one, two = FakeRobot(), FakeRobot()
     one.address, two.address = "http://here:11311/", "http://there:11311/"
     with Reservation(one, home), Reservation(two, home):
         assert not (home / "robots").exists()
 
 
 def test_robot_that_cannot_be_connected_is_not_reserved(home: Path) -> None:
-    class Missing(Answering):
+    class Missing(FakeRobot):
         def connect(self) -> None:
             raise NotReadyError("no master")
 
-    class Half(Answering):
+    class Half(FakeRobot):
         def connect(self) -> None:
             super().connect()
             raise NotReadyError("no master")
@@ -684,13 +682,13 @@ def test_robot_that_cannot_be_connected_is_not_reserved(home: Path) -> None:
     half = Half()
     with pytest.raises(NotReadyError, match="no master"):
         Reservation(half, home).__enter__()
-    assert half.connections == 0, "what it has opened is closed"
-    with Reservation(Answering(), home):
+    assert half.connections == 0, "its open connection is closed"
+    with Reservation(FakeRobot(), home):
         pass
 
 
 @pytest.fixture(autouse=True)
-def no_threads_are_left() -> Iterator[None]:
+def join_threads() -> Iterator[None]:
     yield
     checking = () if SHARED_POOL.pool is None else SHARED_POOL.pool._threads._threads
     for thread in threading.enumerate():

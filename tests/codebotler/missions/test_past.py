@@ -1,4 +1,4 @@
-"""What a mission did is read from its log, and another mission does the rest, without doing it again."""
+"""A mission continues from the log of one that ended early, and repeats no step."""
 
 from __future__ import annotations
 
@@ -51,12 +51,12 @@ def task_program():
 YES_NO = (Option("yes"), Option("no"))
 
 
-def failed(home: Path, program: str) -> Path:
+def fail(home: Path, program: str) -> Path:
     return failed_mission(home, program, WORLD)
 
 
-def test_a_log_tells_what_was_done_and_where(tmp_path: Path) -> None:
-    past = read_past(failed(tmp_path, BRING), SKILLS)
+def test_past_lists_steps_with_their_places_and_answers(tmp_path: Path) -> None:
+    past = read_past(fail(tmp_path, BRING), SKILLS)
     done = [(one.kind, one.text, one.place, one.answer) for one in past.trace]
     assert done == [
         ("goto", "kitchen", "hall", None),
@@ -73,8 +73,10 @@ def test_a_log_tells_what_was_done_and_where(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("skill", "held"), [("pick", "mug"), ("say", "mug"), ("place", "")])
-def test_a_step_without_a_result_is_unsure_until_a_person_says(tmp_path: Path, skill: str, held: str) -> None:
-    folder = failed(tmp_path, BRING)
+def test_a_step_without_a_result_is_unsure_until_a_person_answers(
+    tmp_path: Path, skill: str, held: str
+) -> None:
+    folder = fail(tmp_path, BRING)
     cut(folder, line_of(folder, skill, "skill"))
     past = read_past(folder, SKILLS)
     assert past.unsure is not None
@@ -89,14 +91,14 @@ def test_a_step_without_a_result_is_unsure_until_a_person_says(tmp_path: Path, s
 
 @pytest.mark.parametrize("skill", ["go_to", "pick"])
 def test_a_drive_is_never_unsure_nor_is_a_step_with_a_result(tmp_path: Path, skill: str) -> None:
-    folder = failed(tmp_path, BRING)
+    folder = fail(tmp_path, BRING)
     cut(folder, line_of(folder, skill, "skill" if skill == "go_to" else "result"))
     assert read_past(folder, SKILLS).unsure is None
 
 
 def test_a_failed_step_was_not_done(tmp_path: Path) -> None:
     program = 'def task_program():\n    pick("moon")\n'
-    past = read_past(failed(tmp_path, program), SKILLS)
+    past = read_past(fail(tmp_path, program), SKILLS)
     ((tried,), unsure) = past.trace, past.unsure
     assert (tried.kind, tried.failed, unsure, past.place) == ("pick", "PickInvalidObject", None, "hall")
     assert (past.held, past.done, len(past.steps)) == ("", [], 1)
@@ -116,8 +118,8 @@ def test_a_mission_that_is_done_has_no_rest(tmp_path: Path) -> None:
         read_past(mission.folder, SKILLS)
 
 
-def test_a_continuation_that_never_ran_leaves_the_past_as_it_was(tmp_path: Path) -> None:
-    past = read_past(failed(tmp_path, BRING), SKILLS)
+def test_a_continuation_that_never_ran_leaves_the_past_unchanged(tmp_path: Path) -> None:
+    past = read_past(fail(tmp_path, BRING), SKILLS)
     with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
         mission.continue_from(past)
         mission.fail("the model is away")
@@ -133,7 +135,7 @@ def test_a_continuation_that_never_ran_leaves_the_past_as_it_was(tmp_path: Path)
 
 
 def test_a_rest_that_did_not_run_leaves_the_question_open(tmp_path: Path) -> None:
-    folder = failed(tmp_path, BRING)
+    folder = fail(tmp_path, BRING)
     cut(folder, line_of(folder, "pick", "skill"))
     past = read_past(folder, SKILLS).resolve(happened=True)
     with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
@@ -143,8 +145,8 @@ def test_a_rest_that_did_not_run_leaves_the_question_open(tmp_path: Path) -> Non
     assert read_past(mission.folder, SKILLS).unsure is not None
 
 
-def test_a_persons_word_is_kept_through_all_rests(tmp_path: Path) -> None:
-    folder = failed(tmp_path, BRING)
+def test_a_persons_testimony_is_kept_through_all_continuations(tmp_path: Path) -> None:
+    folder = fail(tmp_path, BRING)
     cut(folder, line_of(folder, "pick", "skill"))
     past = read_past(folder, SKILLS).resolve(happened=True)
     with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
@@ -160,24 +162,24 @@ def test_a_persons_word_is_kept_through_all_rests(tmp_path: Path) -> None:
     assert second.testimony.startswith(f"{past.testimony}; ")
 
 
-def test_where_nothing_was_tried_the_program_is_still_the_rest(tmp_path: Path) -> None:
-    folder = failed(tmp_path, BRING)
+def test_mission_that_tried_nothing_may_repeat_its_program(tmp_path: Path) -> None:
+    folder = fail(tmp_path, BRING)
     assert read_past(folder, SKILLS).has_failed
-    cut(folder, line_of(folder, "go_to", "skill"))  # the drive has begun, and may be repeated
+    cut(folder, line_of(folder, "go_to", "skill"))  # A drive may be repeated.
     assert read_past(folder, SKILLS).is_untouched
-    folder = failed(tmp_path, "def task_program():\n    undefined()\n")
-    assert not read_past(folder, SKILLS).is_untouched  # it would fail again
+    folder = fail(tmp_path, "def task_program():\n    undefined()\n")
+    assert not read_past(folder, SKILLS).is_untouched  # It would fail again.
 
 
-def test_a_mission_without_a_program_is_begun_again_instead(tmp_path: Path) -> None:
+def test_mission_without_a_program_cannot_be_continued(tmp_path: Path) -> None:
     with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
         mission.fail("the model is away")
     with pytest.raises(UserError):
         read_past(mission.folder, SKILLS)
 
 
-def test_the_rest_begins_after_what_earlier_missions_did(tmp_path: Path) -> None:
-    past = read_past(failed(tmp_path, BRING), SKILLS)
+def test_the_rest_begins_after_the_steps_of_earlier_missions(tmp_path: Path) -> None:
+    past = read_past(fail(tmp_path, BRING), SKILLS)
     with Mission(tmp_path, "simulated") as mission:
         mission.continue_from(past)
         mission.draft("def task_program():\n    say('a')\n    go_to('nowhere')\n")
@@ -193,8 +195,8 @@ def test_the_rest_begins_after_what_earlier_missions_did(tmp_path: Path) -> None
     assert read_past(other.folder, SKILLS).before == again.before
 
 
-def test_the_simulated_robot_is_where_it_was(tmp_path: Path) -> None:
-    folder = failed(tmp_path, BRING)
+def test_simulated_robot_resumes_where_it_was(tmp_path: Path) -> None:
+    folder = fail(tmp_path, BRING)
     cut(folder, line_of(folder, "ask", "result"))
     robot = Simulated(WORLD, speed=None)
     robot.connect()
@@ -204,11 +206,11 @@ def test_the_simulated_robot_is_where_it_was(tmp_path: Path) -> None:
     assert robot.perform("is_in_room", ["mug"])
 
 
-# --- what the rest must not do
+# --- steps that the rest must not repeat
 
 
-def rest(*lines: str, past: tuple[Event, ...], begun: str = BRING) -> set[str]:
-    """The kinds of problems of a program for the rest."""
+def check_rest(*lines: str, past: tuple[Event, ...], begun: str = BRING) -> set[str]:
+    """Return the kinds of problems of a program for the rest."""
     program = "def task_program():\n    " + "\n    ".join(lines) + "\n"
     room_map = RoomMap(ROOMS.rooms, "lab", plain=True, past=past)
     found = check(program, room_map=room_map, pool=shared_pool())
@@ -229,14 +231,14 @@ HELD = Event(PICK, "mug", place="kitchen")
         (["go_to('hall')", "say('There is no mug in room 3.')"], set()),
     ],
 )
-def test_what_was_said_is_not_said_again(lines: list[str], problems: set[str]) -> None:
-    assert rest(*lines, past=(SAID,)) == problems
+def test_rest_must_not_repeat_a_statement(lines: list[str], problems: set[str]) -> None:
+    assert check_rest(*lines, past=(SAID,)) == problems
 
 
-def test_a_long_past_is_not_compared_for_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_comparison_with_a_long_past_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("codebotler.checking.repetition.MAX_COMPARED_PAIRS", 3)
-    assert rest("say('a')", "say('b')", past=(SAID, replace(SAID, text="c"))) == {"LongPast"}
-    assert rest("say('a')", past=(SAID, replace(SAID, text="c"))) == set()
+    assert check_rest("say('a')", "say('b')", past=(SAID, replace(SAID, text="c"))) == {"LongPast"}
+    assert check_rest("say('a')", past=(SAID, replace(SAID, text="c"))) == set()
 
 
 @pytest.mark.parametrize(
@@ -247,19 +249,21 @@ def test_a_long_past_is_not_compared_for_minutes(monkeypatch: pytest.MonkeyPatch
         (["pick('plate')"], {"PickWhileHolding"}),
     ],
 )
-def test_what_is_held_is_not_forgotten(lines: list[str], problems: set[str]) -> None:
-    assert rest(*lines, past=(HELD,)) == problems
+def test_rest_must_put_down_the_held_thing(lines: list[str], problems: set[str]) -> None:
+    assert check_rest(*lines, past=(HELD,)) == problems
 
 
 def test_a_thing_may_stay_in_hand_if_the_program_never_put_it_down() -> None:
-    assert rest("say('Here.')", past=(HELD,), begun='def task_program():\n    pick("mug")\n') == set()
+    assert check_rest("say('Here.')", past=(HELD,), begun='def task_program():\n    pick("mug")\n') == set()
 
 
-# --- what the program would still have done
+# --- steps that the program had left
 
 
-def test_a_long_rest_is_not_compared_for_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("codebotler.checking.repetition.MAX_COMPARED_PAIRS", 2)  # one is done, two remain
+def test_comparison_with_a_long_rest_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "codebotler.checking.repetition.MAX_COMPARED_PAIRS", 2
+    )  # One step is done, two remain.
     assert follow(POLL, "def task_program():\n    say('Bye.')\n", WENT, ASKED) == {"LongPast"}
 
 
@@ -284,7 +288,7 @@ MISSED = Event(CHECK, "Anne", found=False, place="lab")
 
 
 def follow(begun: str, rest: str, *past: Event, first: int = 0) -> set[str]:
-    """The kinds of problems of a program for the rest, compared with what remained."""
+    """Return the kinds of problems of a program for the rest, given the steps that remained."""
     room_map = replace(ROOMS, start="lab", past=past)
     found = check(rest, room_map=room_map, pool=shared_pool())
     left = remaining_outcomes(begun, room_map, SKILLS, first=first)
@@ -297,18 +301,20 @@ def poll(times: int, question: str = "Is it hot?") -> str:
 
 @pytest.mark.parametrize("question", ["Is it hot?", "Would you say that it is hot outside?"])
 @pytest.mark.parametrize(("times", "problems"), [(1, set()), (2, {"RepeatedStep"}), (3, {"RepeatedStep"})])
-def test_as_many_steps_may_follow_as_remained(times: int, question: str, problems: set[str]) -> None:
+def test_rest_may_take_as_many_steps_as_remained(times: int, question: str, problems: set[str]) -> None:
     assert follow(POLL, poll(times, question), WENT, ASKED, ASKED) == problems
 
 
 def test_steps_of_earlier_missions_do_not_count_as_this_programs() -> None:
     said = Event(SAY, "I begin.", place="hall")
-    assert follow(POLL, poll(1), said, WENT, ASKED, ASKED) == {"RepeatedStep"}, "it does not say that first"
+    assert follow(POLL, poll(1), said, WENT, ASKED, ASKED) == {"RepeatedStep"}, (
+        "the program does not say that first"
+    )
     assert follow(POLL, poll(1), said, WENT, ASKED, ASKED, first=1) == set()
 
 
 @pytest.mark.slow
-def test_what_was_not_there_may_be_waited_for() -> None:
+def test_rest_may_wait_for_a_missing_person() -> None:
     rest = WAIT.replace("Hello", "Good morning")
     assert follow(WAIT, rest, WENT, MISSED) == set()
     assert follow(POLL, rest, WENT, MISSED) == {"TimeoutError"}
@@ -326,7 +332,7 @@ REFUSED = Event(ASK, "Do you want tea?", YES_NO, "no", place="lab", to="Anne")
 
 
 @pytest.mark.slow
-def test_what_has_no_end_has_no_number() -> None:
+def test_endless_loop_sets_no_limit_on_steps() -> None:
     assert follow(VISIT, VISIT.replace("Do you want tea?", "May I bring you a cup?"), WENT, REFUSED) == set()
 
 
@@ -343,13 +349,13 @@ REPORT = "def task_program():\n    for room in ROOMS:\n        say(f'There is no
         ("No stapler today.", set()),
     ],
 )
-def test_a_text_is_compared_with_what_remained_to_be_said(text: str, problems: set[str]) -> None:
+def test_statement_is_compared_with_the_remaining_statements(text: str, problems: set[str]) -> None:
     begun = REPORT.replace("ROOMS", "['the red room', 'the blue room']")
     said = Event(SAY, "There is no stapler in the red room today.", place="lab")
     assert follow(begun, f"def task_program():\n    say({text!r})\n", said) == problems
 
 
-def test_the_past_repeats_where_the_robot_was() -> None:
+def test_replay_of_the_past_knows_where_the_robot_was() -> None:
     room_map = replace(ROOMS, start="lab", past=(WENT, replace(REFUSED, answer="yes")))
     left = remaining_outcomes(VISIT, room_map, SKILLS)
     assert {tuple((event.kind, event.text) for event in one.trace) for one in left} == {((GOTO, "hall"),)}
@@ -371,8 +377,8 @@ def task_program():
     assert texts == {("lab",)}
 
 
-def test_a_session_compares_the_rest_with_what_remained(tmp_path: Path) -> None:
-    mission = failed(tmp_path, BRING).name
+def test_a_session_compares_the_rest_with_the_remaining_steps(tmp_path: Path) -> None:
+    mission = fail(tmp_path, BRING).name
     past = MissionPast(mission, "", "", POLL, "stopped", (WENT, ASKED, ASKED), "lab")
     session = MissionSession(
         Simulated(WORLD, speed=None),
@@ -389,7 +395,7 @@ def test_a_session_compares_the_rest_with_what_remained(tmp_path: Path) -> None:
 
 
 def test_a_rest_that_was_done_meanwhile_is_not_done_again(tmp_path: Path) -> None:
-    past = read_past(failed(tmp_path, BRING), SKILLS)
+    past = read_past(fail(tmp_path, BRING), SKILLS)
     rest = "def task_program():\n    say('hello')\n"
 
     def session() -> MissionSession:
@@ -411,7 +417,7 @@ def test_a_rest_that_was_done_meanwhile_is_not_done_again(tmp_path: Path) -> Non
     assert first.view.id in second.error
 
 
-def test_nothing_is_known_of_a_program_that_does_something_else() -> None:
+def test_program_that_contradicts_the_past_has_no_remaining_steps() -> None:
     room_map = replace(ROOMS, past=(SAID,))
     assert remaining_outcomes(POLL, room_map, SKILLS) == ()
     assert remaining_outcomes("def task_program():\n    pass\n", room_map, SKILLS) == ()
@@ -430,7 +436,7 @@ def test_nothing_is_known_of_a_program_that_does_something_else() -> None:
         (Event(PICK, "mug", place="lab"), Event(PICK, "mug", place="lab"), False),
     ],
 )
-def test_equal_effects(one: Event, other: Event, is_same: bool) -> None:  # noqa: FBT001 - a value of pytest
+def test_equal_effects(one: Event, other: Event, is_same: bool) -> None:  # noqa: FBT001 - pytest passes it
     assert has_same_effect(one, other, ROOMS) is is_same
 
 
@@ -452,9 +458,9 @@ def test_an_approval_covers_the_rest_of_its_contract(
     approved: int | None,
     done: int,
     wanted: int | None,
-    allows: bool,  # noqa: FBT001 - a value of pytest
+    allows: bool,  # noqa: FBT001 - pytest passes it
 ) -> None:
-    past = read_past(failed(tmp_path, BRING), SKILLS)
+    past = read_past(fail(tmp_path, BRING), SKILLS)
     object.__setattr__(past, "trace", (Event(SAY, "a", place="lab"),) * done)
     approval = PriorApproval.of(view(say=approved))
     assert approval is not None
@@ -463,14 +469,14 @@ def test_an_approval_covers_the_rest_of_its_contract(
 
 
 def test_an_order_for_the_rest_needs_an_instruction_or_a_program(tmp_path: Path) -> None:
-    past = read_past(failed(tmp_path, BRING), SKILLS)
+    past = read_past(fail(tmp_path, BRING), SKILLS)
     with pytest.raises(UserError):
         MissionOrder(past=past)
     assert MissionOrder(past.instruction, past=past).past is past
 
 
 def test_a_person_may_know_the_answer_to_an_unsure_question(tmp_path: Path) -> None:
-    folder = failed(tmp_path, BRING)
+    folder = fail(tmp_path, BRING)
     cut(folder, line_of(folder, "ask", "skill"))
     past = read_past(folder, SKILLS)
     assert past.answers == ("yes", "no")
@@ -505,16 +511,16 @@ TALKED = (
         ("say('I am looking for a zebra')", {"RepeatedStep"}),
     ],
 )
-def test_a_person_may_be_told_or_asked_about_what_went_wrong(line: str, problems: set[str]) -> None:
+def test_rest_may_report_or_ask_about_the_failure(line: str, problems: set[str]) -> None:
     assert follow(FETCH, f"def task_program():\n    {line}\n", *TALKED) == problems
 
 
 def test_a_mission_is_continued_only_once(tmp_path: Path) -> None:
-    folder = failed(tmp_path, BRING)
+    folder = fail(tmp_path, BRING)
     past = read_past(folder, SKILLS)
     mission = Mission(tmp_path, "simulated", "Bring Anne the mug.")
     mission.continue_from(past)
-    assert read_past(folder, SKILLS).trace == past.trace, "the other one has not run yet"
+    assert read_past(folder, SKILLS).trace == past.trace, "the continuation has not run yet"
     mission.draft('def task_program():\n    go_to("nowhere")\n')
     mission.check([])
     mission.approve()
@@ -536,14 +542,14 @@ def test_a_mission_is_continued_only_once(tmp_path: Path) -> None:
 
 
 def test_a_mission_of_another_robot_is_not_continued(tmp_path: Path) -> None:
-    folder = failed(tmp_path, BRING)
+    folder = fail(tmp_path, BRING)
     assert read_past(folder, SKILLS, "simulated").mission
     with pytest.raises(UserError):
         read_past(folder, SKILLS, "ros2")
 
 
 def test_a_mission_on_another_map_is_not_continued(tmp_path: Path) -> None:
-    folder = failed(tmp_path, BRING)
+    folder = fail(tmp_path, BRING)
     with closing(open_log(folder)) as log:
         add_event(log, "map", 0.0, **map_data(WORLD))
     larger = World((*WORLD.rooms, Room("attic")), "hall")

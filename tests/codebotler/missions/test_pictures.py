@@ -1,4 +1,4 @@
-"""Pictures of a mission: kept as they came, within limits, named by its events, and given to other tools."""
+"""A mission stores pictures unchanged, within limits, names them in its events, and exports them."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from codebotler.missions.storage.mcap import write_mcap
 from codebotler.missions.storage.pictures import PictureStore, read_picture
 from codebotler.robots.base import CameraPicture, Feedback, RobotArgument, RobotResult, ignore_feedback
 from codebotler.robots.reservation import Reservation
-from doubles import Answering
+from doubles import FakeRobot
 
 JPEG, PNG = b"\xff\xd8\xff and more", b"\x89PNG\r\n\x1a\n and more"
 PROGRAM = "def task_program():\n    is_in_room('mug')\n"
 
 
-class Showing(Answering):
+class CameraRobot(FakeRobot):
     """A robot that shows pictures while it looks."""
 
     def __init__(self, *pictures: bytes) -> None:
@@ -34,15 +34,15 @@ class Showing(Answering):
         self.pictures = pictures
 
     def perform(
-        self, skill: str, arguments: Sequence[RobotArgument], told: Feedback = ignore_feedback
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
         for data in self.pictures:
-            told(CameraPicture(data))
-        return super().perform(skill, arguments, told)
+            feedback(CameraPicture(data))
+        return super().perform(skill, arguments, feedback)
 
 
 def mission_with(home: Path, *pictures: bytes) -> tuple[Mission, list[LogLine]]:
-    with Reservation(Showing(*pictures), home) as reserved, Mission(home, "showing") as mission:
+    with Reservation(CameraRobot(*pictures), home) as reserved, Mission(home, "showing") as mission:
         mission.draft(PROGRAM)
         mission.check([])
         mission.approve()
@@ -50,7 +50,7 @@ def mission_with(home: Path, *pictures: bytes) -> tuple[Mission, list[LogLine]]:
     return mission, [line for line in read_events(mission.folder) if line["event"] == "picture"]
 
 
-def test_pictures_are_kept_as_they_came_and_named(tmp_path: Path) -> None:
+def test_pictures_are_stored_unchanged_and_named_in_events(tmp_path: Path) -> None:
     mission, lines = mission_with(tmp_path, JPEG, PNG, JPEG)
     names = ["pictures/1.jpg", "pictures/2.png", "pictures/3.jpg"]
     assert [line["file"] for line in lines] == names
@@ -60,7 +60,7 @@ def test_pictures_are_kept_as_they_came_and_named(tmp_path: Path) -> None:
     assert [event_text(line) for line in lines] == [f"picture: {name}" for name in names]
 
 
-def test_what_is_not_kept_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_events_say_which_pictures_were_not_stored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MAX_STORED_PICTURE_BYTES", 20)
     monkeypatch.setattr(module, "MAX_MISSION_PICTURE_BYTES", 2 * len(JPEG))
     mission, lines = mission_with(tmp_path, b"<svg onload=alert(1)>", b"", JPEG + b"!" * 20, JPEG, JPEG, JPEG)
@@ -87,13 +87,13 @@ def test_picture_that_cannot_be_written_stops_the_robot(
     assert (mission.state, "No space left on device" in mission.summary.reason) == (MissionState.FAILED, True)
 
 
-def test_picture_goes_to_whoever_takes_notes() -> None:
+def test_listener_receives_the_picture() -> None:
     notes: list[tuple[str, object]] = []
 
     def note(event: str, /, **data: object) -> None:
         notes.append((event, data.get("picture")))
 
-    live = LiveRobot(Showing(JPEG), note)
+    live = LiveRobot(CameraRobot(JPEG), note)
     assert live.perform("is_in_room", ["mug"]) is True
     assert ("picture", JPEG) in notes
 
@@ -102,7 +102,7 @@ def test_picture_goes_to_whoever_takes_notes() -> None:
     "name",
     ["../secret.jpg", "pictures/../../secret.jpg", "/etc/passwd", "pictures/1.jpg\n", "pictures/9.jpg", 7],
 )
-def test_name_that_leads_elsewhere_is_no_picture(tmp_path: Path, name: object) -> None:
+def test_file_outside_the_pictures_folder_is_not_read(tmp_path: Path, name: object) -> None:
     mission, (line,) = mission_with(tmp_path, JPEG)
     (tmp_path / "secret.jpg").write_bytes(JPEG)
     assert read_picture(mission.folder, line) == ("jpg", JPEG)

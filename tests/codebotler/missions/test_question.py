@@ -19,7 +19,7 @@ from codebotler.missions.mission import MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.storage.log import MissionState, MissionSummary, read_events
 from codebotler.robots.simulated import Simulated
-from doubles import Several
+from doubles import FakeModel
 
 HOUSE = World((Room("hall"), Room("kitchen", ("mug",))), "hall")
 STAY = 'def task_program():\n    say("hello")\n'
@@ -29,10 +29,10 @@ FETCH = 'def task_program():\n    go_to("kitchen")\n    pick("mug")\n    go_to("
 
 
 @contextmanager
-def asking(
+def start_session(
     home: Path, *programs: str, asks: bool = True, name: str = "several"
-) -> Iterator[tuple[MissionSession, Several]]:
-    model = Several(programs)
+) -> Iterator[tuple[MissionSession, FakeModel]]:
+    model = FakeModel(programs)
     session = MissionSession(
         Simulated(HOUSE, speed=None),
         home,
@@ -47,7 +47,7 @@ def asking(
         session.join(10)
 
 
-def waited(session: MissionSession) -> SessionView:
+def wait_for_person(session: MissionSession) -> SessionView:
     return session.wait_until(
         lambda view: view.waits_for_answer or view.may_be_approved or view.waits_for_program
     )
@@ -62,14 +62,14 @@ def notes(home: Path, view: SessionView) -> list[str]:
 def test_a_person_chooses_and_the_mission_keeps_the_answer(
     tmp_path: Path, answer: ClarifyingAnswer, program: str
 ) -> None:
-    with asking(tmp_path, STAY, FETCH, STAY) as (session, _):
-        view = waited(session)
+    with start_session(tmp_path, STAY, FETCH, STAY) as (session, _):
+        view = wait_for_person(session)
         assert view.phase == "question"
         assert view.question is not None
         assert [option.size for option in view.question.options] == [2, 1]
         difference = view.question.chosen(answer)
         session.answer(session.view.question, answer)
-        view = waited(session)
+        view = wait_for_person(session)
         assert (view.program, view.question, view.author) == (program, None, "several")
         assert view.may_be_approved
         assert difference is not None
@@ -78,8 +78,8 @@ def test_a_person_chooses_and_the_mission_keeps_the_answer(
 
 
 def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_path: Path) -> None:
-    with asking(tmp_path, STAY, FETCH) as (session, model):
-        question = waited(session).question
+    with start_session(tmp_path, STAY, FETCH) as (session, model):
+        question = wait_for_person(session).question
         assert question is not None
         assert not question.why_last
         model.programs = [CARRY, GO]
@@ -96,16 +96,16 @@ def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_pa
         assert summary.instruction == "Do it. But quietly."
 
 
-def test_what_a_person_did_not_mean_is_not_taken_again(tmp_path: Path) -> None:
-    with asking(tmp_path, STAY, FETCH, STAY) as (session, model):
-        waited(session)
+def test_rejected_behaviour_is_not_taken_again(tmp_path: Path) -> None:
+    with start_session(tmp_path, STAY, FETCH, STAY) as (session, model):
+        wait_for_person(session)
         model.programs = [FETCH, GO, STAY]
         session.answer(session.view.question, "none", "But quietly.")
         view = session.wait_until(lambda view: view.may_be_approved)
         assert view.program == GO
         assert "2 would do what was not meant" in view.remarks[-1]
-    with asking(tmp_path, STAY, FETCH) as (session, _):
-        waited(session)
+    with start_session(tmp_path, STAY, FETCH) as (session, _):
+        wait_for_person(session)
         session.answer(session.view.question, "none", "But quietly.")
         view = session.wait_until(lambda _: False)
         assert (view.state, view.program) == (MissionState.FAILED, "")
@@ -113,8 +113,8 @@ def test_what_a_person_did_not_mean_is_not_taken_again(tmp_path: Path) -> None:
 
 
 def test_a_recorded_model_is_not_asked_again(tmp_path: Path) -> None:
-    with asking(tmp_path, STAY, FETCH, name="recorded:several") as (session, model):
-        question = waited(session).question
+    with start_session(tmp_path, STAY, FETCH, name="recorded:several") as (session, model):
+        question = wait_for_person(session).question
         assert question is not None
         session.answer(session.view.question, "none", "But quietly.")
         view = session.wait_until(lambda now: now.state is MissionState.FAILED or now.waits_for_answer)
@@ -124,17 +124,17 @@ def test_a_recorded_model_is_not_asked_again(tmp_path: Path) -> None:
 
 
 def test_nobody_is_asked_if_all_do_the_same_or_nobody_can_answer(tmp_path: Path) -> None:
-    with asking(tmp_path, STAY, STAY) as (session, _):
-        assert waited(session).program == STAY
-    with asking(tmp_path, FETCH, STAY, STAY, asks=False) as (session, _):
-        view = waited(session)
+    with start_session(tmp_path, STAY, STAY) as (session, _):
+        assert wait_for_person(session).program == STAY
+    with start_session(tmp_path, FETCH, STAY, STAY, asks=False) as (session, _):
+        view = wait_for_person(session)
         assert view.program == STAY
         assert view.remarks
 
 
 def test_wrong_answers_are_refused(tmp_path: Path) -> None:
-    with asking(tmp_path, STAY, FETCH) as (session, _):
-        waited(session)
+    with start_session(tmp_path, STAY, FETCH) as (session, _):
+        wait_for_person(session)
         with pytest.raises(MissionError):
             session.answer(session.view.question, 2)
         with pytest.raises(MissionError):
@@ -146,8 +146,8 @@ def test_wrong_answers_are_refused(tmp_path: Path) -> None:
 
 
 def test_an_answer_to_an_earlier_question_is_refused(tmp_path: Path) -> None:
-    with asking(tmp_path, STAY, FETCH) as (session, model):
-        first = waited(session).question
+    with start_session(tmp_path, STAY, FETCH) as (session, model):
+        first = wait_for_person(session).question
         model.programs = [CARRY, GO]
         session.answer(first, "none", "But quietly.")
         session.wait_until(lambda now: now.waits_for_answer)
@@ -157,32 +157,32 @@ def test_an_answer_to_an_earlier_question_is_refused(tmp_path: Path) -> None:
 
 
 def test_an_edit_takes_the_place_of_the_question(tmp_path: Path) -> None:
-    with asking(tmp_path, STAY, FETCH) as (session, _):
-        waited(session)
+    with start_session(tmp_path, STAY, FETCH) as (session, _):
+        wait_for_person(session)
         session.edit(GO)
         view = session.wait_until(lambda now: now.may_be_approved)
         assert (view.program, view.question) == (GO, None)
 
 
 def test_a_stop_ends_the_question(tmp_path: Path) -> None:
-    with asking(tmp_path, STAY, FETCH) as (session, _):
-        waited(session)
+    with start_session(tmp_path, STAY, FETCH) as (session, _):
+        wait_for_person(session)
         session.stop("the test")
         assert session.wait_until(lambda _: False).state is MissionState.STOPPED
 
 
 def test_replies_without_a_program_do_not_count(tmp_path: Path) -> None:
-    with asking(tmp_path, "", GO) as (session, _):
-        assert waited(session).program == GO
-    with asking(tmp_path, "", "") as (session, _):
-        assert waited(session).waits_for_program
+    with start_session(tmp_path, "", GO) as (session, _):
+        assert wait_for_person(session).program == GO
+    with start_session(tmp_path, "", "") as (session, _):
+        assert wait_for_person(session).waits_for_program
 
 
 def test_an_old_program_cannot_be_approved_while_a_question_waits(tmp_path: Path) -> None:
-    with asking(tmp_path, STAY, FETCH) as (session, _):
-        waited(session)
+    with start_session(tmp_path, STAY, FETCH) as (session, _):
+        wait_for_person(session)
         session.answer(session.view.question, 0)
-        waited(session)
+        wait_for_person(session)
         session.ask_again(repair=False)
         view = session.wait_until(lambda now: now.waits_for_answer)
         assert view.state is MissionState.CHECKED
@@ -200,15 +200,15 @@ def test_an_edit_while_programs_are_compared_takes_the_place_of_the_question(
         return compare_candidates(*given)
 
     monkeypatch.setattr("codebotler.missions.session.compare_candidates", slow)
-    with asking(tmp_path, STAY, FETCH) as (session, _):
+    with start_session(tmp_path, STAY, FETCH) as (session, _):
         assert begun.wait(10)
         session.edit(GO)
         go_on.set()
-        view = waited(session)
+        view = wait_for_person(session)
         assert (view.program, view.question, view.author) == (GO, None, "")
 
 
-def test_an_edit_outlives_candidates_that_all_do_what_was_not_meant(
+def test_an_edit_outlives_candidates_that_repeat_a_rejected_behaviour(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun, go_on = Event(), Event()
@@ -219,8 +219,8 @@ def test_an_edit_outlives_candidates_that_all_do_what_was_not_meant(
         raise UserError("all would do again what was not meant")
 
     monkeypatch.setattr("codebotler.missions.session.compare_candidates", refuse)
-    with asking(tmp_path, STAY, FETCH) as (session, _):
+    with start_session(tmp_path, STAY, FETCH) as (session, _):
         assert begun.wait(10)
         session.edit(GO)
         go_on.set()
-        assert waited(session).program == GO
+        assert wait_for_person(session).program == GO

@@ -1,4 +1,4 @@
-"""House rules while a robot moves: what they forbid is never told to it, and the mission stops."""
+"""A mission sends the robot no call that a house rule forbids, and stops instead."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
 from codebotler.simulator.guard.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, Rule
 from codebotler.simulator.worlds.room_map import RoomMap
-from doubles import Answering
+from doubles import FakeRobot
 
 VAULT = Rule("vault", "Never go into the vault.", parse('not tr.Exists(goto("vault"))'))
 REPORT = Rule("report", "Say that it is done.", parse('tr.Exists(say("done"))'), "finally")
@@ -42,17 +42,17 @@ def task_program():
 """
 
 
-def answering(answer: Callable[[str, str], RobotResult] = lambda *_: None) -> Answering:
-    return Answering(answer)
+def robot_with(answer: Callable[[str, str], RobotResult] = lambda *_: None) -> FakeRobot:
+    return FakeRobot(answer)
 
 
-def knowing(*rooms: str) -> Answering:
-    """A robot that knows rooms, and is in the first."""
-    told: dict[str, RobotResult] = {"get_all_rooms": [*rooms], "get_current_location": rooms[0]}
-    return answering(lambda skill, _: told.get(skill))
+def robot_in(*rooms: str) -> FakeRobot:
+    """Make a robot that knows these rooms and is in the first."""
+    answers: dict[str, RobotResult] = {"get_all_rooms": [*rooms], "get_current_location": rooms[0]}
+    return robot_with(lambda skill, _: answers.get(skill))
 
 
-def ran(
+def run(
     folder: Path,
     robot: Robot,
     program: str,
@@ -71,24 +71,24 @@ def ran(
     return mission, [json.loads(line) for line in lines]
 
 
-def test_the_robot_is_not_told_what_a_rule_forbids_and_the_mission_stops(tmp_path: Path) -> None:
-    robot = answering()
-    mission, lines = ran(tmp_path, robot, STUBBORN, [VAULT])
+def test_forbidden_call_does_not_reach_the_robot_and_stops_the_mission(tmp_path: Path) -> None:
+    robot = robot_with()
+    mission, lines = run(tmp_path, robot, STUBBORN, [VAULT])
     assert (mission.state, mission.summary.reason) == (MissionState.STOPPED, "stopped by rule vault")
     assert robot.done == ["kitchen"]
     assert robot.cancels
-    (told,) = [line for line in lines if line["event"] == "rule"]
-    assert told["rule"] == "vault"
-    assert told["says"] == VAULT.says
-    assert told["formula"] == str(VAULT.formula)
-    assert (told["what"], told["prevented"], told["line"]) == (["goto", "vault"], True, 6)
+    (violation,) = [line for line in lines if line["event"] == "rule"]
+    assert violation["rule"] == "vault"
+    assert violation["says"] == VAULT.says
+    assert violation["formula"] == str(VAULT.formula)
+    assert (violation["what"], violation["prevented"], violation["line"]) == (["goto", "vault"], True, 6)
     assert mission.summary.line == 6
 
 
 def test_the_robot_is_stopped_before_anything_is_logged(tmp_path: Path) -> None:
     seen: list[str] = []
 
-    class Noting(Answering):
+    class Noting(FakeRobot):
         def cancel(self) -> None:
             super().cancel()
             seen.append("cancel")
@@ -110,18 +110,18 @@ def test_a_refusal_is_logged_and_the_program_may_go_on(tmp_path: Path) -> None:
         "def task_program():\n    try: go_to('vault')\n    except Exception as e: say(type(e).__name__)\n"
         "    go_to('kitchen')\n"
     )
-    robot = answering()
-    mission, lines = ran(tmp_path, robot, program, [refusing])
+    robot = robot_with()
+    mission, lines = run(tmp_path, robot, program, [refusing])
     assert mission.state is MissionState.DONE
     assert robot.done == ["RuleViolation", "kitchen"]
     assert [line["prevented"] for line in lines if line["event"] == "rule"] == [True]
 
 
-def test_what_an_answer_breaks_stops_the_mission_right_after_it(tmp_path: Path) -> None:
+def test_answer_that_breaks_a_rule_stops_the_mission(tmp_path: Path) -> None:
     rule = Rule("stay", "Stop where nobody is.", parse('not tr.Exists(missed("person"))'))
-    robot = answering(lambda skill, _: False if skill == "is_in_room" else None)
+    robot = robot_with(lambda skill, _: False if skill == "is_in_room" else None)
     program = "def task_program():\n    is_in_room('person')\n    say('hello?')\n"
-    mission, lines = ran(tmp_path, robot, program, [rule])
+    mission, lines = run(tmp_path, robot, program, [rule])
     assert mission.state is MissionState.STOPPED
     assert robot.done == ["person"]
     assert [line["prevented"] for line in lines if line["event"] == "rule"] == [False]
@@ -130,7 +130,7 @@ def test_what_an_answer_breaks_stops_the_mission_right_after_it(tmp_path: Path) 
 @pytest.mark.parametrize("said", ["done", "bye"])
 def test_a_rule_of_the_end_is_reported_and_changes_nothing(tmp_path: Path, said: str) -> None:
     program = f"def task_program():\n    say('{said}')\n"
-    mission, lines = ran(tmp_path, answering(), program, [REPORT])
+    mission, lines = run(tmp_path, robot_with(), program, [REPORT])
     assert mission.state is MissionState.DONE
     unkept = 'the rule "report" is not kept at the end: Say that it is done'
     assert mission.summary.reason == ("" if said == "done" else unkept)
@@ -140,21 +140,21 @@ def test_a_rule_of_the_end_is_reported_and_changes_nothing(tmp_path: Path, said:
 @pytest.mark.slow
 @pytest.mark.parametrize("request_", ["vault", "THE VAULT", "kitchen, not the vault"])
 def test_every_room_that_a_request_may_mean_counts(tmp_path: Path, request_: str) -> None:
-    robot = answering()
+    robot = robot_with()
     rule = Rule("vault", VAULT.says, parse('not tr.Exists(goto("^the vault$"))'))
     rooms = [rule] if "the vault" in request_.lower() else [VAULT]
-    mission, _ = ran(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", rooms)
+    mission, _ = run(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", rooms)
     assert mission.state is MissionState.STOPPED
     assert robot.done == []
 
 
-def test_a_room_is_the_one_where_a_request_leads(tmp_path: Path) -> None:
-    """Of two rooms of which one's name is in the other's, the exact name means that one only."""
+def test_exact_room_name_means_that_room_only(tmp_path: Path) -> None:
+    """The name of one of the two rooms contains the other's."""
     rooms = RoomMap(("hall", "room 1", "room 10"), "hall", plain=True)
     silent = Rule("ten", "Say nothing in room 10.", parse('not tr.Exists(at("room 10", say(".*")))'))
     program = "def task_program():\n    go_to('{}')\n    say('hello')\n"
     for room, state in (("room 10", MissionState.STOPPED), ("room 1", MissionState.DONE)):
-        mission, _ = ran(tmp_path / room[-2:], answering(), program.format(room), [silent], rooms)
+        mission, _ = run(tmp_path / room[-2:], robot_with(), program.format(room), [silent], rooms)
         assert mission.state is state, room
 
 
@@ -162,7 +162,7 @@ IN_LAB_2 = Rule("quiet", "Say nothing in lab 2.", parse('not tr.Exists(at("lab 2
 LABS = RoomMap(("hall", "lab", "lab 2"), "hall", plain=True)
 
 
-def told_room(room: str | None) -> str:
+def require_room(room: str | None) -> str:
     if room is None:
         raise RobotError("NoLocation", "the map is not loaded")
     return room
@@ -173,12 +173,12 @@ def told_room(room: str | None) -> str:
     ("where", "state"),
     [(None, MissionState.STOPPED), ("lab", MissionState.DONE), ("lab 2", MissionState.STOPPED)],
 )
-def test_where_a_drive_may_have_led_counts_unless_the_robot_tells(
+def test_every_possible_goal_counts_unless_the_robot_reports_its_room(
     tmp_path: Path, where: str | None, state: MissionState
 ) -> None:
-    robot = answering(lambda skill, _: told_room(where) if skill == "get_current_location" else None)
+    robot = robot_with(lambda skill, _: require_room(where) if skill == "get_current_location" else None)
     program = "def task_program():\n    go_to('the lab 2, at the window')\n    say('hello')\n"
-    mission, _ = ran(tmp_path, robot, program, [IN_LAB_2], LABS)
+    mission, _ = run(tmp_path, robot, program, [IN_LAB_2], LABS)
     assert mission.state is state
 
 
@@ -205,22 +205,22 @@ def test_robot_is_asked_once_and_only_if_a_rule_depends_on_it(tmp_path: Path, ru
         calls.append(skill)
         return "lab" if skill == "get_current_location" else None
 
-    mission, _ = ran(tmp_path, answering(answer), THREE, [rule], LABS)
+    mission, _ = run(tmp_path, robot_with(answer), THREE, [rule], LABS)
     assert mission.state is MissionState.DONE
     assert calls.count("get_current_location") == asked
 
 
 @pytest.mark.parametrize("refuse", [False, True])
-def test_mission_stops_and_says_why_if_nobody_knows_the_room(tmp_path: Path, *, refuse: bool) -> None:
+def test_mission_stops_and_says_why_if_the_room_is_unknown(tmp_path: Path, *, refuse: bool) -> None:
     calls: list[str] = []
 
     def answer(skill: str, _: str) -> RobotResult:
         calls.append(skill)
-        return told_room(None) if skill == "get_current_location" else None
+        return require_room(None) if skill == "get_current_location" else None
 
-    robot = answering(answer)
+    robot = robot_with(answer)
     rule = Rule("quiet", IN_LAB_2.says, IN_LAB_2.formula, refuse=refuse)
-    mission, lines = ran(tmp_path, robot, THREE.replace("say('one')", CAUGHT), [rule], LABS)
+    mission, lines = run(tmp_path, robot, THREE.replace("say('one')", CAUGHT), [rule], LABS)
     assert mission.state is MissionState.STOPPED
     assert calls == ["go_to", "get_current_location"]
     assert robot.cancels
@@ -238,16 +238,14 @@ CAUGHT = "try: say('one')\n    except BaseException: pass"
 
 
 @pytest.mark.parametrize("fails", [False, True], ids=["arrives", "fails"])
-def test_mission_stops_after_a_drive_if_nobody_knows_which_room_was_meant(
-    tmp_path: Path, *, fails: bool
-) -> None:
+def test_mission_stops_after_a_drive_if_its_goal_is_ambiguous(tmp_path: Path, *, fails: bool) -> None:
     def answer(skill: str, _: str) -> RobotResult:
         if fails and skill == "go_to":
             raise RobotError("GoToInvalidLocation", "the door is shut")
-        return told_room("hall" if fails else None) if skill == "get_current_location" else None
+        return require_room("hall" if fails else None) if skill == "get_current_location" else None
 
-    robot = answering(answer)
-    mission, lines = ran(tmp_path, robot, THREE, [AFTER_LAB], LABS)
+    robot = robot_with(answer)
+    mission, lines = run(tmp_path, robot, THREE, [AFTER_LAB], LABS)
     assert mission.state is MissionState.STOPPED
     assert robot.cancels
     assert [line["event"] for line in lines].count("skill") == 1
@@ -260,7 +258,7 @@ def test_failed_drive_to_one_room_needs_no_question(tmp_path: Path) -> None:
         raise RobotError("GoToInvalidLocation", f"{skill}: the door is shut")
 
     program = "def task_program():\n    try: go_to('lab')\n    except Exception: pass\n"
-    mission, _ = ran(tmp_path, answering(answer), program, [AFTER_LAB], LABS)
+    mission, _ = run(tmp_path, robot_with(answer), program, [AFTER_LAB], LABS)
     assert mission.state is MissionState.DONE
 
 
@@ -271,20 +269,20 @@ def test_room_at_the_start_is_asked_for_if_a_rule_depends_on_it(tmp_path: Path) 
         ("lab 2", MissionState.STOPPED),
         ("lab", MissionState.DONE),
     ):
-        robot = answering(lambda skill, _: told_room(where) if skill == "get_current_location" else None)  # noqa: B023 - at once
-        mission, _ = ran(tmp_path / str(where), robot, program, [IN_LAB_2], LABS, place="")
+        robot = robot_with(lambda skill, _: require_room(where) if skill == "get_current_location" else None)  # noqa: B023 - called in this round
+        mission, _ = run(tmp_path / str(where), robot, program, [IN_LAB_2], LABS, place="")
         assert mission.state is state, where
 
 
-def test_rule_of_the_end_is_not_kept_if_nobody_knows_the_room(tmp_path: Path) -> None:
+def test_rule_of_the_end_is_not_kept_if_the_room_is_unknown(tmp_path: Path) -> None:
     end = Rule("end", "Speak in the hall.", parse('not tr.Exists(at("lab", say(".*")))'), "finally")
     calls: list[str] = []
 
     def answer(skill: str, _: str) -> RobotResult:
         calls.append(skill)
-        return told_room(None) if skill == "get_current_location" else None
+        return require_room(None) if skill == "get_current_location" else None
 
-    mission, lines = ran(tmp_path, answering(answer), THREE, [end], LABS)
+    mission, lines = run(tmp_path, robot_with(answer), THREE, [end], LABS)
     assert mission.state is MissionState.DONE
     assert calls.count("get_current_location") == 1
     assert [line["rule"] for line in lines if line["event"] == "rule"] == ["end"]
@@ -296,22 +294,22 @@ def test_robot_that_lists_no_rooms_is_judged_by_the_words_of_drives(tmp_path: Pa
         mission.draft(f"def task_program():\n    go_to('{room}')\n    say('hello')\n")
         mission.check([])
         mission.approve()
-        robot = answering()
+        robot = robot_with()
         with Reservation(robot, tmp_path / room) as reserved, mission:
             mission.run(reserved, "", rules=[IN_LAB_2])
         assert mission.state is state, room
 
 
 @pytest.mark.slow
-def test_a_robot_that_tells_of_a_room_which_nobody_meant_is_there(tmp_path: Path) -> None:
+def test_room_that_the_robot_reports_counts_even_if_not_requested(tmp_path: Path) -> None:
     for request_, where in (("the lab, by the hall", "Lab 2 "), ("where the computers are", "lab 2")):
-        robot = answering(lambda skill, _: where if skill == "get_current_location" else None)  # noqa: B023 - at once
+        robot = robot_with(lambda skill, _: where if skill == "get_current_location" else None)  # noqa: B023 - called in this round
         program = f"def task_program():\n    go_to({request_!r})\n    say('hello')\n"
-        mission, _ = ran(tmp_path / where.strip(), robot, program, [IN_LAB_2], LABS)
+        mission, _ = run(tmp_path / where.strip(), robot, program, [IN_LAB_2], LABS)
         assert mission.state is MissionState.STOPPED, request_
 
 
-def test_where_a_robot_remains_does_not_tell_where_it_has_tried_to_go(tmp_path: Path) -> None:
+def test_room_after_a_failed_drive_does_not_reveal_its_goal(tmp_path: Path) -> None:
     def answer(skill: str, _: str) -> RobotResult:
         if skill == "go_to":
             raise RobotError("GoToInvalidLocation", "the door is shut")
@@ -321,18 +319,18 @@ def test_where_a_robot_remains_does_not_tell_where_it_has_tried_to_go(tmp_path: 
         "tried", "Be silent after that.", parse('not tr.OnlyAfterFirst(goto("lab")).Exists(say("."))')
     )
     program = "def task_program():\n    try: go_to('hall by the lab')\n    except Exception: say('hello')\n"
-    mission, _ = ran(tmp_path, answering(answer), program, [tried], LABS)
+    mission, _ = run(tmp_path, robot_with(answer), program, [tried], LABS)
     assert mission.state is MissionState.STOPPED
 
 
-def test_a_drive_that_failed_began_where_the_robot_was(tmp_path: Path) -> None:
+def test_failed_drive_counts_in_its_starting_room(tmp_path: Path) -> None:
     def answer(skill: str, _: str) -> RobotResult:
         raise RobotError("GoToInvalidLocation", f"{skill}: the door is shut")
 
     back = Rule("back", "Stay in lab 2.", parse('not tr.Exists(at("lab 2", goto(".*")))'))
     program = "def task_program():\n    try: go_to('lab 2')\n    except Exception: pass\n"
     for again, state in (("", MissionState.DONE), ("    go_to('hall')\n", MissionState.STOPPED)):
-        mission, _ = ran(tmp_path / state, answering(answer), program + again, [back], LABS)
+        mission, _ = run(tmp_path / state, robot_with(answer), program + again, [back], LABS)
         assert mission.state is state
 
 
@@ -352,12 +350,12 @@ def test_a_failed_attempt_of_an_own_skill_counts(tmp_path: Path) -> None:
         return None
 
     (tmp_path / "search.py").write_text(SEARCH)
-    robot = answering(answer)
+    robot = robot_with(answer)
     robot.skills = skills_from(tmp_path / "search.py")
     formula = 'not tr.OnlyAfterFirst(search_for("floor")).Exists(say("."))'
     quiet = Rule("quiet", "Be silent after a search.", parse(formula, skills=robot.skills))
     program = "def task_program():\n    try: search_for('floor')\n    except Exception: say('hello')\n"
-    mission, _ = ran(tmp_path, robot, program, [quiet])
+    mission, _ = run(tmp_path, robot, program, [quiet])
     assert mission.state is MissionState.STOPPED
 
 
@@ -397,11 +395,11 @@ def test_leaving_rule_is_enforced_before_drives_and_reported_at_the_end(
 ) -> None:
     (tmp_path / "switches.py").write_text(SWITCHES)
     where = "kitchen" if lines[0] == "go_to('kitchen')" else "hall"
-    robot = answering(lambda skill, _: where if skill == "get_current_location" else None)
+    robot = robot_with(lambda skill, _: where if skill == "get_current_location" else None)
     robot.skills = skills_from(tmp_path / "switches.py")
     off = Rule("off", "Turn off the stove.", parse('not on("stove")', skills=robot.skills), "leaving")
     program = "def task_program():\n" + "".join(f"    {line}\n" for line in lines)
-    mission, log = ran(tmp_path, robot, program, [off])
+    mission, log = run(tmp_path, robot, program, [off])
     assert mission.state is (MissionState.STOPPED if stopped else MissionState.DONE)
     assert [line["event"] for line in log].count("skill") == len(lines) - stopped
     assert [line.get("prevented") for line in log if line["event"] == "rule"] == (
@@ -436,7 +434,7 @@ def wander(sim: Simulation) -> None:
         ("wander()", 'not tr.Exists(at("hall", say(".*")))', 2),
     ],
 )
-def test_a_skill_of_a_user_that_moves_the_robot_moves_it_for_rules_too(
+def test_rules_follow_a_robot_that_own_skills_move(
     tmp_path: Path, call: str, formula: str, done: int
 ) -> None:
     (tmp_path / "own.py").write_text(OWN)
@@ -445,39 +443,39 @@ def test_a_skill_of_a_user_that_moves_the_robot_moves_it_for_rules_too(
     rule = Rule("own", "So it is.", parse(formula, skills=skills))
     rooms = RoomMap(("hall", "lab 2"), "hall")
     program = f"def task_program():\n    {call}\n    say('hello')\n"
-    mission, lines = ran(tmp_path, robot, program, [rule], rooms)
+    mission, lines = run(tmp_path, robot, program, [rule], rooms)
     assert [line["event"] for line in lines].count("skill") == done
     assert mission.state is (MissionState.DONE if done == 2 else MissionState.STOPPED)
 
 
 @pytest.mark.parametrize(("where", "state"), [(None, MissionState.STOPPED), ("hall", MissionState.DONE)])
-def test_a_robot_may_be_anywhere_between_after_a_drive_that_failed(
+def test_failed_drive_may_end_anywhere_unless_the_robot_reports_its_room(
     tmp_path: Path, where: str | None, state: MissionState
 ) -> None:
     def answer(skill: str, _: str) -> RobotResult:
         if skill == "go_to":
             raise RobotError("GoToInvalidLocation", "the door is shut")
-        return told_room(where) if skill == "get_current_location" else None
+        return require_room(where) if skill == "get_current_location" else None
 
     program = "def task_program():\n    try: go_to('lab 2')\n    except Exception: say('hello')\n"
-    mission, _ = ran(tmp_path, answering(answer), program, [IN_LAB_2], LABS)
+    mission, _ = run(tmp_path, robot_with(answer), program, [IN_LAB_2], LABS)
     assert mission.state is state
 
 
-def test_where_the_robot_starts_is_no_request(tmp_path: Path) -> None:
-    """A room whose name lies in that of the start comes first in the list."""
+def test_start_room_is_matched_exactly(tmp_path: Path) -> None:
+    """The first room of the list has a name that is part of the start's name."""
     rooms = RoomMap(("office", "bob's office"), "bob's office")
     rule = Rule("bob", "Say nothing at Bob's.", parse('not tr.Exists(at("bob\'s office", say(".*")))'))
     program = "def task_program():\n    say('hello')\n"
-    mission, _ = ran(tmp_path, answering(), program, [rule], rooms, place="bob's office")
+    mission, _ = run(tmp_path, robot_with(), program, [rule], rooms, place="bob's office")
     assert mission.state is MissionState.STOPPED
 
 
-def test_what_is_carried_counts_on_the_simulated_robot(tmp_path: Path) -> None:
+def test_carried_things_count_on_the_simulated_robot(tmp_path: Path) -> None:
     world = World((Room("hall", ("glass",)), Room("kitchen")), "hall")
     rule = Rule("glass", "No glass leaves the hall.", parse('not tr.Exists(holding("glass", goto(".*")))'))
     program = "def task_program():\n    go_to('hall')\n    pick('glass')\n    go_to('kitchen')\n"
-    mission, lines = ran(tmp_path, Simulated(world, speed=None), program, [rule])
+    mission, lines = run(tmp_path, Simulated(world, speed=None), program, [rule])
     assert mission.state is MissionState.STOPPED
     assert [line["arguments"] for line in lines if line["event"] == "skill"][-1] == {"obj": "glass"}
 
@@ -486,11 +484,11 @@ REGEXES = RoomMap(("hall", "acme inc.", "lab [0-9]"), "hall")
 
 
 @pytest.mark.parametrize("request_", ["acme inc ", " acme inc", "acme inc\t"])
-def test_the_robot_is_told_the_words_that_were_judged(tmp_path: Path, request_: str) -> None:
-    """The regex of the room needs a character at its end, which would be a space."""
-    robot = knowing("hall")
+def test_robot_receives_the_words_that_were_judged(tmp_path: Path, request_: str) -> None:
+    """The room's regex needs one more character, which could be the trailing space."""
+    robot = robot_in("hall")
     rule = Rule("acme", "Stay out.", parse('not tr.Exists(goto("acme inc[.]"))'))
-    mission, _ = ran(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", [rule], REGEXES)
+    mission, _ = run(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", [rule], REGEXES)
     assert mission.state is MissionState.DONE
     assert robot.done[0] == "acme inc"
 
@@ -507,9 +505,9 @@ def test_the_robot_is_told_the_words_that_were_judged(tmp_path: Path, request_: 
 def test_a_robot_with_its_own_planner_is_sent_the_only_listed_room(
     tmp_path: Path, request_: str, received: str
 ) -> None:
-    rooms, robot = RoomMap(("hall", "kitchen"), "hall", plain=True), knowing("hall")
+    rooms, robot = RoomMap(("hall", "kitchen"), "hall", plain=True), robot_in("hall")
     rule = Rule("acme", "Stay out.", parse('not tr.Exists(goto("acme"))'))
-    ran(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", [rule], rooms)
+    run(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", [rule], rooms)
     assert robot.done[0] == received
 
 
@@ -528,15 +526,15 @@ def test_a_room_whose_name_is_a_regex_counts_by_the_words_of_the_request_too(
     rule = Rule("lab", "Take nothing in lab 3.", parse(formula))
     program = "def task_program():\n    go_to('lab {}')\n    pick('knife')\n"
     for number, state in ((3, MissionState.STOPPED), (4, MissionState.DONE)):
-        mission, _ = ran(tmp_path / str(number), answering(), program.format(number), [rule], REGEXES)
+        mission, _ = run(tmp_path / str(number), robot_with(), program.format(number), [rule], REGEXES)
         assert mission.state is state
 
 
 def test_an_answer_is_judged_as_the_option_that_it_means(tmp_path: Path) -> None:
     rule = Rule("no", "Stop at a no.", parse('not tr.Exists(answered("^no$"))'))
-    robot = answering(lambda skill, _: "\tNo\n" if skill == "ask" else None)
+    robot = robot_with(lambda skill, _: "\tNo\n" if skill == "ask" else None)
     program = "def task_program():\n    say(ask('ann', 'Tea?', ['yes', 'no']))\n"
-    mission, _ = ran(tmp_path, robot, program, [rule])
+    mission, _ = run(tmp_path, robot, program, [rule])
     assert mission.state is MissionState.STOPPED
     assert robot.done == ["ann"]
 
@@ -545,7 +543,7 @@ def test_an_answer_is_judged_as_the_option_that_it_means(tmp_path: Path) -> None
 def test_rules_hold_in_a_building_of_more_rooms_than_a_check_takes(tmp_path: Path) -> None:
     rooms = RoomMap(("hall", *(f"room {number}" for number in range(1_500)), "vault"), "hall", plain=True)
     rule = Rule("vault", VAULT.says, parse('not tr.Exists(goto("^vault$"))'))
-    robot = knowing(*rooms.rooms)
+    robot = robot_in(*rooms.rooms)
     program = "def task_program():\n    go_to('into the vault')\n"
     session = MissionSession(
         robot,
@@ -564,7 +562,7 @@ def test_rules_hold_in_a_building_of_more_rooms_than_a_check_takes(tmp_path: Pat
 
 def test_a_rule_that_was_switched_off_is_in_force_for_another_program(tmp_path: Path) -> None:
     session = MissionSession(
-        knowing("hall", "vault"),
+        robot_in("hall", "vault"),
         tmp_path,
         MissionOrder(program=STUBBORN),
         open_model=recorded,
@@ -577,7 +575,7 @@ def test_a_rule_that_was_switched_off_is_in_force_for_another_program(tmp_path: 
             session.switch_off("vault", reason)
     session.switch_off("vault", "the door is broken")
     assert session.wait_until(lambda now: now.may_be_approved).rules_in_force == ()
-    with pytest.raises(MissionError, match="other rules"):  # by somebody who saw it in force
+    with pytest.raises(MissionError, match="other rules"):  # This approval saw it in force.
         session.approve(session.view.digest, despite_problems=True, disabled_rules=())
     session.edit("def task_program():\n    go_to('vault')\n")
     assert session.wait_until(lambda now: now.may_be_approved).rules_in_force == (VAULT,)
@@ -590,7 +588,7 @@ def test_a_rule_stays_switched_off_if_no_other_program_comes(tmp_path: Path) -> 
         raise ModelError("the model is not there", may_pass=False)
 
     order = MissionOrder("Go to the vault.", "refuses", STUBBORN)
-    session = MissionSession(knowing("hall", "vault"), tmp_path, order, open_model=refuses, rules=(VAULT,))
+    session = MissionSession(robot_in("hall", "vault"), tmp_path, order, open_model=refuses, rules=(VAULT,))
     session.start()
     session.wait_until(lambda now: now.may_be_approved)
     session.switch_off("vault", "the door is broken")
@@ -602,9 +600,9 @@ def test_a_rule_stays_switched_off_if_no_other_program_comes(tmp_path: Path) -> 
     session.join(10)
 
 
-def test_a_rule_that_was_switched_off_is_in_force_for_what_a_model_writes_next(tmp_path: Path) -> None:
+def test_a_rule_that_was_switched_off_is_in_force_for_a_models_next_program(tmp_path: Path) -> None:
     order = MissionOrder(next(iter(recorded("recorded").replies)), "recorded")
-    session = MissionSession(knowing("hall", "vault"), tmp_path, order, open_model=recorded, rules=(VAULT,))
+    session = MissionSession(robot_in("hall", "vault"), tmp_path, order, open_model=recorded, rules=(VAULT,))
     session.start()
     session.wait_until(lambda now: now.may_be_approved)
     session.switch_off("vault", "the door is broken")

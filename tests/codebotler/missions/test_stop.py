@@ -1,4 +1,4 @@
-"""The stop button: the robot is stopped first, whatever else there is to end."""
+"""The stop button cancels the robot first, and then calls its listeners."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from codebotler.missions.stop import StopButton
-from doubles import Answering
+from doubles import FakeRobot
 
 
-class Recording(Answering):
-    """A robot that lists when it is cancelled."""
+class RecordingRobot(FakeRobot):
+    """A robot that records when it is cancelled."""
 
     def __init__(self, order: list[str]) -> None:
         super().__init__()
@@ -25,7 +25,7 @@ class Recording(Answering):
 
 def test_robot_is_cancelled_before_listeners_and_the_newest_comes_first() -> None:
     order: list[str] = []
-    button = StopButton(Recording(order))
+    button = StopButton(RecordingRobot(order))
     button.on_press(lambda: order.append("log"))
     button.on_press(lambda: order.append("program"))
     button.press("a test")
@@ -34,7 +34,7 @@ def test_robot_is_cancelled_before_listeners_and_the_newest_comes_first() -> Non
 
 
 def test_first_press_counts_and_each_reaches_the_robot() -> None:
-    robot = Answering()
+    robot = FakeRobot()
     button = StopButton(robot)
     button.press("one")
     button.press("two")
@@ -42,13 +42,13 @@ def test_first_press_counts_and_each_reaches_the_robot() -> None:
     assert 0 <= button.seconds < 60
 
 
-def test_listener_that_fails_keeps_no_other_from_being_called() -> None:
+def test_failing_listener_does_not_prevent_the_others() -> None:
     called: list[str] = []
 
     def fail() -> None:
         raise OSError(28, "No space left on device")
 
-    button = StopButton(Answering())
+    button = StopButton(FakeRobot())
     button.on_press(lambda: called.append("first"))
     button.on_press(fail)
     with pytest.raises(OSError, match="No space"):
@@ -56,8 +56,8 @@ def test_listener_that_fails_keeps_no_other_from_being_called() -> None:
     assert called == ["first"]
 
 
-def test_robot_that_cannot_be_cancelled_keeps_no_listener_from_being_called() -> None:
-    class Breaks(Answering):
+def test_error_in_cancel_does_not_prevent_the_listeners() -> None:
+    class Breaks(FakeRobot):
         def cancel(self) -> None:
             raise TypeError("no such motor")
 
@@ -73,7 +73,7 @@ def test_robot_that_cannot_be_cancelled_keeps_no_listener_from_being_called() ->
 def test_nothing_starts_while_the_robot_is_still_being_cancelled() -> None:
     may_go_on, is_asked = threading.Event(), threading.Event()
 
-    class Slow(Answering):
+    class Slow(FakeRobot):
         def cancel(self) -> None:
             is_asked.set()
             assert may_go_on.wait(30)
@@ -89,7 +89,7 @@ def test_nothing_starts_while_the_robot_is_still_being_cancelled() -> None:
 
 
 def test_robot_that_is_connected_after_the_press_is_cancelled_at_once() -> None:
-    robot, button = Answering(), StopButton()
+    robot, button = FakeRobot(), StopButton()
     button.press("a test")
     button.attach(robot)
     assert robot.cancels == 1
@@ -97,7 +97,7 @@ def test_robot_that_is_connected_after_the_press_is_cancelled_at_once() -> None:
 
 def test_listener_that_comes_after_the_press_is_called_at_once() -> None:
     called: list[str] = []
-    button = StopButton(Answering())
+    button = StopButton(FakeRobot())
     button.press("a test")
     button.on_press(lambda: called.append("late"))
     assert called == ["late"]
@@ -105,7 +105,7 @@ def test_listener_that_comes_after_the_press_is_called_at_once() -> None:
 
 def test_robot_alone_can_be_cancelled_without_a_press() -> None:
     called: list[str] = []
-    robot = Answering()
+    robot = FakeRobot()
     button = StopButton(robot)
     button.on_press(lambda: called.append("log"))
     button.cancel_robot()

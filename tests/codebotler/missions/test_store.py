@@ -1,4 +1,4 @@
-"""Missions on the disk: what a tool that died left behind is closed by the next; torn lines are dropped."""
+"""Missions on the disk: the next tool closes those of a tool that died, and torn lines are dropped."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ from codebotler.missions.storage.store import (
 IF_TOOL_DIES = "its worker cancelled the goal"
 
 
-def left(home: Path, state: MissionState, *events: dict[str, object], torn: str = "") -> Path:
-    """The folder of a mission that nobody has open."""
+def leave(home: Path, state: MissionState, *events: dict[str, object], torn: str = "") -> Path:
+    """Leave the folder of a mission that no tool has open."""
     folder = home / "missions" / "20260102-030405"
     folder.mkdir(parents=True)
     summary = MissionSummary(folder.name, state, "ros1", 1_000.0, if_tool_dies=IF_TOOL_DIES)
@@ -55,7 +55,7 @@ AT: dict[str, object] = {"event": "feedback", "number": 1, "skill": "go_to", "te
 THERE: dict[str, object] = {"event": "result", "number": 1, "skill": "go_to", "result": None}
 
 
-def test_the_rest_of_a_mission_is_what_ran_last() -> None:
+def test_last_continuation_that_ran_is_the_rest_of_a_mission() -> None:
     def one(name: str, continues: str = "", dies: str = IF_TOOL_DIES) -> MissionSummary:
         return MissionSummary(
             name, MissionState.DONE, "simulated", 1.0, continues=continues, if_tool_dies=dies
@@ -67,7 +67,7 @@ def test_the_rest_of_a_mission_is_what_ran_last() -> None:
     ]
     circle = rests_in([one("1", "1"), one("2", "1"), one("1", "2")])
     assert last_rest("1", circle) is not None
-    earlier = one("1", "2")  # begun where the clock shows an earlier time
+    earlier = one("1", "2")  # The clock of its computer is slow.
     assert last_rest("2", rests_in([earlier, one("2", "")])) == earlier
 
 
@@ -84,7 +84,7 @@ def test_the_rest_of_a_mission_is_what_ran_last() -> None:
 def test_mission_of_a_tool_that_died_was_interrupted(
     tmp_path: Path, state: MissionState, events: list[dict[str, object]], named: list[str]
 ) -> None:
-    folder = left(tmp_path, state, *events, torn='{"time": 17')
+    folder = leave(tmp_path, state, *events, torn='{"time": 17')
     (summary,) = recover_missions(tmp_path)
     assert summary.state == "interrupted"
     assert all(name in summary.reason for name in named), summary.reason
@@ -98,7 +98,7 @@ def test_mission_of_a_tool_that_died_was_interrupted(
 
 def test_mission_that_ended_before_its_summary_was_written_is_not_interrupted(tmp_path: Path) -> None:
     end: dict[str, object] = {"event": "state", "state": "failed", "reason": "odd"}
-    folder = left(tmp_path, MissionState.RUNNING, RUNNING, end)
+    folder = leave(tmp_path, MissionState.RUNNING, RUNNING, end)
     assert recover_missions(tmp_path) == []
     summary = MissionSummary.read(folder)
     assert (summary.state, summary.reason, summary.ended) == ("failed", "odd", 1001.0)
@@ -114,11 +114,11 @@ def test_mission_of_a_living_tool_is_left_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [errno.EROFS, errno.EACCES, errno.ENOSPC])
-def test_mission_that_cannot_be_closed_is_told_and_others_are(
+def test_mission_that_cannot_be_closed_is_reported_and_others_are_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], number: int
 ) -> None:
     for name in ("20260101-000001", "20260101-000002"):
-        left(tmp_path, MissionState.RUNNING, RUNNING, DRIVE).rename(tmp_path / "missions" / name)
+        leave(tmp_path, MissionState.RUNNING, RUNNING, DRIVE).rename(tmp_path / "missions" / name)
 
     def open_second(folder: Path) -> Appender:
         if folder.name.endswith("1"):
@@ -135,7 +135,7 @@ def test_mission_that_cannot_be_closed_is_told_and_others_are(
     assert [summary.state for summary in read_missions(tmp_path)] == ["running", "interrupted"]
 
 
-def test_missions_come_in_their_order(tmp_path: Path) -> None:
+def test_missions_are_read_in_order_of_creation(tmp_path: Path) -> None:
     assert read_missions(tmp_path) == []
     for name in ("b", "a"):
         with Mission(tmp_path, name):
@@ -146,7 +146,7 @@ def test_missions_come_in_their_order(tmp_path: Path) -> None:
 def test_the_last_mission_is_found_without_reading_all(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first = left(tmp_path, MissionState.DONE)
+    first = leave(tmp_path, MissionState.DONE)
     for suffix in ("-2", "-9", "-10"):
         folder = first.with_name(first.name + suffix)
         folder.mkdir()
@@ -156,27 +156,27 @@ def test_the_last_mission_is_found_without_reading_all(
         read_missions(tmp_path)
     monkeypatch.setattr("codebotler.missions.storage.store.RECENT_MISSIONS", 1)
     assert find_mission(tmp_path, "last").name.endswith("-10")
-    assert [one.id[-2:] for one in read_missions(tmp_path, 2)] == ["10", "-9"]  # in the order of their times
+    assert [one.id[-2:] for one in read_missions(tmp_path, 2)] == ["10", "-9"]  # Sorted by time.
 
 
-WHOLE = {"id": "x", "state": "done", "robot": "sim", "created": 1.0}
+VALID = {"id": "x", "state": "done", "robot": "sim", "created": 1.0}
 
 
 @pytest.mark.parametrize(
     "text",
     [
         *("", "[]", "{}", '{"id": 3}', "nonsense", '{"id": "x", "state": "odd"', "[" * 100_000),
-        *(json.dumps({**WHOLE, **odd}) for odd in ({"state": "odd"}, {"created": "now"}, {"created": 1e300})),
-        *(json.dumps({**WHOLE, **odd}) for odd in ({"program": 5}, {"problems": [1]}, {"reason": None})),
+        *(json.dumps({**VALID, **bad}) for bad in ({"state": "odd"}, {"created": "now"}, {"created": 1e300})),
+        *(json.dumps({**VALID, **bad}) for bad in ({"program": 5}, {"problems": [1]}, {"reason": None})),
     ],
 )
 def test_summary_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
-    folder = left(tmp_path, MissionState.DONE)
+    folder = leave(tmp_path, MissionState.DONE)
     (folder / SUMMARY_FILE).write_text(text)
     with pytest.raises(UserError, match="not a valid mission summary") as error:
         read_missions(tmp_path)
     assert error.value.file == folder / SUMMARY_FILE
-    assert recover_missions(tmp_path) == [], "a robot can work nevertheless"
+    assert recover_missions(tmp_path) == [], "the robot can still work"
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_summary_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None
     ],
 )
 def test_event_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
-    folder = left(tmp_path, MissionState.DONE, RUNNING)
+    folder = leave(tmp_path, MissionState.DONE, RUNNING)
     with (folder / EVENTS_FILE).open("a") as file:
         file.write(f"{text}\n")
     with pytest.raises(UserError, match=r"JSON|not a mission event") as error:
@@ -197,14 +197,14 @@ def test_event_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
 
 
 def test_summary_of_a_later_version_is_read(tmp_path: Path) -> None:
-    folder = left(tmp_path, MissionState.DONE)
+    folder = leave(tmp_path, MissionState.DONE)
     data = json.loads((folder / SUMMARY_FILE).read_text())
     (folder / SUMMARY_FILE).write_text(json.dumps({**data, "colour": "red"}))
     assert read_missions(tmp_path)[0].state == "done"
 
 
 def test_an_interrupted_mission_is_found_until_a_rest_has_run(tmp_path: Path) -> None:
-    interrupted = left(tmp_path, MissionState.INTERRUPTED)
+    interrupted = leave(tmp_path, MissionState.INTERRUPTED)
 
     def add(number: int, dies: str) -> None:
         folder = interrupted.with_name(f"{interrupted.name}-{number}")
@@ -213,7 +213,7 @@ def test_an_interrupted_mission_is_found_until_a_rest_has_run(tmp_path: Path) ->
             folder.name, MissionState.STOPPED, "sim", 1_000.0 + number, "", continues="x", if_tool_dies=dies
         ).write(folder)
 
-    add(2, "")  # a rest that was stopped before it ran
+    add(2, "")  # This continuation was stopped before it ran.
     assert [one.id for one in find_interrupted(tmp_path)] == [interrupted.name]
     add(3, IF_TOOL_DIES)
     assert find_interrupted(tmp_path) == []

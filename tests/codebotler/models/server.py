@@ -1,4 +1,4 @@
-"""A server on loopback that speaks chat and text completions as OpenAI's does, and misbehaves on demand.
+"""A server on loopback that speaks OpenAI's chat and text completions, and misbehaves on demand.
 
 `python server.py` serves until its standard input ends, and prints its URL first.
 """
@@ -18,15 +18,15 @@ from types import TracebackType
 from typing import Any, Self
 
 TASK = "def task_program():\n"
-CHUNK = 24  # characters of a streamed piece
-DRIP = 0.2  # seconds between two pieces that come for ever
+CHUNK = 24  # A streamed piece has this many characters.
+DRIP = 0.2  # A reply without an end sends a piece this often, in seconds.
 HUGE = 1_000_000
 UNPACKED = 20_000_000
 PAGE = "<html><body>This is a proxy. Please log in.</body></html>"
 
 
 class Fault(Enum):
-    """How the server may misbehave."""
+    """Ways in which the server misbehaves."""
 
     TOO_MANY = auto()
     TOO_MANY_FOR_A_WHILE = auto()
@@ -82,13 +82,13 @@ TOO_MUCH: dict[Fault | None, tuple[int, bytes, str]] = {
 
 @dataclass(frozen=True)
 class Request:
-    """What a client sent.
+    """A request that the server received.
 
     Args:
-        path: below the base URL, such as `/chat/completions`.
-        headers: with names in lower case.
+        path: the path below the base URL, for example `/chat/completions`.
+        headers: the headers, with names in lower case.
         body: the parsed JSON.
-        at: when it came, in seconds of a clock that only goes on.
+        at: when it arrived, in seconds of the monotonic clock.
     """
 
     path: str
@@ -102,7 +102,7 @@ class Request:
 
 
 def program(request: Request) -> str:
-    """A reply with a program, which says the seed that was sent."""
+    """Reply with a program that says the seed of the request."""
     body = f'    go_to("lobby")\n    say("reply {request.body.get("seed", 0)}")\n'
     return f"Here it is.\n\n```python\n{TASK}{body}```\n" if request.is_chat else body
 
@@ -112,14 +112,14 @@ class Server:
     """A server in a thread of its own.
 
     Args:
-        answer: what the model replies to a request.
-        fault: how it misbehaves at a request, which is asked where `faults` are used up.
-        retry_after: what `Retry-After` says, in seconds.
-        delay: how many seconds it is slow.
-        pause: how many seconds it takes for any reply.
-        counts: whether it says how many tokens it used.
+        answer: returns the model's reply to a request.
+        fault: chooses how it misbehaves at a request once `faults` is empty.
+        retry_after: the value of `Retry-After`, in seconds.
+        delay: the seconds that a slow reply takes.
+        pause: the seconds that any reply takes.
+        counts: whether it reports how many tokens it used.
         limits: whether it cuts off replies at the limit of a request.
-        sends: what it sends instead of its own answer: status, headers and body; None for its own.
+        sends: returns status, headers and body to send instead of its own answer, or None.
     """
 
     answer: Callable[[Request], str] = program
@@ -131,11 +131,11 @@ class Server:
     limits: bool = False
     sends: Callable[[Request], tuple[int, dict[str, str], bytes] | None] = lambda _request: None
     faults: deque[Fault | None] = field(default_factory=deque)
-    """How it misbehaves at the next requests."""
+    """The faults of the next requests."""
     requests: list[Request] = field(default_factory=list)
-    """All that were answered, in whatever way."""
+    """All requests so far."""
     open: int = 0
-    """How many requests are being answered."""
+    """The number of requests in progress."""
     most_open: int = 0
     url: str = ""
 
@@ -159,33 +159,33 @@ class Server:
             self._loop.run_until_complete(self._main)
         for task in asyncio.all_tasks(self._loop):
             task.cancel()
-        self._loop.run_until_complete(self._closed())
+        self._loop.run_until_complete(self._wait_for_tasks())
         self._loop.close()
 
     async def _serve(self, started: threading.Event) -> None:
-        server = await asyncio.start_server(self._connected, "127.0.0.1", 0)
+        server = await asyncio.start_server(self._serve_client, "127.0.0.1", 0)
         self.url = f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}/v1"
         started.set()
         try:
             await asyncio.Event().wait()
         finally:
-            server.close()  # without waiting, for clients may keep their connections
+            server.close()  # Do not wait: clients may keep their connections.
 
     @staticmethod
-    async def _closed() -> None:
-        """Let the other tasks end, and what they closed be closed."""
+    async def _wait_for_tasks() -> None:
+        """Wait until the other tasks have ended and their connections are closed."""
         others = asyncio.all_tasks() - {asyncio.current_task()}
         await asyncio.gather(*others, return_exceptions=True)
         await asyncio.sleep(0)
 
-    async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _serve_client(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError, asyncio.CancelledError):
-            while await self._answered(reader, writer):
+            while await self._answer_one(reader, writer):
                 await writer.drain()
         writer.close()
 
-    async def _answered(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bool:
-        """Answer a request; whether the connection goes on."""
+    async def _answer_one(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bool:
+        """Answer a request; return whether the connection stays open."""
         first, *lines = (await reader.readuntil(b"\r\n\r\n")).decode().split("\r\n")
         headers = {name.lower(): value for name, _, value in (line.partition(": ") for line in lines)}
         body = json.loads(await reader.readexactly(int(headers.get("content-length", 0))) or b"{}")
@@ -195,7 +195,7 @@ class Server:
         self.open += 1
         self.most_open = max(self.most_open, self.open)
         try:
-            return await _Answer(self, request, fault, writer).given()
+            return await _Answer(self, request, fault, writer).send()
         finally:
             self.open -= 1
 
@@ -207,30 +207,32 @@ class _Answer:
     fault: Fault | None
     writer: asyncio.StreamWriter
 
-    async def given(self) -> bool:
-        """Answer; whether the connection goes on."""
+    async def send(self) -> bool:
+        """Answer; return whether the connection stays open."""
         if (sent := self.server.sends(self.request)) is not None:
             status, headers, body = sent
             kind = headers.pop("Content-Type", "text/event-stream")
             extra = "".join(f"{name}: {value}\r\n" for name, value in headers.items())
-            return self._body(status, body, kind, extra)
-        return await self._given()
+            return self._send_body(status, body, kind, extra)
+        return await self._send_own()
 
-    async def _given(self) -> bool:
+    async def _send_own(self) -> bool:
         if self.fault is Fault.HUNG_UP:
             return False
         if self.fault in REFUSALS:
-            return self._refused(*REFUSALS[self.fault])
+            return self._refuse(*REFUSALS[self.fault])
         if self.fault in TOO_MUCH:
             status, body, coding = TOO_MUCH[self.fault]
-            return self._body(status, body, "text/event-stream", f"Content-Encoding: {coding}\r\n")
+            return self._send_body(status, body, "text/event-stream", f"Content-Encoding: {coding}\r\n")
         if self.fault in BODIES:
-            return self._body(200, *BODIES[self.fault])
+            return self._send_body(200, *BODIES[self.fault])
         await asyncio.sleep(self.server.delay if self.fault is Fault.SLOW else self.server.pause)
         if self.request.body.get("stream"):
-            return await self._streamed()
+            return await self._stream()
         whole = json.dumps(self._object(self._text(), self._reason()) | {"usage": self._usage()}).encode()
-        return self._body(200, whole[:40] if self.fault is Fault.INVALID_JSON else whole, "application/json")
+        return self._send_body(
+            200, whole[:40] if self.fault is Fault.INVALID_JSON else whole, "application/json"
+        )
 
     def _text(self) -> str:
         match self.fault:
@@ -243,38 +245,38 @@ class _Answer:
         return self.server.answer(self.request)[: self._limit()]
 
     def _limit(self) -> int | None:
-        """The characters that a reply may have."""
+        """Return the most characters that a reply may have."""
         body = self.request.body
         tokens = body.get("max_completion_tokens") or body.get("max_tokens")
         return 4 * tokens if self.server.limits and tokens else None
 
     def _reason(self) -> str:
-        """Why the reply ends."""
+        """Return why the reply ends."""
         if self.fault is Fault.TOOL_CALL:
             return "tool_calls"
         limit = self._limit()
         is_cut_off = limit is not None and len(self.server.answer(self.request)) > limit
         return "length" if is_cut_off else "stop"
 
-    def _refused(self, status: int, message: str, code: str | None) -> bool:
+    def _refuse(self, status: int, message: str, code: str | None) -> bool:
         key = self.request.headers.get("authorization", "")
         error = {"message": message.format(key=key), "type": "error", "param": None, "code": code}
         again = f"Retry-After: {self.server.retry_after}\r\n"
         extra = again if self.fault is Fault.TOO_MANY_FOR_A_WHILE else ""
-        return self._body(status, json.dumps({"error": error}).encode(), "application/json", extra)
+        return self._send_body(status, json.dumps({"error": error}).encode(), "application/json", extra)
 
-    def _body(self, status: int, body: bytes, kind: str, extra: str = "") -> bool:
-        self._head(status, kind, f"Content-Length: {len(body)}\r\n{extra}")
+    def _send_body(self, status: int, body: bytes, kind: str, extra: str = "") -> bool:
+        self._send_head(status, kind, f"Content-Length: {len(body)}\r\n{extra}")
         self.writer.write(body)
         return True
 
-    def _head(self, status: int, kind: str, extra: str) -> None:
-        # The key comes back, as from a server that is careless with it.
+    def _send_head(self, status: int, kind: str, extra: str) -> None:
+        # A careless server sends the key back.
         echo = f"X-Echo: {self.request.headers.get('authorization', '')}\r\n"
         self.writer.write(f"HTTP/1.1 {status} X\r\nContent-Type: {kind}\r\n{echo}{extra}\r\n".encode())
 
-    async def _streamed(self) -> bool:
-        self._head(200, "text/event-stream", "Transfer-Encoding: chunked\r\n")
+    async def _stream(self) -> bool:
+        self._send_head(200, "text/event-stream", "Transfer-Encoding: chunked\r\n")
         async for event in self._events():
             data = f"data: {event}\n\n".encode()
             self.writer.write(b"%x\r\n%s\r\n" % (len(data), data))
@@ -327,7 +329,7 @@ class _Answer:
         return {"id": "1", "object": kind, "created": 1_700_000_000, "model": model, "choices": [choice]}
 
     def _more(self) -> dict[str, Any]:
-        """What a message holds besides text."""
+        """Return the parts of a message other than text."""
         match self.fault:
             case Fault.TOOL_CALL:
                 return {"tool_calls": [{"index": 0, "id": "1", "type": "function", "function": CALL}]}
@@ -342,7 +344,7 @@ class _Answer:
 
 def main() -> None:
     with Server() as server:
-        print(server.url, flush=True)  # noqa: T201 - whoever started it waits for this line
+        print(server.url, flush=True)  # noqa: T201 - the parent process waits for this line
         sys.stdin.read()
 
 

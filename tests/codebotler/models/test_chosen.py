@@ -16,7 +16,7 @@ def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "config.yaml"
 
 
-def test_without_a_choice_it_is_the_recorded_model() -> None:
+def test_default_is_the_recorded_model() -> None:
     assert choose_model() == ChosenModel("recorded:careful")
 
 
@@ -42,7 +42,7 @@ def test_limit_of_the_file_is_for_its_model_unless_a_command_names_one(config: P
     assert other.add_server(SamplingSettings()) == SamplingSettings()
 
 
-def test_without_codebotlers_home_the_file_is_where_settings_are(
+def test_without_codebotler_home_the_file_is_in_the_config_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("CODEBOTLER_HOME")
@@ -53,7 +53,7 @@ def test_without_codebotlers_home_the_file_is_where_settings_are(
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "named"),
     [
         ("", "config.yaml"),
         ("modl: a\nmodel: b\n", "line 1.*modl"),
@@ -63,8 +63,8 @@ def test_without_codebotlers_home_the_file_is_where_settings_are(
         ("model: a\nmax_tokens: 0\n", "line 2"),
     ],
 )
-def test_a_wrong_file_is_told_with_its_line(text: str, told: str, config: Path) -> None:
+def test_invalid_file_is_refused_with_its_line(text: str, named: str, config: Path) -> None:
     config.write_text(text)
-    with pytest.raises(UserError, match=told):
+    with pytest.raises(UserError, match=named):
         choose_model()
-    assert choose_model("recorded:hasty").name == "recorded:hasty", "which needs no file"
+    assert choose_model("recorded:hasty").name == "recorded:hasty", "a named model needs no file"

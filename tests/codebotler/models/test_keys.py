@@ -16,7 +16,7 @@ from codebotler.models.keys import KEY_REMOVED, MIN_SECRET_IN_ERRORS, guard_logs
 from server import Fault, Server
 
 KEY = "sk-Fake0123456789abcdefGHIJ"
-ODD = 'Fake/odd+key="0123456789"&x'  # nothing of it has the shape of a key
+UNUSUAL = 'Fake/odd+key="0123456789"&x'  # No part of it has the usual shape of a key.
 RUN = """
 import asyncio, dataclasses, json, logging, sys, traceback
 from pathlib import Path
@@ -58,10 +58,8 @@ def server() -> Iterator[Server]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("key", [KEY, ODD])
-def test_key_of_a_run_is_in_nothing_that_is_printed_logged_or_written(
-    tmp_path: Path, server: Server, key: str
-) -> None:
+@pytest.mark.parametrize("key", [KEY, UNUSUAL])
+def test_key_is_never_printed_logged_or_written(tmp_path: Path, server: Server, key: str) -> None:
     server.faults.extend([Fault.UNAUTHORIZED, None, Fault.SERVER_ERROR, None, Fault.CUT, None] * 3)
     server.answer = lambda request: f"    say('{request.headers['authorization']}')\n"
     environment = {**os.environ, "OPENAI_API_KEY": key, "VLLM_API_KEY": key, "OPENAI_LOG": "debug"}
@@ -76,7 +74,7 @@ def test_key_of_a_run_is_in_nothing_that_is_printed_logged_or_written(
     )
     assert done.returncode == 0, done.stderr
     sent = {request.headers["authorization"] for request in server.requests}
-    assert sent == {f"Bearer {key}"}  # the server had it, and sent it back with every answer
+    assert sent == {f"Bearer {key}"}  # Every answer of the server repeats it.
     everything = {path.name: path.read_text() for path in tmp_path.rglob("*") if path.is_file()}
     rows = [json.loads(line) for line in everything["completions.jsonl"].splitlines()]
     everything |= {"output": done.stdout, "errors": done.stderr}
@@ -110,13 +108,15 @@ def test_key_within_another_one_leaves_no_rest(monkeypatch: pytest.MonkeyPatch) 
     assert redact("it is abcdefgh-ijklmnop.") == f"it is {KEY_REMOVED}."
 
 
-@pytest.mark.parametrize("spelling", [ODD, json.dumps(ODD)[1:-1], repr(f"'{ODD}")[3:-1], quote(ODD, safe="")])
+@pytest.mark.parametrize(
+    "spelling", [UNUSUAL, json.dumps(UNUSUAL)[1:-1], repr(f"'{UNUSUAL}")[3:-1], quote(UNUSUAL, safe="")]
+)
 def test_key_is_removed_however_it_is_spelt(monkeypatch: pytest.MonkeyPatch, spelling: str) -> None:
-    monkeypatch.setenv("OPENAI_API_KEY", ODD)
+    monkeypatch.setenv("OPENAI_API_KEY", UNUSUAL)
     assert redact(f"a {spelling} b") == f"a {KEY_REMOVED} b"
 
 
-def test_what_is_shorter_than_any_key_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_text_shorter_than_any_key_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("KEYBOARD", "decide"[: MIN_SECRET_IN_ERRORS - 1])
     monkeypatch.setenv("EMPTY_KEY", "")
     assert redact("decide") == "decide"
@@ -148,10 +148,12 @@ def test_program_keeps_names_that_look_like_keys(monkeypatch: pytest.MonkeyPatch
     assert remove_keys(program) == program
 
 
-@pytest.mark.parametrize("spelling", [ODD, json.dumps(ODD)[1:-1], repr(f"'{ODD}")[3:-1], quote(ODD, safe="")])
+@pytest.mark.parametrize(
+    "spelling", [UNUSUAL, json.dumps(UNUSUAL)[1:-1], repr(f"'{UNUSUAL}")[3:-1], quote(UNUSUAL, safe="")]
+)
 def test_program_loses_the_key_itself(monkeypatch: pytest.MonkeyPatch, spelling: str) -> None:
-    monkeypatch.setenv("OPENAI_API_KEY", ODD)
-    monkeypatch.setenv("OTHER_API_KEY", ODD[:-3])
+    monkeypatch.setenv("OPENAI_API_KEY", UNUSUAL)
+    monkeypatch.setenv("OTHER_API_KEY", UNUSUAL[:-3])
     assert remove_keys(f"say('{spelling}')") == f"say('{KEY_REMOVED}')"
 
 
@@ -165,7 +167,7 @@ def test_program_loses_the_key_itself(monkeypatch: pytest.MonkeyPatch, spelling:
         "AIzaSyA" + "b" * 30,
     ],
 )
-def test_what_has_the_shape_of_a_key_is_removed_wherever_it_comes_from(key: str) -> None:
+def test_text_in_the_shape_of_a_key_is_removed(key: str) -> None:
     assert redact(f"Incorrect API key provided: {key}, sorry") == (
         f"Incorrect API key provided: {KEY_REMOVED}, sorry"
     )
@@ -174,7 +176,7 @@ def test_what_has_the_shape_of_a_key_is_removed_wherever_it_comes_from(key: str)
 @pytest.mark.parametrize(
     "text", ["say('sk-8')", "risk-averse people", "pick('hf_x')", "task-program", "a desk-lamp-with-shade"]
 )
-def test_words_of_programs_have_no_shape_of_a_key(text: str) -> None:
+def test_words_of_programs_do_not_look_like_keys(text: str) -> None:
     assert redact(text) == text
 
 

@@ -1,4 +1,4 @@
-"""Real transformers models, made on the spot: one with random weights, others that know one text by heart."""
+"""Real transformers models, made on the spot: one has random weights, the others know one text by heart."""
 
 import asyncio
 import math
@@ -54,7 +54,7 @@ def tokenizer() -> Any:  # noqa: ANN401 - transformers is untyped here
     return transformers.PreTrainedTokenizerFast(tokenizer_object=made, pad_token="<pad>", eos_token=END)
 
 
-def saved(folder: Path, tokenizer: Any, hidden: int, change: Callable[[Any], None]) -> str:  # noqa: ANN401 - transformers is untyped here
+def save_model(folder: Path, tokenizer: Any, hidden: int, change: Callable[[Any], None]) -> str:  # noqa: ANN401 - transformers is untyped here
     torch.manual_seed(0)
     config = transformers.LlamaConfig(
         vocab_size=len(tokenizer),
@@ -78,12 +78,12 @@ def saved(folder: Path, tokenizer: Any, hidden: int, change: Callable[[Any], Non
 @pytest.fixture(scope="module")
 def babbler(tmp_path_factory: pytest.TempPathFactory, tokenizer: Any) -> str:  # noqa: ANN401 - transformers is untyped here
     """A model with random weights."""
-    return saved(tmp_path_factory.mktemp("babbler"), tokenizer, 32, lambda _model: None)
+    return save_model(tmp_path_factory.mktemp("babbler"), tokenizer, 32, lambda _model: None)
 
 
 @pytest.fixture
-def by_heart(tmp_path: Path, tokenizer: Any) -> Callable[..., str]:  # noqa: ANN401 - transformers is untyped here
-    """Models in which each word of a list is followed by the next, and the last by itself."""
+def reciter(tmp_path: Path, tokenizer: Any) -> Callable[..., str]:  # noqa: ANN401 - transformers is untyped here
+    """Make models that write a list of words in order, and then repeat the last one."""
 
     def make(*words: str, template: str | None = None) -> str:
         ids = [tokenizer.convert_tokens_to_ids(word) for word in words]
@@ -101,7 +101,7 @@ def by_heart(tmp_path: Path, tokenizer: Any) -> Callable[..., str]:  # noqa: ANN
 
         tokenizer.chat_template = template
         try:
-            return saved(tmp_path, tokenizer, size, change)
+            return save_model(tmp_path, tokenizer, size, change)
         finally:
             tokenizer.chat_template = None
 
@@ -119,40 +119,40 @@ def replies(name: str, settings: SamplingSettings, *numbers: int) -> list[Reply]
     return run(ask())
 
 
-def test_reply_ends_where_the_function_ends(by_heart: Callable[..., str]) -> None:
-    (reply,) = replies(by_heart(OPENING, GO, SAY, OTHER), SamplingSettings(), 0)
+def test_reply_ends_where_the_function_ends(reciter: Callable[..., str]) -> None:
+    (reply,) = replies(reciter(OPENING, GO, SAY, OTHER), SamplingSettings(), 0)
     assert reply.text == (GO + SAY).rstrip("\n")
     assert reply.program == OPENING + GO + SAY
     assert reply.finish_reason == "stop"
-    assert reply.usage.output_tokens == 3  # the last one showed that the function was over
+    assert reply.usage.output_tokens == 3  # The last token showed that the function was over.
     assert reply.usage.input_tokens is not None
     assert reply.usage.input_tokens > 500
     assert (reply.latency_s or 0) > 0
 
 
-def test_reply_ends_where_the_model_ends_it(by_heart: Callable[..., str]) -> None:
-    (reply,) = replies(by_heart(OPENING, GO, SAY, END), SamplingSettings(), 0)
+def test_reply_ends_where_the_model_ends_it(reciter: Callable[..., str]) -> None:
+    (reply,) = replies(reciter(OPENING, GO, SAY, END), SamplingSettings(), 0)
     assert (reply.text, reply.finish_reason) == (GO + SAY, "stop")
     assert reply.program == OPENING + GO + SAY
 
 
-def test_reply_ends_at_the_limit(by_heart: Callable[..., str]) -> None:
-    (reply,) = replies(by_heart(OPENING, GO), SamplingSettings(max_tokens=5), 0)
+def test_reply_ends_at_the_limit(reciter: Callable[..., str]) -> None:
+    (reply,) = replies(reciter(OPENING, GO), SamplingSettings(max_tokens=5), 0)
     assert (reply.text, reply.finish_reason) == (GO * 5, "length")
     assert reply.usage.output_tokens == 5
 
 
 @pytest.mark.parametrize("template", [TEMPLATE, NO_SYSTEM])
-def test_model_with_a_chat_template_is_given_messages(by_heart: Callable[..., str], template: str) -> None:
-    name = by_heart("[assistant]", f"{FENCE}python\n", OPENING, GO, FENCE, END, template=template)
+def test_model_with_a_chat_template_is_given_messages(reciter: Callable[..., str], template: str) -> None:
+    name = reciter("[assistant]", f"{FENCE}python\n", OPENING, GO, FENCE, END, template=template)
     (reply,) = replies(name, SamplingSettings(), 0)
     assert reply.text == f"{FENCE}python\n{OPENING}{GO}{FENCE}"
     assert reply.program == OPENING + GO
     assert reply.finish_reason == "stop"
 
 
-def test_pieces_are_heard_in_order_and_are_the_reply(by_heart: Callable[..., str], babbler: str) -> None:
-    for name in (by_heart(OPENING, GO, SAY, OTHER), babbler):
+def test_pieces_are_heard_in_order_and_are_the_reply(reciter: Callable[..., str], babbler: str) -> None:
+    for name in (reciter(OPENING, GO, SAY, OTHER), babbler):
         heard: list[str] = []
 
         async def ask(name: str, heard: list[str]) -> Reply:
@@ -180,11 +180,11 @@ def test_replies_of_a_block_are_written_once(babbler: str) -> None:
         model: Any = open_model(babbler, SEEDED)
         generate, sizes = model.model.generate, []
 
-        def watched(**options: Any) -> object:  # noqa: ANN401 - transformers is untyped here
+        def watch(**options: Any) -> object:  # noqa: ANN401 - transformers is untyped here
             sizes.append(len(options["input_ids"]))
             return generate(**options)
 
-        model.model.generate = watched
+        model.model.generate = watch
         for number in range(SEED_BLOCK + 1):
             await model.reply(PROMPT, number=number)
         return sizes
@@ -214,18 +214,18 @@ def test_model_is_given_the_settings(
         model: Any = open_model(babbler, settings)
         generate, given = model.model.generate, {}
 
-        def watched(**options: Any) -> object:  # noqa: ANN401 - transformers is untyped here
+        def watch(**options: Any) -> object:  # noqa: ANN401 - transformers is untyped here
             given.update(options)
             return generate(**{**options, "max_new_tokens": 1})
 
-        model.model.generate = watched
+        model.model.generate = watch
         await model.reply(PROMPT, number=0)
         return given
 
     given = run(ask())
     names = ("do_sample", "temperature", "top_p", "top_k")
     assert {name: given[name] for name in names if given.get(name) is not None} == expected
-    assert given["max_new_tokens"] == 512  # of a base model
+    assert given["max_new_tokens"] == 512  # This is the limit of a base model.
 
 
 def test_requests_that_wait_together_are_one_batch_and_fewer_where_memory_is_small(babbler: str) -> None:
@@ -234,13 +234,13 @@ def test_requests_that_wait_together_are_one_batch_and_fewer_where_memory_is_sma
         generate = model.model.generate
         sizes: list[int] = []
 
-        def watched(**options: Any) -> object:  # noqa: ANN401 - transformers is untyped here
+        def watch(**options: Any) -> object:  # noqa: ANN401 - transformers is untyped here
             sizes.append(len(options["input_ids"]))
             if sizes[-1] > most:
                 raise torch.cuda.OutOfMemoryError("too small")
             return generate(**options)
 
-        model.model.generate = watched
+        model.model.generate = watch
         asked = (model.reply(PROMPT, number=number) for number in range(6))
         return sizes, await asyncio.gather(*asked)
 
@@ -254,7 +254,7 @@ def test_requests_that_wait_together_are_one_batch_and_fewer_where_memory_is_sma
     assert not caught.value.may_pass
 
 
-def test_error_of_the_model_reaches_who_waits(babbler: str) -> None:
+def test_error_of_the_model_reaches_the_caller(babbler: str) -> None:
     async def ask() -> None:
         model: Any = open_model(babbler, SamplingSettings())
         model.model.generate = None
@@ -274,11 +274,11 @@ async def begin_and_cancel(model: Any) -> None:  # noqa: ANN401 - a private part
     await asyncio.wait_for(model._worker, 5)
 
 
-def test_given_up_requests_end_at_once(by_heart: Callable[..., str]) -> None:
-    run(begin_and_cancel(open_model(by_heart(OPENING, GO), SamplingSettings(max_tokens=100_000))))
+def test_cancelled_requests_end_at_once(reciter: Callable[..., str]) -> None:
+    run(begin_and_cancel(open_model(reciter(OPENING, GO), SamplingSettings(max_tokens=100_000))))
 
 
-def test_given_up_block_leaves_no_half_replies(babbler: str) -> None:
+def test_cancelled_block_leaves_no_partial_replies(babbler: str) -> None:
     settings = replace(SEEDED, max_tokens=300)
 
     async def ask() -> str:
@@ -289,7 +289,7 @@ def test_given_up_block_leaves_no_half_replies(babbler: str) -> None:
     assert run(ask()) == replies(babbler, settings, 1)[0].text
 
 
-def test_prompt_that_is_too_long_is_told(babbler: str) -> None:
+def test_too_long_prompt_is_refused(babbler: str) -> None:
     async def ask() -> None:
         await open_model(babbler, SamplingSettings()).reply(prompt_for("Go. " * 5_000), number=0)
 
@@ -304,18 +304,18 @@ def test_prompt_that_is_too_long_is_told(babbler: str) -> None:
         ("{empty}", ["hf:{empty}", "loaded"]),
     ],
 )
-def test_what_is_no_model_is_told_in_a_sentence(tmp_path: Path, path: str, named: list[str]) -> None:
+def test_folder_without_a_model_is_refused(tmp_path: Path, path: str, named: list[str]) -> None:
     with pytest.raises(UserError) as caught:
         open_model("hf:" + path.format(empty=tmp_path), SamplingSettings())
     assert all(name.format(empty=tmp_path) in str(caught.value) for name in named), caught.value
 
 
-def test_base_url_means_nothing_here(babbler: str) -> None:
+def test_local_model_refuses_a_base_url(babbler: str) -> None:
     with pytest.raises(UserError, match="base URL"):
         open_model(babbler, SamplingSettings(base_url="http://localhost:1/v1"))
 
 
-def test_device_and_numbers_are_what_this_machine_has(babbler: str) -> None:
+def test_device_and_number_type_suit_this_machine(babbler: str) -> None:
     model: Any = open_model(babbler, SamplingSettings())
     where = next(model.model.parameters())
     assert where.device.type == model.device

@@ -1,4 +1,4 @@
-"""Servers that speak OpenAI's protocol in their own way, and what their replies are without a program."""
+"""Servers may speak OpenAI's protocol in their own way, and may reply without a program."""
 
 import asyncio
 import json
@@ -30,18 +30,18 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
 
 
 def ask(name: str, server: Server, **settings: Any) -> Reply:  # noqa: ANN401 - of several types
-    async def asked() -> Reply:
+    async def request() -> Reply:
         model = open_model(name, SamplingSettings(base_url=server.url, **settings))
         try:
             return await model.reply(PROMPT, number=0)
         finally:
             await model.close()
 
-    return asyncio.run(asked())
+    return asyncio.run(request())
 
 
 def chunk(name: str, text: str | None = None, end: str | None = None, **more: object) -> dict[str, Any]:
-    """A chunk of a stream; `more` stands in its delta for chat, in its choice for completions."""
+    """Make a chunk of a stream; `more` goes into its delta for chat, into its choice for completions."""
     if name == CHAT:
         delta = more | ({} if text is None else {"role": "assistant", "content": text})
         choice: dict[str, Any] = {"index": 0, "delta": delta, "finish_reason": end}
@@ -52,12 +52,12 @@ def chunk(name: str, text: str | None = None, end: str | None = None, **more: ob
 
 
 def whole(name: str) -> dict[str, Any]:
-    """A chunk with a whole program."""
+    """Make a chunk with a whole program."""
     return chunk(name, (TASK if name == CHAT else "") + BODY)
 
 
-def streams(server: Server, *events: object) -> None:
-    """Have the server send events: objects as data, text as it stands."""
+def stream(server: Server, *events: object) -> None:
+    """Let the server send events: objects as data, text unchanged."""
     sent = [one if isinstance(one, str) else f"data: {json.dumps(one)}\n\n" for one in events]
     body = "".join(sent).encode()
     server.sends = lambda _request: (200, {}, body)
@@ -68,8 +68,8 @@ DONE = "data: [DONE]\n\n"
 
 @both
 @pytest.mark.parametrize("end", ["eos", "eos_token", "end_turn", "", "stop_sequence"])
-def test_unknown_reason_for_the_end_is_an_end(name: str, server: Server, end: str) -> None:
-    streams(server, whole(name), chunk(name, None, end), DONE)
+def test_unknown_finish_reason_ends_the_reply(name: str, server: Server, end: str) -> None:
+    stream(server, whole(name), chunk(name, None, end), DONE)
     reply = ask(name, server)
     assert (reply.program, reply.no_program) == (TASK + BODY, None)
     assert reply.finish_reason in {end, None}
@@ -77,8 +77,8 @@ def test_unknown_reason_for_the_end_is_an_end(name: str, server: Server, end: st
 
 
 @both
-def test_mark_of_the_end_is_enough(name: str, server: Server) -> None:
-    streams(server, whole(name), DONE)
+def test_done_event_alone_ends_the_reply(name: str, server: Server) -> None:
+    stream(server, whole(name), DONE)
     assert ask(name, server).program == TASK + BODY
 
 
@@ -93,27 +93,27 @@ def test_mark_of_the_end_is_enough(name: str, server: Server) -> None:
 )
 def test_last_chunk_may_lack_text_or_choices(name: str, server: Server, last: dict[str, Any] | None) -> None:
     end = chunk(name) | {"choices": None if last is None else [last]}
-    streams(server, whole(name), end, DONE)
+    stream(server, whole(name), end, DONE)
     reply = ask(name, server)
     assert (reply.program, reply.finish_reason) == (TASK + BODY, None if last is None else "stop")
 
 
 @both
-def test_events_without_data_and_retry_lines_are_passed_over(name: str, server: Server) -> None:
-    streams(server, ": hello\n\n", "retry: 3000\n\n", "event: ping\n\n", whole(name), "id: 7\n\n")
-    with pytest.raises(ModelError, match="cut off"):  # it says nothing of an end
+def test_events_without_data_and_retry_lines_are_skipped(name: str, server: Server) -> None:
+    stream(server, ": hello\n\n", "retry: 3000\n\n", "event: ping\n\n", whole(name), "id: 7\n\n")
+    with pytest.raises(ModelError, match="cut off"):  # No event ends it.
         ask(name, server)
-    streams(server, ": hello\n\n", "retry: 3000\n\n", whole(name), "event: ping\n\n", chunk(name, "", "stop"))
+    stream(server, ": hello\n\n", "retry: 3000\n\n", whole(name), "event: ping\n\n", chunk(name, "", "stop"))
     assert ask(name, server).program == TASK + BODY
 
 
 @both
-def test_tokens_counted_up_to_now_in_each_chunk_count_once(name: str, server: Server) -> None:
+def test_cumulative_token_counts_are_not_added_up(name: str, server: Server) -> None:
     counts = [
         {"usage": {"prompt_tokens": 9, "completion_tokens": n, "total_tokens": 9 + n}} for n in (3, 5, 8)
     ]
     events = [whole(name), chunk(name, ""), chunk(name, "", "stop")]
-    streams(server, *(event | count for event, count in zip(events, counts, strict=True)), DONE)
+    stream(server, *(event | count for event, count in zip(events, counts, strict=True)), DONE)
     assert ask(name, server).usage == Usage(9, 8)
 
 
@@ -125,7 +125,7 @@ ERROR = {"error": {"message": "The model is not loaded.", "type": "invalid_reque
 
 @both
 @pytest.mark.parametrize("headers", [JSON, {}])
-def test_error_with_status_200_is_told_at_once_in_the_servers_words(
+def test_error_with_status_200_is_raised_in_the_servers_words(
     name: str, server: Server, headers: dict[str, str]
 ) -> None:
     body = json.dumps(ERROR).encode() if headers else f"data: {json.dumps(ERROR)}\n\n".encode()
@@ -137,9 +137,7 @@ def test_error_with_status_200_is_told_at_once_in_the_servers_words(
 
 @both
 @pytest.mark.parametrize("body", [{"choices": None}, {"object": "error", "message": "no such model"}])
-def test_reply_without_choices_is_an_error_in_a_sentence(
-    name: str, server: Server, body: dict[str, Any]
-) -> None:
+def test_reply_without_choices_raises_one_sentence(name: str, server: Server, body: dict[str, Any]) -> None:
     server.sends = lambda _request: (200, dict(JSON), json.dumps(body).encode())
     with pytest.raises(ModelError) as caught:
         ask(name, server)
@@ -147,7 +145,7 @@ def test_reply_without_choices_is_an_error_in_a_sentence(
 
 
 @both
-def test_address_to_which_a_server_has_moved_is_named(name: str, server: Server) -> None:
+def test_error_names_the_address_of_a_redirect(name: str, server: Server) -> None:
     server.sends = lambda request: (308, {"Location": f"https://new.example/v1{request.path}"}, b"")
     with pytest.raises(ModelError, match=r"redirects to https://new\.example/v1;") as caught:
         ask(name, server)
@@ -159,7 +157,7 @@ def test_address_to_which_a_server_has_moved_is_named(name: str, server: Server)
 
 
 @pytest.fixture
-def proxied(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
+def proxy_server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
     with Server() as proxy:
         address = proxy.url.removesuffix("/v1")
         for variable in ("HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"):
@@ -170,26 +168,26 @@ def proxied(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
 
 @both
 def test_server_on_this_machine_is_never_asked_through_a_proxy(
-    name: str, server: Server, proxied: Server
+    name: str, server: Server, proxy_server: Server
 ) -> None:
     assert ask(name, server).program.startswith(TASK)
-    assert (len(server.requests), len(proxied.requests)) == (1, 0)
+    assert (len(server.requests), len(proxy_server.requests)) == (1, 0)
 
 
 @both
-def test_error_that_came_through_a_proxy_names_it(name: str, server: Server, proxied: Server) -> None:
+def test_error_that_came_through_a_proxy_names_it(name: str, server: Server, proxy_server: Server) -> None:
     server.url = "http://model.invalid/v1"
-    proxied.sends = lambda _request: (502, {"Content-Type": "text/html"}, b"<html>no route</html>")
+    proxy_server.sends = lambda _request: (502, {"Content-Type": "text/html"}, b"<html>no route</html>")
     with pytest.raises(ModelError) as caught:
         ask(name, server)
-    assert f"(through the proxy {proxied.url.removesuffix('/v1')})" in caught.value.sentence
+    assert f"(through the proxy {proxy_server.url.removesuffix('/v1')})" in caught.value.sentence
 
 
 @both
 @pytest.mark.parametrize(
     ("variable", "value"), [("ALL_PROXY", "socks5://127.0.0.1:9"), ("SSL_CERT_FILE", "/no/such.pem")]
 )
-def test_wrong_environment_is_one_sentence(
+def test_wrong_environment_raises_one_sentence(
     name: str, server: Server, monkeypatch: pytest.MonkeyPatch, variable: str, value: str
 ) -> None:
     monkeypatch.setenv(variable, value)
@@ -231,13 +229,13 @@ NO = "I cannot do that."
 def test_reply_without_a_program_says_why(
     server: Server, events: list[dict[str, Any]], kind: str, text: str
 ) -> None:
-    streams(server, *events, DONE)
+    stream(server, *events, DONE)
     reply = ask(CHAT, server)
     assert (reply.no_program, reply.text) == (kind, text)
 
 
-def test_reply_that_was_cut_off_in_its_thoughts_is_cut_off(server: Server) -> None:
-    streams(server, chunk(CHAT, "<think>I should"), chunk(CHAT, None, "length"), DONE)
+def test_reply_cut_off_while_thinking_is_cut_off(server: Server) -> None:
+    stream(server, chunk(CHAT, "<think>I should"), chunk(CHAT, None, "length"), DONE)
     reply = ask(CHAT, server)
     assert (reply.no_program, reply.reasoning, reply.text) == ("cut-off", "I should", "<think>I should")
 
@@ -246,16 +244,14 @@ def test_reply_that_was_cut_off_in_its_thoughts_is_cut_off(server: Server) -> No
     ("after", "why"),
     [("```\nIt goes to", None), ("", "cut-off"), (f"```\nBetter:\n```python\n{TASK}    say('", "cut-off")],
 )
-def test_cut_off_reply_holds_a_program_if_it_goes_on_behind_it(
-    server: Server, after: str, why: str | None
-) -> None:
-    streams(server, chunk(CHAT, f"```python\n{TASK}{BODY}{after}"), chunk(CHAT, None, "length"), DONE)
+def test_cut_off_reply_has_a_program_if_text_follows_it(server: Server, after: str, why: str | None) -> None:
+    stream(server, chunk(CHAT, f"```python\n{TASK}{BODY}{after}"), chunk(CHAT, None, "length"), DONE)
     reply = ask(CHAT, server)
     assert (reply.program, reply.no_program, is_cut_off(reply.finish_reason)) == (TASK + BODY, why, True)
 
 
 @both
-def test_request_that_a_filter_refuses_is_a_reply(name: str, server: Server) -> None:
+def test_filtered_request_becomes_a_reply(name: str, server: Server) -> None:
     said = {"message": "The prompt triggered our content management policy.", "code": "content_filter"}
     server.sends = lambda _request: (400, dict(JSON), json.dumps({"error": said}).encode())
     reply = ask(name, server)
@@ -264,7 +260,7 @@ def test_request_that_a_filter_refuses_is_a_reply(name: str, server: Server) -> 
 
 
 @both
-def test_refused_prompt_is_told_apart_from_other_failures(name: str, server: Server) -> None:
+def test_refused_prompt_differs_from_other_failures(name: str, server: Server) -> None:
     found = []
     for status, said in (
         (400, "This prompt is too long."),
@@ -272,7 +268,7 @@ def test_refused_prompt_is_told_apart_from_other_failures(name: str, server: Ser
         (401, "No"),
     ):
         body = json.dumps({"error": {"message": said}}).encode()
-        server.sends = lambda _request, status=status, body=body: (status, dict(JSON), body)  # type: ignore[misc] # of a test
+        server.sends = lambda _request, status=status, body=body: (status, dict(JSON), body)  # type: ignore[misc] # defaults
         with pytest.raises(ModelError) as caught:
             ask(name, server)
         found.append(caught.value.is_refusal)
@@ -283,29 +279,29 @@ def test_refused_prompt_is_told_apart_from_other_failures(name: str, server: Ser
 def test_reasoning_is_kept_apart(server: Server, field: str) -> None:
     thought = "I might write def task_program(): pass"
     usage = {"prompt_tokens": 9, "completion_tokens": 30, "total_tokens": 39}
-    usage |= {"completion_tokens_details": {"reasoning_tokens": 20}}  # type: ignore[dict-item] # as servers send it
+    usage |= {"completion_tokens_details": {"reasoning_tokens": 20}}  # type: ignore[dict-item] # a nested object
     end = chunk(CHAT, None, "stop") | {"usage": usage}
-    streams(server, chunk(CHAT, None, **{field: thought}), whole(CHAT), end, DONE)
+    stream(server, chunk(CHAT, None, **{field: thought}), whole(CHAT), end, DONE)
     reply = ask(CHAT, server)
     assert (reply.program, reply.reasoning, reply.text) == (TASK + BODY, thought, TASK + BODY)
     assert reply.usage == Usage(9, 30, 20)
 
 
 def test_reasoning_is_heard_between_marks(server: Server) -> None:
-    streams(server, chunk(CHAT, None, reasoning_content="Hm."), whole(CHAT), chunk(CHAT, None, "stop"), DONE)
+    stream(server, chunk(CHAT, None, reasoning_content="Hm."), whole(CHAT), chunk(CHAT, None, "stop"), DONE)
     heard: list[str] = []
 
-    async def asked() -> None:
+    async def request() -> None:
         model = open_model(CHAT, SamplingSettings(base_url=server.url))
         await model.reply(PROMPT, number=0, on_text=heard.append)
         await model.close()
 
-    asyncio.run(asked())
+    asyncio.run(request())
     assert "".join(heard) == f"<think>\nHm.\n</think>\n{TASK}{BODY}"
 
 
 def test_reasoning_in_tags_is_kept_apart(server: Server) -> None:
-    streams(server, chunk(CHAT, "<think>Hm.</think>\n"), whole(CHAT), chunk(CHAT, None, "stop"), DONE)
+    stream(server, chunk(CHAT, "<think>Hm.</think>\n"), whole(CHAT), chunk(CHAT, None, "stop"), DONE)
     reply = ask(CHAT, server)
     assert (reply.program, reply.reasoning.strip()) == (TASK + BODY, "Hm.")
 
@@ -328,7 +324,7 @@ def test_chat_models_get_no_limit_and_base_models_that_of_the_paper(server: Serv
 
 
 @both
-def test_further_fields_are_sent(name: str, server: Server) -> None:
+def test_extra_body_is_sent(name: str, server: Server) -> None:
     ask(name, server, extra_body={"top_k": 20, "chat_template_kwargs": {"enable_thinking": False}})
     body = server.requests[0].body
     assert (body["top_k"], body["chat_template_kwargs"]) == (20, {"enable_thinking": False})
@@ -352,7 +348,7 @@ def test_base_models_take_no_effort(server: Server) -> None:
         ("anthropic:claude-sonnet-4-5", (0.2, None, 16_384)),
     ],
 )
-def test_settings_say_what_is_really_sent(
+def test_settings_show_the_values_that_are_sent(
     name: str, sent: tuple[float | None, float | None, int | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for key in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
@@ -361,12 +357,12 @@ def test_settings_say_what_is_really_sent(
     assert (settings.temperature, settings.top_p, settings.max_tokens) == sent
 
 
-# --- as servers and accounts of today behave
+# --- habits of current servers and accounts
 
 
 def test_thoughts_are_found_wherever_a_stream_cuts_their_tags(server: Server) -> None:
     pieces = ["<think>", "\nOkay.", "</think>\n\n", f"```python\n{TASK}{BODY}```"]
-    streams(server, *(chunk(CHAT, piece) for piece in pieces), chunk(CHAT, None, "stop"), DONE)
+    stream(server, *(chunk(CHAT, piece) for piece in pieces), chunk(CHAT, None, "stop"), DONE)
     reply = ask(CHAT, server)
     assert (reply.program, reply.no_program, reply.reasoning) == (TASK + BODY, None, "Okay.")
     assert reply.text == "".join(pieces)
@@ -381,17 +377,17 @@ def test_thoughts_are_found_wherever_a_stream_cuts_their_tags(server: Server) ->
         'data: {"detail": "context shift is disabled"}\n\n',
     ],
 )
-def test_error_in_the_place_of_a_chunk_is_told_in_the_servers_words(
+def test_error_instead_of_a_chunk_is_raised_in_the_servers_words(
     name: str, server: Server, event: str
 ) -> None:
-    streams(server, event, DONE)
+    stream(server, event, DONE)
     with pytest.raises(ModelError, match="context shift is disabled"):
         ask(name, server)
 
 
 @both
-def test_reply_that_a_server_gives_up_is_none(name: str, server: Server) -> None:
-    streams(server, whole(name), chunk(name, "", "abort"), DONE)
+def test_aborted_reply_is_an_error_that_may_pass(name: str, server: Server) -> None:
+    stream(server, whole(name), chunk(name, "", "abort"), DONE)
     with pytest.raises(ModelError, match="cut off") as caught:
         ask(name, server)
     assert caught.value.may_pass
@@ -405,13 +401,13 @@ def test_reply_that_a_server_gives_up_is_none(name: str, server: Server) -> None
         (400, "Invalid prompt: flagged as potentially violating our usage policy."),
     ],
 )
-def test_filters_of_providers_are_filters(server: Server, status: int, said: str) -> None:
+def test_messages_of_providers_filters_are_recognised(server: Server, status: int, said: str) -> None:
     server.sends = lambda _request: (status, dict(JSON), json.dumps({"error": {"message": said}}).encode())
     assert ask(CHAT, server).no_program == "filtered"
 
 
 @pytest.mark.parametrize("said", ["Budget has been exceeded!", "API key expired. Please renew it."])
-def test_account_that_runs_out_refuses_no_prompt(server: Server, said: str) -> None:
+def test_exhausted_account_is_not_a_refusal(server: Server, said: str) -> None:
     server.sends = lambda _request: (400, dict(JSON), json.dumps({"error": {"message": said}}).encode())
     with pytest.raises(ModelError) as caught:
         ask(CHAT, server)
@@ -428,17 +424,17 @@ def test_server_of_the_environment_is_an_own_server(server: Server, monkeypatch:
     monkeypatch.setenv("OPENAI_BASE_URL", server.url)
     monkeypatch.setenv("ALL_PROXY", "socks5://127.0.0.1:9")
 
-    async def asked() -> None:
+    async def request() -> None:
         model = open_model("openai-chat:some", SamplingSettings(max_tokens=99))
         await model.reply(PROMPT, number=0)
         await model.close()
 
-    asyncio.run(asked())
+    asyncio.run(request())
     assert server.requests[0].body["max_tokens"] == 99
 
 
 @both
-def test_socks_proxy_is_nothing_to_a_server_on_this_machine(
+def test_socks_proxy_is_ignored_for_a_server_on_this_machine(
     name: str, server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ALL_PROXY", "socks5://127.0.0.1:9")
@@ -446,7 +442,7 @@ def test_socks_proxy_is_nothing_to_a_server_on_this_machine(
 
 
 @pytest.mark.parametrize("field", ["temperature", "max_tokens", "stream"])
-def test_extra_body_sets_nothing_that_has_a_setting(field: str) -> None:
+def test_extra_body_must_not_repeat_a_setting(field: str) -> None:
     with pytest.raises(UserError, match=field):
         SamplingSettings(extra_body={field: 1})
 
@@ -475,7 +471,7 @@ def test_settings_of_providers_with_effort_and_seed(
         ("google:gemini-2.5-pro", {"reasoning_effort": "most"}),
     ],
 )
-def test_what_a_provider_does_not_take_is_refused(
+def test_setting_that_a_provider_does_not_take_is_refused(
     name: str, asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("GOOGLE_API_KEY", "a key of nobody")

@@ -38,13 +38,13 @@ def _without_keys(monkeypatch: pytest.MonkeyPatch) -> None:
         ("completions:m", None, ["completions:m", "--base-url", "OPENAI_API_KEY"]),
     ],
 )
-def test_what_is_missing_is_told_in_a_sentence(name: str, url: str | None, named: list[str]) -> None:
+def test_unusable_models_are_refused_in_one_sentence(name: str, url: str | None, named: list[str]) -> None:
     with pytest.raises(UserError) as caught:
         open_model(name, SamplingSettings(base_url=url))
     assert all(each in caught.value.sentence for each in named), caught.value
 
 
-def test_missing_extra_is_told_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_for_a_missing_extra_names_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "torch", None)
     monkeypatch.delitem(sys.modules, "codebotler.models.local", raising=False)
     with pytest.raises(UserError, match="torch") as caught:
@@ -53,7 +53,7 @@ def test_missing_extra_is_told_with_the_command(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize("name", ["openai-chat:m", "vllm:m", "ollama:m", "completions:m", "anthropic:m"])
-def test_models_are_named_as_they_were_asked_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_models_keep_the_name_they_were_opened_with(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-ant-0123456789")
     model = open_model(name, SamplingSettings(base_url=URL))
     assert model.name == name
@@ -100,7 +100,7 @@ def test_key_that_cannot_be_sent_is_refused(
     assert sentence.isprintable()
 
 
-def test_key_of_another_provider_is_no_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_invalid_key_of_another_provider_is_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-one\nsk-two")
     asyncio.run(open_model("openai-chat:m", SamplingSettings(base_url=URL)).close())
 
@@ -115,7 +115,7 @@ def test_key_of_another_provider_is_no_matter(monkeypatch: pytest.MonkeyPatch) -
     ],
 )
 @pytest.mark.parametrize("key", ["", "  "])
-def test_blank_key_is_a_missing_one(
+def test_blank_key_counts_as_missing(
     monkeypatch: pytest.MonkeyPatch, name: str, variable: str, key: str
 ) -> None:
     monkeypatch.setenv(variable, key)

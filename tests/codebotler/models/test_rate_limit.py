@@ -1,4 +1,4 @@
-"""Limits and further tries, against a real server."""
+"""Limits and retries work against a real server."""
 
 import asyncio
 import random
@@ -42,7 +42,7 @@ def use(
     timeout: float = 30,
     **limits: Any,  # noqa: ANN401 - of several types
 ) -> tuple[RateLimited, T]:
-    async def used() -> tuple[RateLimited, T]:
+    async def run() -> tuple[RateLimited, T]:
         model = open_model(name, SamplingSettings(base_url=server.url, seed=0, timeout=timeout))
         paced = RateLimited(model, first_wait=0.01, **limits)
         assert paced.model.name == name
@@ -51,14 +51,14 @@ def use(
         finally:
             await paced.close()
 
-    return asyncio.run(used())
+    return asyncio.run(run())
 
 
-async def one(paced: RateLimited) -> Reply:
+async def ask_once(paced: RateLimited) -> Reply:
     return await paced.reply(PROMPT, number=0)
 
 
-def many(count: int) -> Callable[[RateLimited], Awaitable[list[Reply]]]:
+def ask_many(count: int) -> Callable[[RateLimited], Awaitable[list[Reply]]]:
     async def ask(paced: RateLimited) -> list[Reply]:
         return await asyncio.gather(*(paced.reply(PROMPT, number=number) for number in range(count)))
 
@@ -82,27 +82,23 @@ PASSING = [
 
 @both
 @pytest.mark.parametrize("fault", PASSING, ids=lambda fault: fault.name)
-def test_what_may_pass_is_tried_again(name: str, server: Server, fault: Fault) -> None:
+def test_passing_faults_are_retried(name: str, server: Server, fault: Fault) -> None:
     server.faults.extend([fault, fault])
-    paced, reply = use(server, one, name=name, timeout=1 if fault in {Fault.SLOW, Fault.STALLED} else 30)
+    paced, reply = use(server, ask_once, name=name, timeout=1 if fault in {Fault.SLOW, Fault.STALLED} else 30)
     assert "reply 0" in reply.program
     assert (paced.requests, paced.retry_count) == (3, 2)
     assert len(server.requests) == 3
 
 
-def test_that_the_first_request_is_tried_again_is_told_once(
-    server: Server, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_first_retry_is_logged_once(server: Server, caplog: pytest.LogCaptureFixture) -> None:
     server.faults.extend([Fault.HUNG_UP, Fault.HUNG_UP])
-    use(server, one)
-    (told,) = caplog.messages
-    assert "again" in told
-    assert told.endswith("(Server disconnected without sending a response)")
+    use(server, ask_once)
+    (message,) = caplog.messages
+    assert "again" in message
+    assert message.endswith("(Server disconnected without sending a response)")
 
 
-def test_that_a_later_request_is_tried_again_is_not_told(
-    server: Server, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_later_retries_are_not_logged(server: Server, caplog: pytest.LogCaptureFixture) -> None:
     async def two(paced: RateLimited) -> int:
         await paced.reply(prompt_for("x"), number=0)
         server.faults.append(Fault.HUNG_UP)
@@ -119,28 +115,26 @@ def test_that_a_later_request_is_tried_again_is_not_told(
     [Fault.UNAUTHORIZED, Fault.NOT_FOUND, Fault.NO_MONEY, Fault.TOO_LONG],
     ids=lambda fault: fault.name,
 )
-def test_what_does_not_pass_is_not(name: str, server: Server, fault: Fault) -> None:
+def test_lasting_faults_are_not_retried(name: str, server: Server, fault: Fault) -> None:
     server.faults.append(fault)
     with pytest.raises(ModelError) as caught:
-        use(server, one, name=name)
+        use(server, ask_once, name=name)
     assert "tried" not in caught.value.sentence
     assert len(server.requests) == 1
 
 
 @both
 @pytest.mark.parametrize("fault", [Fault.EMPTY, Fault.WITHOUT_CODE], ids=lambda fault: fault.name)
-def test_reply_without_a_program_is_the_models_fault_and_not_asked_for_again(
-    name: str, server: Server, fault: Fault
-) -> None:
+def test_reply_without_a_program_is_not_retried(name: str, server: Server, fault: Fault) -> None:
     server.faults.append(fault)
-    paced, _ = use(server, one, name=name)
+    paced, _ = use(server, ask_once, name=name)
     assert (paced.requests, paced.retry_count, len(server.requests)) == (1, 0, 1)
 
 
-def test_tries_come_to_an_end(server: Server) -> None:
+def test_retries_are_limited(server: Server) -> None:
     server.fault = lambda _request: Fault.SERVER_ERROR
     with pytest.raises(ModelError) as caught:
-        use(server, one, retries=2)
+        use(server, ask_once, retries=2)
     assert caught.value.sentence.endswith("(tried 3 times)")
     assert caught.value.may_pass
     assert len(server.requests) == 3
@@ -148,7 +142,7 @@ def test_tries_come_to_an_end(server: Server) -> None:
 
 def test_waits_grow(server: Server) -> None:
     server.faults.extend([Fault.SERVER_ERROR] * 5)
-    use(server, one)
+    use(server, ask_once)
     starts = [request.at for request in server.requests]
     waits = [later - earlier for earlier, later in pairwise(starts)]
     assert len(waits) == 5
@@ -157,13 +151,13 @@ def test_waits_grow(server: Server) -> None:
 
 
 @both
-def test_who_asks_for_peace_gets_it_from_all_requests(name: str, server: Server) -> None:
+def test_retry_after_delays_all_requests(name: str, server: Server) -> None:
     server.faults.append(Fault.TOO_MANY_FOR_A_WHILE)
     server.retry_after = 1
 
     async def ask(paced: RateLimited) -> None:
         first = asyncio.create_task(paced.reply(PROMPT, number=0))
-        while not paced.retry_count:  # noqa: ASYNC110 - a counter, which tells nobody
+        while not paced.retry_count:  # noqa: ASYNC110 - the counter has no event
             await asyncio.sleep(0.005)
         await asyncio.gather(first, *(paced.reply(PROMPT, number=number) for number in range(3)))
 
@@ -173,37 +167,37 @@ def test_who_asks_for_peace_gets_it_from_all_requests(name: str, server: Server)
     assert all(0.98 < request.at - refused.at < 10 for request in later)
 
 
-def test_who_asks_for_peace_for_too_long_is_not_waited_for(server: Server) -> None:
+def test_too_long_retry_after_is_an_error(server: Server) -> None:
     server.faults.append(Fault.TOO_MANY_FOR_A_WHILE)
     server.retry_after = 3600
     with pytest.raises(ModelError) as caught:
-        use(server, one)
+        use(server, ask_once)
     assert caught.value.retry_after == 3600
 
 
 def test_no_more_requests_are_under_way_than_allowed(server: Server) -> None:
     server.pause = 0.1
-    _, replies = use(server, many(12), concurrency=3)
+    _, replies = use(server, ask_many(12), concurrency=3)
     assert len(replies) == 12
     assert server.most_open == 3
 
 
-def test_requests_are_spread_over_the_minute_tries_included(server: Server) -> None:
+def test_requests_and_retries_are_spread_over_the_minute(server: Server) -> None:
     server.faults.extend([None, Fault.SERVER_ERROR])
-    paced, _ = use(server, many(5), requests_per_minute=1200)
+    paced, _ = use(server, ask_many(5), requests_per_minute=1200)
     assert paced.requests == 6
     starts = [request.at for request in server.requests]
     assert starts[-1] - starts[0] > 4 * 0.05
 
 
 def test_counters_add_up(server: Server) -> None:
-    paced, replies = use(server, many(5))
+    paced, replies = use(server, ask_many(5))
     assert (paced.requests, paced.retry_count) == (5, 0)
     assert paced.tokens_used == sum(reply.usage.total for reply in replies)
 
 
 def spend(paced: RateLimited) -> Awaitable[tuple[int, BudgetSpentError]]:
-    async def spending() -> tuple[int, BudgetSpentError]:
+    async def run() -> tuple[int, BudgetSpentError]:
         for number in range(100):
             try:
                 await paced.reply(PROMPT, number=number)
@@ -211,7 +205,7 @@ def spend(paced: RateLimited) -> Awaitable[tuple[int, BudgetSpentError]]:
                 return number, error
         raise AssertionError("the budget is without end")
 
-    return spending()
+    return run()
 
 
 @both
@@ -240,15 +234,15 @@ class HundredTokens:
 
 
 def test_budget_that_is_used_to_the_last_token_is_spent() -> None:
-    async def spending() -> tuple[int, BudgetSpentError]:
+    async def run() -> tuple[int, BudgetSpentError]:
         return await spend(RateLimited(HundredTokens(), token_budget=200))
 
-    replies, error = asyncio.run(spending())
+    replies, error = asyncio.run(run())
     assert (replies, error.used) == (2, 200)
 
 
 @both
-def test_budget_holds_where_nobody_counts_tokens(name: str, server: Server) -> None:
+def test_budget_holds_if_the_server_counts_no_tokens(name: str, server: Server) -> None:
     server.counts = False
     paced, (replies, _) = use(server, spend, name=name, token_budget=5_000)
     assert 2 <= replies <= 6
@@ -258,7 +252,7 @@ def test_budget_holds_where_nobody_counts_tokens(name: str, server: Server) -> N
 def test_reply_that_breaks_off_counts_against_the_budget(server: Server) -> None:
     server.fault = lambda _request: Fault.CUT
     with pytest.raises(BudgetSpentError):
-        use(server, one, token_budget=100)
+        use(server, ask_once, token_budget=100)
     assert len(server.requests) == 1
 
 
@@ -272,12 +266,12 @@ def test_requests_that_wait_find_the_budget_spent(server: Server) -> None:
     assert len(server.requests) == 2
 
 
-def test_spent_budget_is_told_without_waiting_for_a_turn(server: Server) -> None:
+def test_spent_budget_is_reported_without_waiting(server: Server) -> None:
     async def ask(paced: RateLimited) -> float:
-        await one(paced)
+        await ask_once(paced)
         start = time.monotonic()
         with pytest.raises(BudgetSpentError):
-            await one(paced)
+            await ask_once(paced)
         return time.monotonic() - start
 
     _, seconds = use(server, ask, token_budget=10, requests_per_minute=12)
@@ -286,14 +280,14 @@ def test_spent_budget_is_told_without_waiting_for_a_turn(server: Server) -> None
 
 def test_budget_that_is_spent_while_a_request_waits_for_its_turn_stops_it(server: Server) -> None:
     async def ask(paced: RateLimited) -> list[Any]:
-        return [*await asyncio.gather(one(paced), one(paced), return_exceptions=True)]
+        return [*await asyncio.gather(ask_once(paced), ask_once(paced), return_exceptions=True)]
 
     _, ends = use(server, ask, token_budget=10, requests_per_minute=40)
     assert [type(end) for end in ends] == [Reply, BudgetSpentError]
     assert len(server.requests) == 1
 
 
-def test_given_up_requests_leave_nothing_behind(server: Server) -> None:
+def test_cancelled_requests_leave_nothing_behind(server: Server) -> None:
     async def ask(paced: RateLimited) -> Reply:
         server.faults.extend([Fault.SLOW, Fault.SERVER_ERROR, Fault.SLOW])
         tasks = [asyncio.create_task(paced.reply(PROMPT, number=number)) for number in range(6)]
@@ -311,7 +305,7 @@ def test_given_up_requests_leave_nothing_behind(server: Server) -> None:
     assert "reply 0" in reply.program
 
 
-INTERRUPTED = """
+SCRIPT = """
 import asyncio, sys
 from codebotler.models.sampling import SamplingSettings
 from codebotler.models.open import open_model
@@ -336,10 +330,10 @@ except KeyboardInterrupt:
 
 @pytest.mark.slow
 @both
-def test_control_c_stops_all_requests_at_once_and_without_a_word(name: str, server: Server) -> None:
+def test_control_c_stops_all_requests_at_once_and_quietly(name: str, server: Server) -> None:
     server.faults.extend([Fault.SLOW, Fault.STALLED] * 10)
     with subprocess.Popen(
-        [sys.executable, "-X", "dev", "-c", INTERRUPTED, name, server.url],
+        [sys.executable, "-X", "dev", "-c", SCRIPT, name, server.url],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -364,7 +358,7 @@ def test_every_reply_comes_once_through_many_faults(name: str, server: Server) -
         return dice.choice(bad) if dice.random() < 0.2 else None
 
     server.fault = fault
-    paced, replies = use(server, many(100), name=name)
+    paced, replies = use(server, ask_many(100), name=name)
     assert [f'say("reply {number}")' in reply.program for number, reply in enumerate(replies)] == [True] * 100
     assert len(server.requests) == paced.requests == 100 + paced.retry_count
     assert paced.retry_count > 5

@@ -24,22 +24,22 @@ def write(path: Path, text: str) -> Path:
 
 
 @pytest.mark.parametrize("name", ["recorded", "recorded:", "recorded:careful", "careful"])
-def test_careful_model_is_the_one_that_is_meant_by_recorded(name: str) -> None:
+def test_recorded_means_the_careful_model(name: str) -> None:
     assert open_recorded(name).name == "recorded:careful"
 
 
-def test_unknown_recorded_model_is_told_in_a_sentence() -> None:
+def test_unknown_recorded_model_is_refused() -> None:
     with pytest.raises(UserError, match=r'"recorded:lazy".* recorded:careful or recorded:hasty'):
         open_recorded("recorded:lazy")
 
 
-def test_replies_come_round_again() -> None:
+def test_replies_repeat_in_a_cycle() -> None:
     model = open_recorded("recorded:hasty")
     for instruction, replies in model.replies.items():
         assert [model.solution(instruction, i) for i in range(2 * len(replies))] == [*replies, *replies]
 
 
-def test_nobody_recorded_an_instruction_of_ones_own() -> None:
+def test_new_instruction_has_no_recording() -> None:
     with pytest.raises(KeyError):
         open_recorded("recorded").solution("Fetch me a coffee", 0)
 
@@ -51,7 +51,7 @@ def test_both_models_know_the_same_instructions() -> None:
 
 
 @pytest.mark.parametrize("name", RECORDED_NAMES)
-def test_every_recorded_program_defines_its_task_or_is_said_not_to_parse(name: str) -> None:
+def test_every_recorded_program_defines_its_task_or_is_marked_as_broken(name: str) -> None:
     for replies in open_recorded(name).replies.values():
         assert replies
         for reply in replies:
@@ -97,14 +97,14 @@ def test_spaces_capitals_and_the_final_full_stop_do_not_make_another_instruction
         assert reply_to(other) == reply_to(instruction)
 
 
-# --- the first sentence of the README
+# --- the first instruction in the README
 
 CHECK_THE_PRINTER_ROOMS = "Check every printer room for a stapler, and come back and tell me which have none"
 PRINTER_ROOMS = ("printer room 1", "printer room 2", "printer room 3")
 
 
-def what_it_does(model: str, without_stapler: Iterable[str]) -> tuple[str, str]:
-    """What a recorded program says in the end, and where."""
+def run_recorded(model: str, without_stapler: Iterable[str]) -> tuple[str, str]:
+    """Run a recorded program; return its only statement, and where it made it."""
     rooms = (Room(room, () if room in without_stapler else ("stapler",)) for room in ("lab", *PRINTER_ROOMS))
     world = World((Room("hall"), *rooms), "hall")
     (outcome,) = run([(reply_to(CHECK_THE_PRINTER_ROOMS, model=model).program, world)], workers=1)
@@ -119,13 +119,13 @@ def what_it_does(model: str, without_stapler: Iterable[str]) -> tuple[str, str]:
 def test_the_readmes_first_instruction_is_carried_out_by_the_careful_model(
     without_stapler: tuple[str, ...],
 ) -> None:
-    said, place = what_it_does("recorded", without_stapler)
+    said, place = run_recorded("recorded", without_stapler)
     assert place == "hall"
     assert tuple(room for room in PRINTER_ROOMS if room in said) == without_stapler
 
 
 def test_the_readmes_first_instruction_is_one_that_the_hasty_model_gets_wrong() -> None:
-    said, _ = what_it_does("recorded:hasty", PRINTER_ROOMS)
+    said, _ = run_recorded("recorded:hasty", PRINTER_ROOMS)
     assert [room for room in PRINTER_ROOMS if room in said] == ["printer room 3"]
 
 
@@ -136,7 +136,7 @@ def test_the_readmes_first_instruction_is_in_the_readme() -> None:
     assert f'codebotler run "{CHECK_THE_PRINTER_ROOMS}"' in rest
 
 
-def test_unknown_instruction_is_told_with_the_closest_that_are_known() -> None:
+def test_error_for_an_unknown_instruction_names_the_closest() -> None:
     with pytest.raises(UnknownInstructionError) as caught:
         reply_to("Fetch me a coffee from the kitchen")
     sentence = caught.value.sentence
@@ -150,7 +150,7 @@ def test_unknown_instruction_is_told_with_the_closest_that_are_known() -> None:
 
 
 @pytest.mark.parametrize("name", ["", "gpt-5.1", ":a", "hf:", "completions: ", "openai-chat:"])
-def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
+def test_error_for_an_invalid_name_says_how_models_are_named(name: str) -> None:
     with pytest.raises(UserError, match=r"not the name of a model.* recorded"):
         open_model(name, SamplingSettings())
 
@@ -170,14 +170,14 @@ def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
         ({"base_url": "http://a/v1?key=sk-secret"}, ["base URL", "query"]),
     ],
 )
-def test_settings_out_of_range_are_told(wrong: dict[str, Any], named: list[str]) -> None:
+def test_settings_out_of_range_are_refused(wrong: dict[str, Any], named: list[str]) -> None:
     with pytest.raises(UserError) as caught:
         SamplingSettings(**wrong)
     assert all(name in caught.value.sentence for name in named), caught.value
     assert "sk-secret" not in str(caught.value)
 
 
-def test_recorded_programs_have_no_base_url() -> None:
+def test_recorded_model_refuses_a_base_url() -> None:
     with pytest.raises(UserError, match=r"recorded.* base URL"):
         open_model("recorded", SamplingSettings(base_url="http://localhost:8000/v1"))
 
@@ -188,6 +188,6 @@ def test_of_several_models_one_is_enough_for_a_base_url() -> None:
         expect_server("recorded", "recorded:hasty")
 
 
-def test_seed_counts_on_with_the_number_of_the_reply() -> None:
+def test_seed_grows_with_the_number_of_the_reply() -> None:
     assert SamplingSettings(seed=7).seed_of(3) == 10
     assert SamplingSettings().seed_of(3) is None

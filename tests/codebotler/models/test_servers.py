@@ -1,4 +1,4 @@
-"""Chat and text completions, each against a real server that does what servers do."""
+"""Chat and text completions work with a real server, and survive its faults."""
 
 import asyncio
 import os
@@ -32,17 +32,17 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
 
 
 def ask(name: str, server: Server, prompt: Prompt = PROMPT, **settings: Any) -> tuple[Reply, list[str]]:  # noqa: ANN401 - of several types
-    """One reply from an own server, and what was heard of it."""
+    """Ask an own server once; return its reply and the pieces that were heard."""
     heard: list[str] = []
 
-    async def asked(model: Model) -> Reply:
+    async def request(model: Model) -> Reply:
         try:
             return await model.reply(prompt, number=4, on_text=heard.append)
         finally:
             await model.close()
 
     return asyncio.run(
-        asked(open_model(name, SamplingSettings(base_url=server.url, seed=3, **settings)))
+        request(open_model(name, SamplingSettings(base_url=server.url, seed=3, **settings)))
     ), heard
 
 
@@ -67,7 +67,7 @@ def test_reply_is_streamed_and_holds_the_program(name: str, server: Server) -> N
 
 
 @both
-def test_server_is_told_the_settings(name: str, server: Server) -> None:
+def test_settings_are_sent(name: str, server: Server) -> None:
     ask(name, server, temperature=0.7, top_p=0.9, max_tokens=99)
     body = server.requests[0].body
     limit = body.get("max_tokens") or body.get("max_completion_tokens")
@@ -77,14 +77,14 @@ def test_server_is_told_the_settings(name: str, server: Server) -> None:
 
 @both
 def test_settings_that_are_none_are_left_to_the_server(name: str, server: Server) -> None:
-    async def asked() -> Reply:
+    async def request() -> Reply:
         settings = SamplingSettings(base_url=server.url, temperature=None, top_p=None)
         model = open_model(name, settings)
         reply = await model.reply(PROMPT, number=4)
         await model.close()
         return reply
 
-    asyncio.run(asked())
+    asyncio.run(request())
     assert not {"temperature", "top_p", "seed"} & set(server.requests[0].body)
 
 
@@ -95,7 +95,7 @@ def test_chat_is_sent_as_messages(server: Server) -> None:
     assert tuple(sent) == prompt.messages
 
 
-def test_text_is_sent_with_what_stops_it(server: Server) -> None:
+def test_text_is_sent_with_its_stop_sequences(server: Server) -> None:
     ask(BASE, server)
     body = server.requests[0].body
     assert body["prompt"] == PROMPT.text
@@ -108,7 +108,7 @@ def test_server_that_does_not_stop_is_cut_at_the_functions_end(server: Server) -
     assert reply.program == TASK + PROGRAM
 
 
-def test_openai_is_chat_completions_where_a_base_url_is_given(server: Server) -> None:
+def test_openai_means_chat_completions_if_a_base_url_is_given(server: Server) -> None:
     model = open_model("openai:m", SamplingSettings(base_url=server.url))
     assert model.name == "openai-chat:m"
     reply, _ = ask("openai:m", server)
@@ -138,7 +138,7 @@ LASTING = {
 
 @both
 @pytest.mark.parametrize("fault", [*PASSING, *LASTING], ids=lambda fault: fault.name)
-def test_failure_is_told_in_a_sentence_with_whether_it_may_pass(
+def test_failure_is_one_sentence_and_says_whether_it_may_pass(
     name: str, server: Server, fault: Fault
 ) -> None:
     server.faults.append(fault)
@@ -150,7 +150,7 @@ def test_failure_is_told_in_a_sentence_with_whether_it_may_pass(
     assert "\n" not in error.sentence
     assert error.may_pass == (fault in PASSING)
     assert error.retry_after is None
-    assert len(server.requests) == 1  # the client itself tries nothing again
+    assert len(server.requests) == 1  # The client itself does not retry.
 
 
 @both
@@ -158,7 +158,7 @@ def test_failure_is_told_in_a_sentence_with_whether_it_may_pass(
     ("said", "seconds"),
     [("7", 7), ("soon", None), ("Wed, 21 Oct 2015 07:28:00 GMT", 0), ("nan", None)],
 )
-def test_server_may_ask_for_peace(name: str, server: Server, said: str, seconds: float | None) -> None:
+def test_retry_after_is_read(name: str, server: Server, said: str, seconds: float | None) -> None:
     server.faults.append(Fault.TOO_MANY_FOR_A_WHILE)
     server.retry_after = said
     with pytest.raises(ModelError) as caught:
@@ -169,7 +169,7 @@ def test_server_may_ask_for_peace(name: str, server: Server, said: str, seconds:
 
 @both
 @pytest.mark.parametrize("fault", [Fault.SLOW, Fault.STALLED], ids=lambda fault: fault.name)
-def test_reply_that_takes_too_long_is_given_up(name: str, server: Server, fault: Fault) -> None:
+def test_slow_reply_times_out(name: str, server: Server, fault: Fault) -> None:
     server.faults.append(fault)
     with pytest.raises(ModelError) as caught:
         ask(name, server, timeout=0.3)
@@ -178,8 +178,8 @@ def test_reply_that_takes_too_long_is_given_up(name: str, server: Server, fault:
 
 
 @both
-def test_reply_that_never_ends_is_given_up_though_its_pieces_come_in_time(name: str, server: Server) -> None:
-    async def asked() -> None:
+def test_endless_reply_times_out_though_its_pieces_arrive_in_time(name: str, server: Server) -> None:
+    async def request() -> None:
         model = open_model(name, SamplingSettings(base_url=server.url, timeout=1.0))
         try:
             await asyncio.wait_for(model.reply(PROMPT, number=0, on_text=heard.append), 10)
@@ -189,7 +189,7 @@ def test_reply_that_never_ends_is_given_up_though_its_pieces_come_in_time(name: 
     heard: list[str] = []
     server.faults.append(Fault.DRIP)
     with pytest.raises(ModelError) as caught:
-        asyncio.run(asked())
+        asyncio.run(request())
     assert re.match(rf"{name}: .* 1 s", caught.value.sentence)
     assert caught.value.may_pass
     assert len(heard) > 2
@@ -197,16 +197,14 @@ def test_reply_that_never_ends_is_given_up_though_its_pieces_come_in_time(name: 
 
 @both
 @pytest.mark.parametrize("word", ["pk_location_name", "hf_rooms_to_visit"])
-def test_program_with_a_name_that_looks_like_a_key_stays_as_it_is(
-    name: str, server: Server, word: str
-) -> None:
+def test_program_with_a_name_that_looks_like_a_key_is_unchanged(name: str, server: Server, word: str) -> None:
     server.answer = lambda request: f"{TASK * request.is_chat}    {word} = 1\n"
     reply, _ = ask(name, server)
     assert reply.program == f"{TASK}    {word} = 1\n"
 
 
 @both
-def test_short_key_that_a_server_sends_back_is_not_told(
+def test_short_key_that_a_server_sends_back_is_not_shown(
     name: str, server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "sesame")
@@ -219,7 +217,9 @@ def test_short_key_that_a_server_sends_back_is_not_told(
 
 @both
 @pytest.mark.parametrize("key", ["", " "])
-def test_blank_key_is_no_key(name: str, server: Server, monkeypatch: pytest.MonkeyPatch, key: str) -> None:
+def test_blank_key_counts_as_missing(
+    name: str, server: Server, monkeypatch: pytest.MonkeyPatch, key: str
+) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", key)
     reply, _ = ask(name, server)
     assert reply.program == TASK + PROGRAM
@@ -228,7 +228,7 @@ def test_blank_key_is_no_key(name: str, server: Server, monkeypatch: pytest.Monk
 
 
 @both
-def test_server_that_is_not_there_is_told(name: str, server: Server) -> None:
+def test_unreachable_server_raises_one_sentence(name: str, server: Server) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         server.url = f"http://127.0.0.1:{taken.getsockname()[1]}/v1"
@@ -260,7 +260,7 @@ def test_huge_reply_is_a_reply(name: str, server: Server) -> None:
 
 @pytest.mark.parametrize("name", [CHAT, BASE, "anthropic:some", "google:some", "openai-responses:some"])
 @pytest.mark.parametrize("fault", [Fault.COMPRESSED, Fault.COMPRESSED_ERROR, Fault.ENDLESS])
-def test_more_than_a_reply_can_be_is_not_read(
+def test_oversized_reply_is_not_read(
     name: str, fault: Fault, server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for key in ("ANTHROPIC_API_KEY", "GOOGLE_API_KEY", "OPENAI_API_KEY"):
@@ -292,8 +292,8 @@ def test_server_that_does_not_count_tokens_leaves_them_unknown(name: str, server
 
 
 @both
-def test_given_up_request_ends_at_once_and_the_next_one_is_answered(name: str, server: Server) -> None:
-    async def asked() -> Reply:
+def test_cancelled_request_ends_at_once_and_the_next_one_is_answered(name: str, server: Server) -> None:
+    async def request() -> Reply:
         model = open_model(name, SamplingSettings(base_url=server.url, seed=7))
         begun = asyncio.Event()
         server.faults.append(Fault.STALLED)
@@ -306,7 +306,7 @@ def test_given_up_request_ends_at_once_and_the_next_one_is_answered(name: str, s
         await model.close()
         return reply
 
-    assert asyncio.run(asked()).program == TASK + PROGRAM
+    assert asyncio.run(request()).program == TASK + PROGRAM
 
 
 def run(work: Coroutine[Any, Any, T]) -> T:
@@ -314,7 +314,7 @@ def run(work: Coroutine[Any, Any, T]) -> T:
 
 
 def test_server_speaks_both_protocols_without_streaming_too(server: Server) -> None:
-    async def asked() -> tuple[str | None, str]:
+    async def request() -> tuple[str | None, str]:
         async with openai.AsyncOpenAI(api_key="a", base_url=server.url, max_retries=0) as client:
             chat = await client.chat.completions.create(model="m", messages=[], seed=7)
             text = await client.completions.create(model="m", prompt="", seed=7)
@@ -323,6 +323,6 @@ def test_server_speaks_both_protocols_without_streaming_too(server: Server) -> N
                 await client.completions.create(model="m", prompt="")
         return chat.choices[0].message.content, text.choices[0].text
 
-    said, text = run(asked())
+    said, text = run(request())
     assert PROGRAM in (said or "")
     assert text == PROGRAM

@@ -20,8 +20,8 @@ def no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @contextmanager
-def server(body: bytes, status: int = 200) -> Iterator[int]:
-    """A server that lists models, as those of models do; its port."""
+def serve(body: bytes, status: int = 200) -> Iterator[int]:
+    """Run a server that lists models, and yield its port."""
 
     class Listing(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
@@ -43,7 +43,7 @@ def test_the_models_of_a_server_on_this_machine_come_first() -> None:
     body = json.dumps(
         {"object": "list", "data": [{"id": "qwen3:8b"}, {"id": "llama 3"}, {"id": "nomic-embed-text"}]}
     )
-    with server(body.encode()) as port:
+    with serve(body.encode()) as port:
         found = find_usable_models({"Ollama": port, "vLLM": 1})
     url = f"http://127.0.0.1:{port}/v1"
     assert found[0] == UsableModel("openai-chat:qwen3:8b", "Ollama answers on this machine", url)
@@ -63,12 +63,12 @@ def test_the_models_of_a_server_on_this_machine_come_first() -> None:
         (b'{"error": "no"}', 401),
     ],
 )
-def test_what_is_no_server_of_models_is_passed_over(body: bytes, status: int) -> None:
-    with server(body, status) as port:
+def test_other_servers_are_ignored(body: bytes, status: int) -> None:
+    with serve(body, status) as port:
         assert [one.name for one in find_usable_models({"vLLM": port})] == RECORDED
 
 
-def test_a_server_that_says_nothing_is_not_waited_for() -> None:
+def test_silent_server_is_not_waited_for() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listening:
         port = listening.getsockname()[1]
         began = time.monotonic()
@@ -76,7 +76,7 @@ def test_a_server_that_says_nothing_is_not_waited_for() -> None:
         assert time.monotonic() - began < 10
 
 
-def test_a_key_in_the_environment_opens_a_model(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_key_in_the_environment_makes_a_model_usable(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "OPENAI_API_KEY" in suggest_model({})
     monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-secret-of-mine")
     monkeypatch.setenv("OPENAI_API_KEY", " ")

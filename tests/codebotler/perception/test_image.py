@@ -1,4 +1,4 @@
-"""Pictures, good and bad ones: each becomes plain colour or one clear sentence."""
+"""Each picture becomes an upright image in colour, or raises an error of one sentence."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from codebotler.perception.image import MAX_IMAGE_BYTES
 RED, BLUE = (255, 0, 0), (0, 0, 255)
 
 
-def halves(mode: str = "RGB", left: Any = RED, right: Any = BLUE) -> Image.Image:  # noqa: ANN401 - as Pillow has it
-    """A picture 40 pixels wide and 20 high, whose halves differ."""
+def make_halves(mode: str = "RGB", left: Any = RED, right: Any = BLUE) -> Image.Image:  # noqa: ANN401 - Pillow takes any
+    """Make a picture of 40 x 20 pixels whose halves differ."""
     image = Image.new(mode, (40, 20), left)
     image.paste(right, (20, 0, 40, 20))
     return image
 
 
-def file_of(image: Image.Image, kind: str = "PNG", **options: Any) -> bytes:  # noqa: ANN401 - as Pillow has it
+def encode(image: Image.Image, kind: str = "PNG", **options: Any) -> bytes:  # noqa: ANN401 - Pillow takes any
     file = io.BytesIO()
     image.save(file, kind, **options)
     return file.getvalue()
 
 
 def png_of_size(width: int, height: int) -> bytes:
-    """A PNG that says it is huge, in a few bytes."""
+    """Make a PNG of a few bytes whose header claims this size."""
     parts = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0), b"IDAT" + zlib.compress(b"")
     chunks = (struct.pack(">I", len(part) - 4) + part + struct.pack(">I", zlib.crc32(part)) for part in parts)
     return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
 
 
-def near(image: Image.Image, at: tuple[int, int], colour: tuple[int, int, int]) -> bool:
+def is_near(image: Image.Image, at: tuple[int, int], colour: tuple[int, int, int]) -> bool:
     found = image.getpixel(at)
     assert isinstance(found, tuple)
     return all(abs(a - b) < 12 for a, b in zip(found, colour, strict=True))
@@ -48,42 +48,42 @@ def near(image: Image.Image, at: tuple[int, int], colour: tuple[int, int, int]) 
 @pytest.mark.parametrize("kind", ["JPEG", "PNG", "WEBP"])
 def test_files_become_pictures(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "picture"
-    path.write_bytes(file_of(halves(), kind))
+    path.write_bytes(encode(make_halves(), kind))
     image = read_image(path)
     assert (image.mode, image.size) == ("RGB", (40, 20))
-    assert near(image, (5, 10), RED)
-    assert near(image, (35, 10), BLUE)
+    assert is_near(image, (5, 10), RED)
+    assert is_near(image, (35, 10), BLUE)
 
 
-def test_picture_of_a_turned_camera_is_upright() -> None:
+def test_picture_of_a_rotated_camera_is_upright() -> None:
     exif = Image.Exif()
-    exif[0x0112] = 6  # a quarter turn
-    image = image_of(file_of(halves(), "JPEG", exif=exif))
+    exif[0x0112] = 6  # This value means a quarter turn.
+    image = image_of(encode(make_halves(), "JPEG", exif=exif))
     assert image.size == (20, 40)
-    assert near(image, (10, 5), RED)
-    assert near(image, (10, 35), BLUE)
+    assert is_near(image, (10, 5), RED)
+    assert is_near(image, (10, 35), BLUE)
     assert not Image.open(io.BytesIO(jpeg_of(image))).getexif()
 
 
-def test_what_shines_through_is_white() -> None:
-    image = image_of(file_of(halves("RGBA", (255, 0, 0, 255), (0, 0, 0, 0))))
+def test_transparent_pixels_become_white() -> None:
+    image = image_of(encode(make_halves("RGBA", (255, 0, 0, 255), (0, 0, 0, 0))))
     assert (image.mode, image.getpixel((5, 5)), image.getpixel((35, 5))) == ("RGB", RED, (255, 255, 255))
-    grey = image_of(file_of(halves("LA", (0, 255), (0, 0))))
+    grey = image_of(encode(make_halves("LA", (0, 255), (0, 0))))
     assert (grey.getpixel((5, 5)), grey.getpixel((35, 5))) == ((0, 0, 0), (255, 255, 255))
 
 
 def test_sixteen_bits_of_grey_become_eight() -> None:
     row = struct.pack("<40H", *[2_000] * 20, *[4_000] * 20)
-    image = image_of(file_of(Image.frombytes("I;16", (40, 20), row * 20)))
+    image = image_of(encode(Image.frombytes("I;16", (40, 20), row * 20)))
     assert (image.mode, image.getpixel((5, 5)), image.getpixel((35, 5))) == ("RGB", (128,) * 3, (255,) * 3)
-    dark = image_of(file_of(Image.new("I;16", (40, 20), 0)))
+    dark = image_of(encode(Image.new("I;16", (40, 20), 0)))
     assert dark.getpixel((5, 5)) == (0, 0, 0)
 
 
 @pytest.mark.parametrize("mode", ["1", "L", "P", "CMYK"])
 def test_other_modes_become_colour(mode: str) -> None:
     kind = "JPEG" if mode == "CMYK" else "PNG"
-    assert image_of(file_of(Image.new(mode, (40, 20)), kind)).mode == "RGB"
+    assert image_of(encode(Image.new(mode, (40, 20)), kind)).mode == "RGB"
 
 
 @pytest.mark.parametrize(
@@ -91,33 +91,33 @@ def test_other_modes_become_colour(mode: str) -> None:
     [
         (b"", "empty"),
         (b"no picture at all", "not a JPEG, PNG or WebP file"),
-        (file_of(halves(), "GIF"), "not a JPEG, PNG or WebP file"),
-        (file_of(halves(), "JPEG")[:300], "damaged or incomplete"),
-        (file_of(Image.effect_noise((200, 200), 50), "PNG")[:5_000], "damaged or incomplete"),
-        (file_of(Image.new("RGB", (1, 1))), "1 x 1 pixels; use at least 16"),
+        (encode(make_halves(), "GIF"), "not a JPEG, PNG or WebP file"),
+        (encode(make_halves(), "JPEG")[:300], "damaged or incomplete"),
+        (encode(Image.effect_noise((200, 200), 50), "PNG")[:5_000], "damaged or incomplete"),
+        (encode(Image.new("RGB", (1, 1))), "1 x 1 pixels; use at least 16"),
         (png_of_size(10_000, 5_000), "10,000 x 5,000 pixels; use at"),
         (png_of_size(11_000, 11_000), "11,000 x 11,000 pixels; use at"),
         (png_of_size(60_000, 60_000), "3600000000 pixels"),
         (b"\xff" * (MAX_IMAGE_BYTES + 1), "50,000,000 bytes"),
     ],
 )
-def test_bad_picture_is_said_in_a_sentence(data: bytes, sentence: str) -> None:
+def test_bad_picture_raises_one_sentence(data: bytes, sentence: str) -> None:
     with pytest.raises(UserError) as error:
         image_of(data)
     assert sentence in str(error.value)
 
 
-def test_every_cut_of_a_picture_is_refused_or_read() -> None:
-    whole = file_of(halves(), "PNG")
+def test_every_truncated_picture_is_refused_or_read() -> None:
+    whole = encode(make_halves(), "PNG")
     for end in range(0, len(whole), 3):
         try:
             image_of(whole[:end])
         except UserError:
             continue
-        assert end > len(whole) - 20  # only what ends the file is missing
+        assert end > len(whole) - 20  # Only the end of the file may be missing.
 
 
-def test_missing_file_and_folder_are_said(tmp_path: Path) -> None:
+def test_missing_file_and_folder_raise_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="No such file") as error:
         read_image(tmp_path / "none.jpg")
     assert error.value.file == tmp_path / "none.jpg"
@@ -152,7 +152,7 @@ def test_encodings_of_cameras(encoding: str, pixel: bytes, colour: tuple[int, in
 
 
 def test_compressed_picture_of_a_camera() -> None:
-    data = base64.b64encode(file_of(halves(), "JPEG")).decode()
+    data = base64.b64encode(encode(make_halves(), "JPEG")).decode()
     assert image_from_ros({"format": "jpeg", "data": data}).size == (40, 20)
 
 
@@ -172,17 +172,17 @@ def test_compressed_picture_of_a_camera() -> None:
         ({"ranges": []}, "not an image message"),
     ],
 )
-def test_bad_message_is_said_in_a_sentence(said: dict[str, object], sentence: str) -> None:
+def test_bad_message_raises_one_sentence(said: dict[str, object], sentence: str) -> None:
     with pytest.raises(UserError) as error:
         image_from_ros(said, "the picture on /camera")
     assert str(error.value).startswith("the picture on /camera")
     assert sentence in str(error.value)
 
 
-# --- what is sent and kept
+# --- encoding and boxes
 
 
-def test_large_picture_is_sent_small() -> None:
+def test_large_picture_is_scaled_down() -> None:
     small = image_of(jpeg_of(Image.new("RGB", (3_000, 1_500), RED)))
     assert small.size == (1024, 512)
     assert image_of(jpeg_of(Image.new("RGBA", (40, 20), (255, 0, 0, 255)))).size == (40, 20)

@@ -1,4 +1,4 @@
-"""The page on perception says what is so."""
+"""The guide's page on perception agrees with the code."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ PAGE = (Path(__file__).parents[3] / "docs" / "perception.md").read_text()
 TEXT = " ".join(PAGE.split())
 
 
-def test_what_comes_out_is_told() -> None:
+def test_page_lists_the_fields_of_a_sighting() -> None:
     assert re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE) == [field.name for field in fields(Sighting)]
 
 
-def test_code_looks_into_a_picture(
+def test_example_looks_into_a_picture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -36,8 +36,8 @@ def test_code_looks_into_a_picture(
     assert read_image(tmp_path / "seen.jpg").size == (64, 40)
 
 
-def test_limits_are_those_of_the_code() -> None:
-    for told in (
+def test_page_names_the_limits_of_the_code() -> None:
+    for sentence in (
         f"at most {MAX_IMAGE_BYTES // 10**6} MB and {MAX_PIXELS // 10**6} million pixels",
         f"at least {MIN_SIDE} pixels per side",
         f"at most {LONGEST_SIDE:,} pixels per side",
@@ -47,12 +47,12 @@ def test_limits_are_those_of_the_code() -> None:
         f"Pictures of more than {missionpictures.MAX_STORED_PICTURE_BYTES // 10**6} MB",
         f"a total of {missionpictures.MAX_MISSION_PICTURE_BYTES // 10**6} MB per mission",
     ):
-        assert told in TEXT, told
+        assert sentence in TEXT, sentence
     listed = re.search(r"encodings? (`.*?)\. ", TEXT)
     assert listed is not None
     assert re.findall("`(.*?)`", listed[1]) == list(ENCODINGS)
 
 
-def test_what_was_not_seen_is_said() -> None:
+def test_page_says_which_models_were_not_tested() -> None:
     assert "only with random weights" in TEXT
     assert "We did not test how well real models recognise objects" in TEXT

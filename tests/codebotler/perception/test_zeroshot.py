@@ -1,4 +1,4 @@
-"""A real OWL-ViT, made on the spot with random weights: it really looks, and knows nothing."""
+"""The detector runs a real OWL-ViT, made on the spot with random weights."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ SMALL = {"hidden_size": 16, "intermediate_size": 16, "num_hidden_layers": 1, "nu
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A model as its makers would have saved it."""
-    torch.manual_seed(8)  # by which it is sure of nothing
+    """Save a model the way its makers would."""
+    torch.manual_seed(8)  # With this seed, no score is near 0 or 1.
     letters = sorted(tokenizers.pre_tokenizers.ByteLevel.alphabet())
     words = [*letters, *(f"{letter}</w>" for letter in letters), "<|startoftext|>", "<|endoftext|>"]
     vocabulary = {word: number for number, word in enumerate(words)}
@@ -38,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     folder = tmp_path_factory.mktemp("owl")
     model = transformers.OwlViTForObjectDetection(config)
-    model.box_head.dense2.weight.data *= 0.01  # else each box is a line at an edge
+    model.box_head.dense2.weight.data *= 0.01  # Otherwise each box is a line at an edge.
     model.save_pretrained(folder)
     transformers.CLIPTokenizer(vocab=vocabulary, merges=[]).save_pretrained(folder)
     transformers.OwlViTImageProcessorPil(size={"height": SIDE, "width": SIDE}).save_pretrained(folder)
@@ -50,8 +50,8 @@ def detector(folder: Path) -> Detector:
     return open_detector(f"hf:{folder}", least_score=1e-6)
 
 
-def raw(folder: Path, label: str) -> tuple[float, list[float]]:
-    """The best score and its box in pixels, from the model without the pipeline."""
+def detect_directly(folder: Path, label: str) -> tuple[float, list[float]]:
+    """Return the best score and its box, from the model without the pipeline."""
     model = transformers.OwlViTForObjectDetection.from_pretrained(folder).eval()
     processor = transformers.OwlViTImageProcessorPil.from_pretrained(folder)
     tokens = transformers.CLIPTokenizer.from_pretrained(folder)(label, return_tensors="pt")
@@ -65,8 +65,8 @@ def raw(folder: Path, label: str) -> tuple[float, list[float]]:
 
 
 @pytest.mark.parametrize("label", ["mug", "red mug", "a, b, c", "ü 漢", "ignore all, true"])
-def test_it_says_what_the_model_says_of_the_whole_label(folder: Path, detector: Detector, label: str) -> None:
-    score, edges = raw(folder, label)
+def test_detector_gives_the_model_the_whole_label(folder: Path, detector: Detector, label: str) -> None:
+    score, edges = detect_directly(folder, label)
     sighting = detector.look(PICTURE, f" {label}\n")
     assert sighting.found
     assert sighting.score == pytest.approx(score, abs=1e-5)
@@ -77,7 +77,7 @@ def test_it_says_what_the_model_says_of_the_whole_label(folder: Path, detector: 
     assert sighting.box == pytest.approx(edges, abs=1 / 40)
 
 
-def test_what_is_less_sure_than_wanted_is_not_found(folder: Path, detector: Detector) -> None:
+def test_score_below_the_threshold_is_not_found(folder: Path, detector: Detector) -> None:
     score = detector.look(PICTURE, "mug").score
     assert 0.1 < score < 0.9
     unsure = open_detector(f"hf:{folder}", least_score=(score + 1) / 2).look(PICTURE, "mug")
@@ -93,7 +93,7 @@ def test_label_of_too_many_words_is_refused(detector: Detector) -> None:
         detector.look(PICTURE, " ")
 
 
-def test_model_that_fails_says_so(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_of_the_model_becomes_one_sentence(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     detector: Any = open_detector(f"hf:{folder}")
     monkeypatch.setattr(detector._pipeline.model, "forward", lambda **_: 1 / 0)
     with pytest.raises(PerceptionError, match="division by zero") as error:
@@ -102,7 +102,7 @@ def test_model_that_fails_says_so(folder: Path, monkeypatch: pytest.MonkeyPatch)
     detector.close()
 
 
-def test_what_is_no_detector_is_refused(tmp_path: Path, folder: Path) -> None:
+def test_folder_without_a_detector_is_refused(tmp_path: Path, folder: Path) -> None:
     with pytest.raises(UserError, match="no such model folder"):
         open_detector(f"hf:{tmp_path / 'none'}")
     with pytest.raises(UserError, match="detector"):
@@ -116,7 +116,7 @@ def test_what_is_no_detector_is_refused(tmp_path: Path, folder: Path) -> None:
         open_detector(f"hf:{tmp_path}")
 
 
-def test_box_ends_with_the_picture() -> None:
+def test_box_is_clipped_to_the_picture() -> None:
     from codebotler.perception.zeroshot import _to_shares  # noqa: PLC0415 - it imports torch
 
     assert _to_shares(-7, 20, 40) == (0, 0.5)

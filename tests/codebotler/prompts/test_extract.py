@@ -34,18 +34,18 @@ def in_task(*statements: str) -> str:
     return "\n".join(["def task_program():", *("    " + s for s in statements)])
 
 
-def fenced(code: str, info: str = "python", marks: str = "```") -> str:
+def fence(code: str, info: str = "python", marks: str = "```") -> str:
     return f"{marks}{info}\n{code}{marks}\n"
 
 
 @pytest.mark.parametrize("step", [10, pytest.param(1, marks=pytest.mark.slow)])
-def test_recorded_programs_stay_as_they_are_alone_and_in_chat(step: int) -> None:
+def test_recorded_programs_are_unchanged_alone_and_in_chat(step: int) -> None:
     for reply in RECORDED[::step]:
         program, once = reply.program, source(reply.program)
         assert source(once) == once
         if reply.fails not in UNPARSABLE:
             assert once.strip("\n") == program.strip("\n")
-            assert source(f"Sure! Here it is:\n\n{fenced(program)}\nIt goes there.\n") == once
+            assert source(f"Sure! Here it is:\n\n{fence(program)}\nIt goes there.\n") == once
             assert source(f"Sure, here it is:\n\n{program}\nThis program goes there and talks.\n") == once
 
 
@@ -55,15 +55,15 @@ def test_recorded_programs_stay_as_they_are_alone_and_in_chat(step: int) -> None
         TASK,
         "\n\n" + TASK + "\n\n",
         TASK.replace("\n", "\r\n"),
-        fenced(TASK),
-        fenced(TASK, "py"),
-        fenced(TASK, ""),
-        fenced(TASK, "Python title=x"),
-        fenced(TASK, marks="~~~"),
-        fenced(TASK, marks="````"),
+        fence(TASK),
+        fence(TASK, "py"),
+        fence(TASK, ""),
+        fence(TASK, "Python title=x"),
+        fence(TASK, marks="~~~"),
+        fence(TASK, marks="````"),
         "```python\n" + TASK,
         "```python\n" + TASK + "\nThis program drives there.",
-        "Here is the program:\n" + fenced(TASK) + "It says hello (once).",
+        "Here is the program:\n" + fence(TASK) + "It says hello (once).",
         "Here is the program:\n\n" + TASK + "\nThis program says hello\nand (of course) goes there.\n",
         " Here is the program:\n\n" + TASK,
         "Here's a program that\n(hopefully) works:\n" + TASK,
@@ -75,31 +75,31 @@ def test_recorded_programs_stay_as_they_are_alone_and_in_chat(step: int) -> None
         "以下是程序：\n\n" + TASK + "\n它会说你好。\n",  # noqa: RUF001 - Chinese prose
         "  " + TASK.replace("\n", "\n  ").rstrip(" "),
         "Like this:\n\n    " + TASK.replace("\n", "\n    ").rstrip(" ") + "\nThat is all.\n",
-        "1. The program:\n   " + fenced(TASK).replace("\n", "\n   "),
-        "Install it:\n" + fenced("pip install robot\n", "bash") + "Then:\n" + fenced(TASK),
-        fenced(OTHER) + "Or better:\n" + fenced(TASK),
-        fenced(TASK) + "Or better:\n" + fenced(CUT_OFF + "\n").removesuffix("```\n"),
-        fenced(TASK) + "Call it:\n" + fenced("task_program()\n"),
-        "<think>\nPerhaps\n" + fenced(OTHER) + "or not.\n</think>\n\n" + fenced(TASK),
+        "1. The program:\n   " + fence(TASK).replace("\n", "\n   "),
+        "Install it:\n" + fence("pip install robot\n", "bash") + "Then:\n" + fence(TASK),
+        fence(OTHER) + "Or better:\n" + fence(TASK),
+        fence(TASK) + "Or better:\n" + fence(CUT_OFF + "\n").removesuffix("```\n"),
+        fence(TASK) + "Call it:\n" + fence("task_program()\n"),
+        "<think>\nPerhaps\n" + fence(OTHER) + "or not.\n</think>\n\n" + fence(TASK),
         "<think>" + OTHER + "</think>" + TASK,
         " <thinking>\n" + OTHER + "</thinking>\n" + BODY,
         OTHER + "\nThat may do.</think>\n\nHere it is:\n" + TASK,
-        fenced(TASK) + "<think>\n" + fenced(OTHER) + "\nHm, ",
+        fence(TASK) + "<think>\n" + fence(OTHER) + "\nHm, ",
         "<THINK>\n" + OTHER + "</Think>\n" + TASK,
         "<think>They say </think>, and\n\n" + OTHER + "\nor not.\n</think>\n" + TASK,
-        "<think>\nI will greet.</think>Here it is:\n" + fenced(TASK),
-        OTHER + "\nThat may do.</THINKING>\n" + fenced(TASK) + "It thinks.\n</think>\n",
-        fenced(TASK) + "To fill in:\n" + fenced('def task_program():\n    """Says it."""\n    ...\n'),
-        fenced("def task_program():\n    pass\n") + "Filled in:\n" + fenced(TASK),
+        "<think>\nI will greet.</think>Here it is:\n" + fence(TASK),
+        OTHER + "\nThat may do.</THINKING>\n" + fence(TASK) + "It thinks.\n</think>\n",
+        fence(TASK) + "To fill in:\n" + fence('def task_program():\n    """Says it."""\n    ...\n'),
+        fence("def task_program():\n    pass\n") + "Filled in:\n" + fence(TASK),
         BODY,
         BODY.lstrip(),
-        fenced(BODY),
+        fence(BODY),
         BODY + "```\nThis works.\n",
         TASK + "\n\n# Task: drive home\n# at once\ndef task_program():\n    go_to('ho",
         "Certainly\n\n" + TASK + "\nThis is all of it.\n",
     ],
 )
-def test_one_program_in_many_dresses(reply: str) -> None:
+def test_program_is_found_in_many_kinds_of_replies(reply: str) -> None:
     assert source(reply) == TASK
 
 
@@ -107,26 +107,26 @@ def test_one_program_in_many_dresses(reply: str) -> None:
     "reply",
     [
         TASK,
-        fenced(TASK),
-        BODY + "```\n\n# Task: say other\n" + fenced(OTHER),
-        TASK + "```\n\n# Task: say other\n" + fenced(OTHER),
+        fence(TASK),
+        BODY + "```\n\n# Task: say other\n" + fence(OTHER),
+        TASK + "```\n\n# Task: say other\n" + fence(OTHER),
         BODY + "\n\n# Task: drive home\ndef task_program():\n    go_to('home')\n",
         TASK + "\n\n# Task: drive home\ndef task_program():\n    go_to('home')\n",
         BODY + "\n\nTask: drive home\ndef task_program():\n    go_to('home')\n",
         TASK + "\n\nTask: drive home\ndef task_program():\n    go_to('home')\n",
-        fenced(TASK) + "\n# Task: say other\n" + fenced(OTHER),
+        fence(TASK) + "\n# Task: say other\n" + fence(OTHER),
         TASK + "\n\n# Task: drive home\n# at once\ndef task_program():\n    go_to('ho",
     ],
 )
-def test_what_a_base_model_writes_first_counts(reply: str) -> None:
+def test_first_program_of_a_base_model_counts(reply: str) -> None:
     assert source(reply, continues=True) == TASK
 
 
-def test_code_without_a_definition_is_taken_as_it_is() -> None:
+def test_code_without_a_definition_is_unchanged() -> None:
     assert source("1. Like this:\n   ```\n   go_to('home')\n   ```\n") == "go_to('home')\n"
 
 
-def test_what_parses_is_no_prose() -> None:
+def test_text_that_parses_is_not_prose() -> None:
     reply = "Here it is:\n\nrooms: list\n\n" + TASK + "\nThis is all of it.\n"
     assert source(reply) == "rooms: list\n\n" + TASK
 
@@ -137,12 +137,12 @@ def test_tabs_stay_tabs() -> None:
     assert source(body.lstrip()) == "def task_program():\n" + body
 
 
-def test_body_whose_first_line_opens_a_block() -> None:
+def test_body_that_begins_with_a_block_is_indented() -> None:
     body = "    if is_in_room('mug'):\n        pick('mug')\n    else:\n        say('no')\n"
     assert source(body.strip()) == "def task_program():\n" + body
 
 
-def test_code_in_front_and_behind_stays() -> None:
+def test_code_before_and_after_the_program_is_kept() -> None:
     constants = "import re\n\nX = 5  # comment\nA, B = (\n    1,\n    2,\n)\n"
     program = f"{constants}\n{HELPER}\n{USES_HELPER}\ntask_program()\n"
     assert source(program) == program
@@ -154,8 +154,8 @@ def test_text_that_looks_like_prose_or_fences_stays_in_a_string() -> None:
     assert source(program) == program
 
 
-def test_thoughts_that_end_in_nothing_are_no_program() -> None:
-    assert source("<think>\n" + fenced(TASK)) == ""
+def test_thought_without_an_answer_is_not_a_program() -> None:
+    assert source("<think>\n" + fence(TASK)) == ""
     kept = 'def task_program():\n    say("""\n<think> is a tag, and so is\n</think>\n""")\n'
     assert source(kept) == kept
 
@@ -165,38 +165,38 @@ def test_a_tag_in_code_begins_and_ends_no_thought(tag: str) -> None:
     in_line = f"def task_program():\n    say('a {tag}')\n"
     alone = f'def task_program():\n    say("""\n{tag}\n""")\n'
     for code in (in_line, alone):
-        assert source(f"<think>\nFirst:\n{fenced(OTHER)}</think>\nSo:\n{fenced(code)}Done.\n") == code
-        assert source(f"So:\n{fenced(code)}Done.\n") == code
-        assert source(f"So:\n{fenced(code)}".removesuffix("```\n")) == code
+        assert source(f"<think>\nFirst:\n{fence(OTHER)}</think>\nSo:\n{fence(code)}Done.\n") == code
+        assert source(f"So:\n{fence(code)}Done.\n") == code
+        assert source(f"So:\n{fence(code)}".removesuffix("```\n")) == code
     assert source(f"Here it is:\n\n{in_line}\nThat is all of it.\n") == in_line
 
 
-def test_an_outline_is_taken_where_there_is_nothing_else() -> None:
+def test_an_outline_is_taken_if_there_is_nothing_else() -> None:
     outline = "def task_program():\n    pass\n"
-    assert source("Here:\n" + fenced(outline)) == outline
+    assert source("Here:\n" + fence(outline)) == outline
 
 
-def test_other_blocks_come_along_only_where_needed() -> None:
+def test_other_blocks_are_added_only_if_needed() -> None:
     unused = "def unused():\n    pass\n"
     stub = "def go_to(room):\n    pass\n"
     needed = f"{HELPER}\n\n{USES_HELPER}"
-    assert source(fenced(HELPER) + "and\n" + fenced(unused) + fenced(stub) + fenced(USES_HELPER)) == needed
-    assert source(fenced(USES_HELPER) + fenced(HELPER)) == f"{USES_HELPER}\n\n{HELPER}"
-    assert source(fenced(HELPER) + fenced("rooms = list\n") + fenced(USES_HELPER)) == needed
-    assert source(fenced(HELPER + TASK) + fenced(USES_HELPER)) == f"{HELPER}{TASK}\n\n{USES_HELPER}"
+    assert source(fence(HELPER) + "and\n" + fence(unused) + fence(stub) + fence(USES_HELPER)) == needed
+    assert source(fence(USES_HELPER) + fence(HELPER)) == f"{USES_HELPER}\n\n{HELPER}"
+    assert source(fence(HELPER) + fence("rooms = list\n") + fence(USES_HELPER)) == needed
+    assert source(fence(HELPER + TASK) + fence(USES_HELPER)) == f"{HELPER}{TASK}\n\n{USES_HELPER}"
     newer = "def rooms():\n    return []\n"
     assert source(blocks(HELPER + TASK, newer, USES_HELPER)) == f"{newer}\n\n{USES_HELPER}"
-    assert source(fenced(USES_HELPER) + fenced(HELPER + TASK)) == HELPER + TASK
+    assert source(fence(USES_HELPER) + fence(HELPER + TASK)) == HELPER + TASK
 
 
-def test_helpers_of_helpers_come_along() -> None:
+def test_helpers_of_helpers_are_added() -> None:
     helper = "def rooms():\n    return ROOMS\n"
     expected = f"ROOMS = []\n\n\n{helper}\n\n{USES_HELPER}"
-    assert source(fenced("ROOMS = []\n") + fenced(helper) + fenced(USES_HELPER)) == expected
+    assert source(fence("ROOMS = []\n") + fence(helper) + fence(USES_HELPER)) == expected
 
 
 def blocks(*codes: str) -> str:
-    return "and\n".join(fenced(code) for code in codes)
+    return "and\n".join(fence(code) for code in codes)
 
 
 CALLS_A = "def task_program():\n    a()\n"
@@ -280,14 +280,14 @@ USES_X = "def a():\n    say(x)\n"
         pytest.param([CALLS_A, "a = 1\nreturn\n", "a = 2\n"], [0, 2], id="a helper has to compile"),
     ],
 )
-def test_which_other_blocks_come_along(given: list[str], kept: list[int]) -> None:
+def test_only_these_blocks_are_added(given: list[str], kept: list[int]) -> None:
     assert source(blocks(*given)) == "\n\n".join(given[i] for i in kept)
 
 
-def test_the_work_grows_with_the_reply_and_no_faster(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_work_grows_no_faster_than_the_reply(monkeypatch: pytest.MonkeyPatch) -> None:
     read = []
 
-    def counted(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
+    def count(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
         read.append(sum(1 for _ in ast.walk(tree)))
         return undefined_names(tree, skills)
 
@@ -297,7 +297,7 @@ def test_the_work_grows_with_the_reply_and_no_faster(monkeypatch: pytest.MonkeyP
         assert extract.function(blocks(USES_HELPER, "rooms = f0\n", *chain))[0].startswith(USES_HELPER)
         return sum(read)
 
-    monkeypatch.setattr("codebotler.prompts.extract.undefined_names", counted)
+    monkeypatch.setattr("codebotler.prompts.extract.undefined_names", count)
     assert work(80) < 10 * work(10)
 
 
@@ -305,19 +305,19 @@ def test_no_text_of_a_reply_is_parsed_twice(monkeypatch: pytest.MonkeyPatch) -> 
     texts: list[str] = []
     parse = ast.parse
 
-    def counted(text: str, name: str) -> ast.Module:
+    def count(text: str, name: str) -> ast.Module:
         texts.append(text)
         return parse(text, name)
 
-    monkeypatch.setattr(ast, "parse", counted)
+    monkeypatch.setattr(ast, "parse", count)
 
     for reply in (
         TASK,
         BODY,
         BODY.lstrip(),
-        f"Here it is for you:\n\n{fenced(TASK)}\nIt drives there.\nThen it speaks.\n",
+        f"Here it is for you:\n\n{fence(TASK)}\nIt drives there.\nThen it speaks.\n",
     ):
-        new = reply.replace("hello", "good day")  # which no other test has parsed
+        new = reply.replace("hello", "good day")  # No other test parses this.
         texts.clear()
         extract.function(new)
         assert 0 < len(texts) == len(set(texts))
@@ -327,7 +327,7 @@ def test_no_text_of_a_reply_is_parsed_twice(monkeypatch: pytest.MonkeyPatch) -> 
     "reply",
     [
         CUT_OFF,
-        fenced(CUT_OFF + "\n"),
+        fence(CUT_OFF + "\n"),
         "```python\n" + CUT_OFF,
         "Here you go:\n\n" + CUT_OFF,
         TASK + "\ndef helper(a,",
@@ -340,7 +340,7 @@ def test_no_text_of_a_reply_is_parsed_twice(monkeypatch: pytest.MonkeyPatch) -> 
 )
 def test_cut_off_stays_cut_off(reply: str) -> None:
     program = program_of(reply)
-    if "Dear all" not in reply:  # there, what may be prose is dropped, and the string stays open
+    if "Dear all" not in reply:  # In that one, text that may be prose is dropped, and the string stays open.
         assert program.source.rstrip("\n").endswith(reply.rstrip("`\n").rsplit("\n", 1)[-1])
     if "is_in" not in reply:
         assert [p.kind for p in find_flaws(program.source)] == ["SyntaxError"]
@@ -354,7 +354,7 @@ def test_nothing_is_lost_wherever_a_program_is_cut(program: str, at: int) -> Non
         assert source("```python\n" + cut).strip() == cut.strip()
 
 
-def test_broken_code_in_front_is_no_prose() -> None:
+def test_broken_code_before_the_program_is_kept() -> None:
     reply = "def helper(:\n    return 1\n\n" + TASK
     assert source(reply) == reply
 
@@ -368,7 +368,7 @@ def test_reply_without_code_is_the_source(reply: str) -> None:
 
 
 @given(st.text(alphabet=st.sampled_from("`~ \n\t#a(=:\"'\0\ud800é"), max_size=60) | st.text())
-def test_any_reply_and_any_source_is_taken(text: str) -> None:
+def test_any_text_is_read_without_an_error(text: str) -> None:
     program = program_of(text)
     assert isinstance(find_flaws(program.source), tuple)
     assert isinstance(find_flaws(text), tuple)

@@ -27,7 +27,7 @@ def room(name: str, *objects: str, people: tuple[Person, ...] = ()) -> Room:
 
 SCHOLAR = Person("omar", ("6", "8"))
 LECTURER = Person("lena", ("no",))
-SHOWN = {
+EXPECTED = {
     "Drive to the greenhouse": (
         World((room("hall"), room("greenhouse")), "hall"),
         (Event("goto", "greenhouse"), Event("say", "the sprinklers start in ten minutes")),
@@ -84,9 +84,9 @@ SHOWN = {
 
 
 @pytest.mark.parametrize("example", examples(), ids=lambda example: example.instruction[:20])
-def test_example_is_right_and_does_in_a_world_what_its_instruction_says(example: Example) -> None:
-    (known,) = (begins for begins in SHOWN if example.instruction.startswith(begins))
-    world, trace = SHOWN[known]
+def test_example_has_no_flaws_and_follows_its_instruction(example: Example) -> None:
+    (known,) = (begins for begins in EXPECTED if example.instruction.startswith(begins))
+    world, trace = EXPECTED[known]
     assert find_flaws(example.program) == ()
     outcome = run(example.program, world)
     assert outcome.status is Status.FINISHED, outcome.error
@@ -113,7 +113,7 @@ def texts(prompt: Prompt) -> tuple[str, str]:
 
 
 @pytest.mark.parametrize("skill", [*SKILLS.values(), WAVE], ids=lambda skill: skill.name)
-def test_every_skill_of_the_table_stands_in_both_prompts(skill: Skill) -> None:
+def test_every_skill_of_the_table_is_in_both_prompts(skill: Skill) -> None:
     for text in texts(prompt_for("Go to the lab.", skills=SKILLS.with_skill(WAVE))):
         assert f'def {skill.signature}:\n    """{skill.doc}' in text
 
@@ -126,7 +126,7 @@ def test_a_skill_that_is_left_out_is_in_no_prompt_nor_an_example() -> None:
     for text in texts(prompt_for("Go to the lab.", skills=SKILLS.without({"pick", "is_in_room"}))):
         assert not re.search(r"pick|is_in_room", text)
         assert "def place(" in text
-        assert "Omar" in text, "an example without them"
+        assert "Omar" in text, "an example without these skills stays"
 
 
 def test_chat_begins_with_the_rules_shows_the_examples_and_ends_with_the_instruction() -> None:
@@ -149,7 +149,7 @@ def test_text_is_python_up_to_the_opening_and_holds_each_instruction_as_a_commen
 @pytest.mark.parametrize(
     "instruction", ["Say $x and ${y} and {z}", 'Say """\nimport os\n"""', "a\n\nb", "Sag „grüß Gott“", "# a"]
 )
-def test_any_instruction_stays_what_it_is_and_stays_a_comment(instruction: str) -> None:
+def test_any_instruction_is_unchanged_and_stays_a_comment(instruction: str) -> None:
     prompt = prompt_for(instruction)
     assert prompt.messages[-1].text == instruction
     assert prompt.instruction == instruction
@@ -159,7 +159,7 @@ def test_any_instruction_stays_what_it_is_and_stays_a_comment(instruction: str) 
     assert find_flaws(prompt.text + "    pass\n") == ()
 
 
-def test_rooms_are_told_where_they_are_known() -> None:
+def test_prompt_lists_known_rooms() -> None:
     prompt = prompt_for("Go to the lab.", rooms=["lab", "alice's office"])
     for text in texts(prompt):
         assert "The rooms of this building are: lab, alice's office." in text
@@ -203,7 +203,7 @@ def test_repair_of_a_program_that_holds_a_fence_is_fenced_with_a_longer_one() ->
     assert program_of(answer.text).source == program
 
 
-def test_hash_is_that_of_all_but_the_instruction(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_hash_covers_all_but_the_instruction(monkeypatch: pytest.MonkeyPatch) -> None:
     before = template_hash()
     assert re.fullmatch("[0-9a-f]{64}", before)
     assert template_hash(SKILLS.with_skill(WAVE)) != before
@@ -253,11 +253,11 @@ def test_function_ends_where_something_else_begins(rest: str) -> None:
         "    say('cut o",
     ],
 )
-def test_function_goes_on_where_a_line_without_indentation_belongs_to_it(body: str) -> None:
+def test_function_continues_over_unindented_lines_that_belong_to_it(body: str) -> None:
     assert PROMPT.program_from(body) == OPENING + body
 
 
-def test_reply_that_begins_anew_is_taken_as_it_is() -> None:
+def test_reply_with_its_own_definition_is_kept_unchanged() -> None:
     for reply in (f"```python\n{OPENING}{BODY}```\n", OPENING + BODY, f"\nasync {OPENING}{BODY}"):
         assert PROMPT.program_from(reply) == reply
 
@@ -268,6 +268,6 @@ def test_end_of_a_huge_reply_is_found_at_once() -> None:
     assert task_end(OPENING, BODY + "done\n" * 200_000) == len(BODY) - 1
 
 
-def test_prompt_is_a_value() -> None:
+def test_equal_prompts_compare_equal() -> None:
     assert replace(PROMPT) == PROMPT
     assert prompt_for("Go to the lab.") == PROMPT

@@ -1,4 +1,4 @@
-"""Replies as models of many makers write them: thoughts, fences, and what their chat templates leave."""
+"""Programs are found in the replies of many models, among thoughts, fences and chat templates."""
 
 import pytest
 from hypothesis import given
@@ -18,12 +18,12 @@ IN_DOCSTRING = (
 IN_STRING = 'def task_program():\n    say("""\n```\ncode\n```\n""")\n'
 
 
-def fenced(code: str, info: str = "python", marks: str = "```") -> str:
+def fence(code: str, info: str = "python", marks: str = "```") -> str:
     return f"{marks}{info}\n{code}{marks}\n"
 
 
 def read(reply: str) -> tuple[str, str]:
-    """The program and the reasoning, read in this process."""
+    """Return the program and the reasoning, read in this process."""
     program, reasoning, _ = extract.function(reply)
     return program, reasoning
 
@@ -39,31 +39,31 @@ def source(reply: str) -> str:
     "reply",
     [
         f"A draft:\n\n{OTHER}\nThis is better:\n\n{TASK}\nIt says hello.",
-        f"{OTHER}\nOr better:\n{fenced(TASK)}",
-        f"{fenced(OTHER)}\nOr better:\n\n{TASK}",
+        f"{OTHER}\nOr better:\n{fence(TASK)}",
+        f"{fence(OTHER)}\nOr better:\n\n{TASK}",
         f"def task_program():\n    pass\n\nFilled in, it is this:\n\n{TASK}",
-        f"{fenced('def task_program():' + chr(10) + '    ...' + chr(10))}\n{fenced(TASK)}",
+        f"{fence('def task_program():' + chr(10) + '    ...' + chr(10))}\n{fence(TASK)}",
         f"{CUT_OFF}\n\n{TASK}",
         f"{TASK}\n\n# Shorter\n{CUT_OFF}",
-        f"{fenced(OTHER.replace('()', '(', 1))}Without the mistake:\n{fenced(TASK)}",
-        f"{fenced(OTHER)}{fenced(TASK)}To fill in:\n{fenced(TASK[:20] + '    pass' + chr(10))}",
-        f"{fenced(OTHER)}{fenced(TASK)}Run it:\n{fenced('task_program()' + chr(10))}",
+        f"{fence(OTHER.replace('()', '(', 1))}Without the mistake:\n{fence(TASK)}",
+        f"{fence(OTHER)}{fence(TASK)}To fill in:\n{fence(TASK[:20] + '    pass' + chr(10))}",
+        f"{fence(OTHER)}{fence(TASK)}Run it:\n{fence('task_program()' + chr(10))}",
     ],
 )
 def test_last_complete_definition_counts(reply: str) -> None:
     assert source(reply) == TASK
 
 
-def test_stub_in_front_of_the_real_one_is_no_outline() -> None:
+def test_stub_before_the_real_definition_is_kept() -> None:
     both = f"def task_program():\n    pass\n\n\n{TASK}"
-    assert source(f"{fenced(OTHER)}\nOr better:\n{fenced(both)}") == both
+    assert source(f"{fence(OTHER)}\nOr better:\n{fence(both)}") == both
 
 
 @pytest.mark.parametrize("joint", ["\n\n", "\n\n# A better one\n"])
 def test_block_with_two_definitions_stays_whole_as_its_last_one_counts(joint: str) -> None:
     both = f"{OTHER}{joint}{TASK}"
     assert source(both) == both
-    assert source(f"Here it is:\n{fenced(both)}") == both
+    assert source(f"Here it is:\n{fence(both)}") == both
 
 
 @pytest.mark.parametrize(
@@ -79,10 +79,10 @@ def test_block_with_two_definitions_stays_whole_as_its_last_one_counts(joint: st
 )
 def test_turn_that_the_model_wrote_for_its_user_ends_the_reply(turn: str) -> None:
     assert source(BARE + turn + OTHER) == TASK
-    assert source(fenced(TASK) + turn + fenced(OTHER)) == TASK
+    assert source(fence(TASK) + turn + fence(OTHER)) == TASK
 
 
-def test_instruction_that_is_repeated_in_front_is_no_end() -> None:
+def test_instruction_before_the_program_does_not_end_the_reply() -> None:
     assert source("[INST] Say hello in the kitchen. [/INST]\n" + TASK) == TASK
 
 
@@ -92,12 +92,12 @@ def test_instruction_that_is_repeated_in_front_is_no_end() -> None:
 @pytest.mark.parametrize("program", [IN_DOCSTRING, IN_STRING])
 @pytest.mark.parametrize("info", ["python", ""])
 def test_fence_within_a_text_of_the_program_does_not_end_it(program: str, info: str) -> None:
-    assert source(f"Here it is:\n{fenced(program, info)}This is all of it.\n") == program
+    assert source(f"Here it is:\n{fence(program, info)}This is all of it.\n") == program
     assert source(f"Here it is:\n```{info}\n{program}") == program
-    assert source(f"Here it is:\n{fenced(program, info, '~~~')}This is all of it.\n") == program
+    assert source(f"Here it is:\n{fence(program, info, '~~~')}This is all of it.\n") == program
 
 
-def test_fence_in_the_docstring_of_a_program_without_fences() -> None:
+def test_fence_in_a_docstring_is_kept_without_other_fences() -> None:
     assert source(f"Here it is for you:\n\n{IN_DOCSTRING}\nThis is all of it.\n") == IN_DOCSTRING
 
 
@@ -105,7 +105,7 @@ def test_fence_in_the_docstring_of_a_program_without_fences() -> None:
     ("closing", "closes"),
     [("```", True), ("   ```", True), ("````  ", True), ("    ```", False), ("~~~", False)],
 )
-def test_what_closes_a_fence_of_code_that_was_cut_off(closing: str, closes: bool) -> None:  # noqa: FBT001 - a value of pytest
+def test_only_valid_closings_end_a_fence_of_cut_off_code(closing: str, closes: bool) -> None:  # noqa: FBT001 - pytest passes it
     program = source(f"```python\n{CUT_OFF}{closing}\nx = 1\n```\n")
     assert program == CUT_OFF if closes else program == f"{CUT_OFF}{closing}\nx = 1\n"
 
@@ -113,9 +113,9 @@ def test_what_closes_a_fence_of_code_that_was_cut_off(closing: str, closes: bool
 @pytest.mark.parametrize(
     "reply",
     [
-        f"```markdown\n{fenced(TASK)}```\n",
-        f"```python\ndef task_program():\n    say('x'\n\nSorry, once more:\n\n{fenced(TASK)}",
-        "1. The program:\n\n    " + fenced(TASK).replace("\n", "\n    ") + "\n2. It is done.\n",
+        f"```markdown\n{fence(TASK)}```\n",
+        f"```python\ndef task_program():\n    say('x'\n\nSorry, once more:\n\n{fence(TASK)}",
+        "1. The program:\n\n    " + fence(TASK).replace("\n", "\n    ") + "\n2. It is done.\n",
         "- ```python\n  " + TASK.replace("\n", "\n  ") + "```\n",
         f"```python\n{BARE}```\nThis program says hello.\n",
         f"```python\n{BARE}```",
@@ -124,7 +124,7 @@ def test_what_closes_a_fence_of_code_that_was_cut_off(closing: str, closes: bool
         f"```python\n{BARE}```\nRun it:\n```\ntask_program()\n```\n",
     ],
 )
-def test_fence_that_is_not_where_it_should_be(reply: str) -> None:
+def test_misplaced_fences_do_not_hide_the_program(reply: str) -> None:
     assert source(reply) == TASK
 
 
@@ -158,7 +158,7 @@ PAIRS = [
 @pytest.mark.parametrize(
     ("thought", "joint"),
     [
-        ("\nPerhaps:\n" + fenced(OTHER) + "Or not.\n", "\n\nSo:\n"),
+        ("\nPerhaps:\n" + fence(OTHER) + "Or not.\n", "\n\nSo:\n"),
         ("\n" + OTHER, "\n"),
         ("\n" + OTHER.rstrip(), ""),
     ],
@@ -166,22 +166,22 @@ PAIRS = [
 def test_thought_is_reasoning_and_never_the_program(first: str, last: str, thought: str, joint: str) -> None:
     assert read(f"{first}{thought}{last}{joint}{TASK}") == (TASK, thought.strip())
     if joint:
-        assert read(f"{first}{thought}{last}{joint}{fenced(CUT_OFF)}") == (CUT_OFF, thought.strip())
+        assert read(f"{first}{thought}{last}{joint}{fence(CUT_OFF)}") == (CUT_OFF, thought.strip())
 
 
 @pytest.mark.parametrize(("first", "last"), PAIRS[:10])
-def test_thought_without_an_answer_is_no_program(first: str, last: str) -> None:
-    assert read(f"{first}\n{fenced(OTHER)}{last}\n") == ("\n", fenced(OTHER).strip())
-    assert read(f"{first}\n{fenced(OTHER)}") == ("", fenced(OTHER).strip())
+def test_thought_without_an_answer_is_not_a_program(first: str, last: str) -> None:
+    assert read(f"{first}\n{fence(OTHER)}{last}\n") == ("\n", fence(OTHER).strip())
+    assert read(f"{first}\n{fence(OTHER)}") == ("", fence(OTHER).strip())
 
 
 @pytest.mark.parametrize("last", [last for _, last in PAIRS[:12]])
 def test_thought_that_the_prompt_began_ends_where_its_last_marker_is(last: str) -> None:
-    draft = f"Perhaps:\n{fenced(OTHER)}That is it."
-    assert read(f"{draft}{last}\n\n{fenced(TASK)}") == (TASK, draft)
-    assert read(f"{draft}\n{last}\n\n{fenced(CUT_OFF)}") == (CUT_OFF, draft)
-    assert read(f"{last}\n\n{fenced(TASK)}") == (TASK, "")
-    assert read(f"Perhaps:\n```python\n{OTHER}{last}\n\n{fenced(TASK)}")[0] == TASK
+    draft = f"Perhaps:\n{fence(OTHER)}That is it."
+    assert read(f"{draft}{last}\n\n{fence(TASK)}") == (TASK, draft)
+    assert read(f"{draft}\n{last}\n\n{fence(CUT_OFF)}") == (CUT_OFF, draft)
+    assert read(f"{last}\n\n{fence(TASK)}") == (TASK, "")
+    assert read(f"Perhaps:\n```python\n{OTHER}{last}\n\n{fence(TASK)}")[0] == TASK
 
 
 @pytest.mark.parametrize(
@@ -189,18 +189,18 @@ def test_thought_that_the_prompt_began_ends_where_its_last_marker_is(last: str) 
     [
         f"<answer>\n{TASK}</answer>",
         f"<answer>{TASK}</answer>\nThis is all of it.",
-        f"<plan>\nGo and speak.\n</plan>\n<answer>\n{fenced(TASK)}</answer>",
+        f"<plan>\nGo and speak.\n</plan>\n<answer>\n{fence(TASK)}</answer>",
         f"<think>Go.</think><answer>\n{TASK}</answer>",
         f"<code>\n{TASK}</code>\n",
         f"<|START_THINKING|>Go.<|END_THINKING|><|START_RESPONSE|>{TASK}<|END_RESPONSE|>",
-        f"<|begin_of_solution|>\n{fenced(TASK)}<|end_of_solution|>",
+        f"<|begin_of_solution|>\n{fence(TASK)}<|end_of_solution|>",
     ],
 )
 def test_pair_of_markers_around_the_answer_is_dropped(reply: str) -> None:
     assert source(reply) == TASK
 
 
-# --- what chat templates leave
+# --- remains of chat templates
 
 
 @pytest.mark.parametrize(
@@ -257,12 +257,12 @@ def test_residue_around_the_program_is_dropped(reply: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["</s>", "[/INST]", "<|im_end|>", "python", "assistant", "<b>", "```"])
-def test_text_of_the_program_is_no_residue(text: str) -> None:
+def test_text_of_the_program_is_not_dropped(text: str) -> None:
     program = (
         f'X = """\n{text}\n"""\n\n\ndef task_program():\n    say("{text}")\n    say("{text}")  # {text}\n'
     )
     assert source(program) == program
-    assert source(f"Here it is:\n{fenced(program, marks='````')}This is all of it.\n") == program
+    assert source(f"Here it is:\n{fence(program, marks='````')}This is all of it.\n") == program
 
 
 @pytest.mark.parametrize(
@@ -319,14 +319,14 @@ REPLIES = st.lists(st.sampled_from(PIECES), max_size=14).map("\n".join)
 @given(
     st.lists(st.sampled_from(["go_to('kitchen')", "say('</think>')", "say('''\n```\n''')", "x = 1  # </s>"]))
 )
-def test_fenced_program_is_found_as_it_is(statements: list[str]) -> None:
+def test_fenced_program_is_found_unchanged(statements: list[str]) -> None:
     program = "\n".join(["def task_program():", "    pass", *(f"    {one}" for one in statements)]) + "\n"
-    assert source(fenced(program, marks="````")) == program
-    assert source(f"<think>Perhaps.</think>\nSo:\n{fenced(program, marks='````')}It is done.") == program
+    assert source(fence(program, marks="````")) == program
+    assert source(f"<think>Perhaps.</think>\nSo:\n{fence(program, marks='````')}It is done.") == program
 
 
 @given(REPLIES)
-def test_program_that_was_found_is_found_in_itself(reply: str) -> None:
+def test_program_is_found_again_in_itself(reply: str) -> None:
     program = source(reply)
     if task_definitions(parse_leniently(program)):
         assert source(program) == program

@@ -1,4 +1,4 @@
-"""Robots and a model that answer as a test tells them to."""
+"""A robot and a model whose answers a test chooses."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from codebotler.robots.base import CancelledError, Feedback, RobotArgument, Robo
 from codebotler.robots.clock import Clock
 
 
-class Answering:
-    """A robot that does nothing but to answer.
+class FakeRobot:
+    """A robot that only answers.
 
     Args:
-        answer: gives or raises the answer to a skill, given its name and its first argument.
+        answer: returns or raises the answer to a skill, given its name and its first argument.
     """
 
     name, address, if_tool_dies = "answering", "", "it ended with the tool"
@@ -35,12 +35,12 @@ class Answering:
         self.clock.restart()
 
     def perform(
-        self, skill: str, arguments: Sequence[RobotArgument], told: Feedback = ignore_feedback
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
         if self.cancels:
             raise CancelledError
         first = str(arguments[0]) if arguments else ""
-        told(f"doing {skill}")
+        feedback(f"doing {skill}")
         result = self.answer(skill, first)
         self.done.append(first or skill)
         return result
@@ -52,8 +52,8 @@ class Answering:
         self.connections -= 1
 
 
-def raising(error: Exception) -> Callable[[str, str], RobotResult]:
-    """An answer that is an error."""
+def fail_with(error: Exception) -> Callable[[str, str], RobotResult]:
+    """Make an answer that raises an error."""
 
     def answer(_skill: str, _first: str) -> RobotResult:
         raise error
@@ -61,13 +61,13 @@ def raising(error: Exception) -> Callable[[str, str], RobotResult]:
     return answer
 
 
-def giving(*results: RobotResult) -> Callable[[str, str], RobotResult]:
-    """Answers, one after the other."""
+def replay(*results: RobotResult) -> Callable[[str, str], RobotResult]:
+    """Make answers that return these results, one after the other."""
     rest = iter(results)
     return lambda _skill, _first: next(rest)
 
 
-class Several:
+class FakeModel:
     """A model that writes one program after another."""
 
     name = "several"

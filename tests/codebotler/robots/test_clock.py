@@ -18,7 +18,7 @@ def test_time_passes_at_its_speed() -> None:
     assert clock.now - start == pytest.approx(100 * took, abs=5)
 
 
-def test_where_waiting_takes_no_time_it_passes_by_waiting_only() -> None:
+def test_without_a_speed_time_passes_only_by_waiting() -> None:
     clock = Clock(speed=None)
     assert (clock.now, clock.wait(3600), clock.now) == (0, True, 3600)
 

@@ -1,4 +1,4 @@
-"""Files that connect a robot: what they map, what is sent, what comes back, and what is refused."""
+"""Files that connect a robot map its skills to calls, fill in requests, and read results."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def read(folder: Path, text: str) -> Connection:
     return read_connection(path, SKILLS)
 
 
-def test_what_a_file_maps_is_what_the_robot_has(tmp_path: Path) -> None:
+def test_robot_has_the_skills_that_its_file_maps(tmp_path: Path) -> None:
     text = f"places: places.yaml\npose: {{tf: {{to: base}}}}\nskills:\n  {GO_TO}\n"
     found = read(tmp_path, text)
     assert [*found.skills(SKILLS)] == ["get_current_location", "get_all_rooms", "go_to"]
@@ -61,7 +61,7 @@ def test_what_a_file_maps_is_what_the_robot_has(tmp_path: Path) -> None:
         (f"keepout: {{mask: /a, info: /b}}\nskills:\n  {SAY}\n", 1, "keepout"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, line: int, words: str) -> None:
+def test_error_names_the_line(tmp_path: Path, text: str, line: int, words: str) -> None:
     with pytest.raises(UserError) as error:
         read(tmp_path, text)
     assert error.value.line == line
@@ -119,7 +119,7 @@ def test_actions_of_the_skill_table_are_calls_as_well() -> None:
         ({"ok": False}, "/open reports a failure"),
     ],
 )
-def test_why_a_skill_failed(received: dict[str, Any], message: str) -> None:
+def test_error_says_why_a_skill_failed(received: dict[str, Any], message: str) -> None:
     call = SkillCall("service", "/open", "a/srv/B", success="ok", failure="OpenFailed")
     with pytest.raises(RobotError) as error:
         call.answer(received)
@@ -134,16 +134,16 @@ def test_result_is_at_the_path_of_a_field() -> None:
         call.answer({"found": []})
 
 
-def test_robot_is_still_when_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_robot_is_still_when_it_reports_no_motion(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
     monkeypatch.setattr("time.monotonic", lambda: now)
     seen = Motion()
-    states = [(seen.is_still, seen.is_moving)]  # it has said nothing
+    states = [(seen.is_still, seen.is_moving)]  # It has reported nothing yet.
     pose = {"is": "pose", "x": 1.0, "y": 0.0, "yaw": math.pi, "frame": "map"}
     for later, said in (
         (0.0, pose),
         (0.4, {"is": "velocity", "speed": 0.5}),
-        (0.4, {**pose, "x": 1.01, "yaw": -math.pi}),  # the same direction
+        (0.4, {**pose, "x": 1.01, "yaw": -math.pi}),  # The direction is the same.
         (0.2, {"is": "velocity", "speed": 0.0}),
         (0.1, {**pose, "y": 0.1}),
     ):
@@ -151,7 +151,7 @@ def test_robot_is_still_when_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None
         seen.record(said)
         states.append((seen.is_still, seen.is_moving))
     now += 1.5
-    states.append((seen.is_still, seen.is_moving))  # it says no more
+    states.append((seen.is_still, seen.is_moving))  # It reports nothing any more.
     assert seen.is_silent
     assert states == [(False, False), *[(False, True)] * 3, (True, False), (False, True), (False, False)]
 

@@ -1,4 +1,4 @@
-"""What a graph offers becomes a first file for `--connect`."""
+"""The offers of a ROS graph become a first file for `--connect`."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from codebotler.robots.ros.connections.discovery import draft_connection
 NAV2 = "action /navigate_to_pose nav2_msgs/action/NavigateToPose"
 
 
-def written(*offers: str) -> dict[str, Any]:
-    """What is not in a comment."""
+def draft(*offers: str) -> dict[str, Any]:
+    """Read the lines that are not in comments."""
     read: dict[str, Any] = yaml.safe_load(draft_connection(offers))
     return read
 
@@ -26,15 +26,15 @@ def comments(*offers: str) -> str:
     return "\n".join(line.strip() for line in lines if line.lstrip().startswith("#"))
 
 
-def in_comment(start: str, *offers: str) -> Any:  # noqa: ANN401 - as it is in YAML
-    """A line that is in a comment, as it is read without the #."""
+def read_comment(start: str, *offers: str) -> Any:  # noqa: ANN401 - any value of YAML
+    """Read a line that is in a comment, without its #."""
     (line,) = [line for line in comments(*offers).splitlines() if line.startswith(f"# {start}: ")]
     return yaml.safe_load(line.removeprefix("# "))[start]
 
 
 def test_drive_of_nav2_waits_for_places() -> None:
-    assert written(NAV2) == {"robot": "ros2", "skills": None}
-    assert in_comment("go_to", NAV2) == {
+    assert draft(NAV2) == {"robot": "ros2", "skills": None}
+    assert read_comment("go_to", NAV2) == {
         "action": "/navigate_to_pose",
         "type": "nav2_msgs/action/NavigateToPose",
         "goal": {"pose": "$place"},
@@ -44,7 +44,7 @@ def test_drive_of_nav2_waits_for_places() -> None:
 
 def test_own_actions_are_written_with_arguments_and_results() -> None:
     offers = [f"action {s.ros.server} robot_actions_pkg/action/{s.ros.type}" for s in SKILLS.rows if s.ros]
-    skills = written(*offers)["skills"]
+    skills = draft(*offers)["skills"]
     assert skills.keys() == SKILLS.keys()
     kind = "robot_actions_pkg/action"
     assert skills["go_to"] == {
@@ -57,24 +57,24 @@ def test_own_actions_are_written_with_arguments_and_results() -> None:
 
 
 @pytest.mark.parametrize("name", ["/speech", "/robot/say", "/robot_tts", "/tts/say_text"])
-def test_speech_is_a_topic_that_is_heard(name: str) -> None:
+def test_speech_topic_becomes_the_skill_say(name: str) -> None:
     said = {"topic": name, "type": "std_msgs/msg/String", "message": {"data": "$message"}}
-    assert written(f"hears {name} std_msgs/msg/String")["skills"] == {"say": said}
+    assert draft(f"hears {name} std_msgs/msg/String")["skills"] == {"say": said}
 
 
 @pytest.mark.parametrize(
     "offer",
     ["sends /speech std_msgs/msg/String", "hears /chatter std_msgs/msg/String", "hears /say lab/msg/Say"],
 )
-def test_other_texts_are_no_speech(offer: str) -> None:
-    assert written(offer)["skills"] is None
+def test_other_text_topics_are_not_speech(offer: str) -> None:
+    assert draft(offer)["skills"] is None
     assert offer.split()[1] in comments(offer)
 
 
 def test_services_are_suggested_as_own_skills() -> None:
     offers = ("service /door/open std_srvs/srv/Trigger", "service /lamp/on std_srvs/srv/SetBool")
-    assert written(*offers)["skills"] is None
-    door, lamp = in_comment("open_door", *offers), in_comment("on_lamp", *offers)
+    assert draft(*offers)["skills"] is None
+    door, lamp = read_comment("open_door", *offers), read_comment("on_lamp", *offers)
     assert door == {
         "service": "/door/open",
         "type": "std_srvs/srv/Trigger",
@@ -86,31 +86,31 @@ def test_services_are_suggested_as_own_skills() -> None:
 
 def test_cameras_wait_for_a_detector() -> None:
     offer = "sends /camera/image_raw sensor_msgs/msg/Image"
-    assert in_comment("is_in_room", offer)["image"] == "/camera/image_raw"
+    assert read_comment("is_in_room", offer)["image"] == "/camera/image_raw"
     offer = "sends /camera/compressed sensor_msgs/msg/CompressedImage"
-    assert in_comment("is_in_room", offer)["image"] == "/camera/compressed"
+    assert read_comment("is_in_room", offer)["image"] == "/camera/compressed"
 
 
 AMCL = "sends /amcl_pose geometry_msgs/msg/PoseWithCovarianceStamped"
 TF, ODOM = "sends /tf tf2_msgs/msg/TFMessage", "sends /odom nav_msgs/msg/Odometry"
 
 
-def test_pose_is_that_of_amcl_else_of_tf() -> None:
-    assert written(TF, ODOM, AMCL)["pose"] == {"topic": "/amcl_pose"}
-    assert written(TF, ODOM)["pose"] == {"tf": {"from": "map", "to": "base_link"}}
+def test_pose_comes_from_amcl_or_else_from_tf() -> None:
+    assert draft(TF, ODOM, AMCL)["pose"] == {"topic": "/amcl_pose"}
+    assert draft(TF, ODOM)["pose"] == {"tf": {"from": "map", "to": "base_link"}}
     assert "# pose: {tf: " in comments(TF, AMCL)
-    assert "pose" not in written(ODOM)
-    assert in_comment("pose", ODOM) == {"topic": "/odom"}
-    assert written(ODOM)["velocity"] == {"topic": "/odom"}
+    assert "pose" not in draft(ODOM)
+    assert read_comment("pose", ODOM) == {"topic": "/odom"}
+    assert draft(ODOM)["velocity"] == {"topic": "/odom"}
 
 
 def test_only_the_first_of_several_is_written() -> None:
     offers = [f"hears /{name} std_msgs/msg/String" for name in ("tts", "say")]
-    assert written(*offers)["skills"]["say"]["topic"] == "/say"
-    assert in_comment("say", *offers)["topic"] == "/tts"
+    assert draft(*offers)["skills"]["say"]["topic"] == "/say"
+    assert read_comment("say", *offers)["topic"] == "/tts"
 
 
-def test_the_rest_is_listed_once_without_what_every_graph_has() -> None:
+def test_other_offers_are_listed_once_without_ros_internals() -> None:
     offers = (
         "sends /scan sensor_msgs/msg/LaserScan",
         "hears /scan sensor_msgs/msg/LaserScan",
@@ -129,12 +129,12 @@ def test_the_rest_is_listed_once_without_what_every_graph_has() -> None:
 
 def test_hostile_names_stay_out_of_the_file() -> None:
     assert (
-        written("hears /x\nskills:\n/say std_msgs/msg/String", "hears /{say std_msgs/msg/String")["skills"]
+        draft("hears /x\nskills:\n/say std_msgs/msg/String", "hears /{say std_msgs/msg/String")["skills"]
         is None
     )
 
 
-def test_what_is_written_connects_a_robot(tmp_path: Path) -> None:
+def test_draft_connects_a_robot(tmp_path: Path) -> None:
     speech, file = "hears /speech std_msgs/msg/String", tmp_path / "robot.yaml"
     file.write_text(draft_connection([NAV2, TF, ODOM, speech]))
     read = read_connection(file, SKILLS)
@@ -150,7 +150,7 @@ def test_own_actions_connect_a_robot(tmp_path: Path) -> None:
     assert read_connection(tmp_path / "robot.yaml", SKILLS).calls.keys() == SKILLS.keys()
 
 
-def test_example_of_the_guide() -> None:
+def test_guide_shows_this_draft() -> None:
     page = (Path(__file__).parents[3] / "docs" / "nav2.md").read_text()
     offers = (
         NAV2,

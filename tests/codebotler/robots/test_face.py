@@ -1,4 +1,4 @@
-"""A robot with a face: what is spoken goes there, all else to the robot; a stop takes back what is asked."""
+"""A robot with a face speaks and asks there, does all else itself, and withdraws questions at a stop."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from codebotler.robots.face import (
 from codebotler.robots.open import ROBOT_KINDS, open_with_face
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
-from doubles import Answering
+from doubles import FakeRobot
 
 TEA = """def task_program():
     say("Good morning")
@@ -49,13 +49,13 @@ WORLD = World((Room("hall"), Room("kitchen")), "hall")
 LONG = 30.0
 
 
-def faced(seconds: float = LONG) -> tuple[RobotWithFace, Face]:
+def with_face(seconds: float = LONG) -> tuple[RobotWithFace, Face]:
     face = Face(seconds)
     return RobotWithFace(Simulated(WORLD, speed=None, skills=without_speech()), face), face
 
 
-def question_of(face: Face, number: int = 0) -> FaceQuestion:
-    """The first question with a number above this one."""
+def await_question(face: Face, number: int = 0) -> FaceQuestion:
+    """Wait for a question with a number above this one."""
     ends = time.monotonic() + LONG
     while (question := face.shown.question) is None or question.number <= number:
         assert time.monotonic() < ends
@@ -64,14 +64,14 @@ def question_of(face: Face, number: int = 0) -> FaceQuestion:
 
 
 @contextmanager
-def going(does: Callable[[], object]) -> Iterator[list[object]]:
-    """Something that goes on in a thread; what it returned or raised is there at the end."""
+def spawn(work: Callable[[], object]) -> Iterator[list[object]]:
+    """Run work in a thread; at the end, the list holds its result or its error."""
     ended: list[object] = []
 
     def go() -> None:
         try:
-            ended.append(does())
-        except Exception as error:  # noqa: BLE001 - looked at by the test
+            ended.append(work())
+        except Exception as error:  # noqa: BLE001 - the test looks at it
             ended.append(error)
 
     thread = threading.Thread(target=go, daemon=True)
@@ -82,14 +82,14 @@ def going(does: Callable[[], object]) -> Iterator[list[object]]:
 
 
 @pytest.mark.parametrize("are_regexes", [True, False])
-def test_its_rooms_are_what_those_of_the_other_robot_are(are_regexes: bool) -> None:  # noqa: FBT001 - a parameter
-    inner = Answering()
+def test_rooms_are_regexes_if_those_of_the_inner_robot_are(are_regexes: bool) -> None:  # noqa: FBT001 - pytest passes it
+    inner = FakeRobot()
     inner.rooms_are_regexes = are_regexes
     assert RobotWithFace(inner, Face()).rooms_are_regexes is are_regexes
 
 
-def test_what_is_spoken_goes_to_the_face_and_all_else_to_the_robot() -> None:
-    inner, face = Answering(lambda skill, _: ["hall"] if skill == "get_all_rooms" else None), Face()
+def test_speech_goes_to_the_face_and_all_else_to_the_robot() -> None:
+    inner, face = FakeRobot(lambda skill, _: ["hall"] if skill == "get_all_rooms" else None), Face()
     robot = RobotWithFace(inner, face)
     robot.connect()
     assert robot.perform("get_all_rooms", []) == ["hall"]
@@ -97,8 +97,8 @@ def test_what_is_spoken_goes_to_the_face_and_all_else_to_the_robot() -> None:
     robot.perform("say", ["hello"])
     assert inner.done == ["get_all_rooms", "kitchen"]
     assert [said.text for said in face.shown.said] == ["hello"]
-    with going(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No", "Yes")])) as ended:
-        question = question_of(face)
+    with spawn(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No", "Yes")])) as ended:
+        question = await_question(face)
         assert (question.person, question.text, question.options) == ("ann", "Tea?", ("Yes", "No", "Yes"))
         face.answer(question.number, 2)
     assert ended == ["Yes"]
@@ -107,8 +107,8 @@ def test_what_is_spoken_goes_to_the_face_and_all_else_to_the_robot() -> None:
     assert inner.connections == 0
 
 
-def test_the_last_things_that_were_said_stay_until_another_mission() -> None:
-    robot, face = faced()
+def test_last_statements_stay_until_another_mission() -> None:
+    robot, face = with_face()
     robot.connect()
     for text in "abcd":
         robot.perform("say", [text])
@@ -119,8 +119,8 @@ def test_the_last_things_that_were_said_stay_until_another_mission() -> None:
     assert not face.shown.said
 
 
-def test_what_the_face_has_the_robot_may_lack() -> None:
-    inner = Answering()
+def test_robot_may_lack_the_skills_of_the_face() -> None:
+    inner = FakeRobot()
     inner.missing = {"say": "no server", "ask": "no server", "pick": "no arm"}
     robot = RobotWithFace(inner, Face())
     assert robot.missing == {"pick": "no arm"}
@@ -128,8 +128,8 @@ def test_what_the_face_has_the_robot_may_lack() -> None:
     assert len(missing_skills(f"{TEA}    pick('mug')\n", robot)) == 1
 
 
-def test_a_robot_with_a_face_resumes_a_mission_as_without() -> None:
-    robot, _ = faced()
+def test_a_robot_with_a_face_resumes_a_mission_like_one_without() -> None:
+    robot, _ = with_face()
     robot.connect()
     gone = Event("goto", "kitchen", place="hall")
     resume_robot(robot, MissionPast("1", "", "", TEA, "it failed", (gone,)))
@@ -137,14 +137,14 @@ def test_a_robot_with_a_face_resumes_a_mission_as_without() -> None:
 
 
 @pytest.mark.parametrize("kind", [kind for kind in ROBOT_KINDS if kind != "pyrobosim"])
-def test_the_robot_behind_a_face_is_asked_for_nothing_that_is_spoken(kind: str) -> None:
+def test_robot_behind_a_face_has_no_speech_skills(kind: str) -> None:
     robot = open_with_face(kind, Options(world=WORLD), Face())
     assert isinstance(robot, RobotWithFace)
     assert robot.skills == SKILLS
     assert set(robot._robot.skills) == set(SKILLS) - {"say", "ask"}
 
 
-def test_whatever_is_spoken_is_shown_by_the_parameters_of_its_row() -> None:
+def test_own_speech_skills_are_shown_by_their_parameters() -> None:
     text = (Parameter("text"),)
     choose = (
         Parameter("choices", ValueType(is_list=True), is_options=True),
@@ -159,23 +159,23 @@ def test_whatever_is_spoken_is_shown_by_the_parameters_of_its_row() -> None:
     robot.connect()
     robot.perform("whisper", ["psst"])
     assert [said.text for said in face.shown.said] == ["psst"]
-    with going(lambda: robot.perform("choose", [("Tea", "Milk"), "A drink?", "ann"])) as ended:
-        asked = question_of(face)
+    with spawn(lambda: robot.perform("choose", [("Tea", "Milk"), "A drink?", "ann"])) as ended:
+        asked = await_question(face)
         assert (asked.person, asked.text, asked.options) == ("ann", "A drink?", ("Tea", "Milk"))
         face.answer(asked.number, 1)
     assert ended == ["Milk"]
 
 
 def test_saying_takes_time_by_the_robots_clock() -> None:
-    robot, _ = faced()
+    robot, _ = with_face()
     robot.connect()
     for text, seconds in (("hi", 1.0), ("x" * 60, 4.0), ("x" * 5_000, 14.0)):
         robot.perform("say", [text])
         assert robot.clock.now == seconds
 
 
-def test_nobody_answers() -> None:
-    robot, face = faced(seconds=0.05)
+def test_unanswered_question_times_out() -> None:
+    robot, face = with_face(seconds=0.05)
     robot.connect()
     with pytest.raises(RobotError, match=r'"Tea\?" .*0\.05 s') as error:
         robot.perform("ask", ["ann", "Tea?", ("Yes",)])
@@ -187,11 +187,11 @@ def test_nobody_answers() -> None:
         face.answer(ended.number, 0)
 
 
-def test_the_first_answer_counts_and_the_others_are_told_so() -> None:
-    robot, face = faced()
+def test_the_first_answer_counts_and_later_ones_are_refused() -> None:
+    robot, face = with_face()
     robot.connect()
-    with going(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No")])) as ended:
-        number = question_of(face).number
+    with spawn(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No")])) as ended:
+        number = await_question(face).number
         for position in (-1, 2):
             with pytest.raises(AnswerError, match="not one of"):
                 face.answer(number, position)
@@ -203,25 +203,25 @@ def test_the_first_answer_counts_and_the_others_are_told_so() -> None:
     assert ended == ["No"]
 
 
-def test_an_answer_to_the_question_before_answers_no_other() -> None:
-    robot, face = faced()
+def test_an_answer_to_an_earlier_question_is_refused() -> None:
+    robot, face = with_face()
     robot.connect()
-    with going(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No")])):
-        first = question_of(face).number
+    with spawn(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No")])):
+        first = await_question(face).number
         face.answer(first, 0)
-    with going(lambda: robot.perform("ask", ["ann", "Sure?", ("Yes", "No")])) as ended:
-        second = question_of(face, first).number
+    with spawn(lambda: robot.perform("ask", ["ann", "Sure?", ("Yes", "No")])) as ended:
+        second = await_question(face, first).number
         with pytest.raises(AnswerError):
             face.answer(first, 0)
         face.answer(second, 1)
     assert ended == ["No"]
 
 
-def test_a_stop_takes_the_question_back_at_once_and_nothing_more_is_spoken() -> None:
-    robot, face = faced()
+def test_a_stop_withdraws_the_question_and_silences_the_robot() -> None:
+    robot, face = with_face()
     robot.connect()
-    with going(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No")])) as ended:
-        number = question_of(face).number
+    with spawn(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No")])) as ended:
+        number = await_question(face).number
         robot.cancel()
         assert face.shown.question is None
         assert face.shown.ended is not None
@@ -242,11 +242,11 @@ def test_a_stop_takes_the_question_back_at_once_and_nothing_more_is_spoken() -> 
     robot.perform("say", ["hello"])
 
 
-def test_a_stop_ends_what_is_being_said() -> None:
+def test_a_stop_interrupts_a_statement() -> None:
     face = Face()
     robot = RobotWithFace(Simulated(WORLD, skills=without_speech()), face)
     robot.connect()
-    with going(lambda: robot.perform("say", ["x" * 5_000])) as ended:
+    with spawn(lambda: robot.perform("say", ["x" * 5_000])) as ended:
         while not face.shown.said:
             time.sleep(0.002)
         robot.cancel()
@@ -254,7 +254,7 @@ def test_a_stop_ends_what_is_being_said() -> None:
 
 
 def test_the_robot_is_stopped_even_if_the_face_cannot_be() -> None:
-    inner, face = Answering(), Face()
+    inner, face = FakeRobot(), Face()
     robot = RobotWithFace(inner, face)
     robot.connect()
 
@@ -262,23 +262,23 @@ def test_the_robot_is_stopped_even_if_the_face_cannot_be() -> None:
         raise OSError("full")
 
     face.changed = broken
-    with going(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes",)])), pytest.raises(OSError, match="full"):
+    with spawn(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes",)])), pytest.raises(OSError, match="full"):
         robot.cancel()
     assert inner.cancels == 1
 
 
-def test_who_shows_it_is_counted_and_told() -> None:
-    robot, face = faced()
+def test_screens_are_counted_and_reported() -> None:
+    robot, face = with_face()
     robot.connect()
-    told: list[object] = []
+    phrases: list[object] = []
     changes: list[int] = []
     face.changed = lambda: changes.append(face.screens)
-    robot.perform("say", ["a"], told.append)
+    robot.perform("say", ["a"], phrases.append)
     with face.count_screen(), face.count_screen():
-        robot.perform("say", ["b"], told.append)
+        robot.perform("say", ["b"], phrases.append)
     with face.count_screen():
-        robot.perform("say", ["c"], told.append)
-    assert [re.findall(r"\bno\b|\d", str(text)) for text in told] == [["no"], ["2"], ["1"]]
+        robot.perform("say", ["c"], phrases.append)
+    assert [re.findall(r"\bno\b|\d", str(text)) for text in phrases] == [["no"], ["2"], ["1"]]
     assert face.screens == 0
     assert changes == [0, 1, 2, 2, 1, 0, 1, 1, 0]
 
@@ -286,19 +286,19 @@ def test_who_shows_it_is_counted_and_told() -> None:
 # --- missions
 
 
-def run(home: Path, program: str, seconds: float, does: Callable[[Mission, Face], None]) -> Mission:
-    robot, face = faced(seconds)
+def run(home: Path, program: str, seconds: float, work: Callable[[Mission, Face], None]) -> Mission:
+    robot, face = with_face(seconds)
     with Reservation(robot, home) as reserved, Mission(home, robot.name) as mission:
         mission.draft(program)
         mission.check([])
         mission.approve()
-        with going(lambda: mission.run(reserved)):
-            does(mission, face)
+        with spawn(lambda: mission.run(reserved)):
+            work(mission, face)
         return mission
 
 
 def test_a_mission_speaks_and_hears(tmp_path: Path) -> None:
-    mission = run(tmp_path, TEA, LONG, lambda _, face: face.answer(question_of(face).number, 0))
+    mission = run(tmp_path, TEA, LONG, lambda _, face: face.answer(await_question(face).number, 0))
     assert mission.state is MissionState.DONE
     assert [(event.kind, event.text, event.answer) for event in mission.trace] == [
         ("say", "Good morning", None),
@@ -309,9 +309,9 @@ def test_a_mission_speaks_and_hears(tmp_path: Path) -> None:
     assert events == ["skill", "feedback", "result"] * 3
 
 
-def test_a_mission_that_is_stopped_while_it_asks(tmp_path: Path) -> None:
+def test_a_stop_ends_a_mission_that_asks(tmp_path: Path) -> None:
     def stop(mission: Mission, face: Face) -> None:
-        question_of(face)
+        await_question(face)
         mission.stop("a test")
         assert face.shown.question is None
 

@@ -1,4 +1,4 @@
-"""A robot of one's own is a class; here three, each with a real server."""
+"""A robot of one's own is a class; the three examples work with real servers."""
 
 import json
 import socket
@@ -81,7 +81,7 @@ def test_methods_are_skills_async_or_not_and_rooms_lists_the_rooms(write: Write)
         "def go_to(self, location): self.event.wait(600)",
     ],
 )
-def test_a_stop_ends_what_goes_on(write: Write, go_to: str) -> None:
+def test_a_stop_ends_a_running_skill(write: Write, go_to: str) -> None:
     robot = write(
         f"""
     def __init__(self): self.event = threading.Event()
@@ -138,7 +138,7 @@ def test_declared_errors_reach_the_program_and_others_end_the_mission(tmp_path: 
     robot.disconnect()
 
 
-def test_a_stop_that_fails_is_told(write: Write) -> None:
+def test_error_in_stop_loses_the_robot(write: Write) -> None:
     robot = write(
         """
     def stop(self): raise OSError("the line is dead")
@@ -147,20 +147,20 @@ def test_a_stop_that_fails_is_told(write: Write) -> None:
 """
     )
     robot.connect()
-    told: list[str] = []
+    errors: list[str] = []
 
     def speak() -> None:
         try:
             robot.perform("say", ["hello"])
         except RobotLostError as error:
-            told.append(str(error))
+            errors.append(str(error))
 
     thread = threading.Thread(target=speak)
     thread.start()
     time.sleep(0.1)
     robot.cancel()
     thread.join(SOON)
-    (sentence,) = told
+    (sentence,) = errors
     assert sentence.startswith("Spot.stop failed: OSError: the line is dead (lab_robot_")
     assert sentence.endswith(".py, line 5); STOP THE ROBOT BY HAND")
 
@@ -259,7 +259,7 @@ def test_a_robot_that_does_not_connect_is_not_ready(write: Write) -> None:
         ("1 / 0\n", r"line 1: it cannot be run: ZeroDivisionError"),
     ],
 )
-def test_what_a_class_lacks_is_said_in_a_sentence(tmp_path: Path, source: str, message: str) -> None:
+def test_error_names_the_fault_of_a_class(tmp_path: Path, source: str, message: str) -> None:
     path = tmp_path / "lab_robot.py"
     path.write_text(source)
     with pytest.raises(UserError, match=message):
@@ -280,15 +280,15 @@ class Controller(socketserver.StreamRequestHandler):
                 answer = {"result": ["cup", "pen"]}
             elif name == "move" and arguments == ["pen", "drawer"]:
                 answer = {"error": "the drawer is full"}
-            DONE.append([name, *arguments])
+            CALLS.append([name, *arguments])
             self.wfile.write(json.dumps(answer).encode() + b"\n")
 
 
-DONE: list[Any] = []
+CALLS: list[Any] = []
 
 
-def test_a_robot_with_an_sdk(monkeypatch: pytest.MonkeyPatch) -> None:
-    DONE.clear()
+def test_sdk_example_performs_skills_and_stops(monkeypatch: pytest.MonkeyPatch) -> None:
+    CALLS.clear()
     with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Controller) as server:
         server.daemon_threads = True
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -304,11 +304,11 @@ def test_a_robot_with_an_sdk(monkeypatch: pytest.MonkeyPatch) -> None:
         robot.cancel()
         robot.disconnect()
         server.shutdown()
-    assert DONE == [["detect"], ["move", "cup", "bin"], ["move", "pen", "drawer"], ["halt"]]
+    assert CALLS == [["detect"], ["move", "cup", "bin"], ["move", "pen", "drawer"], ["halt"]]
 
 
 class CartHandler(BaseHTTPRequestHandler):
-    """A cart; a drive to the attic takes until it is stopped."""
+    """The server of a cart; a drive to the attic lasts until the stop."""
 
     stop = threading.Event()
 
@@ -337,7 +337,7 @@ class CartHandler(BaseHTTPRequestHandler):
         """Say nothing."""
 
 
-def test_a_robot_with_http(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_http_example_performs_skills_and_stops(monkeypatch: pytest.MonkeyPatch) -> None:
     with ThreadingHTTPServer(("127.0.0.1", 0), CartHandler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         monkeypatch.setenv("CART_URL", f"http://127.0.0.1:{server.server_address[1]}")
@@ -386,9 +386,7 @@ server.run("streamable-http", host="127.0.0.1", port=int(sys.argv[1]))
 
 
 @pytest.mark.slow
-def test_a_robot_whose_skills_are_tools_of_an_mcp_server(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_mcp_example_performs_skills_and_stops(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -417,7 +415,7 @@ def test_a_robot_whose_skills_are_tools_of_an_mcp_server(
 
 
 def wait_for(port: int) -> None:
-    """Wait until something listens."""
+    """Wait until a server listens."""
     deadline = time.monotonic() + SOON
     while time.monotonic() < deadline:
         with suppress(OSError), socket.create_connection(("127.0.0.1", port), 1.0):

@@ -1,4 +1,4 @@
-"""Places are read from a plain file or, by a few lines of YAML, from what other people wrote down."""
+"""Places are read from a plain file or, by a few lines of YAML, from files of other tools."""
 
 import math
 import re
@@ -85,7 +85,7 @@ def test_parts_of_a_pose_may_lie_apart(tmp_path: Path) -> None:
     assert points(places) == {"hall": (1, 2, 0.5)}
 
 
-def test_stars_make_the_name(tmp_path: Path) -> None:
+def test_stars_in_a_path_make_the_name(tmp_path: Path) -> None:
     content = "floors: {ground: {rooms: {hall: [0, 0]}}, first: {rooms: {hall: [1, 1]}}}\n"
     each = "each: floors.*.rooms.*"
     assert [*points(read(tmp_path, f"{{file: places.yaml, {each}}}", content))] == [
@@ -96,7 +96,7 @@ def test_stars_make_the_name(tmp_path: Path) -> None:
     assert "hall on the first floor" in points(read(tmp_path, mapping, content))
 
 
-def test_entries_without_a_name_and_others_are_left_out(tmp_path: Path) -> None:
+def test_entries_without_a_name_or_of_another_kind_are_left_out(tmp_path: Path) -> None:
     content = """{"a": [{"id": 0, "at": [1, 2], "kind": "node"}, {"at": [3, 4], "kind": "node"},
     {"id": "", "at": [5, 6], "kind": "node"}, {"id": 7, "at": [[1, 2], [3, 4]], "kind": "edge"}]}"""
     mapping = "{file: g.json, each: a.*, name: id, pose: at, where: {kind: node}}"
@@ -112,7 +112,7 @@ def test_pixels_become_metres_also_in_polygons(tmp_path: Path) -> None:
     assert hall.polygon[0] == pytest.approx((-4, 7))
     assert hall.polygon[2] == pytest.approx((-2, 5))
     places = read(tmp_path, '{file: places.yaml, each: "*", resolution: 0.05}', "hall: [10, 20]\n")
-    assert points(places)["hall"] == pytest.approx((0.5, -1, 0))  # as building files of RMF count
+    assert points(places)["hall"] == pytest.approx((0.5, -1, 0))  # In RMF, y points down.
 
 
 def test_places_come_from_several_files(tmp_path: Path) -> None:
@@ -144,7 +144,7 @@ def test_places_come_from_several_files(tmp_path: Path) -> None:
         ("rooms: {}\n", 1, ["places"]),
     ],
 )
-def test_faults_are_told_with_the_place_and_its_line(
+def test_errors_name_the_place_and_its_line(
     tmp_path: Path, content: str, line: int, words: list[str]
 ) -> None:
     with pytest.raises(UserError) as caught:
@@ -156,14 +156,14 @@ def test_faults_are_told_with_the_place_and_its_line(
 @pytest.mark.parametrize(
     "mapping", ["", "[]", "7", "{file: places.yaml, yaw: deg}", "{file: places.yaml, eech: a}", "none.yaml"]
 )
-def test_faulty_mappings_are_told(tmp_path: Path, mapping: str) -> None:
+def test_faulty_mappings_are_refused(tmp_path: Path, mapping: str) -> None:
     with pytest.raises(UserError):
         read(tmp_path, mapping)
 
 
-# --- files of other people
+# --- files of other tools
 
-GIVEN = {
+MAPPINGS = {
     "arena.yaml": """
   - {file: FILE, each: arena.rooms.*, pose: pose, polygon: room_polygon}
   - {file: FILE, each: arena.rooms.*.beacons.*, pose: near_pose}
@@ -190,7 +190,7 @@ GIVEN = {
   height: 420
 """,
 }
-READ: dict[str, dict[str, tuple[float, float, float]]] = {
+EXPECTED: dict[str, dict[str, tuple[float, float, float]]] = {
     "arena.yaml": {
         "kitchen": (2.9, 4.6, math.pi / 2),
         "living room": (6, 3.1, 0),
@@ -219,25 +219,25 @@ READ: dict[str, dict[str, tuple[float, float, float]]] = {
 }
 
 
-def read_given(corpus: Path, name: str, mapping: str) -> Places:
+def read_case(corpus: Path, name: str, mapping: str) -> Places:
     path = corpus / "cases" / "places" / name
     robot = YamlFile(f"places: {mapping.replace('FILE', str(path))}", Path("robot.yaml"))
     assert isinstance(robot.data, dict)
     return read_places(robot.data["places"], robot)
 
 
-@pytest.mark.parametrize("name", GIVEN)
-def test_files_of_other_people_are_read_by_a_few_lines(corpus: Path, name: str) -> None:
-    places = points(read_given(corpus, name, GIVEN[name]))
-    assert [*places] == [*READ[name]]
-    for one, pose in READ[name].items():
+@pytest.mark.parametrize("name", MAPPINGS)
+def test_files_of_other_tools_are_read_by_short_mappings(corpus: Path, name: str) -> None:
+    places = points(read_case(corpus, name, MAPPINGS[name]))
+    assert [*places] == [*EXPECTED[name]]
+    for one, pose in EXPECTED[name].items():
         assert places[one] == pytest.approx(pose, abs=1e-4)
 
 
 @pytest.mark.parametrize(("name", "left_out"), [("areas.json", "bedroom"), ("waypoints.yaml", "reception")])
-def test_what_nobody_can_mean_is_refused(corpus: Path, name: str, left_out: str) -> None:
+def test_ambiguous_place_is_refused_unless_it_is_skipped(corpus: Path, name: str, left_out: str) -> None:
     with pytest.raises(UserError, match=rf"{name}, line \d+: .*skip: \[{left_out}\]"):
-        read_given(corpus, name, GIVEN[name].replace(f", skip: [{left_out}]", ""))
+        read_case(corpus, name, MAPPINGS[name].replace(f", skip: [{left_out}]", ""))
 
 
 RMF = """\
@@ -267,7 +267,7 @@ GUIDE = Path(__file__).parents[3] / "docs" / "nav2.md"
         ("graph.geojson", NAV2, {"dock": (1.5, 2, 0)}),
     ],
 )
-def test_mappings_of_the_guide_read_what_they_are_for(
+def test_mappings_in_the_guide_read_their_files(
     tmp_path: Path, name: str, content: str, expected: dict[str, tuple[float, float, float]]
 ) -> None:
     section = GUIDE.read_text().partition("\n## Places\n")[2]

@@ -65,14 +65,14 @@ MEASURED = World(
 )
 
 
-def connected(world: World = WORLD, speed: float | None = None) -> Pyrobosim:
+def connect(world: World = WORLD, speed: float | None = None) -> Pyrobosim:
     robot = Pyrobosim(world, speed=speed)
     robot.connect()
     return robot
 
 
-def places(told: Sequence[str | CameraPicture]) -> list[Point]:
-    read = (str(phrase).removeprefix("at (").removesuffix(")").split(", ") for phrase in told)
+def places(phrases: Sequence[str | CameraPicture]) -> list[Point]:
+    read = (str(phrase).removeprefix("at (").removesuffix(")").split(", ") for phrase in phrases)
     return [(float(x), float(y)) for x, y in read]
 
 
@@ -82,8 +82,8 @@ def position(robot: Pyrobosim) -> Point:
     return pose.x, pose.y
 
 
-def lying(robot: Pyrobosim) -> dict[str, list[str]]:
-    """What lies where."""
+def layout(robot: Pyrobosim) -> dict[str, list[str]]:
+    """Return the objects in each room."""
     contents = robot._robot.contents
     return {name: [thing.label for thing in things] for name, things in contents.items() if things}
 
@@ -95,7 +95,7 @@ def worker() -> Iterator[Worker]:
     worker.close()
 
 
-# --- the same as in the simulator
+# --- agreement with the simulator
 
 
 def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Worker) -> None:
@@ -110,7 +110,7 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Wo
     expected = list(run(pairs, workers=1, settings=SIMULATION))
     manipulating = set()
     for (name, program, world), outcome in zip(tasks, expected, strict=True):
-        robot = LiveRobot(connected(world), lambda *_, **__: None, clock_starts=SIMULATION.clock_starts)
+        robot = LiveRobot(connect(world), lambda *_, **__: None, clock_starts=SIMULATION.clock_starts)
         found = worker.run_live(program, robot)
         assert (found.status, found.error) == (outcome.status, outcome.error), name
         assert found.trace == outcome.trace, name
@@ -136,7 +136,7 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Wo
     ],
 )
 def test_errors_are_those_of_the_simulator(room: str, calls: list[tuple[str, ...]], kind: str) -> None:
-    robot = connected()
+    robot = connect()
     robot.perform("go_to", [room])
     *before, (skill, *arguments) = calls
     for earlier, *given in before:
@@ -149,7 +149,7 @@ def test_errors_are_those_of_the_simulator(room: str, calls: list[tuple[str, ...
 
 
 def test_people_answer_as_the_world_file_says() -> None:
-    robot = connected()
+    robot = connect()
     assert robot.perform("get_all_rooms", []) == ["hall", "kitchen", "study", "lab"]
     assert robot.perform("is_in_room", ["ann"]) is False
     robot.perform("go_to", ["Kitchen"])
@@ -163,11 +163,11 @@ def test_people_answer_as_the_world_file_says() -> None:
 
 
 def test_objects_lie_where_they_were_put() -> None:
-    robot = connected()
-    assert lying(robot) == {"kitchen": ["cup", "mug", "mug"], "lab": [r"laser\b"]}
+    robot = connect()
+    assert layout(robot) == {"kitchen": ["cup", "mug", "mug"], "lab": [r"laser\b"]}
     robot.perform("go_to", ["kitchen"])
     robot.perform("pick", ["the mug"])
-    assert lying(robot)["kitchen"] == ["cup", "mug"]
+    assert layout(robot)["kitchen"] == ["cup", "mug"]
     robot.perform("go_to", ["study"])
     assert robot.perform("is_in_room", ["mug"]) is False
     robot.perform("place", ["the mug"])
@@ -175,30 +175,30 @@ def test_objects_lie_where_they_were_put() -> None:
     robot.perform("go_to", ["lab"])
     robot.perform("pick", ["laser"])
     robot.perform("place", ["laser"])
-    assert lying(robot) == {"kitchen": ["cup", "mug"], "study": ["mug"], "lab": [r"laser\b"]}
+    assert layout(robot) == {"kitchen": ["cup", "mug"], "study": ["mug"], "lab": [r"laser\b"]}
     robot.perform("pick", ["laser"])
 
 
 def test_resumed_robot_is_where_it_was_and_holds_what_it_held() -> None:
-    robot = connected()
+    robot = connect()
     robot.resume((Event("goto", "kitchen"), Event("pick", "mug", place="kitchen")))
     assert robot.perform("get_current_location", []) == "kitchen"
-    assert lying(robot)["kitchen"] == ["cup", "mug"]
+    assert layout(robot)["kitchen"] == ["cup", "mug"]
     robot.perform("place", ["mug"])
 
 
-def test_robot_drives_to_the_table_for_it() -> None:
-    robot, told = connected(), list[str | CameraPicture]()
+def test_robot_drives_to_the_table_to_pick() -> None:
+    robot, phrases = connect(), list[str | CameraPicture]()
     robot.perform("go_to", ["kitchen"])
-    robot.perform("pick", ["mug"], told.append)
-    assert len(told) >= 2
+    robot.perform("pick", ["mug"], phrases.append)
+    assert len(phrases) >= 2
     assert robot.perform("get_current_location", []) == "kitchen"
-    robot.perform("go_to", ["kitchen"], told.append)
-    assert told[-1] == told[0]
+    robot.perform("go_to", ["kitchen"], phrases.append)
+    assert phrases[-1] == phrases[0]
 
 
-def test_pyrobosim_is_who_knows() -> None:
-    robot = connected()
+def test_state_comes_from_pyrobosim() -> None:
+    robot = connect()
     robot.perform("go_to", ["lab"])
     stage = robot._drivable
     assert stage is not None
@@ -216,31 +216,31 @@ def test_pyrobosim_is_who_knows() -> None:
 def test_many_objects_find_a_place() -> None:
     footprint: tuple[Point, ...] = ((0, 0), (1.5, 0), (1.5, 1.5), (0, 1.5))
     crowd = tuple(f"thing {number}" for number in range(60))
-    robot = connected(World((Room("store", crowd, (), footprint), Room("hall")), "store"))
+    robot = connect(World((Room("store", crowd, (), footprint), Room("hall")), "store"))
     for thing in crowd:
         robot.perform("pick", [thing])
         robot.perform("go_to", ["hall"])
         robot.perform("place", [thing])
         robot.perform("go_to", ["store"])
-    assert lying(robot) == {"hall": list(crowd)}
+    assert layout(robot) == {"hall": list(crowd)}
 
 
-# --- ways
+# --- routes
 
 
-def goes_through_no_wall(robot: Pyrobosim, way: Sequence[Point]) -> bool:
+def is_free_of_walls(robot: Pyrobosim, way: Sequence[Point]) -> bool:
     assert robot._drivable is not None
     return bool(robot._drivable._world.total_internal_polygon.buffer(0.1).covers(LineString(way)))
 
 
-def test_it_drives_around_walls_and_takes_its_time() -> None:
-    robot, told = connected(), list[str | CameraPicture]()
+def test_robot_drives_around_walls_at_walking_pace() -> None:
+    robot, phrases = connect(), list[str | CameraPicture]()
     start = position(robot)
-    robot.perform("go_to", ["study"], told.append)
-    way = [start, *places(told)]
+    robot.perform("go_to", ["study"], phrases.append)
+    way = [start, *places(phrases)]
     assert way[-1] == pytest.approx(position(robot), abs=0.05)
-    assert goes_through_no_wall(robot, way)
-    assert not goes_through_no_wall(robot, [way[0], way[-1]])
+    assert is_free_of_walls(robot, way)
+    assert not is_free_of_walls(robot, [way[0], way[-1]])
     length = sum(math.dist(a, b) for a, b in itertools.pairwise(way))
     assert length / METRES_PER_SECOND - 1 < robot.clock.now < 2 * length / METRES_PER_SECOND
     now = robot.clock.now
@@ -248,27 +248,27 @@ def test_it_drives_around_walls_and_takes_its_time() -> None:
     assert robot.clock.now == now + SKILLS["say"].seconds
 
 
-def test_feedback_tells_places_on_the_way() -> None:
-    robot, told = connected(speed=10), list[str | CameraPicture]()
+def test_feedback_reports_positions_on_the_way() -> None:
+    robot, phrases = connect(speed=10), list[str | CameraPicture]()
     began = time.monotonic()
-    robot.perform("go_to", ["study"], told.append)
-    assert len(told) <= 2 + (time.monotonic() - began) / FEEDBACK_SECONDS
-    assert len(places(told)) >= 3
+    robot.perform("go_to", ["study"], phrases.append)
+    assert len(phrases) <= 2 + (time.monotonic() - began) / FEEDBACK_SECONDS
+    assert len(places(phrases)) >= 3
     assert robot.clock.now == pytest.approx(10 * (time.monotonic() - began), rel=0.5)
 
 
-def test_measured_rooms_are_where_they_are_and_all_can_be_reached() -> None:
-    robot, told = connected(MEASURED), list[str | CameraPicture]()
+def test_rooms_with_footprints_keep_their_places_and_can_be_reached() -> None:
+    robot, phrases = connect(MEASURED), list[str | CameraPicture]()
     assert position(robot) == pytest.approx((3.0, 1.0))
     for room, corner in (("kitchen", (4.0, 4.0)), ("shed", (9.0, 2.0)), ("hall", (3.0, 1.0))):
-        robot.perform("go_to", [room], told.append)
+        robot.perform("go_to", [room], phrases.append)
         assert robot.perform("get_current_location", []) == room
-        assert math.dist(position(robot), corner) < 0.5, "not in the wall, but near"
-    assert goes_through_no_wall(robot, [(3.0, 1.0), *places(told)])
+        assert math.dist(position(robot), corner) < 0.5, "near the corner, but not in the wall"
+    assert is_free_of_walls(robot, [(3.0, 1.0), *places(phrases)])
 
 
 def test_closed_door_is_an_error_and_nothing_has_moved() -> None:
-    robot = connected()
+    robot = connect()
     at, stage = position(robot), robot._drivable
     assert stage is not None
     for hallway in stage._world.hallways:
@@ -291,7 +291,7 @@ def test_closed_door_is_an_error_and_nothing_has_moved() -> None:
         (Room("b", ("mug",), footprint=SMALL), 'no table .*"b"'),
     ],
 )
-def test_rooms_that_cannot_be_are_said(room: Room, named: str) -> None:
+def test_impossible_rooms_are_refused(room: Room, named: str) -> None:
     first = Room("a", footprint=((0, 0), (4, 0), (4, 4), (0, 4)))
     robot = Pyrobosim(World((first, room), "a"))
     with pytest.raises(NotReadyError, match=named):
@@ -299,9 +299,9 @@ def test_rooms_that_cannot_be_are_said(room: Room, named: str) -> None:
     robot.disconnect()
 
 
-def test_nothing_can_be_put_down_where_no_table_has_room() -> None:
+def test_nothing_can_be_put_down_if_no_table_has_room() -> None:
     first = Room("a", ("mug",), footprint=((0, 0), (4, 0), (4, 4), (0, 4)))
-    robot = connected(World((first, Room("b", footprint=SMALL)), "a"))
+    robot = connect(World((first, Room("b", footprint=SMALL)), "a"))
     robot.perform("pick", ["mug"])
     robot.perform("go_to", ["b"])
     with pytest.raises(RobotError, match=r'no table .*"b"') as error:
@@ -335,7 +335,7 @@ print(json.dumps({
 """
 
 
-def test_same_world_has_the_same_ways_and_nothing_else_goes_on(tmp_path: Path) -> None:
+def test_same_world_gives_the_same_routes_without_side_effects(tmp_path: Path) -> None:
     world = tmp_path / "world.yaml"
     world.write_text(WORLD.to_yaml())
     found = []
@@ -343,11 +343,11 @@ def test_same_world_has_the_same_ways_and_nothing_else_goes_on(tmp_path: Path) -
         command = [sys.executable, "-W", "error", "-c", PLAN, str(world)]
         environment = {**os.environ, "PYTHONHASHSEED": seed}
         done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
-        assert not done.stderr, "pyrobosim logs to the terminal unless told otherwise"
+        assert not done.stderr, "pyrobosim must not log to the terminal"
         found.append(json.loads(done.stdout))
     assert found[0] == found[1]
     assert found[0]["quiet"] == [[], 1, []]
-    assert found[0]["dice"], "whatever is random would differ between runs"
+    assert found[0]["dice"], "the state of numpy's random numbers must not change"
 
 
 # --- stop
@@ -355,7 +355,7 @@ def test_same_world_has_the_same_ways_and_nothing_else_goes_on(tmp_path: Path) -
 
 @pytest.mark.parametrize("held", [False, True])
 def test_cancel_ends_a_drive_on_the_way_and_all_that_comes_after(*, held: bool) -> None:
-    robot = connected(speed=1)
+    robot = connect(speed=1)
     if held:
         robot.clock.speed = None
         robot.perform("go_to", ["lab"])
@@ -381,48 +381,48 @@ def test_cancel_ends_a_drive_on_the_way_and_all_that_comes_after(*, held: bool) 
     assert position(robot) == stands
     robot.connect()
     assert robot.perform("get_current_location", []) == "hall"
-    assert lying(robot) == {"kitchen": ["cup", "mug", "mug"], "lab": [r"laser\b"]}
+    assert layout(robot) == {"kitchen": ["cup", "mug", "mug"], "lab": [r"laser\b"]}
     robot.clock.speed = None
     robot.perform("go_to", ["kitchen"])
     robot.disconnect()
     robot.disconnect()
 
 
-def test_cancel_while_it_plans_is_not_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot, told = connected(), list[str | CameraPicture]()
+def test_cancel_during_planning_still_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, phrases = connect(), list[str | CameraPicture]()
     at, stage = position(robot), robot._drivable
     assert stage is not None
     plan = stage.robot.plan_path
 
-    def cancelled_meanwhile(*arguments: object) -> object:
+    def cancel_meanwhile(*arguments: object) -> object:
         robot.cancel()
         return plan(*arguments)
 
-    monkeypatch.setattr(stage.robot, "plan_path", cancelled_meanwhile)
+    monkeypatch.setattr(stage.robot, "plan_path", cancel_meanwhile)
     with pytest.raises(CancelledError):
-        robot.perform("go_to", ["kitchen"], told.append)
-    assert (position(robot), told) == (at, [])
+        robot.perform("go_to", ["kitchen"], phrases.append)
+    assert (position(robot), phrases) == (at, [])
 
 
 def test_cancel_before_the_hand_has_closed_leaves_the_object(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = connected()
+    robot = connect()
     robot.perform("go_to", ["kitchen"])
     wait = robot.clock.wait
 
-    def cancelled_meanwhile(seconds: float) -> bool:
+    def cancel_meanwhile(seconds: float) -> bool:
         if seconds == SKILLS["pick"].seconds:
             robot.cancel()
         return wait(seconds)
 
-    monkeypatch.setattr(robot.clock, "wait", cancelled_meanwhile)
+    monkeypatch.setattr(robot.clock, "wait", cancel_meanwhile)
     with pytest.raises(CancelledError):
         robot.perform("pick", ["mug"])
-    assert lying(robot)["kitchen"] == ["cup", "mug", "mug"]
+    assert layout(robot)["kitchen"] == ["cup", "mug", "mug"]
     assert robot._robot.held is None
 
 
-def test_cancel_before_anything_goes_on_is_not_forgotten() -> None:
-    robot = connected()
+def test_cancel_before_any_skill_still_counts() -> None:
+    robot = connect()
     robot.cancel()
     with pytest.raises(CancelledError):
         robot.perform("say", ["hello"])
@@ -457,8 +457,8 @@ def test_command_runs_a_program_and_ctrl_c_stops_it(tmp_path: Path) -> None:
     done = subprocess.run(
         [*command, "0"], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
-    told = done.stderr.removeprefix("connecting the robot ...\n")  # said where it takes its time
-    assert (done.returncode, told) == (0, "")
+    errors = done.stderr.removeprefix("connecting the robot ...\n")  # Only a slow start prints it.
+    assert (done.returncode, errors) == (0, "")
     assert "robot pyrobosim" in done.stdout
     assert 'puts down "cup"' in done.stdout
     with subprocess.Popen(
@@ -487,19 +487,19 @@ def test_command_keeps_a_house_rule(tmp_path: Path) -> None:
     assert "puts down" not in done.stdout
 
 
-def test_it_is_listed() -> None:
+def test_pyrobosim_is_listed_as_working() -> None:
     (kind,) = (kind for kind in check_readiness() if kind.name == "pyrobosim")
     assert kind.works
 
 
 def test_rooms_are_regexes_for_the_check_as_in_its_world() -> None:
-    plan, place = ask_rooms(connected(World((Room("hall"), Room("kitchen|cafe")), "hall")), print)
+    plan, place = ask_rooms(connect(World((Room("hall"), Room("kitchen|cafe")), "hall")), print)
     assert plan is not None
     assert (plan.room("the cafe"), place) == ("kitchen|cafe", "hall")
 
 
 @pytest.mark.parametrize(("room", "is_stopped"), [("printer room 2", False), ("printer room 3", True)])
-def test_rules_about_where_it_is_hold_along_its_own_way(
+def test_rules_about_its_position_hold_along_its_own_route(
     tmp_path: Path, room: str, *, is_stopped: bool
 ) -> None:
     world = read_world(OFFICE)

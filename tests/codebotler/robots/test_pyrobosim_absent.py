@@ -1,4 +1,4 @@
-"""What is said of robots in pyrobosim, where that is installed and where it is not."""
+"""Pyrobosim is reported as missing with its fix, or is opened and needs a world."""
 
 import importlib.util
 import subprocess
@@ -12,21 +12,21 @@ from codebotler.robots.base import Options, Robot
 from codebotler.robots.open import check_readiness, open_robot
 
 WORLD = World((Room("hall"), Room("kitchen", ("mug",))), "hall")
-MEND = "pip install 'codebotler[pyrobosim]'"
+INSTALL = "pip install 'codebotler[pyrobosim]'"
 
 
-def test_what_is_missing_is_said_with_the_mend(monkeypatch: pytest.MonkeyPatch) -> None:
-    check_readiness()  # imports the other kinds, which are to keep the real function
+def test_missing_installation_is_reported_with_its_fix(monkeypatch: pytest.MonkeyPatch) -> None:
+    check_readiness()  # Import the other kinds first, so that they keep the real function.
     monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
     (kind,) = (kind for kind in check_readiness() if kind.name == "pyrobosim")
-    assert (kind.works, kind.mend) == (False, MEND)
+    assert (kind.works, kind.mend) == (False, INSTALL)
     assert "pyrobosim" in kind.missing
     with pytest.raises(UserError, match="pyrobosim") as error:
         open_robot("pyrobosim", Options(world=WORLD))
-    assert MEND in error.value.sentence
+    assert INSTALL in error.value.sentence
 
 
-def test_it_is_opened_by_its_name_and_needs_a_world(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pyrobosim_is_opened_by_name_and_needs_a_world(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda _name: object())
     robot: Robot = open_robot("pyrobosim", Options(world=WORLD, speed=3))
     assert (robot.name, robot.address, robot.clock.speed) == ("pyrobosim", "", 3)

@@ -1,4 +1,4 @@
-"""One robot is kept for one tool, however its address is written, and where nobody else can meddle."""
+"""A lock reserves a robot for one tool, however its address is written, safe from other users."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import pytest
 from codebotler.robots.base import NotReadyError, Options
 from codebotler.robots.open import open_robot
 from codebotler.robots.reservation import Reservation, lock_folder, normalize_address
-from doubles import Answering
+from doubles import FakeRobot
 
 
-def addressed(address: str) -> Answering:
-    robot = Answering()
+def robot_at(address: str) -> FakeRobot:
+    robot = FakeRobot()
     robot.address = address
     return robot
 
@@ -51,11 +51,11 @@ def test_names_of_this_machine_are_one(host: str) -> None:
 
 
 @pytest.mark.parametrize("address", ["nonsense", "", "ws://", "ws://robot:a", "ws://[::1", "ftp://robot"])
-def test_what_is_no_address_stays_as_it_is(address: str) -> None:
+def test_invalid_address_is_unchanged(address: str) -> None:
     assert normalize_address(address) == address
 
 
-def test_addresses_of_other_robots_stay_apart() -> None:
+def test_addresses_of_other_robots_stay_different() -> None:
     others = (
         "ws://a:1",
         "ws://a:2",
@@ -69,30 +69,30 @@ def test_addresses_of_other_robots_stay_apart() -> None:
     assert len({normalize_address(address) for address in others}) == len(others)
 
 
-def test_robot_with_an_address_is_kept_whatever_the_home(tmp_path: Path) -> None:
+def test_robot_with_an_address_is_reserved_across_homes(tmp_path: Path) -> None:
     with (
-        Reservation(addressed("ws://robot:9090"), tmp_path / "one"),
+        Reservation(robot_at("ws://robot:9090"), tmp_path / "one"),
         pytest.raises(NotReadyError, match="another tool"),
     ):
-        Reservation(addressed("ws://robot:9090"), tmp_path / "two").__enter__()
-    with Reservation(Answering(), tmp_path / "one"), Reservation(Answering(), tmp_path / "two"):
+        Reservation(robot_at("ws://robot:9090"), tmp_path / "two").__enter__()
+    with Reservation(FakeRobot(), tmp_path / "one"), Reservation(FakeRobot(), tmp_path / "two"):
         assert [file.name for file in (tmp_path / "one" / "robots").iterdir()] == ["answering.lock"]
 
 
 @pytest.mark.parametrize("address", [f"ws://{'x' * 5_000}:9090", "\ud800", "ws://../../robot:9090"])
 def test_any_address_can_be_locked(address: str, tmp_path: Path) -> None:
-    with Reservation(addressed(address), tmp_path), pytest.raises(NotReadyError, match="another tool"):
-        Reservation(addressed(address), tmp_path).__enter__()
+    with Reservation(robot_at(address), tmp_path), pytest.raises(NotReadyError, match="another tool"):
+        Reservation(robot_at(address), tmp_path).__enter__()
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder of locks, in another one than /tmp."""
+    """Put the folder of locks elsewhere than in /tmp."""
     monkeypatch.setattr("codebotler.robots.reservation.LOCKS_IN", tmp_path)
     return tmp_path / f"codebotler-{os.getuid()}"
 
 
-def test_locks_lie_where_nobody_else_can_write(folder: Path) -> None:
+def test_only_the_user_can_write_into_the_folder_of_locks(folder: Path) -> None:
     assert lock_folder() == folder
     assert folder.stat().st_mode & 0o777 == 0o700
 
@@ -121,4 +121,4 @@ def test_folder_of_locks_that_is_not_ours_is_refused(
             monkeypatch.setattr("os.getuid", lambda: uid + 1)
             folder.rename(tmp_path / f"codebotler-{uid + 1}")
     with pytest.raises(NotReadyError, match=f"{folder.parent}/codebotler-.*remove"):
-        Reservation(addressed("ws://robot:9090"), tmp_path).__enter__()
+        Reservation(robot_at("ws://robot:9090"), tmp_path).__enter__()

@@ -1,4 +1,4 @@
-"""The simulated robot drives at walking pace, tells where it is, and stops in the middle of everything."""
+"""The simulated robot drives at walking pace, reports its position, and stops at any moment."""
 
 import subprocess
 import sys
@@ -25,14 +25,14 @@ WORLD = World(
 )
 
 
-def connected(speed: float | None = None) -> Simulated:
+def connect(speed: float | None = None) -> Simulated:
     robot = Simulated(WORLD, speed=speed)
     robot.connect()
     return robot
 
 
-def test_driving_takes_as_long_as_the_way_is() -> None:
-    robot = connected()
+def test_driving_time_follows_from_the_distance() -> None:
+    robot = connect()
     robot.perform("go_to", ["Kitchen"])
     assert robot.clock.now == pytest.approx(5 / METRES_PER_SECOND)
     assert robot.perform("get_current_location", []) == "kitchen"
@@ -40,19 +40,19 @@ def test_driving_takes_as_long_as_the_way_is() -> None:
     assert robot.clock.now == pytest.approx(5 / METRES_PER_SECOND)
 
 
-def test_feedback_tells_places_on_the_way() -> None:
-    told: list[str | CameraPicture] = []
-    connected(speed=10).perform("go_to", ["kitchen"], told.append)
-    assert told[-1] == "at (4.0, 5.0)"
-    assert 2 <= len(told) <= 8
-    texts = [str(text).removeprefix("at (").removesuffix(")") for text in told]
+def test_feedback_reports_positions_on_the_way() -> None:
+    phrases: list[str | CameraPicture] = []
+    connect(speed=10).perform("go_to", ["kitchen"], phrases.append)
+    assert phrases[-1] == "at (4.0, 5.0)"
+    assert 2 <= len(phrases) <= 8
+    texts = [str(text).removeprefix("at (").removesuffix(")") for text in phrases]
     places = [tuple(map(float, text.split(", "))) for text in texts]
     assert places == sorted(places)
     assert all(abs((x - 1) * 4 / 3 - (y - 1)) < 0.2 for x, y in places)
 
 
-def test_skills_do_what_they_do_in_the_simulator() -> None:
-    robot = connected()
+def test_skills_work_as_in_the_simulator() -> None:
+    robot = connect()
     robot.perform("go_to", ["kitchen"])
     assert robot.perform("get_all_rooms", []) == ["hall", "kitchen"]
     assert robot.perform("is_in_room", ["mug"]) is True
@@ -74,12 +74,12 @@ def test_skills_do_what_they_do_in_the_simulator() -> None:
 )
 def test_errors_are_those_of_the_simulator(skill: str, arguments: list[str], kind: str) -> None:
     with pytest.raises(RobotError) as error:
-        connected().perform(skill, arguments)
+        connect().perform(skill, arguments)
     assert error.value.kind == kind
 
 
 def test_cancel_ends_a_drive_on_the_way_and_all_that_comes_after() -> None:
-    robot = connected(speed=0.01)
+    robot = connect(speed=0.01)
     with ThreadPoolExecutor(1) as thread:
         on_the_way = threading.Event()
         driving = thread.submit(robot.perform, "go_to", ["kitchen"], lambda _: on_the_way.set())
@@ -98,15 +98,15 @@ def test_cancel_ends_a_drive_on_the_way_and_all_that_comes_after() -> None:
     assert robot.perform("get_current_location", []) == "hall"
 
 
-def test_cancel_before_anything_goes_on_is_not_forgotten() -> None:
-    robot = connected()
+def test_cancel_before_any_skill_still_counts() -> None:
+    robot = connect()
     robot.cancel()
     with pytest.raises(CancelledError):
         robot.perform("say", ["hello"])
 
 
-def test_world_is_as_at_the_start_after_connecting_again() -> None:
-    robot = connected()
+def test_connecting_again_resets_the_world() -> None:
+    robot = connect()
     robot.perform("go_to", ["kitchen"])
     robot.perform("pick", ["mug"])
     robot.disconnect()
@@ -116,7 +116,7 @@ def test_world_is_as_at_the_start_after_connecting_again() -> None:
     robot.perform("pick", ["mug"])
 
 
-def test_it_is_opened_by_its_name_and_needs_a_world() -> None:
+def test_simulated_robot_is_opened_by_name_and_needs_a_world() -> None:
     robot: Robot = open_robot("sim", Options(world=WORLD, speed=3))
     assert (robot.name, robot.clock.speed) == ("simulated", 3)
     with pytest.raises(UserError, match="--world FILE"):
@@ -125,7 +125,7 @@ def test_it_is_opened_by_its_name_and_needs_a_world() -> None:
         open_robot("simm")
 
 
-def test_every_kind_of_robot_is_listed_with_what_is_missing() -> None:
+def test_every_kind_of_robot_is_listed_with_missing_requirements() -> None:
     kinds = {kind.name: kind for kind in check_readiness()}
     assert list(kinds) == ["sim", "pyrobosim", "ros1", "rosbridge", "ros2"]
     assert kinds["sim"].works
@@ -133,14 +133,14 @@ def test_every_kind_of_robot_is_listed_with_what_is_missing() -> None:
 
 
 @pytest.mark.parametrize("python", [Path(sys.executable), Path("/no/such/python")])
-def test_robots_on_ros_are_judged_by_the_python_that_is_named(python: Path) -> None:
+def test_robots_on_ros_are_checked_with_the_given_python(python: Path) -> None:
     kinds = {kind.name: kind for kind in check_readiness(python)}
     for name in ("ros1", "ros2"):
         assert not kinds[name].works
         assert kinds[name].missing.startswith(str(python))
 
 
-def test_each_mend_is_a_command(tmp_path: Path) -> None:
+def test_each_fix_is_a_command(tmp_path: Path) -> None:
     mends = [
         kind.mend for path in (sys.executable, "/no", "/bin/false") for kind in check_readiness(Path(path))
     ]

@@ -1,4 +1,4 @@
-"""How tests look at a face, with stand-ins for the voice and the microphone that a browser here lacks."""
+"""Open a face in a browser, with stand-ins for the voice and the microphone that it lacks."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SPEAKING = """
   Object.defineProperty(navigator, "userActivation", { value: { hasBeenActive: true } });
 })();
 """
-"""A stubbed speechSynthesis: no sound comes out of it."""
+"""A stub of speechSynthesis, which makes no sound."""
 
 HEARING = """
 (() => {
@@ -49,12 +49,12 @@ HEARING = """
   window.fail = (error) => tell("error", { error });
 })();
 """
-"""A stubbed SpeechRecognition: no microphone and no understanding; it has heard what it is told."""
+"""A stub of SpeechRecognition, which hears the words of a test."""
 
 MUTE = (
     "delete window.speechSynthesis; delete window.SpeechRecognition; delete window.webkitSpeechRecognition;"
 )
-"""A browser that can neither speak nor listen."""
+"""A script that removes speech and recognition from a browser."""
 
 ASKS = """def task_program():
     say("Good morning")
@@ -67,7 +67,7 @@ TWICE = """def task_program():
     second = ask("ann", "Are you sure?", ["Yes", "No"])
     say(first + second)
 """
-REFUSED = "409 (Conflict)"  # an answer that came too late, in the words of the browser
+REFUSED = "409 (Conflict)"  # The browser logs this when an answer comes too late.
 
 
 def face_of(
@@ -82,8 +82,8 @@ def face_of(
     return page
 
 
-def until(page: Page, holds: str) -> None:
-    """Wait until a script says so; the page's policy forbids Playwright's own way of waiting."""
+def wait_until(page: Page, holds: str) -> None:
+    """Wait until a script returns true; the page's policy forbids Playwright's own function for it."""
     ends = time.monotonic() + 60
     while not page.evaluate(holds):
         assert time.monotonic() < ends, holds
@@ -94,6 +94,6 @@ def option(page: Page, text: str) -> Locator:
     return page.locator("#options button", has_text=re.compile(rf"^\d?{text}$"))
 
 
-def said(page: Page) -> Locator:
-    """What was said last."""
+def last_statement(page: Page) -> Locator:
+    """Find the last statement."""
     return page.locator("#said p").last

@@ -1,4 +1,4 @@
-"""The page as a user starts it: in a process of its own, on a free port."""
+"""Start the page as a user does, in a process of its own and on a free port."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ SERVE = ("codebotler", "serve", "--world", "world.yaml")
 
 @dataclass(frozen=True)
 class Answer:
-    """What a server answered.
+    """An answer of a server.
 
     Args:
-        status: of HTTP.
-        headers: by lower-case name.
-        text: its body.
+        status: the status of HTTP.
+        headers: the headers, by lower-case name.
+        text: the body.
     """
 
     status: int
@@ -47,12 +47,12 @@ class Answer:
 
 
 class PageServer:
-    """`codebotler serve` in a folder; as a context manager it ends with it.
+    """`codebotler serve` in a folder. As a context manager, it ends the process.
 
     Args:
-        folder: where the world file and the missions lie.
-        arguments: further ones.
-        world: what the world file says.
+        folder: the folder of the world file and the missions.
+        arguments: more arguments of the command.
+        world: the text of the world file.
         serve: another command that serves a page.
     """
 
@@ -63,31 +63,31 @@ class PageServer:
         (folder / "world.yaml").write_text(world)
         name, words = serve[0], (*serve[1:], "--port", "0", *arguments)
         variables = {**os.environ, "CODEBOTLER_HOME": str(self.home), "NO_PROXY": "*"}
-        self._said = folder / "said.txt"
-        with self._said.open("w") as file:
+        self._output = folder / "said.txt"
+        with self._output.open("w") as file:
             self._process = Forked(name, *words, cwd=folder, environment=variables, stderr=file, preload=PAGE)
-        while (link := re.search(r"http://\S+:(\d+)/(?:\?token=(\S+))?\n", self.said)) is None:
-            assert self._process.poll() is None, self.said
+        while (link := re.search(r"http://\S+:(\d+)/(?:\?token=(\S+))?\n", self.output)) is None:
+            assert self._process.poll() is None, self.output
             time.sleep(0.02)
         self.link, self.port, self.token = link[0].strip(), int(link[1]), link[2] or ""
 
     @property
     def face_token(self) -> str:
-        """The token of the robot's face, where it has one."""
+        """The token of the robot's face, if it has one."""
         ends = time.monotonic() + 60
-        while (found := re.search(r"/face\?token=(\S+)\n", self.said)) is None:
-            assert time.monotonic() < ends, self.said
+        while (found := re.search(r"/face\?token=(\S+)\n", self.output)) is None:
+            assert time.monotonic() < ends, self.output
             time.sleep(0.02)
         return found[1]
 
     @property
-    def said(self) -> str:
-        """What it has told whoever started it."""
-        return self._said.read_text()
+    def output(self) -> str:
+        """The output of the process so far."""
+        return self._output.read_text()
 
     @property
     def pid(self) -> int:
-        """The number of its process."""
+        """The ID of the process."""
         return self._process.pid
 
     def __enter__(self) -> Self:
@@ -99,13 +99,13 @@ class PageServer:
         self.end()
 
     def end(self, number: int = signal.SIGTERM) -> int:
-        """End it, and give its status."""
+        """End the process, and return its status."""
         self._process.send_signal(number)
         self._process.communicate(timeout=60)
         return self._process.wait()
 
     def ask(self, method: str, path: str, body: object = None, **headers: str) -> Answer:
-        """Send a request as it stands; without a token, unless a header has one."""
+        """Send a request unchanged; it has no token unless a header has one."""
         given = {name.replace("_", "-"): value for name, value in headers.items()}
         text = body if isinstance(body, bytes | str) else None if body is None else json.dumps(body)
         if text is not None:
@@ -125,7 +125,7 @@ class PageServer:
 
     @property
     def face_link(self) -> str:
-        """What opens the robot's face, where it has one."""
+        """The link that opens the robot's face, if it has one."""
         return f"http://localhost:{self.port}/face?token={self.face_token}"
 
     def face(self, method: str, path: str, body: object = None) -> Answer:
@@ -133,7 +133,7 @@ class PageServer:
         return self.ask(method, path, body, authorization=f"Bearer {unquote_plus(self.face_token)}")
 
     def run(self, program: str, *, despite_problems: bool = False) -> None:
-        """Have the robot run a program, as the API's clients do."""
+        """Let the robot run a program, as the API's clients do."""
         begun = self.call("POST", "/api/missions", {"program": program})
         assert begun.status == 201, begun.text
         ends = time.monotonic() + 60
@@ -145,7 +145,7 @@ class PageServer:
         assert approved.status == 200, approved.text
 
     def rest(self) -> None:
-        """Stop the mission at hand, and one that a page begins behind that, which was closed as it did so."""
+        """Stop the current mission, and one that a closing page may begin after it."""
         stopped, ends = None, time.monotonic() + 60
         while not (robot := self.call("GET", "/api/robot").data)["is_over"]:
             assert time.monotonic() < ends, "the robot does not come to rest"
@@ -156,7 +156,7 @@ class PageServer:
 
     @property
     def cookie(self) -> str:
-        """What a browser sends that has opened the link."""
+        """The cookie that a browser sends once it has opened the link."""
         answer = self.ask("GET", f"/?token={self.token}")
         return answer.headers["set-cookie"].partition(";")[0]
 

@@ -1,4 +1,4 @@
-"""The API: everything the page does, by a client that has the token."""
+"""A client with the token can do through the API all that the page does."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
         yield server
 
 
-def until(server: PageServer, holds: Callable[[dict[str, Any]], bool], seconds: float = 60.0) -> Any:  # noqa: ANN401 - JSON
+def wait_until(server: PageServer, holds: Callable[[dict[str, Any]], bool], seconds: float = 60.0) -> Any:  # noqa: ANN401 - JSON
     ends = time.monotonic() + seconds
     while not holds(now := server.call("GET", "/api/missions/current").data):
         assert time.monotonic() < ends, now
@@ -46,14 +46,14 @@ def until(server: PageServer, holds: Callable[[dict[str, Any]], bool], seconds: 
     return now
 
 
-def begun(server: PageServer, program: str) -> Any:  # noqa: ANN401 - JSON
+def begin(server: PageServer, program: str) -> Any:  # noqa: ANN401 - JSON
     answer = server.call("POST", "/api/missions", {"program": program})
     assert answer.status == 201, answer.text
-    return until(server, lambda now: now["check"] is not None)
+    return wait_until(server, lambda now: now["check"] is not None)
 
 
-def stream(server: PageServer, mission: str, last: int = 0) -> list[tuple[int, dict[str, Any]]]:
-    """All events of a mission with their numbers, as a browser's EventSource would have them."""
+def read_events(server: PageServer, mission: str, last: int = 0) -> list[tuple[int, dict[str, Any]]]:
+    """Read all events of a mission with their numbers, like a browser's EventSource."""
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=30)
     headers = {"Authorization": f"Bearer {server.token}", "Last-Event-ID": str(last)}
     connection.request("GET", f"/api/missions/{mission}/events", headers=headers)
@@ -71,25 +71,25 @@ def stream(server: PageServer, mission: str, last: int = 0) -> list[tuple[int, d
 
 
 @pytest.mark.slow
-def test_where_a_program_failed_is_told(server: PageServer) -> None:
+def test_view_names_the_line_where_a_program_failed(server: PageServer) -> None:
     fails = "def task_program():\n    go_to('kitchen')\n    raise ValueError('odd')\n"
-    view = begun(server, fails)
+    view = begin(server, fails)
     approval = {"program": view["digest"], "despite_problems": True}
     assert server.call("POST", f"/api/missions/{view['id']}/approve", approval).status == 200
-    over = until(server, lambda now: now["is_over"])
+    over = wait_until(server, lambda now: now["is_over"])
     assert (over["state"], over["line"]) == ("failed", 3)
     assert "odd" in over["reason"]
 
 
 @pytest.mark.slow
-def test_a_mission_from_its_program_to_its_files(server: PageServer) -> None:
-    view = begun(server, HELLO)
+def test_a_mission_runs_from_its_program_to_its_files(server: PageServer) -> None:
+    view = begin(server, HELLO)
     approval = {"program": view["digest"]}
     assert server.call("POST", f"/api/missions/{view['id']}/approve", approval).status == 200
-    events = stream(server, view["id"])
+    events = read_events(server, view["id"])
     assert [number for number, _ in events] == list(range(1, len(events) + 1))
     assert events[-1][1]["state"] == "done"
-    assert stream(server, "current", last=len(events) - 1) == events[-1:]
+    assert read_events(server, "current", last=len(events) - 1) == events[-1:]
     jsonl = server.call("GET", f"/api/missions/{view['id']}/events.jsonl")
     assert [json.loads(line) for line in jsonl.text.splitlines()] == [event for _, event in events]
     assert f'filename="{view["id"]}.jsonl"' in jsonl.headers["content-disposition"]
@@ -102,50 +102,50 @@ def test_a_mission_from_its_program_to_its_files(server: PageServer) -> None:
     assert server.call("GET", f"/api/missions/{view['id']}").data["state"] == "done"
 
 
-def test_problems_need_a_word_and_the_program_that_was_seen(server: PageServer) -> None:
-    view = begun(server, BAD)
+def test_approval_names_the_program_and_accepts_its_problems(server: PageServer) -> None:
+    view = begin(server, BAD)
     path = f"/api/missions/{view['id']}/approve"
     refused = server.call("POST", path, {"program": view["digest"]})
     assert (refused.status, "has problems" in refused.data["detail"]) == (409, True)
     other = server.call("POST", path, {"program": "0" * 16, "despite_problems": True})
     assert (other.status, "has changed" in other.data["detail"]) == (409, True)
     assert server.call("PUT", f"/api/missions/{view['id']}/program", {"program": HELLO}).status == 200
-    mended = until(server, lambda now: now["check"] is not None)
+    mended = wait_until(server, lambda now: now["check"] is not None)
     assert (mended["problems"], mended["program"]) == ([], HELLO)
 
 
 @pytest.mark.slow
-def test_a_model_is_asked_again_and_told_of_the_problems(tmp_path: Path) -> None:
+def test_a_model_is_asked_again_with_or_without_the_problems(tmp_path: Path) -> None:
     with (
         Server(answer=lambda asked: HELLO if "cellar" in json.dumps(asked.body) else BAD) as model,
         PageServer(tmp_path, "--model", "completions:m", "--base-url", model.url) as server,
     ):
         server.call("POST", "/api/missions", {"instruction": "say hello"})
         for repair, problems in ((True, 1), (False, 0), (False, 1)):
-            now = until(server, lambda now: now["check"] is not None and not now["busy"])
+            now = wait_until(server, lambda now: now["check"] is not None and not now["busy"])
             assert len(now["problems"]) == problems
             again = server.call("POST", f"/api/missions/{now['id']}/again", {"repair": repair})
             assert (again.status, again.data["busy"]) == (202, "asking completions:m")
     with PageServer(tmp_path) as server:
-        begun(server, HELLO)
-        assert server.call("POST", "/api/missions/current/again", {}).status == 409, "nobody wrote it"
+        begin(server, HELLO)
+        assert server.call("POST", "/api/missions/current/again", {}).status == 409, "no model wrote it"
 
 
 def test_without_a_world_the_robot_works_in_the_office_of_the_examples(tmp_path: Path) -> None:
     office = Path(__file__).parents[3] / "examples" / "office.yaml"
     assert OFFICE.read_bytes() == office.read_bytes()
     with PageServer(tmp_path, serve=("codebotler", "serve")) as server:
-        assert server.said.startswith("the robot works in an example office; --world FILE ")
-        view = begun(server, "def task_program():\n    go_to('printer room 3')\n")
+        assert server.output.startswith("the robot works in an example office; --world FILE ")
+        view = begin(server, "def task_program():\n    go_to('printer room 3')\n")
         assert view["check"]["problems"] == []
 
 
 @pytest.mark.slow
-def test_who_does_not_read_holds_nothing_up(tmp_path: Path) -> None:
-    """Twenty clients follow a mission that tells more than a connection holds, and read none of it."""
+def test_clients_that_do_not_read_delay_nothing(tmp_path: Path) -> None:
+    """Twenty clients follow a mission with more events than a connection buffers, and read none."""
     many = "def task_program():\n    for n in range(115):\n        say(str(n) + 'x' * 8000)\n"
     with PageServer(tmp_path, "--speed", "0") as server, ExitStack() as opened:
-        view = begun(server, many)
+        view = begin(server, many)
         request = (
             f"GET /api/missions/{view['id']}/events HTTP/1.1\r\nHost: localhost\r\n"
             f"Authorization: Bearer {server.token}\r\n\r\n"
@@ -157,19 +157,19 @@ def test_who_does_not_read_holds_nothing_up(tmp_path: Path) -> None:
             lazy.sendall(request.encode())
         approval = {"program": view["digest"]}
         assert server.call("POST", "/api/missions/current/approve", approval).status == 200
-        events = stream(server, view["id"])
+        events = read_events(server, view["id"])
         assert sum(len(json.dumps(event)) for _, event in events) > 900_000
         assert events[-1][1]["state"] == "done"
-        assert begun(server, HELLO)["state"] == "checked"
+        assert begin(server, HELLO)["state"] == "checked"
         began = time.monotonic()
         server.end()
         assert time.monotonic() - began < 8
 
 
-def test_a_stop_ends_the_mission_at_hand(server: PageServer) -> None:
-    view = begun(server, FAR)
+def test_a_stop_ends_the_current_mission(server: PageServer) -> None:
+    view = begin(server, FAR)
     server.call("POST", "/api/missions/current/approve", {"program": view["digest"]})
-    until(server, lambda now: now["doing"] != "")
+    wait_until(server, lambda now: now["doing"] != "")
     assert server.call("POST", "/api/missions", {"program": HELLO}).status == 409
     began = time.monotonic()
     assert server.call("POST", "/api/stop").status == 202
@@ -180,7 +180,7 @@ def test_a_stop_ends_the_mission_at_hand(server: PageServer) -> None:
 
 
 def test_a_key_stops_only_a_robot_that_runs(server: PageServer) -> None:
-    begun(server, HELLO)
+    begin(server, HELLO)
     assert server.call("POST", "/api/stop?only_moving=true").data == {"stopping": False}
     assert server.call("GET", "/api/robot").data["state"] == "checked"
     assert server.call("POST", "/api/stop").data == {"stopping": True}
@@ -190,7 +190,7 @@ def test_a_key_stops_only_a_robot_that_runs(server: PageServer) -> None:
 def test_the_rest_of_a_mission_is_a_mission_of_its_own(server: PageServer) -> None:
     fails = "def task_program():\n    say('hello')\n    raise ValueError('odd')\n"
     server.run(fails, despite_problems=True)
-    failed = until(server, lambda now: now["is_over"])
+    failed = wait_until(server, lambda now: now["is_over"])
     begun = server.call("POST", "/api/missions/current/continue", {})
     assert begun.status == 201
     assert begun.data["id"] != failed["id"]
@@ -200,7 +200,7 @@ def test_the_rest_of_a_mission_is_a_mission_of_its_own(server: PageServer) -> No
     server.rest()
     assert server.call("POST", "/api/missions/unknown/continue", {}).status == 404
     server.run(HELLO)
-    done = until(server, lambda now: now["is_over"])
+    done = wait_until(server, lambda now: now["is_over"])
     assert (done["state"], done["past"]) == ("done", None)
     assert server.call("POST", "/api/missions/current/continue", {}).status == 422
 
@@ -218,9 +218,9 @@ def test_the_server_recovers_from_a_failed_skill(tmp_path: Path) -> None:
         ) as server,
     ):
         first = server.call("POST", "/api/missions", {"instruction": "Fetch a cup."}).data["id"]
-        checked = until(server, lambda now: now["check"] is not None)
+        checked = wait_until(server, lambda now: now["check"] is not None)
         server.call("POST", "/api/missions/current/approve", {"program": checked["digest"]})
-        done = until(server, lambda now: now["id"] not in {"", first} and now["is_over"])
+        done = wait_until(server, lambda now: now["id"] not in {"", first} and now["is_over"])
         assert (done["state"], done["past"]["mission"]) == ("done", first)
 
 
@@ -238,15 +238,15 @@ def test_only_a_person_says_whether_an_unsure_step_happened(tmp_path: Path) -> N
             assert len(begun["past"]["steps"]) == int(happened)
 
 
-def test_a_check_alone_begins_nothing(server: PageServer) -> None:
+def test_a_check_begins_no_mission(server: PageServer) -> None:
     before = len(read_missions(server.home))
     found = server.call("POST", "/api/check", {"program": "def task_program():\n    fly()\n"}).data
     assert (found["accepted"], found["problems"][0]["line"]) == (False, 2)
     assert len(read_missions(server.home)) == before
 
 
-def test_texts_that_no_encoding_takes_are_told(server: PageServer) -> None:
-    view = begun(server, "def task_program():\n    say('\\ud800')\n    go_to('\\udfff')\n")
+def test_lone_surrogates_are_escaped_or_refused(server: PageServer) -> None:
+    view = begin(server, "def task_program():\n    say('\\ud800')\n    go_to('\\udfff')\n")
     assert "\\udfff" in json.dumps(view["problems"])
     raw = server.call("POST", "/api/missions", {"program": "def task_program():\n    say('\ud800')\n"})
     assert (raw.status, raw.data["detail"][0]["loc"]) == (422, ["body", "program"])
@@ -267,13 +267,13 @@ def test_texts_that_no_encoding_takes_are_told(server: PageServer) -> None:
         ("POST", "/api/missions", {"instruction": "fly", "model": "recorded:nobody"}, 201),
     ],
 )
-def test_what_is_asked_wrongly_is_said(
+def test_faulty_requests_get_their_status(
     server: PageServer, method: str, path: str, body: object, status: int
 ) -> None:
     answer = server.call(method, path, body)
     assert answer.status == status, answer.text
     if status == 201:
-        assert "unknown recorded model" in until(server, lambda now: now["is_over"])["trouble"]
+        assert "unknown recorded model" in wait_until(server, lambda now: now["is_over"])["trouble"]
 
 
 @pytest.mark.parametrize(
@@ -285,7 +285,7 @@ def test_what_is_asked_wrongly_is_said(
         ("GET", "/api/check", "POST"),
     ],
 )
-def test_another_method_is_told_which_are_taken(
+def test_answer_to_another_method_names_the_allowed_ones(
     server: PageServer, method: str, path: str, allowed: str
 ) -> None:
     answer = server.call(method, path)
@@ -300,7 +300,7 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
         yield server
 
 
-def test_before_there_is_a_mission_that_is_said(fresh: PageServer) -> None:
+def test_error_without_a_mission_says_how_to_begin_one(fresh: PageServer) -> None:
     for method, path in (
         ("GET", "/events"),
         ("GET", "/events.jsonl"),
@@ -313,7 +313,7 @@ def test_before_there_is_a_mission_that_is_said(fresh: PageServer) -> None:
 
 
 @pytest.mark.slow
-def test_missions_that_cannot_be_kept_are_said_before_the_page_is_there(tmp_path: Path) -> None:
+def test_unwritable_home_is_refused_before_the_page_starts(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text(WORLD)
     ended = subprocess.run(
         [sys.executable, "-m", "codebotler", *SERVE[1:], "--port", "0"],
@@ -329,7 +329,7 @@ def test_missions_that_cannot_be_kept_are_said_before_the_page_is_there(tmp_path
     assert "CODEBOTLER_HOME" in ended.stderr
 
 
-def test_missions_that_can_no_longer_be_kept_are_said_in_a_sentence(fresh: PageServer) -> None:
+def test_home_that_becomes_unwritable_raises_one_sentence(fresh: PageServer) -> None:
     missions = fresh.home / "missions"
     missions.rmdir()
     missions.touch()
@@ -339,9 +339,9 @@ def test_missions_that_can_no_longer_be_kept_are_said_in_a_sentence(fresh: PageS
     assert (answer.status, answer.data["detail"]) == (409, f"{missions}: File exists")
 
 
-def test_a_mission_of_before_can_be_read_and_no_longer_followed(server: PageServer) -> None:
-    before = begun(server, HELLO)["id"]
-    begun(server, HELLO)
+def test_an_earlier_mission_can_be_read_but_not_followed(server: PageServer) -> None:
+    before = begin(server, HELLO)["id"]
+    begin(server, HELLO)
     for method, what, body in (("GET", "events", None), ("POST", "again", {})):
         answer = server.call(method, f"/api/missions/{before}/{what}", body)
         assert answer.status == 409
@@ -356,22 +356,22 @@ def test_the_api_is_described(server: PageServer) -> None:
 
 
 @pytest.mark.slow
-def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(tmp_path: Path) -> None:
+def test_the_robot_stops_when_the_tool_ends_and_is_reported_after_a_kill(tmp_path: Path) -> None:
     with PageServer(tmp_path) as server:
-        view = begun(server, FAR)
+        view = begin(server, FAR)
         server.call("POST", "/api/missions/current/approve", {"program": view["digest"]})
-        until(server, lambda now: now["doing"] != "")
+        wait_until(server, lambda now: now["doing"] != "")
         server.end(signal.SIGINT)
     (stopped,) = read_missions(tmp_path / "home")
     assert stopped.state == "stopped"
     assert "shutting down" in stopped.reason
     with PageServer(tmp_path) as server:
-        view = begun(server, FAR)
+        view = begin(server, FAR)
         server.call("POST", "/api/missions/current/approve", {"program": view["digest"]})
-        until(server, lambda now: now["doing"] != "")
+        wait_until(server, lambda now: now["doing"] != "")
         server.end(signal.SIGKILL)
     with PageServer(tmp_path) as server:
-        assert re.search("interrupted.* go_to", server.said)
+        assert re.search("interrupted.* go_to", server.output)
         (interrupted,) = server.call("GET", "/api/robot").data["interrupted"]
         assert "go_to" in interrupted["reason"]
         assert read_missions(tmp_path / "home")[-1].state == "interrupted"

@@ -1,4 +1,4 @@
-"""The console: the rules of the command line for any number of viewers, none of whom it waits for."""
+"""The console keeps the command line's rules for any number of viewers, and waits for none."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console, Notifier
 from codebotler.web.panes.instruction import examples
-from doubles import Answering
+from doubles import FakeRobot
 from server import Server
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
@@ -45,7 +45,7 @@ WORLD = World((Room("hall"), Room("kitchen")), "hall")
 
 
 class Author:
-    """A model that says what a test wants, piece by piece, and then waits to be let go on.
+    """A model that writes the programs of a test in two pieces, and may wait in between.
 
     A string that defines no function is a reply without a program.
     """
@@ -58,7 +58,7 @@ class Author:
         self.asked: list[Prompt] = []
         self.is_closed = False
 
-    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:  # noqa: ARG002 - as models have it
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:  # noqa: ARG002 - models take it
         self.asked.append(prompt)
         if not self.programs:
             raise ModelError("the model is not there", may_pass=False)
@@ -75,7 +75,7 @@ class Author:
         self.is_closed = True
 
 
-def desk_of(home: Path, robot: Robot | None = None, author: Author | None = None) -> Console:
+def make_console(home: Path, robot: Robot | None = None, author: Author | None = None) -> Console:
     def model(_name: str) -> Model:
         assert author is not None
         return author
@@ -85,12 +85,12 @@ def desk_of(home: Path, robot: Robot | None = None, author: Author | None = None
 
 @pytest.fixture
 def console(tmp_path: Path) -> Iterator[Console]:
-    with desk_of(tmp_path) as console:
+    with make_console(tmp_path) as console:
         yield console
 
 
-def until(console: Console, holds: Callable[[SessionView], bool], seconds: float = 60.0) -> SessionView:
-    """The first view of which something holds."""
+def wait_until(console: Console, holds: Callable[[SessionView], bool], seconds: float = 60.0) -> SessionView:
+    """Wait for a view of which something holds."""
     ends = time.monotonic() + seconds
     while not holds(console.view):
         assert time.monotonic() < ends, console.view
@@ -98,13 +98,13 @@ def until(console: Console, holds: Callable[[SessionView], bool], seconds: float
     return console.view
 
 
-def checked(console: Console, program: str = HELLO) -> SessionView:
+def begin_and_check(console: Console, program: str = HELLO) -> SessionView:
     console.begin(MissionOrder(program=program))
-    return until(console, lambda view: view.check is not None)
+    return wait_until(console, lambda view: view.check is not None)
 
 
-def approved(console: Console, program: str = HELLO) -> None:
-    view = checked(console, program)
+def begin_and_approve(console: Console, program: str = HELLO) -> None:
+    view = begin_and_check(console, program)
     session = console.session
     assert session is not None
     session.approve(view.digest)
@@ -112,14 +112,14 @@ def approved(console: Console, program: str = HELLO) -> None:
 
 def test_an_instruction_becomes_a_mission_that_is_done(tmp_path: Path) -> None:
     author = Author(HELLO)
-    with desk_of(tmp_path, author=author) as console:
+    with make_console(tmp_path, author=author) as console:
         session = console.begin(MissionOrder("say hello in the kitchen", "author"))
-        view = until(console, lambda view: view.may_be_approved)
+        view = wait_until(console, lambda view: view.may_be_approved)
         assert (view.program, view.problems, view.state) == (HELLO, (), MissionState.CHECKED)
         assert "kitchen" in author.asked[0].messages[-1].text
         assert author.is_closed
         session.approve(view.digest)
-        view = until(console, lambda view: view.is_over)
+        view = wait_until(console, lambda view: view.is_over)
         assert view.state is MissionState.DONE
         assert [m.text for m in view.progress.moments if m.kind == "say"] == ["hello"]
         assert [line["event"] for line in session.events()][-1] == "state"
@@ -139,20 +139,20 @@ def test_every_example_runs_to_its_end_in_the_example_office(tmp_path: Path) -> 
         assert len(examples(console)) >= 3
         for instruction in known_instructions(RoomMap.of(world)):
             console.begin(MissionOrder(instruction))
-            view = until(console, lambda view: view.check is not None)
+            view = wait_until(console, lambda view: view.check is not None)
             assert console.session is not None
             console.session.approve(view.digest, despite_problems=True)
-            ended = until(console, lambda view: view.is_over)
+            ended = wait_until(console, lambda view: view.is_over)
             assert (ended.state, ended.reason) == (MissionState.DONE, ""), instruction
 
 
-def test_instructions_that_are_offered_instead_have_their_rooms_here(tmp_path: Path) -> None:
+def test_suggested_instructions_have_their_rooms_here(tmp_path: Path) -> None:
     office, model = read_world(OFFICE), open_recorded("recorded")
     for world, count in ((office, 3), (WORLD, 0)):
         robot = Simulated(world, speed=None)
         with Console(robot, tmp_path, lambda _: model, models=("recorded",), world=world) as console:
             console.begin(MissionOrder("Go to the lobby, and tell me how many people are there."))
-            view = until(console, lambda view: view.is_over)
+            view = wait_until(console, lambda view: view.is_over)
             known = view.suggestions
             assert known is not None
             assert view.reason == view.error == "recorded:careful has no program for this instruction"
@@ -160,11 +160,11 @@ def test_instructions_that_are_offered_instead_have_their_rooms_here(tmp_path: P
             assert set(known) <= set(known_instructions(RoomMap.of(world)))
 
 
-def test_a_program_is_seen_while_it_is_written_and_a_stop_ends_that(tmp_path: Path) -> None:
+def test_a_program_is_seen_while_it_is_written_and_a_stop_ends_the_writing(tmp_path: Path) -> None:
     author = Author(HELLO, waits=True)
-    with desk_of(tmp_path, author=author) as console:
+    with make_console(tmp_path, author=author) as console:
         session = console.begin(MissionOrder("say hello", "author"))
-        view = until(console, lambda view: bool(view.reply))
+        view = wait_until(console, lambda view: bool(view.reply))
         assert (view.arriving.code, view.is_written, view.may_be_edited) == (HELLO[:10], True, False)
         console.stop("a test")
         session.join(5)
@@ -177,17 +177,17 @@ PROSE = "I cannot do that."
 
 def test_a_reply_without_a_program_waits_for_a_person_who_asks_again(tmp_path: Path) -> None:
     author = Author(PROSE, PROSE, HELLO)
-    with desk_of(tmp_path, author=author) as console:
+    with make_console(tmp_path, author=author) as console:
         session = console.begin(MissionOrder("say hello", "author"))
         for repair in (False, True):
-            view = until(console, lambda view: view.waits_for_program)
+            view = wait_until(console, lambda view: view.waits_for_program)
             assert view.programless is not None
             assert (view.programless.text, view.phase, view.problems) == (PROSE, "no-program", ())
             assert (view.may_be_approved, view.may_be_edited, view.may_be_asked_again) == (False, True, True)
             with pytest.raises(MissionError):
                 session.approve(view.digest)
             session.ask_again(repair=repair)
-        view = until(console, lambda view: view.may_be_approved)
+        view = wait_until(console, lambda view: view.may_be_approved)
         assert (view.program, view.programless, view.author) == (HELLO, None, "author")
         first, again, repaired = (prompt.messages[-1].text for prompt in author.asked)
         assert first == again != repaired
@@ -196,30 +196,30 @@ def test_a_reply_without_a_program_waits_for_a_person_who_asks_again(tmp_path: P
         ] * 2
 
 
-def test_a_program_stays_where_the_next_reply_holds_none(tmp_path: Path) -> None:
-    with desk_of(tmp_path, author=Author(HELLO, PROSE)) as console:
+def test_a_program_is_kept_if_the_next_reply_has_none(tmp_path: Path) -> None:
+    with make_console(tmp_path, author=Author(HELLO, PROSE)) as console:
         session = console.begin(MissionOrder("say hello", "author"))
-        before = until(console, lambda view: view.may_be_approved)
+        before = wait_until(console, lambda view: view.may_be_approved)
         session.ask_again(repair=False)
-        view = until(console, lambda view: view.may_be_approved and view.programless is not None)
+        view = wait_until(console, lambda view: view.may_be_approved and view.programless is not None)
         assert (view.program, view.check) == (before.program, before.check)
         session.approve(view.digest)
-        assert until(console, lambda view: view.is_over).state is MissionState.DONE
+        assert wait_until(console, lambda view: view.is_over).state is MissionState.DONE
 
 
-def test_a_program_can_be_typed_where_the_model_wrote_none(tmp_path: Path) -> None:
-    with desk_of(tmp_path, author=Author(PROSE)) as console:
+def test_a_program_can_be_typed_if_the_model_wrote_none(tmp_path: Path) -> None:
+    with make_console(tmp_path, author=Author(PROSE)) as console:
         console.begin(MissionOrder("say hello", "author"))
-        until(console, lambda view: view.waits_for_program)
+        wait_until(console, lambda view: view.waits_for_program)
         console.edit(HELLO)
-        view = until(console, lambda view: view.may_be_approved)
+        view = wait_until(console, lambda view: view.may_be_approved)
         assert (view.program, view.author, view.programless) == (HELLO, "", None)
 
 
 def test_a_mission_without_a_program_can_be_stopped(tmp_path: Path) -> None:
-    with desk_of(tmp_path, author=Author(PROSE)) as console:
+    with make_console(tmp_path, author=Author(PROSE)) as console:
         session = console.begin(MissionOrder("say hello", "author"))
-        until(console, lambda view: view.waits_for_program)
+        wait_until(console, lambda view: view.waits_for_program)
         console.stop("a test")
         session.join(5)
         assert (console.view.is_over, console.view.state) == (True, MissionState.STOPPED)
@@ -238,43 +238,43 @@ def test_a_higher_limit_counts_from_then_on(tmp_path: Path) -> None:
         Console(robot, tmp_path, model, models=("openai-chat:m",), world=WORLD) as console,
     ):
         session = console.begin(MissionOrder("say hello"))
-        view = until(console, lambda view: view.waits_for_program)
+        view = wait_until(console, lambda view: view.waits_for_program)
         assert view.programless is not None
         assert (view.programless.kind, view.programless.higher_limit) == ("cut-off", 32)
         session.ask_again(repair=False, max_tokens=view.programless.higher_limit)
-        assert until(console, lambda view: view.may_be_approved).program == HELLO
+        assert wait_until(console, lambda view: view.may_be_approved).program == HELLO
         session.ask_again(repair=False)
-        until(console, lambda view: view.may_be_approved)
+        wait_until(console, lambda view: view.may_be_approved)
         bodies = [request.body for request in server.requests]
         assert [body["max_tokens"] for body in bodies] == [8, 32, 32]
         assert [body["temperature"] for body in bodies] == [0.5] * 3
 
 
-def test_a_blank_program_is_none_where_there_is_an_instruction(tmp_path: Path) -> None:
-    with desk_of(tmp_path, author=Author(HELLO)) as console:
+def test_a_blank_program_is_ignored_if_there_is_an_instruction(tmp_path: Path) -> None:
+    with make_console(tmp_path, author=Author(HELLO)) as console:
         console.begin(MissionOrder("say hello", program=" \n"))
-        assert until(console, lambda view: view.may_be_approved).program == HELLO
+        assert wait_until(console, lambda view: view.may_be_approved).program == HELLO
 
 
 def test_an_emptied_program_has_a_problem_and_can_be_filled_again(console: Console) -> None:
-    checked(console)
+    begin_and_check(console)
     console.edit("")
-    view = until(console, lambda view: view.check is not None and not view.program)
+    view = wait_until(console, lambda view: view.check is not None and not view.program)
     assert (view.state, len(view.problems)) == (MissionState.CHECKED, 1)
     console.edit(HELLO)
-    assert until(console, lambda view: view.may_be_approved and bool(view.program)).problems == ()
+    assert wait_until(console, lambda view: view.may_be_approved and bool(view.program)).problems == ()
 
 
 def test_without_an_instruction_no_model_is_asked_again(tmp_path: Path) -> None:
-    with desk_of(tmp_path, author=Author(HELLO)) as console:
+    with make_console(tmp_path, author=Author(HELLO)) as console:
         session = console.begin(MissionOrder(model="author", program=HELLO))
-        assert not until(console, lambda view: view.may_be_approved).may_be_asked_again
+        assert not wait_until(console, lambda view: view.may_be_approved).may_be_asked_again
         with pytest.raises(MissionError, match="cannot be queried"):
             session.ask_again(repair=False)
 
 
-def test_problems_need_a_word_about_them(console: Console) -> None:
-    view = checked(console, BAD)
+def test_problems_need_explicit_approval(console: Console) -> None:
+    view = begin_and_check(console, BAD)
     session = console.session
     assert session is not None
     assert '"cellar"' in view.problems[0]
@@ -282,50 +282,50 @@ def test_problems_need_a_word_about_them(console: Console) -> None:
         session.approve(view.digest)
     assert console.view.state is MissionState.CHECKED
     session.approve(view.digest, despite_problems=True)
-    assert until(console, lambda view: view.is_over).state is MissionState.FAILED
+    assert wait_until(console, lambda view: view.is_over).state is MissionState.FAILED
 
 
 def test_only_the_program_that_was_seen_can_be_approved(console: Console) -> None:
-    seen = checked(console)
+    seen = begin_and_check(console)
     console.edit(HELLO.replace("hello", "bye"))
     session = console.session
     assert session is not None
     with pytest.raises(MissionError, match=r"changed|checked"):
         session.approve(seen.digest)
-    until(console, lambda view: view.check is not None)
+    wait_until(console, lambda view: view.check is not None)
     with pytest.raises(MissionError, match="changed"):
         session.approve(seen.digest)
     assert console.view.state is MissionState.CHECKED
 
 
-def test_a_program_typed_by_hand_has_the_instruction_only_if_it_is_still_that_ones(console: Console) -> None:
+def test_an_edited_program_keeps_the_instruction_only_if_it_is_similar(console: Console) -> None:
     written = "def task_program():\n    go_to('kitchen')\n    say('hello')\n    say('bye')\n"
     for program, instruction in (
         (written.replace("bye", "later"), "Greet the kitchen."),
         ("def task_program():\n    pick('mug')\n    place('mug')\n", ""),
     ):
         console.begin(MissionOrder("Greet the kitchen.", program=written, author="some:model"))
-        until(console, lambda view: view.check is not None)
+        wait_until(console, lambda view: view.check is not None)
         console.stop("a test")
-        until(console, lambda view: view.is_over)
+        wait_until(console, lambda view: view.is_over)
         console.edit(program)
-        view = until(console, lambda view: view.check is not None)
+        view = wait_until(console, lambda view: view.check is not None)
         assert (view.instruction, view.author) == (instruction, "")
         filed = MissionSummary.read(console.home / "missions" / view.id)
         assert (filed.instruction, filed.model) == (instruction, "")
 
 
 def test_an_edited_program_is_checked_again_and_the_last_one_counts(console: Console) -> None:
-    checked(console)
+    begin_and_check(console)
     for number in range(5):
         console.edit(HELLO + f"    say('{number}')\n")
-    view = until(console, lambda view: view.check is not None)
+    view = wait_until(console, lambda view: view.check is not None)
     assert view.program.endswith("say('4')\n")
     assert not view.busy
     assert MissionSummary.read(console.home / "missions" / view.id).program == view.program
 
 
-def test_a_program_can_be_edited_while_the_robot_is_connected(
+def test_a_program_can_be_edited_while_the_robot_connects(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     go_on, connect = threading.Event(), Simulated.connect
@@ -335,17 +335,17 @@ def test_a_program_can_be_edited_while_the_robot_is_connected(
         connect(robot)
 
     monkeypatch.setattr(Simulated, "connect", slow)
-    with desk_of(tmp_path) as console:
+    with make_console(tmp_path) as console:
         console.begin(MissionOrder(program=BAD))
-        until(console, lambda view: view.busy == "connecting the robot")
+        wait_until(console, lambda view: view.busy == "connecting the robot")
         console.edit(HELLO)
         go_on.set()
-        view = until(console, lambda view: view.check is not None)
+        view = wait_until(console, lambda view: view.check is not None)
         assert (view.program, view.problems) == (HELLO, ())
         assert MissionSummary.read(console.home / "missions" / view.id).program == HELLO
 
 
-def test_a_stop_while_the_robot_is_connected_ends_all_before_it_moves(
+def test_a_stop_while_the_robot_connects_ends_the_mission(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     go_on, connect = threading.Event(), Simulated.connect
@@ -355,9 +355,9 @@ def test_a_stop_while_the_robot_is_connected_ends_all_before_it_moves(
         connect(robot)
 
     monkeypatch.setattr(Simulated, "connect", slow)
-    with desk_of(tmp_path) as console:
+    with make_console(tmp_path) as console:
         session = console.begin(MissionOrder(program=HELLO))
-        until(console, lambda view: view.busy == "connecting the robot")
+        wait_until(console, lambda view: view.busy == "connecting the robot")
         began = time.monotonic()
         console.stop("a test")
         assert time.monotonic() - began < 1
@@ -374,50 +374,50 @@ def test_a_stop_while_the_robot_is_connected_ends_all_before_it_moves(
 
 def test_a_model_is_asked_again_with_its_program_and_the_problems(tmp_path: Path) -> None:
     author = Author(BAD, HELLO)
-    with desk_of(tmp_path, author=author) as console:
+    with make_console(tmp_path, author=author) as console:
         session = console.begin(MissionOrder("say hello", "author"))
-        until(console, lambda view: view.may_be_approved)
+        wait_until(console, lambda view: view.may_be_approved)
         session.ask_again(repair=True)
-        view = until(console, lambda view: view.may_be_approved and view.program == HELLO)
+        view = wait_until(console, lambda view: view.may_be_approved and view.program == HELLO)
         assert view.problems == ()
         assert "cellar" in author.asked[1].messages[-1].text
 
 
-def test_a_model_that_fails_when_asked_again_takes_nothing_away(tmp_path: Path) -> None:
+def test_a_model_that_fails_when_asked_again_changes_nothing(tmp_path: Path) -> None:
     author = Author(BAD)
-    with desk_of(tmp_path, author=author) as console:
+    with make_console(tmp_path, author=author) as console:
         session = console.begin(MissionOrder("say hello", "author"))
-        until(console, lambda view: view.may_be_approved)
+        wait_until(console, lambda view: view.may_be_approved)
         console.edit(HELLO)
-        before = until(console, lambda view: view.may_be_approved and view.program == HELLO)
+        before = wait_until(console, lambda view: view.may_be_approved and view.program == HELLO)
         session.ask_again(repair=False)
-        view = until(console, lambda view: bool(view.error))
+        view = wait_until(console, lambda view: bool(view.error))
         assert view.error == "the model is not there"
         assert (view.program, view.check, view.state) == (HELLO, before.check, MissionState.CHECKED)
         session.approve(view.digest)
-        assert until(console, lambda view: view.is_over).state is MissionState.DONE
+        assert wait_until(console, lambda view: view.is_over).state is MissionState.DONE
         assert console.view.program == HELLO
 
 
-def test_a_program_is_there_again_when_the_asking_is_stopped(tmp_path: Path) -> None:
+def test_a_stopped_request_restores_the_program(tmp_path: Path) -> None:
     author = Author(HELLO, BAD)
-    with desk_of(tmp_path, author=author) as console:
+    with make_console(tmp_path, author=author) as console:
         session = console.begin(MissionOrder("say hello", "author"))
-        until(console, lambda view: view.may_be_approved)
+        wait_until(console, lambda view: view.may_be_approved)
         author.waits = True
         session.ask_again(repair=False)
-        view = until(console, lambda view: view.reply == BAD[:10])
+        view = wait_until(console, lambda view: view.reply == BAD[:10])
         assert (view.state, view.phase) == (MissionState.CHECKED, "writing")
         console.stop("a test")
-        assert until(console, lambda view: view.is_over).program == HELLO
+        assert wait_until(console, lambda view: view.is_over).program == HELLO
 
 
 def test_no_other_program_is_asked_for_while_one_is_being_approved(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with desk_of(tmp_path, author=Author(HELLO, BAD)) as console:
+    with make_console(tmp_path, author=Author(HELLO, BAD)) as console:
         session = console.begin(MissionOrder("say hello", "author"))
-        view = until(console, lambda view: view.may_be_approved)
+        view = wait_until(console, lambda view: view.may_be_approved)
         approve = Mission.approve
 
         def slowly(mission: Mission, *, despite_problems: bool = False, by: str = "") -> None:
@@ -436,27 +436,27 @@ def test_no_other_program_is_asked_for_while_one_is_being_approved(
         thread = threading.Thread(target=ask)
         monkeypatch.setattr(Mission, "approve", slowly)
         session.approve(view.digest)
-        view = until(console, lambda view: view.is_over)
+        view = wait_until(console, lambda view: view.is_over)
         thread.join()
         assert (view.state, view.phase, view.program, len(refused)) == (MissionState.DONE, "done", HELLO, 1)
 
 
 def test_a_stop_reaches_a_robot_that_is_asked_for_its_rooms(tmp_path: Path) -> None:
-    told = threading.Event()
+    is_cancelled = threading.Event()
 
-    class Slow(Answering):
+    class Slow(FakeRobot):
         def cancel(self) -> None:
             super().cancel()
-            told.set()
+            is_cancelled.set()
 
     def answer(_skill: str, _first: str) -> RobotResult:
-        if not told.wait(10):
+        if not is_cancelled.wait(10):
             return ["hall"]
         raise CancelledError
 
-    with desk_of(tmp_path, Slow(answer)) as console:
+    with make_console(tmp_path, Slow(answer)) as console:
         session = console.begin(MissionOrder(program=HELLO))
-        assert until(console, lambda view: bool(view.id)).phase == "starting"
+        assert wait_until(console, lambda view: bool(view.id)).phase == "starting"
         console.stop("a test")
         session.join(5)
         assert (console.view.is_over, console.view.state, console.view.error) == (
@@ -466,7 +466,7 @@ def test_a_stop_reaches_a_robot_that_is_asked_for_its_rooms(tmp_path: Path) -> N
         )
 
 
-def test_nothing_begins_while_a_skill_has_not_ended_since_a_stop(
+def test_nothing_begins_while_a_skill_outlasts_a_stop(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("codebotler.missions.mission.STOP_GRACE_SECONDS", 0.1)
@@ -479,14 +479,14 @@ def test_nothing_begins_while_a_skill_has_not_ended_since_a_stop(
         may_answer.wait(60)
         return None
 
-    with desk_of(tmp_path, Answering(never)) as console:
-        approved(console, "def task_program():\n    say('a')\n")
+    with make_console(tmp_path, FakeRobot(never)) as console:
+        begin_and_approve(console, "def task_program():\n    say('a')\n")
         assert is_asked.wait(30)
         console.stop("a person")
-        until(console, lambda view: view.is_over)
+        wait_until(console, lambda view: view.is_over)
         with pytest.raises(MissionError):
             console.begin(MissionOrder(program=HELLO))
-        with pytest.raises(NotReadyError):  # as another process would
+        with pytest.raises(NotReadyError):  # Another process would do the same.
             Reservation(console.robot, tmp_path).__enter__()
         may_answer.set()
         ends = time.monotonic() + 30
@@ -497,30 +497,30 @@ def test_nothing_begins_while_a_skill_has_not_ended_since_a_stop(
 
 
 def test_a_running_mission_is_not_disturbed(tmp_path: Path) -> None:
-    with desk_of(tmp_path, Simulated(WORLD)) as console:
-        approved(console, FAR)
-        view = until(console, lambda view: bool(view.progress.skill))
+    with make_console(tmp_path, Simulated(WORLD)) as console:
+        begin_and_approve(console, FAR)
+        view = wait_until(console, lambda view: bool(view.progress.skill))
         assert (view.progress.doing, view.progress.line) == ('drives to "kitchen"', 3)
         with pytest.raises(MissionError, match="stop it first"):
             console.begin(MissionOrder(program=HELLO))
         with pytest.raises(MissionError, match="cannot be changed"):
             console.edit(HELLO)
         console.stop("a test")
-        assert until(console, lambda view: view.is_over).state is MissionState.STOPPED
+        assert wait_until(console, lambda view: view.is_over).state is MissionState.STOPPED
 
 
-def test_another_instruction_takes_the_place_of_one_that_waits(console: Console) -> None:
-    first = checked(console)
+def test_another_instruction_replaces_one_that_waits(console: Console) -> None:
+    first = begin_and_check(console)
     console.begin(MissionOrder(program=BAD))
-    until(console, lambda view: view.check is not None and view.number > first.number)
+    wait_until(console, lambda view: view.check is not None and view.number > first.number)
     assert [summary.state for summary in read_missions(console.home)] == ["stopped", "checked"]
 
 
 def test_the_robot_is_stopped_with_the_tool(tmp_path: Path) -> None:
     robot = Simulated(WORLD)
-    with desk_of(tmp_path, robot) as console:
-        approved(console, FAR)
-        until(console, lambda view: bool(view.progress.skill))
+    with make_console(tmp_path, robot) as console:
+        begin_and_approve(console, FAR)
+        wait_until(console, lambda view: bool(view.progress.skill))
     assert read_missions(tmp_path)[0].state == "stopped"
 
 
@@ -532,20 +532,20 @@ def test_a_stop_between_the_approval_and_the_start_counts(tmp_path: Path) -> Non
         go_on.wait(20)
 
     robot.keep_out = keep_out  # type: ignore[attr-defined]  # an optional method
-    with desk_of(tmp_path, robot) as console:
+    with make_console(tmp_path, robot) as console:
         session = console.begin(MissionOrder(program=HELLO))
-        view = until(console, lambda view: view.may_be_approved)
+        view = wait_until(console, lambda view: view.may_be_approved)
         assert not console.stop("a test", only_moving=True)
         session.approve(view.digest)
         assert starting.wait(20)
         assert console.stop("a test", only_moving=True)
         session._stop_button.ended.wait(20)
         go_on.set()
-        assert until(console, lambda view: view.is_over).state is MissionState.STOPPED
+        assert wait_until(console, lambda view: view.is_over).state is MissionState.STOPPED
         assert not session.view.progress.visited
 
 
-def test_a_draft_that_nobody_saw_is_no_draft_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_draft_that_nobody_saw_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begun, go_on = threading.Event(), threading.Event()
 
     def slow(program: str, **how: Any) -> CheckResult:  # noqa: ANN401 - passed on
@@ -554,14 +554,17 @@ def test_a_draft_that_nobody_saw_is_no_draft_before(tmp_path: Path, monkeypatch:
         return check(program, **how)
 
     monkeypatch.setattr("codebotler.missions.drafts.check", slow)
-    with desk_of(tmp_path) as console:
+    with make_console(tmp_path) as console:
         console.begin(MissionOrder(program=HELLO))
         assert begun.wait(20)
         console.edit(f"{HELLO}# a comment\n")
         go_on.set()
-        assert until(console, lambda view: view.may_be_approved).earlier is None
+        assert wait_until(console, lambda view: view.may_be_approved).earlier is None
         console.edit(HELLO)
-        assert until(console, lambda view: view.may_be_approved and view.program == HELLO).earlier is not None
+        assert (
+            wait_until(console, lambda view: view.may_be_approved and view.program == HELLO).earlier
+            is not None
+        )
 
 
 @pytest.mark.slow
@@ -569,23 +572,23 @@ def test_a_draft_that_nobody_saw_is_no_draft_before(tmp_path: Path, monkeypatch:
 def test_a_check_that_nobody_wants_ends(tmp_path: Path, *, is_edit: bool) -> None:
     looks = "".join(f"    if is_in_room('t{number}'):\n        say('{number}')\n" for number in range(12))
     slow = f"def task_program():\n    for i in range(20):\n        sum(range(7 * 10**6))\n{looks}"
-    with desk_of(tmp_path) as console:
+    with make_console(tmp_path) as console:
         session = console.begin(MissionOrder(program=slow))
-        until(console, lambda view: view.busy == "checking" and bool(view.id))
+        wait_until(console, lambda view: view.busy == "checking" and bool(view.id))
         time.sleep(0.3)
         if is_edit:
             session.edit(HELLO)
         else:
             console.begin(MissionOrder(program=HELLO))
-        until(console, lambda view: view.may_be_approved and view.program == HELLO)
+        wait_until(console, lambda view: view.may_be_approved and view.program == HELLO)
 
 
 @pytest.mark.slow
 def test_a_check_does_not_delay_the_end(tmp_path: Path) -> None:
     slow = "def task_program():\n    while True:\n        sum(range(10**9))\n"
-    with desk_of(tmp_path) as console:
+    with make_console(tmp_path) as console:
         session = console.begin(MissionOrder(program=slow))
-        until(console, lambda view: view.busy == "checking" and bool(view.id))
+        wait_until(console, lambda view: view.busy == "checking" and bool(view.id))
         time.sleep(0.3)
         began = time.monotonic()
         console.end()
@@ -593,7 +596,7 @@ def test_a_check_does_not_delay_the_end(tmp_path: Path) -> None:
         assert time.monotonic() - began < 5
 
 
-def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stop_does_not_wait_for_a_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     go_on = threading.Event()
 
     def slow(program: str, **how: Any) -> CheckResult:  # noqa: ANN401 - passed on
@@ -601,11 +604,11 @@ def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         return check(program, **how)
 
     monkeypatch.setattr("codebotler.missions.drafts.check", slow)
-    with desk_of(tmp_path) as console:
+    with make_console(tmp_path) as console:
         session = console.begin(MissionOrder(program=HELLO))
-        until(console, lambda view: view.busy == "checking" and bool(view.id))
+        wait_until(console, lambda view: view.busy == "checking" and bool(view.id))
         console.stop("a test")
-        assert until(console, lambda view: view.state is MissionState.STOPPED).check is None
+        assert wait_until(console, lambda view: view.state is MissionState.STOPPED).check is None
         go_on.set()
         session.join(10)
         assert (console.view.state, console.view.check, console.view.is_over) == (
@@ -615,35 +618,35 @@ def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         )
 
 
-def test_missions_that_a_dead_tool_left_are_told_of(tmp_path: Path) -> None:
+def test_missions_of_a_dead_tool_are_listed(tmp_path: Path) -> None:
     mission = Mission(tmp_path, "simulated")
     mission.draft(HELLO)
     mission._close()
-    with desk_of(tmp_path) as console:
+    with make_console(tmp_path) as console:
         assert [summary.id for summary in console.interrupted] == [mission.id]
         assert "ended unexpectedly" in console.interrupted[0].reason
-    with desk_of(tmp_path) as console:
+    with make_console(tmp_path) as console:
         assert console.interrupted == (), "the robot has not moved"
 
 
-def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:
-    with desk_of(tmp_path, author=Author()) as console:
+def test_the_error_of_a_model_is_shown(tmp_path: Path) -> None:
+    with make_console(tmp_path, author=Author()) as console:
         console.begin(MissionOrder("say hello", "author"))
-        view = until(console, lambda view: view.is_over)
+        view = wait_until(console, lambda view: view.is_over)
         assert (view.error, view.state) == ("the model is not there", MissionState.FAILED)
 
 
 def test_the_same_program_keeps_its_author_when_it_is_run_again(tmp_path: Path) -> None:
-    with desk_of(tmp_path, author=Author(HELLO)) as console:
+    with make_console(tmp_path, author=Author(HELLO)) as console:
         session = console.begin(MissionOrder("say hello", "author"))
-        session.approve(until(console, lambda view: view.may_be_approved).digest)
-        until(console, lambda view: view.is_over)
+        session.approve(wait_until(console, lambda view: view.may_be_approved).digest)
+        wait_until(console, lambda view: view.is_over)
         for program, author in ((HELLO, "author"), (HELLO + "# mine\n", "")):
             console.edit(program)
-            view = until(console, lambda view: view.may_be_approved)
+            view = wait_until(console, lambda view: view.may_be_approved)
             assert (view.author, view.model, view.program) == (author, "author", program)
             console.stop("a test")
-            until(console, lambda view: view.is_over)
+            wait_until(console, lambda view: view.is_over)
     assert [one.model for one in read_missions(tmp_path)] == ["author", "author", ""]
 
 
@@ -658,20 +661,20 @@ def test_a_mission_whose_end_cannot_be_logged_has_ended_in_the_view(
         return add(log, event, clock, **data)
 
     monkeypatch.setattr("codebotler.missions.mission.add_event", full)
-    with desk_of(tmp_path) as console:
-        approved(console)
-        view = until(console, lambda view: view.is_over)
+    with make_console(tmp_path) as console:
+        begin_and_approve(console)
+        view = wait_until(console, lambda view: view.is_over)
         assert (view.state, view.phase) == (MissionState.DONE, "done")
         assert "No space left" in view.error
 
 
-def test_the_first_model_writes_where_none_is_named(tmp_path: Path) -> None:
-    with desk_of(tmp_path, author=Author(HELLO)) as console:
+def test_the_first_model_writes_if_none_is_named(tmp_path: Path) -> None:
+    with make_console(tmp_path, author=Author(HELLO)) as console:
         console.begin(MissionOrder("say hello"))
-        assert until(console, lambda view: view.may_be_approved).model == console.models[0]
+        assert wait_until(console, lambda view: view.may_be_approved).model == console.models[0]
 
 
-def test_an_order_that_says_nothing_is_refused() -> None:
+def test_an_empty_order_is_refused() -> None:
     with pytest.raises(UserError, match="instruction is empty"):
         MissionOrder(" ", "author", program="\n")
 
@@ -683,10 +686,10 @@ def test_a_program_that_is_too_long_is_refused(console: Console) -> None:
 
 
 def test_a_robot_that_is_used_elsewhere_is_not_waited_for(tmp_path: Path) -> None:
-    with desk_of(tmp_path) as one, desk_of(tmp_path) as other:
-        checked(one)
+    with make_console(tmp_path) as one, make_console(tmp_path) as other:
+        begin_and_check(one)
         other.begin(MissionOrder(program=HELLO))
-        view = until(other, lambda view: view.is_over)
+        view = wait_until(other, lambda view: view.is_over)
         assert "robot simulated" in view.error
         assert view.id == ""
 
@@ -700,13 +703,13 @@ def test_viewers_are_woken_at_each_change(console: Console) -> None:
     assert not asyncio.run(console.notifier.until(lambda: False, 0.01))
 
 
-def test_one_robot_answers_while_another_viewer_sleeps(tmp_path: Path) -> None:
-    """What a viewer does not read does not pile up anywhere: a view is all there is."""
+def test_a_view_keeps_only_the_last_moments(tmp_path: Path) -> None:
+    """Unread changes do not pile up, since a viewer reads only the current view."""
     answers: dict[str, RobotResult] = {"get_all_rooms": ["hall"], "get_current_location": "hall"}
-    robot = Answering(lambda skill, _: answers.get(skill))
-    with desk_of(tmp_path, robot) as console:
-        approved(console, "def task_program():\n    for n in range(300):\n        say(str(n))\n")
-        view = until(console, lambda view: view.is_over)
+    robot = FakeRobot(lambda skill, _: answers.get(skill))
+    with make_console(tmp_path, robot) as console:
+        begin_and_approve(console, "def task_program():\n    for n in range(300):\n        say(str(n))\n")
+        view = wait_until(console, lambda view: view.is_over)
         assert view.state is MissionState.DONE
         assert len(view.progress.moments) == 200
         assert console.session is not None

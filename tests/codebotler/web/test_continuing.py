@@ -45,7 +45,7 @@ TYPED = "def task_program():\n    go_to('kitchen')\n    say('hello')\n    go_to(
 
 
 class Author:
-    """A model that writes one program after the other, and may do something before a reply."""
+    """A model that writes one program after another, and may act before its last reply."""
 
     name = "author"
     settings = SamplingSettings()
@@ -55,7 +55,7 @@ class Author:
         self.asked: list[Prompt] = []
         self.before_last: Callable[[], object] = lambda: None
 
-    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:  # noqa: ARG002 - as models have it
+    async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:  # noqa: ARG002 - models take it
         self.asked.append(prompt)
         if not self.programs:
             raise ModelError("the model is not there", may_pass=False)
@@ -68,7 +68,7 @@ class Author:
         pass
 
 
-def desk_of(home: Path, author: Author, recoveries: int = 0, speed: float | None = None) -> Console:
+def make_console(home: Path, author: Author, recoveries: int = 0, speed: float | None = None) -> Console:
     def model(_name: str) -> Model:
         return author
 
@@ -78,11 +78,11 @@ def desk_of(home: Path, author: Author, recoveries: int = 0, speed: float | None
 
 @pytest.fixture
 def console(tmp_path: Path) -> Iterator[Console]:
-    with desk_of(tmp_path, Author()) as console:
+    with make_console(tmp_path, Author()) as console:
         yield console
 
 
-def until(console: Console, holds: Callable[[SessionView], bool], seconds: float = 15.0) -> SessionView:
+def wait_until(console: Console, holds: Callable[[SessionView], bool], seconds: float = 15.0) -> SessionView:
     ends = time.monotonic() + seconds
     while not holds(console.view):
         assert time.monotonic() < ends, console.view
@@ -91,9 +91,9 @@ def until(console: Console, holds: Callable[[SessionView], bool], seconds: float
 
 
 def fetch(console: Console) -> SessionView:
-    """Have the model's program run, which fails because there is no mug."""
+    """Run the model's program, which fails because there is no mug."""
     session = console.begin(MissionOrder("Fetch the mug.", "author"))
-    view = until(console, lambda view: view.may_be_approved)
+    view = wait_until(console, lambda view: view.may_be_approved)
     assert view.problems == ()
     session.approve(view.digest)
     view = session.wait_until(lambda _: False)
@@ -103,12 +103,12 @@ def fetch(console: Console) -> SessionView:
 
 def test_the_model_of_the_program_writes_the_rest_and_a_person_approves_it(tmp_path: Path) -> None:
     author = Author(FETCH, GO_BACK)
-    with desk_of(tmp_path, author) as console:
+    with make_console(tmp_path, author) as console:
         before = fetch(console)
         past = console.past_of("last")
         session = console.begin(console.rest_of(past))
-        assert map_state(session.view, WORLD).room == "kitchen"  # before the robot was asked
-        view = until(console, lambda view: view.may_be_approved)
+        assert map_state(session.view, WORLD).room == "kitchen"  # The robot has not been asked yet.
+        view = wait_until(console, lambda view: view.may_be_approved)
         assert (view.model, view.instruction, view.program) == ("author", "Fetch the mug.", GO_BACK)
         assert view.past == past
         assert (past.mission, view.progress.room) == (before.id, "kitchen")
@@ -124,9 +124,9 @@ def test_the_model_of_the_program_writes_the_rest_and_a_person_approves_it(tmp_p
 
 def test_a_mission_without_an_instruction_is_continued_from_its_program(tmp_path: Path) -> None:
     failed_mission(tmp_path, TYPED, WORLD, "")
-    with desk_of(tmp_path, Author()) as console:
+    with make_console(tmp_path, Author()) as console:
         console.begin(console.rest_of(console.past_of("last")))
-        view = until(console, lambda view: view.check is not None)
+        view = wait_until(console, lambda view: view.check is not None)
         assert view.check is not None
         assert (view.program, view.model, view.may_be_edited) == (TYPED, "", True)
         assert any("hello" in one.message and "kitchen" in one.message for one in view.check.problems)
@@ -134,38 +134,38 @@ def test_a_mission_without_an_instruction_is_continued_from_its_program(tmp_path
         marked = [(deed.text, deed.is_repeated) for scene in strip.scenes for deed in scene.deeds]
         assert marked == [("hello", True)]
         console.edit(GO_BACK)
-        view = until(console, lambda view: view.program == GO_BACK and view.check is not None)
+        view = wait_until(console, lambda view: view.program == GO_BACK and view.check is not None)
         assert (view.problems, view.past is None) == ((), False)
 
 
 def test_the_past_is_kept_until_the_rest_has_begun(tmp_path: Path) -> None:
     author = Author(FETCH, GO_BACK)
-    with desk_of(tmp_path, author) as console:
+    with make_console(tmp_path, author) as console:
         fetch(console)
         console.begin(console.rest_of(console.past_of("last")))
-        view = until(console, lambda view: view.may_be_approved)
+        view = wait_until(console, lambda view: view.may_be_approved)
         console.stop("a test")
-        until(console, lambda view: view.is_over)
+        wait_until(console, lambda view: view.is_over)
         session = console.edit(GO_BACK)
-        again = until(console, lambda now: now.number == 3 and now.may_be_approved)
+        again = wait_until(console, lambda now: now.number == 3 and now.may_be_approved)
         assert (again.past, again.instruction) == (view.past, view.instruction)
         session.approve(again.digest)
         session.wait_until(lambda _: False)
         console.edit(GO_BACK)
-        assert until(console, lambda now: now.number == 4 and now.may_be_approved).past is None
+        assert wait_until(console, lambda now: now.number == 4 and now.may_be_approved).past is None
 
 
-def test_an_unsure_step_is_a_persons_to_decide(tmp_path: Path) -> None:
+def test_a_person_decides_about_an_unsure_step(tmp_path: Path) -> None:
     folder = failed_mission(tmp_path, TYPED, WORLD, "")
     cut(folder, line_of(folder, "say", "skill"), MissionState.RUNNING)
-    with desk_of(tmp_path, Author()) as console:
+    with make_console(tmp_path, Author()) as console:
         assert [one.id for one in console.interrupted] == [folder.name]
         past = console.past_of(folder.name)
         with pytest.raises(UserError):
             console.rest_of(past)
         console.begin(console.rest_of(past.resolve(happened=True)))
         assert console.interrupted == ()
-        view = until(console, lambda view: view.check is not None)
+        view = wait_until(console, lambda view: view.check is not None)
         assert view.past is not None
         assert view.past.trace[-1].text == "hello"
 
@@ -173,19 +173,19 @@ def test_an_unsure_step_is_a_persons_to_decide(tmp_path: Path) -> None:
 def test_a_new_mission_removes_the_notice_of_another_one(tmp_path: Path) -> None:
     folder = failed_mission(tmp_path, TYPED, WORLD, "")
     cut(folder, line_of(folder, "say", "result"), MissionState.RUNNING)
-    with desk_of(tmp_path, Author()) as console:
+    with make_console(tmp_path, Author()) as console:
         assert console.interrupted
         console.begin(MissionOrder(program=GO_BACK))
         assert console.interrupted == ()
 
 
 class Immovable(Simulated):
-    """A simulated robot that nobody can put where the log says it was."""
+    """A simulated robot that cannot be put where the log says it was."""
 
-    resume = property()  # without a getter, as if it were not there
+    resume = property()  # Without a getter, it counts as missing.
 
 
-def test_the_robot_and_the_log_are_witnesses(tmp_path: Path) -> None:
+def test_evidence_comes_from_the_robot_and_the_log(tmp_path: Path) -> None:
     robot: Robot = Immovable(WORLD, speed=None)
     trace = (
         Event("goto", "kitchen", place="hall", destination="kitchen"),
@@ -203,34 +203,34 @@ def test_the_robot_and_the_log_are_witnesses(tmp_path: Path) -> None:
     assert "hall" not in str(ask_evidence(Simulated(WORLD), tmp_path, past, noted.append))
 
 
-# --- by itself
+# --- recovery without a person
 
 
 @pytest.mark.slow
 def test_a_failed_skill_is_recovered_within_the_approval(tmp_path: Path) -> None:
-    with desk_of(tmp_path, Author(FETCH, GO_BACK), recoveries=1) as console:
+    with make_console(tmp_path, Author(FETCH, GO_BACK), recoveries=1) as console:
         before = fetch(console)
-        view = until(console, lambda view: view.number == 2 and view.is_over)
+        view = wait_until(console, lambda view: view.number == 2 and view.is_over)
         assert view.state is MissionState.DONE
         assert MissionSummary.read(tmp_path / "missions" / view.id).continues == before.id
 
 
 def test_a_rest_beyond_the_approval_waits_for_a_person(tmp_path: Path) -> None:
-    with desk_of(tmp_path, Author(FETCH, ELSEWHERE), recoveries=1) as console:
+    with make_console(tmp_path, Author(FETCH, ELSEWHERE), recoveries=1) as console:
         fetch(console)
-        until(console, lambda view: view.number == 2 and view.may_be_approved)
+        wait_until(console, lambda view: view.number == 2 and view.may_be_approved)
         time.sleep(0.05)
         assert console.view.state is MissionState.CHECKED
 
 
 def test_a_mission_that_was_put_aside_is_still_offered(tmp_path: Path) -> None:
-    with desk_of(tmp_path, Author(FETCH, GO_BACK)) as console:
+    with make_console(tmp_path, Author(FETCH, GO_BACK)) as console:
         before = fetch(console)
         console.edit(GO_BACK)
-        view = until(console, lambda now: now.number == 2 and now.may_be_approved)
+        view = wait_until(console, lambda now: now.number == 2 and now.may_be_approved)
         assert (view.past, console.unfinished) == (None, before.id)
         console.begin(console.rest_of(console.past_of(console.unfinished)))
-        until(console, lambda now: now.number == 3 and now.may_be_approved)
+        wait_until(console, lambda now: now.number == 3 and now.may_be_approved)
         assert console.unfinished == ""
 
 
@@ -248,11 +248,11 @@ def test_after_an_own_skill_without_an_event_a_person_decides() -> None:
     assert not is_recoverable(view, [{"event": "result", "skill": "dispense"}, failed], table)
 
 
-def test_recoveries_are_counted(tmp_path: Path) -> None:
+def test_recoveries_are_limited(tmp_path: Path) -> None:
     author = Author(SEEK, "def task_program():\n    go_to('study')\n    pick('mug')\n", GO_BACK)
-    with desk_of(tmp_path, author, recoveries=1) as console:
+    with make_console(tmp_path, author, recoveries=1) as console:
         fetch(console)
-        until(console, lambda view: view.number == 2 and view.is_over)
+        wait_until(console, lambda view: view.number == 2 and view.is_over)
         assert console.view.state is MissionState.FAILED
         time.sleep(0.05)
         assert (console.view.number, len(author.programs)) == (2, 1)
@@ -260,7 +260,7 @@ def test_recoveries_are_counted(tmp_path: Path) -> None:
 
 def test_a_stop_before_the_recovery_ends_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read = recovery.past_to_recover
-    with desk_of(tmp_path, Author(FETCH, GO_BACK), recoveries=1) as console:
+    with make_console(tmp_path, Author(FETCH, GO_BACK), recoveries=1) as console:
 
         def stop_first(session: MissionSession, robot: Robot, home: Path) -> MissionPast | None:
             past = read(session, robot, home)
@@ -271,7 +271,7 @@ def test_a_stop_before_the_recovery_ends_it(tmp_path: Path, monkeypatch: pytest.
         stopped: list[MissionPast | None] = []
         monkeypatch.setattr(console_module, "past_to_recover", stop_first)
         fetch(console)
-        until(console, lambda _: bool(stopped))
+        wait_until(console, lambda _: bool(stopped))
         time.sleep(0.05)
         assert stopped[0] is not None
         assert (console.view.number, console.view.is_over) == (1, True)
@@ -279,30 +279,30 @@ def test_a_stop_before_the_recovery_ends_it(tmp_path: Path, monkeypatch: pytest.
 
 def test_a_stop_while_the_rest_is_written_leaves_nothing_to_run(tmp_path: Path) -> None:
     author = Author(FETCH, GO_BACK)
-    with desk_of(tmp_path, author, recoveries=1) as console:
+    with make_console(tmp_path, author, recoveries=1) as console:
         author.before_last = lambda: console.stop("a test")
         fetch(console)
-        view = until(console, lambda view: view.number == 2 and view.is_over)
+        view = wait_until(console, lambda view: view.number == 2 and view.is_over)
         assert (view.state, view.progress.has_begun) == (MissionState.STOPPED, False)
 
 
 def test_after_a_stop_by_key_a_person_must_approve(tmp_path: Path) -> None:
     author = Author(FETCH, GO_BACK)
-    with desk_of(tmp_path, author, recoveries=1) as console:
+    with make_console(tmp_path, author, recoveries=1) as console:
         author.before_last = lambda: console.stop("a test", only_moving=True)
         fetch(console)
-        until(console, lambda view: view.number == 2 and view.may_be_approved)
+        wait_until(console, lambda view: view.number == 2 and view.may_be_approved)
         time.sleep(0.05)
         assert console.view.state is MissionState.CHECKED
 
 
 def test_a_stop_is_never_recovered(tmp_path: Path) -> None:
     far = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('hall')\n"
-    with desk_of(tmp_path, Author(far, GO_BACK), 3, speed=1.0) as console:
+    with make_console(tmp_path, Author(far, GO_BACK), 3, speed=1.0) as console:
         session = console.begin(MissionOrder("Walk.", "author"))
-        view = until(console, lambda view: view.may_be_approved)
+        view = wait_until(console, lambda view: view.may_be_approved)
         session.approve(view.digest)
-        until(console, lambda view: view.is_running and view.progress.is_driving)
+        wait_until(console, lambda view: view.is_running and view.progress.is_driving)
         console.stop("a test")
         session.join()
         assert console.view.state is MissionState.STOPPED
@@ -312,9 +312,9 @@ def test_a_stop_is_never_recovered(tmp_path: Path) -> None:
 
 def test_a_crash_of_the_program_is_never_recovered(tmp_path: Path) -> None:
     crashes = "def task_program():\n    go_to('kitchen')\n    raise ValueError('odd')\n"
-    with desk_of(tmp_path, Author(crashes, GO_BACK), recoveries=3) as console:
+    with make_console(tmp_path, Author(crashes, GO_BACK), recoveries=3) as console:
         session = console.begin(MissionOrder("Walk.", "author"))
-        view = until(console, lambda view: view.may_be_approved)
+        view = wait_until(console, lambda view: view.may_be_approved)
         session.approve(view.digest, despite_problems=True)
         assert session.wait_until(lambda _: False).state is MissionState.FAILED
         time.sleep(0.05)
@@ -329,7 +329,7 @@ def test_a_key_pressed_while_the_recovery_is_approved_stops_the_robot(
         "def task_program():\n    go_to('kitchen')\n    pick('mug')\n    go_to('hall')\n    go_to('study')\n"
     )
     back = "def task_program():\n    go_to('hall')\n    go_to('study')\n"
-    with desk_of(tmp_path, Author(far, back), 1, speed=50.0) as console:
+    with make_console(tmp_path, Author(far, back), 1, speed=50.0) as console:
 
         def watch(session: MissionSession, seen: str, *, by: str = "", is_person: bool = True) -> None:
             if by:
@@ -338,5 +338,5 @@ def test_a_key_pressed_while_the_recovery_is_approved_stops_the_robot(
 
         monkeypatch.setattr(MissionSession, "approve", watch)
         fetch(console)
-        view = until(console, lambda view: view.number == 2 and view.is_over)
+        view = wait_until(console, lambda view: view.number == 2 and view.is_over)
         assert view.state is MissionState.STOPPED

@@ -1,4 +1,4 @@
-"""What pages draw: how far a mission has come, the rooms, and what a robot would do."""
+"""Pages draw a mission's progress, its rooms, and the storyboards of a program."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def after(*lines: dict[str, Any]) -> Progress:
     return progress
 
 
-def test_progress_tells_what_goes_on_and_where() -> None:
+def test_progress_shows_the_current_skill_and_place() -> None:
     driving = after(call("go_to", location="study"), line("feedback", text="at (1.5, -2.0)"))
     assert (driving.doing, driving.room, driving.at) == ('drives to "study"', "study", (1.5, -2.0))
     assert driving.is_driving
@@ -60,7 +60,7 @@ def test_progress_tells_what_goes_on_and_where() -> None:
     assert (there.doing, there.skill, there.is_driving, there.room) == ("", "", False, "study")
 
 
-def test_what_is_spoken_is_told_apart() -> None:
+def test_moments_distinguish_questions_answers_and_statements() -> None:
     asked = after(
         call("ask", person="ann", question="tea?", options=["yes", "no"]),
         line("result", number=1, skill="ask", result="yes"),
@@ -73,8 +73,8 @@ def test_what_is_spoken_is_told_apart() -> None:
     )
 
 
-def test_where_the_robot_was_what_it_met_and_what_it_holds() -> None:
-    """In the words of the program, since only the robot knows what these mean."""
+def test_progress_lists_visited_rooms_finds_and_the_held_thing() -> None:
+    """Rooms keep the words of the program, since only the robot knows their meaning."""
     on_the_way = after(call("go_to", location="kitchen"), line("feedback", text="at (1.0, 2.0)"))
     assert (on_the_way.visited, on_the_way.trail) == ((), ((1.0, 2.0),))
     events = [
@@ -97,39 +97,39 @@ def test_where_the_robot_was_what_it_met_and_what_it_holds() -> None:
     assert after(call("go_to", location="attic"), failed).visited == ()
 
 
-def test_a_robot_that_was_stopped_on_its_way_is_where_its_dot_is() -> None:
+def test_a_robot_stopped_on_its_way_is_in_the_room_of_its_position() -> None:
     world = read_world(OFFICE)
 
-    def shown(*lines: dict[str, Any]) -> MapState:
+    def show(*lines: dict[str, Any]) -> MapState:
         rooms = RoomMap.of(world)
         return map_state(SessionView(room_map=rooms, progress=after(*lines)), world)
 
     first = [call("go_to", location="printer room 2"), line("feedback", text="at (7.0, 3.0)"), done("go_to")]
     second = [call("go_to", location="printer room 3"), line("feedback", text="at (8.5, 3.0)")]
     cancelled = line("cancelled", number=2, skill="go_to")
-    assert shown(*first).room == "printer room 2"
-    assert shown(*first, *second).is_driving
-    assert shown(*first, *second).room == "printer room 3"
-    stopped = shown(*first, *second, cancelled)
+    assert show(*first).room == "printer room 2"
+    assert show(*first, *second).is_driving
+    assert show(*first, *second).room == "printer room 3"
+    stopped = show(*first, *second, cancelled)
     assert (stopped.at, stopped.room, stopped.is_driving) == ((8.5, 3.0), "printer room 2", False)
-    between = shown(*first, *second, line("feedback", text="at (9.5, 3.0)"), cancelled)
+    between = show(*first, *second, line("feedback", text="at (9.5, 3.0)"), cancelled)
     assert (between.room, between.sentence) == ("", "The robot is between rooms.")
-    lost = shown(call("go_to", location="printer room 2"), cancelled)
+    lost = show(call("go_to", location="printer room 2"), cancelled)
     assert (lost.at, lost.room) == (None, "")
     failed = line("error", number=2, skill="go_to", kind="E", message="m")
-    assert shown(*first, call("go_to", location="supply room"), failed).room == "printer room 2"
+    assert show(*first, call("go_to", location="supply room"), failed).room == "printer room 2"
     seen = [call("is_in_room", entity="mug"), done("is_in_room", result=True)]
     finds = after(*first, call("go_to", location="supply room"), failed, *seen).finds
     assert finds == (Find("printer room 2", "mug"),)
 
 
-def test_a_program_that_sleeps_is_said_to_wait() -> None:
+def test_progress_shows_that_a_sleeping_program_waits() -> None:
     sleep = line("sleep", seconds=30.0, line=3)
     now = Progress().after(sleep)
     assert (now.doing, now.line) == ("waits for 30 s", 3)
 
 
-def test_the_clock_stands_when_the_robot_has_stopped() -> None:
+def test_the_clock_stops_with_the_robot() -> None:
     stop, running = line("stop", 19.8, by="x"), line("state", 0.0, state="running")
     assert after(running, stop, line("state", 20.7, state="stopped")).clock == 19.8
     assert after(running, line("sleep", 1.0, seconds=9.0), line("state", 10.0, state="done")).clock == 10.0
@@ -157,7 +157,7 @@ def test_a_stop_is_one_event() -> None:
         assert words == ["mission created", 'drives to "supply room"', "stopped from the page"]
 
 
-def test_the_line_is_the_one_that_the_program_says() -> None:
+def test_progress_keeps_the_line_of_a_call() -> None:
     spoken = call("say", message="a")
     assert after(spoken).line is None
     assert after({**spoken, "line": 3}).line == 3
@@ -203,7 +203,7 @@ def test_a_floorplan_of_a_huge_building_stays_small() -> None:
 
 
 def test_nothing_is_drawn_over_the_name_of_a_room() -> None:
-    """The name stands at the side that is farther from where the robot stands, and above all else."""
+    """The name is on the side farther from the robot, and is drawn after all else."""
     for stands, side in (((1.0, 3.5), max), ((1.0, 0.5), min)):
         room = Room("start_loc", footprint=((0, 0), (4, 0), (4, 4), (0, 4)), stand_at=stands)
         drawn = floorplan(World((room,), "start_loc"), MapState(stands, "start_loc", trail=((0, 0), stands)))
@@ -213,11 +213,11 @@ def test_nothing_is_drawn_over_the_name_of_a_room() -> None:
         assert abs(float(name) - float(robot)) > 0.62 + 0.34
         assert drawn.index("<text") > max(drawn.index("polyline"), drawn.index('class="body"'))
     state = MapState(room="start_loc", finds={"start_loc": ["ann"]}, held="mug")
-    told = "The robot is in start_loc and is holding mug. Found in start_loc: ann."
-    assert told in floorplan(World((Room("start_loc"),), "start_loc"), state)
+    sentence = "The robot is in start_loc and is holding mug. Found in start_loc: ann."
+    assert sentence in floorplan(World((Room("start_loc"),), "start_loc"), state)
 
 
-def test_what_was_found_in_a_large_room_is_clear_of_the_robot() -> None:
+def test_finds_in_a_large_room_do_not_cover_the_robot() -> None:
     world = read_world(OFFICE)
     at, room = (7.0, 3.0), "printer room 2"
     drawn = floorplan(world, MapState(at, room, trail=(at, at), finds={room: ["stapler"]}, held="paper"))
@@ -257,14 +257,14 @@ def test_strips_show_each_kind_of_world_once() -> None:
         (("kitchen", "attic"), None),
     ],
 )
-def test_rooms_are_ticked_off_as_they_are_reached(visited: tuple[str, ...], reached: int | None) -> None:
+def test_scenes_are_reached_in_order(visited: tuple[str, ...], reached: int | None) -> None:
     rooms = ("start_loc", "kitchen", "hall", _LEFT_OUT, "study")
     strip = Strip("", tuple(map(Scene, rooms)), "Done.", ends_well=True)
     assert scenes_reached(strip, visited, ()) == reached
     assert scenes_reached(Strip("", (Scene("hall"),), "Done.", ends_well=True), ("kitchen",), ()) is None
 
 
-def test_a_strip_in_which_something_else_is_found_is_no_longer_possible() -> None:
+def test_a_find_rules_out_strips_without_it() -> None:
     program = "def task_program():\n    go_to('kitchen')\n    say('yes' if is_in_room('mug') else 'no')\n"
     shown = strips(check(program, rooms=["hall", "kitchen"]))
     assert len(shown) == 2
@@ -276,7 +276,7 @@ def test_a_strip_in_which_something_else_is_found_is_no_longer_possible() -> Non
     assert said == {True: ["yes"], False: ["no"]}
 
 
-def test_a_strip_in_which_something_else_is_answered_is_no_longer_possible() -> None:
+def test_an_answer_rules_out_strips_with_another() -> None:
     program = "def task_program():\n    go_to('kitchen')\n    ask('ann', 'Tea?', ['Yes', 'No'])\n"
     shown = strips(check(program, rooms=["hall", "kitchen"], samples=20))
     answers = [one.scenes[-1].deeds[-1].text for one in shown]
@@ -314,7 +314,7 @@ def test_a_typed_program_is_named_by_its_first_steps(program: str, named: str) -
     )
 
 
-def test_strips_say_what_their_worlds_are_like() -> None:
+def test_strips_describe_their_worlds() -> None:
     program = """def task_program():
     go_to("kitchen")
     if is_in_room("mug"):
@@ -336,7 +336,7 @@ def test_a_drive_to_nowhere_and_a_long_run_are_shown() -> None:
     assert len(strips(check(many, rooms=["hall"]))) <= MAX_STRIPS
 
 
-def test_what_fails_is_shown_first_also_in_the_last_of_many_worlds() -> None:
+def test_failing_strip_is_shown_first_even_from_the_last_of_many_worlds() -> None:
     looks = "".join(f"    if is_in_room('thing {n}'):\n        say('{n}')\n" for n in range(4))
     program = f"def task_program():\n{looks}    if is_in_room('key'):\n        go_to('cellar')\n"
     found = check(program, rooms=["hall"], samples=20)

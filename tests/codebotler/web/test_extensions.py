@@ -1,4 +1,4 @@
-"""Packages add pages by an entry point; one that is broken keeps nobody from the robot."""
+"""Packages add pages by an entry point; a broken package does not keep people from the robot."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ def test_a_package_adds_pages_and_a_broken_one_is_left_out(
         assert server.call("GET", "/api/hello").data == "hello"
         assert server.ask("GET", "/hello").status == server.ask("GET", "/api/hello").status == 401
         assert "Hello" in server.call("GET", "/").text
-    assert re.search('"broken_pages" .*: No module named', server.said)
-    assert '"wrong_pages"' in server.said
+    assert re.search('"broken_pages" .*: No module named', server.output)
+    assert '"wrong_pages"' in server.output
 
 
 @pytest.mark.slow
 def test_codebotler_needs_no_benchmark() -> None:
-    """The pages of the benchmark come by the entry point alone."""
+    """The pages of the benchmark come only through the entry point."""
     code = "import codebotler.web.server, sys; print(any(m.startswith('roboeval') for m in sys.modules))"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout == "False\n"

@@ -1,4 +1,4 @@
-"""The face over HTTP: it shows what the robot says and asks, takes an answer, and may do nothing else."""
+"""The face over HTTP shows what the robot says and asks, takes answers, and may do nothing else."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
 
 
 @pytest.fixture(autouse=True)
-def at_rest(server: PageServer) -> None:
+def stop_robot(server: PageServer) -> None:
     server.call("POST", "/api/stop")
-    until(server, lambda now: now["is_over"])
+    wait_until(server, lambda now: now["is_over"])
 
 
-def until(server: PageServer, holds: Callable[[dict[str, Any]], object], seconds: float = 60.0) -> Any:  # noqa: ANN401 - JSON
-    """What the face shows as soon as something holds of it."""
+def wait_until(server: PageServer, holds: Callable[[dict[str, Any]], object], seconds: float = 60.0) -> Any:  # noqa: ANN401 - JSON
+    """Wait until something holds of what the face shows."""
     ends = time.monotonic() + seconds
     while not holds(now := server.call("GET", "/api/face").data):
         assert time.monotonic() < ends, now
@@ -62,37 +62,37 @@ def until(server: PageServer, holds: Callable[[dict[str, Any]], object], seconds
     return now
 
 
-def opened(server: PageServer, path: str = LIVE, **headers: str) -> ClientConnection:
+def open_socket(server: PageServer, path: str = LIVE, **headers: str) -> ClientConnection:
     return connect(
         f"ws://127.0.0.1:{server.port}{path}", additional_headers=headers, proxy=None, open_timeout=30
     )
 
 
-def watching(server: PageServer) -> ClientConnection:
-    """The websocket of a face, as its page opens it."""
+def open_face(server: PageServer) -> ClientConnection:
+    """Open the websocket of a face like its page."""
     cookie = server.ask("GET", f"/face?token={server.face_token}").headers["set-cookie"].partition(";")[0]
-    return opened(server, cookie=cookie, origin=f"http://127.0.0.1:{server.port}")
+    return open_socket(server, cookie=cookie, origin=f"http://127.0.0.1:{server.port}")
 
 
-def heard(socket: ClientConnection, holds: Callable[[dict[str, Any]], object]) -> Any:  # noqa: ANN401 - JSON
-    """The first message of which something holds."""
+def receive(socket: ClientConnection, holds: Callable[[dict[str, Any]], object]) -> Any:  # noqa: ANN401 - JSON
+    """Receive messages until something holds of one, and return it."""
     while True:
         now = json.loads(socket.recv(timeout=60))
         if holds(now):
             return now
 
 
-def ending(socket: ClientConnection, number: int) -> Any:  # noqa: ANN401 - JSON
-    """How a question ended, as soon as that is told."""
-    return heard(socket, lambda now: (now["ended"] or {}).get("number") == number)["ended"]
+def receive_end(socket: ClientConnection, number: int) -> Any:  # noqa: ANN401 - JSON
+    """Receive the end of a question."""
+    return receive(socket, lambda now: (now["ended"] or {}).get("number") == number)["ended"]
 
 
 @pytest.mark.slow
 def test_a_question_is_answered_from_the_face(server: PageServer) -> None:
-    with watching(server) as one, watching(server) as other:
-        heard(one, lambda now: now["screens"] == 2)
+    with open_face(server) as one, open_face(server) as other:
+        receive(one, lambda now: now["screens"] == 2)
         server.run(TEA)
-        asked, same = (heard(socket, lambda now: now["question"]) for socket in (one, other))
+        asked, same = (receive(socket, lambda now: now["question"]) for socket in (one, other))
         assert asked["question"] == same["question"]
         assert (asked["doing"], asked["question"]["person"]) == ("asking", "ann")
         assert (asked["question"]["text"], asked["question"]["options"]) == ("Tea?", ["Yes", "No"])
@@ -101,36 +101,36 @@ def test_a_question_is_answered_from_the_face(server: PageServer) -> None:
         taken = server.face("POST", "/api/face/answer", answer)
         assert (taken.status, taken.data["question"]) == (200, None)
         for socket in (one, other):
-            ended = heard(socket, lambda now: (now["ended"] or {}).get("number") == answer["question"])[
+            ended = receive(socket, lambda now: (now["ended"] or {}).get("number") == answer["question"])[
                 "ended"
             ]
             assert (ended["how"], ended["answer"]) == ("answered", "No")
         again = server.face("POST", "/api/face/answer", answer)
         assert (again.status, 'already answered: "No"' in again.data["detail"]) == (409, True)
-        over = heard(one, lambda now: now["is_over"])
+        over = receive(one, lambda now: now["is_over"])
         assert [said["text"] for said in over["said"]] == ["Good morning", "She says No"]
-    assert until(server, lambda now: now["screens"] == 0)
+    assert wait_until(server, lambda now: now["screens"] == 0)
 
 
 @pytest.mark.slow
-def test_a_stop_takes_the_question_back_on_every_face(server: PageServer) -> None:
-    with watching(server) as one, watching(server) as other:
+def test_a_stop_withdraws_the_question_on_every_face(server: PageServer) -> None:
+    with open_face(server) as one, open_face(server) as other:
         server.run(TEA)
-        number = until(server, lambda now: now["question"])["question"]["number"]
+        number = wait_until(server, lambda now: now["question"])["question"]["number"]
         server.call("POST", "/api/stop")
         over = server.face("GET", "/api/face?once=over").data
         assert (over["is_over"], over["state"]) == (True, "stopped")
         for socket in (one, other):
-            assert ending(socket, number)["how"] == "withdrawn"
+            assert receive_end(socket, number)["how"] == "withdrawn"
         late = server.face("POST", "/api/face/answer", {"question": number, "option": 0})
         assert (late.status, "withdrawn" in late.data["detail"]) == (409, True)
 
 
 @pytest.mark.slow
-def test_nobody_answers_in_time(tmp_path: Path) -> None:
+def test_a_question_without_an_answer_in_time_fails_the_mission(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--face", "--speed", "0", "--face-timeout", "1") as server:
         server.run(TEA)
-        assert until(server, lambda now: now["is_over"])["ended"]["how"] == "unanswered"
+        assert wait_until(server, lambda now: now["is_over"])["ended"]["how"] == "unanswered"
         (mission,) = read_missions(server.home)
         assert mission.state == "failed"
         assert re.match(r'AskTimeout: .*"Tea\?" .*1 s', mission.reason)
@@ -139,18 +139,18 @@ def test_nobody_answers_in_time(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_face_tells_what_the_robot_does_and_nothing_of_its_program(server: PageServer) -> None:
+def test_the_face_shows_what_the_robot_does_and_nothing_of_its_program(server: PageServer) -> None:
     assert server.face("GET", "/api/face").data["doing"] == "idle"
     server.run(SECRET, despite_problems=True)
-    moving = until(server, lambda now: now["doing"] == "moving")
+    moving = wait_until(server, lambda now: now["doing"] == "moving")
     assert moving["to"] == "kitchen"
-    over = until(server, lambda now: now["is_over"])
+    over = wait_until(server, lambda now: now["is_over"])
     assert (over["state"], over["reason"]) == ("failed", "")
     assert "secret" not in server.face("GET", "/api/face").text
 
 
-def test_a_robot_that_does_not_confirm_its_stop_is_told_of_on_the_face(tmp_path: Path) -> None:
-    """It concerns whoever stands beside it."""
+def test_the_face_shows_that_a_robot_does_not_confirm_its_stop(tmp_path: Path) -> None:
+    """People next to the robot must know."""
     face = Face()
     console = Console(
         Simulated(World((Room("a"),), "a")), tmp_path, lambda _: pytest.fail("no model"), face=face
@@ -163,9 +163,9 @@ def test_a_robot_that_does_not_confirm_its_stop_is_told_of_on_the_face(tmp_path:
 
 def test_a_face_stops_a_robot_that_runs_and_nothing_else(server: PageServer) -> None:
     server.run(FAR)
-    until(server, lambda now: now["doing"] == "moving")
+    wait_until(server, lambda now: now["doing"] == "moving")
     assert server.face("POST", "/api/face/stop?only_moving=false").data == {"stopping": True}
-    assert until(server, lambda now: now["is_over"])["state"] == "stopped"
+    assert wait_until(server, lambda now: now["is_over"])["state"] == "stopped"
     assert "at the face" in read_missions(server.home)[-1].reason
     server.call("POST", "/api/missions", {"program": FAR})
     while server.call("GET", "/api/robot").data["state"] != "checked":
@@ -177,36 +177,36 @@ def test_a_face_stops_a_robot_that_runs_and_nothing_else(server: PageServer) -> 
 @pytest.mark.parametrize(
     "answer", [{}, {"question": 1}, {"question": 1, "option": -1}, {"question": 1, "option": "x"}]
 )
-def test_an_answer_that_is_none_is_refused(server: PageServer, answer: object) -> None:
+def test_an_invalid_answer_is_refused(server: PageServer, answer: object) -> None:
     assert server.face("POST", "/api/face/answer", answer).status == 422
 
 
 @pytest.mark.slow
-def test_a_face_that_reads_nothing_holds_nothing_up(tmp_path: Path) -> None:
+def test_a_face_that_reads_nothing_delays_nothing(tmp_path: Path) -> None:
     """Its messages would fill all buffers many times over."""
     talks = "def task_program():\n    for n in range(400):\n        say(str(n) + chr(8987) * 5000)\n"
-    with PageServer(tmp_path, "--face", "--speed", "0") as server, watching(server) as slow:
-        heard(slow, lambda now: now["screens"] == 1)
-        with watching(server) as quick:
+    with PageServer(tmp_path, "--face", "--speed", "0") as server, open_face(server) as slow:
+        receive(slow, lambda now: now["screens"] == 1)
+        with open_face(server) as quick:
             server.run(talks, despite_problems=True)
-            over = heard(quick, lambda now: now["state"] == "done")
+            over = receive(quick, lambda now: now["state"] == "done")
             assert over["said"][-1]["text"].startswith("399")
 
 
-def test_what_a_face_sends_has_a_limit(server: PageServer) -> None:
-    with watching(server) as socket:
+def test_messages_of_a_face_have_a_size_limit(server: PageServer) -> None:
+    with open_face(server) as socket:
         socket.send("x" * (MAX_BODY_BYTES + 1))
         with pytest.raises(ConnectionClosedError) as closed:
-            heard(socket, lambda _: False)
+            receive(socket, lambda _: False)
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 1009
         assert server.call("GET", "/api/face").status == 200
 
 
-# --- what a face may
+# --- permissions of a face
 
 
-def test_a_face_may_do_nothing_but_be_one(server: PageServer) -> None:
+def test_a_face_may_use_only_its_own_addresses(server: PageServer) -> None:
     described = server.call("GET", "/api/openapi.json").data["paths"]
     theirs = {"/api/face", "/api/face/answer", "/api/face/stop"}
     assert theirs < described.keys()
@@ -221,14 +221,14 @@ def test_a_face_may_do_nothing_but_be_one(server: PageServer) -> None:
 
 
 def test_a_face_reaches_no_page_of_an_operator_over_the_websocket(server: PageServer) -> None:
-    """NiceGUI takes messages for any page whose number they bear, whoever sends them."""
+    """NiceGUI takes messages for any page by its number, from any sender."""
     link = server.ask("GET", f"/face?token={server.face_token}")
     here = f"http://127.0.0.1:{server.port}"
     with pytest.raises(InvalidStatus) as refused:
-        opened(server, NICEGUI, cookie=link.headers["set-cookie"].partition(";")[0], origin=here)
+        open_socket(server, NICEGUI, cookie=link.headers["set-cookie"].partition(";")[0], origin=here)
     assert refused.value.response.status_code == 403
-    with opened(server, NICEGUI, cookie=server.cookie, origin=here):
-        pass  # an operator's page gets there
+    with open_socket(server, NICEGUI, cookie=server.cookie, origin=here):
+        pass  # An operator's page may open it.
     polling = NICEGUI.replace("websocket", "polling")
     assert server.face("GET", polling).status == 403
 
@@ -238,7 +238,7 @@ def test_no_other_page_listens_to_the_face(server: PageServer, origin: str) -> N
     cookie = server.ask("GET", f"/face?token={server.face_token}").headers["set-cookie"].partition(";")[0]
     for headers in ({"cookie": cookie, "origin": origin}, {"cookie": cookie}, {"origin": origin}):
         with pytest.raises(InvalidStatus):
-            opened(server, **headers)
+            open_socket(server, **headers)
     asked = server.ask("POST", "/api/face/answer", {"question": 1, "option": 0}, cookie=cookie, origin=origin)
     assert asked.status == 403
 
@@ -246,7 +246,7 @@ def test_no_other_page_listens_to_the_face(server: PageServer, origin: str) -> N
 def test_nobody_sees_the_face_without_its_token(server: PageServer) -> None:
     for method, path in (("GET", "/face"), ("GET", "/api/face"), ("POST", "/api/face/answer")):
         assert server.ask(method, path, {}).status == 401
-    with suppress(InvalidStatus), opened(server, origin=f"http://127.0.0.1:{server.port}"):
+    with suppress(InvalidStatus), open_socket(server, origin=f"http://127.0.0.1:{server.port}"):
         pytest.fail("it was let in")
 
 
@@ -256,7 +256,7 @@ def test_the_page_of_the_face_has_a_stricter_policy(server: PageServer) -> None:
     answer = connection.getresponse()
     policies = answer.headers.get_all("content-security-policy") or []
     connection.close()
-    assert len(policies) == 2, "that of all pages, and its own"
+    assert len(policies) == 2, "the policy of all pages, and its own"
     (own,) = [policy for policy in policies if "require-trusted-types-for 'script'" in policy]
     assert "unsafe" not in own
     assert "script-src 'self';" in own
@@ -265,7 +265,7 @@ def test_the_page_of_the_face_has_a_stricter_policy(server: PageServer) -> None:
 @pytest.mark.slow
 def test_there_is_no_face_unless_one_is_asked_for(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--speed", "0") as server:
-        assert "face" not in server.said
+        assert "face" not in server.output
         assert server.call("GET", "/face").status == 404
         assert server.call("GET", "/api/face").status == 404
         server.run("def task_program():\n    say('hello')\n")
@@ -293,7 +293,7 @@ def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], name
     assert named in err
 
 
-def test_tokens_can_be_named_so_that_a_tablets_link_stays(tmp_path: Path) -> None:
+def test_the_token_of_the_face_can_be_chosen(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--face", "--face-token", "the tablet's token") as server:
         assert server.face_token == "the+tablet%27s+token"
         found = server.ask("GET", "/api/face", authorization="Bearer the tablet's token")

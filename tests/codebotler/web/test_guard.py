@@ -1,4 +1,4 @@
-"""What keeps others from the robot: each line of it is tried from outside, on the port."""
+"""Each rule that keeps others from the robot is tried from outside, on the port."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
         yield server
 
 
-def socket(server: PageServer, **headers: str) -> int:
-    """The status with which a websocket is opened, as a browser opens one; 101 if it is."""
+def open_socket(server: PageServer, **headers: str) -> int:
+    """Open a websocket like a browser, and return the status: 101 if it opens."""
     given = {name.replace("_", "-"): value for name, value in headers.items()}
     try:
         with connect(
@@ -66,7 +66,7 @@ def test_nothing_is_answered_without_the_token(server: PageServer) -> None:
         assert server.ask("GET", path).status == 401, path
     for method, path in (("POST", "/api/missions"), ("POST", "/api/stop"), ("POST", "/api/check")):
         assert server.ask(method, path, {}).status == 401, path
-    assert socket(server, origin=origin(server)) == 403
+    assert open_socket(server, origin=origin(server)) == 403
 
 
 def test_clients_that_send_no_whole_request_give_way_to_new_ones(server: PageServer) -> None:
@@ -91,7 +91,7 @@ def test_the_link_opens_the_page_and_leaves_no_token_in_it(server: PageServer) -
     assert {"httponly", "samesite=strict", f"path={path}"} <= parts
     assert len(path) > 32, "a server on another port must not guess which path has the cookie"
     assert server.ask("GET", f"{path}/", cookie=cookie.partition(";")[0]).status == 200
-    assert socket(server, cookie=cookie.partition(";")[0], origin=origin(server)) == 101
+    assert open_socket(server, cookie=cookie.partition(";")[0], origin=origin(server)) == 101
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,7 @@ def test_the_link_opens_the_page_and_leaves_no_token_in_it(server: PageServer) -
         ("/%C2%85", 400),
     ],
 )
-def test_the_link_leads_to_pages_of_ours_only(server: PageServer, path: str, status: int) -> None:
+def test_the_link_leads_only_to_pages_of_ours(server: PageServer, path: str, status: int) -> None:
     answer = server.ask("GET", f"{path}?token={server.token}")
     assert (answer.status, "location" in answer.headers) == (status, False)
 
@@ -133,7 +133,7 @@ def test_the_link_of_a_page_opens_it(server: PageServer, path: str, leads: str) 
     ("path", "status"),
     [("/a%00b", 400), ("/static/a%00b", 400), ("/%0d%0aX", 400), ("/api/missions/a%00b", 404)],
 )
-def test_only_names_have_control_characters(server: PageServer, path: str, status: int) -> None:
+def test_control_characters_are_allowed_only_in_names(server: PageServer, path: str, status: int) -> None:
     assert server.call("GET", path).status == status
 
 
@@ -159,20 +159,20 @@ def test_wrong_tokens_and_cookies_open_nothing(server: PageServer) -> None:
     name = server.cookie.partition("=")[0]
     assert server.ask("GET", "/", cookie=f"{name}=wrong").status == 401
     assert server.ask("GET", "/", cookie=f"{name}={server.token}").status == 401
-    beside = f"{server.cookie}; codebotler-{server.port}=x; {name.replace('operator', 'face')}=x"
-    assert server.ask("GET", "/", cookie=beside).status == 200
+    cookies = f"{server.cookie}; codebotler-{server.port}=x; {name.replace('operator', 'face')}=x"
+    assert server.ask("GET", "/", cookie=cookies).status == 200
     assert server.ask("GET", "/", cookie=f"{server.cookie}x").status == 401
     assert server.ask("GET", "/", cookie="{=;;=").status == 401
 
 
 def test_a_token_in_the_address_opens_pages_only(server: PageServer) -> None:
-    """Where programs ask, it would stand in logs."""
+    """The addresses of other requests end up in logs."""
     for path in ("/api/robot", "/_nicegui/x"):
         answer = server.ask("GET", f"{path}?token={server.token}")
         assert (answer.status, "set-cookie" in answer.headers) == (401, False)
 
 
-def test_wrong_tokens_are_not_tried_for_ever(tmp_path: Path) -> None:
+def test_tries_with_wrong_tokens_are_limited(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--token", "one-that-a-person-made") as server:
         cookie = server.cookie
         wrong = [server.ask("GET", f"/?token=wrong{n}").status for n in range(MAX_WRONG_TOKENS + 2)]
@@ -180,10 +180,10 @@ def test_wrong_tokens_are_not_tried_for_ever(tmp_path: Path) -> None:
         assert server.call("GET", "/api/robot").status == 429
         forwarded = server.ask("GET", f"/?token={server.token}", x_forwarded_for="10.9.8.7")
         assert (forwarded.status, forwarded.headers["retry-after"]) == (429, "60")
-        assert server.ask("GET", "/api/robot", cookie=cookie).status == 200  # who is in stays in
+        assert server.ask("GET", "/api/robot", cookie=cookie).status == 200  # A cookie still works.
 
 
-def test_nobody_keeps_the_token_that_was_made_from_a_stop(tmp_path: Path) -> None:
+def test_wrong_tokens_do_not_keep_a_generated_token_from_a_stop(tmp_path: Path) -> None:
     with PageServer(tmp_path) as server:
         wrong = [server.ask("GET", f"/?token=wrong{n}").status for n in range(MAX_WRONG_TOKENS + 1)]
         assert wrong[-1] == 429
@@ -202,7 +202,7 @@ def test_tries_are_counted_by_address_and_for_a_while() -> None:
     assert access.of_token("a token", "here") is Role.OPERATOR
 
 
-def test_a_token_that_was_made_here_opens_whatever_was_tried_before() -> None:
+def test_a_generated_token_works_after_any_wrong_tokens() -> None:
     access = Access.from_options(None, "the tablet's own", open_to_all=False, is_private=True)
     for _ in range(MAX_WRONG_TOKENS):
         access.of_token("wrong", "here")
@@ -212,7 +212,7 @@ def test_a_token_that_was_made_here_opens_whatever_was_tried_before() -> None:
             access.of_token(token, "here")
 
 
-def test_addresses_that_tried_are_not_kept_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_stored_addresses_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("codebotler.web.security.access.MAX_ADDRESSES", 3)
     access = Access("a token", "a face")
     for number in range(9):
@@ -227,7 +227,7 @@ def test_a_token_is_made_for_each_start() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "named"),
     [
         (["--no-token", "--host", "0.0.0.0"], "--no-token cannot be combined"),
         *(
@@ -249,27 +249,27 @@ def test_a_token_is_made_for_each_start() -> None:
         (["--host", "999.1.1.1"], "cannot listen"),
     ],
 )
-def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told: str) -> None:
+def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], named: str) -> None:
     (tmp_path / "world.yaml").write_text("robot: a\nrooms: [a]\n")
     words = ("serve", "--world", "world.yaml", *arguments)
     with Forked("codebotler", *words, cwd=tmp_path, environment=ENVIRONMENT, preload=PAGE) as process:
         _, err = process.communicate(timeout=30)
     assert process.returncode == 2
-    assert told in err
+    assert named in err
 
 
 @pytest.mark.slow
-def test_other_machines_need_the_token_and_that_is_said(tmp_path: Path) -> None:
+def test_other_machines_need_the_token_and_the_output_says_so(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--host", "0.0.0.0") as server:
         assert server.token
-        assert "Other machines" in server.said
+        assert "Other machines" in server.output
         for path in ("/", "/api/robot", "/static/page.css"):
             assert server.ask("GET", path).status == 401
             assert server.ask("GET", path, host=f"192.0.2.7:{server.port}").status == 401
             assert server.ask("GET", path, host="evil.example").status == 421
         assert server.call("GET", "/api/robot").status == 200
     with PageServer(tmp_path) as server:
-        assert "Other machines" not in server.said
+        assert "Other machines" not in server.output
 
 
 def test_without_a_token_this_machine_gets_in_but_no_other_page(tmp_path: Path) -> None:
@@ -279,15 +279,15 @@ def test_without_a_token_this_machine_gets_in_but_no_other_page(tmp_path: Path) 
         assert server.ask("POST", "/api/stop").status == 202
         assert server.ask("POST", "/api/stop", origin="http://evil.example").status == 403
         assert server.ask("GET", "/", host="evil.example").status == 421
-        assert socket(server, origin="http://evil.example") == 403
+        assert open_socket(server, origin="http://evil.example") == 403
 
 
 # --- other pages
 
 
 @pytest.mark.parametrize("host", ["evil.example", "localhost.evil.example", "10.0.0.1", "localhost.:80"])
-def test_only_our_own_names_are_answered_to(server: PageServer, host: str) -> None:
-    """A page whose name was made to lead here (DNS rebinding) still calls us by that name."""
+def test_only_requests_to_our_own_names_are_answered(server: PageServer, host: str) -> None:
+    """A page that leads its name here (DNS rebinding) still calls us by that name."""
     cookie = server.cookie
     assert server.ask("GET", "/api/robot", host=host, cookie=cookie).status == 421
     assert server.ask("GET", f"/?token={server.token}", host=host).status == 421
@@ -327,7 +327,7 @@ def test_only_our_own_names_are_answered_to(server: PageServer, host: str) -> No
     ],
 )
 def test_a_host_is_named_once_and_exactly(hosts: list[str], status: int) -> None:
-    assert passed("/api/robot", "an operator's", hosts) == status
+    assert status_for("/api/robot", "an operator's", hosts) == status
 
 
 def test_websockets_are_only_opened_under_our_own_names(server: PageServer) -> None:
@@ -354,14 +354,14 @@ def test_other_pages_change_nothing_and_hear_nothing(server: PageServer, other: 
     cookie, from_there = server.cookie, other.format(port=server.port)
     assert server.ask("POST", "/api/stop", cookie=cookie, origin=from_there).status == 403
     assert server.ask("GET", "/api/robot", cookie=cookie, origin=from_there).status == 403
-    assert socket(server, cookie=cookie, origin=from_there) == 403
+    assert open_socket(server, cookie=cookie, origin=from_there) == 403
     assert server.ask("POST", "/api/stop", cookie=cookie, origin=origin(server)).status == 202
 
 
-def test_a_browser_that_says_not_from_where_changes_nothing(server: PageServer) -> None:
+def test_a_browser_that_sends_no_origin_changes_nothing(server: PageServer) -> None:
     assert server.ask("POST", "/api/stop", cookie=server.cookie).status == 403
-    assert socket(server, cookie=server.cookie) == 403
-    assert server.call("POST", "/api/stop").status == 202  # a client that shows the token is no browser
+    assert open_socket(server, cookie=server.cookie) == 403
+    assert server.call("POST", "/api/stop").status == 202  # A client with the token is not a browser.
 
 
 @pytest.mark.parametrize("site", ["cross-site", "same-site"])
@@ -371,7 +371,7 @@ def test_other_pages_embed_nothing(server: PageServer, site: str) -> None:
     assert server.ask("GET", "/", cookie=cookie, sec_fetch_site=site, sec_fetch_mode="navigate").status == 200
 
 
-def test_nobody_is_invited(server: PageServer) -> None:
+def test_no_answer_allows_other_origins(server: PageServer) -> None:
     cookie, here = server.cookie, origin(server)
     for path in ("/", "/api/robot", "/_nicegui_ws/socket.io/?EIO=4&transport=polling"):
         for answer in (
@@ -425,7 +425,7 @@ def test_every_answer_has_the_headers(server: PageServer) -> None:
         assert "server" not in answer.headers
 
 
-def test_what_is_sent_has_a_limit(server: PageServer) -> None:
+def test_bodies_have_a_size_limit(server: PageServer) -> None:
     huge = b'{"program": "' + b"x" * MAX_BODY_BYTES + b'"}'
     assert server.call("POST", "/api/check", huge).status == 413
     lying = server.ask(
@@ -435,7 +435,7 @@ def test_what_is_sent_has_a_limit(server: PageServer) -> None:
     assert server.call("POST", "/api/check", {"program": "x" * 300_000}).status == 422
 
 
-def test_what_is_told_to_be_too_large_is_not_waited_for(server: PageServer) -> None:
+def test_a_body_with_too_large_a_length_is_refused_at_once(server: PageServer) -> None:
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=5)
     connection.putrequest("POST", "/api/check")
     connection.putheader("Authorization", f"Bearer {server.token}")
@@ -445,10 +445,10 @@ def test_what_is_told_to_be_too_large_is_not_waited_for(server: PageServer) -> N
     connection.close()
 
 
-def test_no_more_of_a_body_is_passed_on_than_is_taken() -> None:
+def test_no_more_of_a_body_is_passed_on_than_the_limit() -> None:
     passed: list[Message] = []
 
-    async def behind(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001 - as ASGI has it
+    async def behind(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001 - ASGI passes it
         while len(passed) < 9 and (not passed or passed[-1]["type"] == "http.request"):
             passed.append(await receive())
 
@@ -469,18 +469,18 @@ def test_no_more_of_a_body_is_passed_on_than_is_taken() -> None:
     assert [message["type"] for message in passed] == ["http.request", "http.request", "http.disconnect"]
 
 
-def test_what_is_sent_without_its_length_has_the_same_limit(server: PageServer) -> None:
+def test_bodies_without_a_length_have_the_same_limit(server: PageServer) -> None:
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
     connection.putrequest("POST", "/api/check")
     connection.putheader("Authorization", f"Bearer {server.token}")
     connection.putheader("Transfer-Encoding", "chunked")
     connection.endheaders()
-    # No more than one byte too many, since what is sent after it might meet a closed connection.
+    # Send only one byte too many, since later bytes might meet a closed connection.
     for size in (*[100_000] * (MAX_BODY_BYTES // 100_000), 1):
         connection.send(b"%x\r\n%b\r\n" % (size, b"x" * size))
     answer = connection.getresponse()
-    told = json.loads(answer.read())["detail"]
-    assert (answer.status, "2,000,000 bytes" in told) == (413, True)
+    detail = json.loads(answer.read())["detail"]
+    assert (answer.status, "2,000,000 bytes" in detail) == (413, True)
     connection.close()
 
 
@@ -491,7 +491,7 @@ def test_agents_leave_room_for_people(monkeypatch: pytest.MonkeyPatch) -> None:
     async def main() -> None:
         released = asyncio.Event()
 
-        async def behind(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001 - as ASGI calls it
+        async def behind(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001 - ASGI passes it
             if scope["path"] == "/mcp":
                 await released.wait()
             await send({"type": "http.response.start", "status": 200, "headers": []})
@@ -528,11 +528,11 @@ def test_agents_leave_room_for_people(monkeypatch: pytest.MonkeyPatch) -> None:
 # --- roles
 
 
-def passed(path: str, token: str, hosts: Sequence[str] = ("localhost",)) -> int:
-    """The status that the guard alone gives to who shows a token; 200 if it lets them through."""
+def status_for(path: str, token: str, hosts: Sequence[str] = ("localhost",)) -> int:
+    """Return the guard's own status for a token, which is 200 if it lets the request through."""
     sent: list[Message] = []
 
-    async def behind(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001 - as ASGI has it
+    async def behind(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001 - ASGI passes it
         await send({"type": "http.response.start", "status": 200, "headers": []})
         await send({"type": "http.response.body", "body": b""})
 
@@ -556,16 +556,16 @@ def passed(path: str, token: str, hosts: Sequence[str] = ("localhost",)) -> int:
     "path", ["/", "/missions", "/api", "/api/missions", "/api/stop", "/faces", "/api/faces"]
 )
 def test_a_face_cannot_run_programs(path: str) -> None:
-    assert passed(path, "a face's") == 403
-    assert passed(path, "an operator's") == 200
-    assert passed("/face", "a face's") == 200
-    assert passed("/api/face/said", "a face's") == 200
+    assert status_for(path, "a face's") == 403
+    assert status_for(path, "an operator's") == 200
+    assert status_for("/face", "a face's") == 200
+    assert status_for("/api/face/said", "a face's") == 200
 
 
-# --- places
+# --- addresses
 
 
-def test_names_by_which_the_page_may_be_called() -> None:
+def test_the_page_knows_its_own_names() -> None:
     here, everywhere = PageAddress(), PageAddress("0.0.0.0", names=("Robot.Local",))
     assert (here.is_loopback, "localhost" in here.hosts) == (True, True)
     assert (everywhere.is_loopback, "robot.local" in everywhere.hosts) == (False, True)
@@ -626,7 +626,7 @@ def test_only_the_origins_of_the_proxies_count(
 def test_a_proxy_opens_nothing_without_the_token(proxied: PageServer) -> None:
     for path in ("/robot/", "/robot/api/robot", "/robot/static/page.css", "/"):
         assert proxied.ask("GET", path, host="robot.example").status == 401, path
-    assert socket(proxied, host="robot.example", origin="https://robot.example") == 403
+    assert open_socket(proxied, host="robot.example", origin="https://robot.example") == 403
 
 
 @pytest.mark.parametrize(
@@ -668,9 +668,7 @@ def test_no_header_chooses_the_path(proxied: PageServer, prefix: str) -> None:
         {"host": "lab.example", "origin": "https://lab.example:8443"},
     ],
 )
-def test_an_origin_of_a_proxy_is_refused_with_what_to_do(
-    proxied: PageServer, headers: dict[str, str]
-) -> None:
+def test_refusal_of_a_proxys_origin_names_the_option(proxied: PageServer, headers: dict[str, str]) -> None:
     answer = proxied.ask("POST", "/api/stop", cookie=proxied.cookie, **headers)
     assert (answer.status, "--behind-proxy" in answer.data["detail"]) == (403, True), answer.text
 
@@ -706,7 +704,7 @@ def test_addresses_of_proxies_are_read(text: str, address: OuterAddress) -> None
         *("https://hôst", "https://host:123456", "https://host/ä", "https://host\n"),
     ],
 )
-def test_what_is_no_address_of_a_proxy_is_refused(text: str) -> None:
+def test_invalid_addresses_of_proxies_are_refused(text: str) -> None:
     with pytest.raises(UserError, match="write https://HOST"):
         OuterAddress.parse(text)
 

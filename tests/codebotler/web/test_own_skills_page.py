@@ -1,4 +1,4 @@
-"""The page of a robot with skills of its user's: listed, checked, run and told in their words."""
+"""The page of a robot with own skills lists, checks and runs them."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_a_program_with_own_skills_is_checked_and_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "name", sorted({path.parent.name for path in SETS.glob("*/suite.yaml")} - {QUADRUPED.name})
 )
-def test_the_other_sets_are_served_as_well(tmp_path: Path, name: str) -> None:
+def test_the_other_example_sets_are_served(tmp_path: Path, name: str) -> None:
     own = SETS / name
     more = ("--speed", "0", "--skills", str(own / "skills.py"), "--rules", str(own / "rules.yaml"))
     (completion, *_) = recorded_completions("recorded:careful", load_suite(own))

@@ -1,4 +1,4 @@
-"""Whether an operator is there: by open websockets, with a moment for those who reload."""
+"""An operator is present while a websocket is open, and for a moment after, in case of a reload."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class Pages:
     def __init__(self, loop: Loop) -> None:
         self.loop = loop
         self.left: list[float] = []
-        self.presence = Presence(self._behind, SECONDS, lambda: self.left.append(loop.now))
+        self.presence = Presence(self._stay_open, SECONDS, lambda: self.left.append(loop.now))
         self._open: list[tuple[asyncio.Event, asyncio.Task[None]]] = []
 
-    async def _behind(self, scope: Scope, _receive: Receive, _send: Send) -> None:
+    async def _stay_open(self, scope: Scope, _receive: Receive, _send: Send) -> None:
         await scope["until"].wait()
         if scope["breaks"]:
             raise ConnectionError
@@ -63,12 +63,12 @@ async def _send(_message: Message) -> None:
     pass
 
 
-async def nobody_is_there(pages: Pages) -> None:
+async def stay_empty(pages: Pages) -> None:
     await pages.wait(100)
     assert pages.left == []
 
 
-async def the_last_one_leaves(pages: Pages) -> None:
+async def leave_one_by_one(pages: Pages) -> None:
     await pages.come()
     await pages.come()
     await pages.leave()
@@ -83,7 +83,7 @@ async def the_last_one_leaves(pages: Pages) -> None:
     assert len(pages.left) == 1
 
 
-async def somebody_reloads(pages: Pages) -> None:
+async def reload_once(pages: Pages) -> None:
     await pages.come()
     await pages.leave()
     await pages.wait(9)
@@ -95,14 +95,14 @@ async def somebody_reloads(pages: Pages) -> None:
     assert len(pages.left) == 1
 
 
-async def a_connection_breaks(pages: Pages) -> None:
+async def break_connection(pages: Pages) -> None:
     await pages.come(breaks=True)
     await pages.leave()
     await pages.wait(11)
     assert len(pages.left) == 1
 
 
-async def a_face_and_other_sockets_are_no_operators(pages: Pages) -> None:
+async def ignore_faces_and_other_sockets(pages: Pages) -> None:
     await pages.come()
     await pages.come(role=Role.FACE)
     await pages.come(path="/api/face/live")
@@ -118,14 +118,14 @@ async def a_face_and_other_sockets_are_no_operators(pages: Pages) -> None:
 @pytest.mark.parametrize(
     "happens",
     [
-        nobody_is_there,
-        the_last_one_leaves,
-        somebody_reloads,
-        a_connection_breaks,
-        a_face_and_other_sockets_are_no_operators,
+        stay_empty,
+        leave_one_by_one,
+        reload_once,
+        break_connection,
+        ignore_faces_and_other_sockets,
     ],
 )
-def test_presence(happens: Callable[[Pages], Awaitable[None]]) -> None:
+def test_operator_leaves_once_the_last_page_stays_closed(happens: Callable[[Pages], Awaitable[None]]) -> None:
     loop = Loop()
 
     async def run() -> None:

@@ -23,7 +23,7 @@ HOST = re.compile(rb"^host:.*$", re.IGNORECASE | re.MULTILINE)
 CONNECTION = re.compile(rb"^connection:(?! *upgrade)[^\r]*\r\n", re.IGNORECASE | re.MULTILINE)
 
 
-def certificate(folder: Path) -> Path:
+def write_certificate(folder: Path) -> Path:
     """Write a certificate for this machine that is signed by its own key, with the key."""
     key, name = (
         ec.generate_private_key(ec.SECP256R1()),
@@ -49,11 +49,11 @@ def certificate(folder: Path) -> Path:
 
 
 class TLSProxy:
-    """The proxy, on a thread of its own; as a context manager it ends with it.
+    """The proxy, on a thread of its own. As a context manager, it ends the thread.
 
     Args:
-        folder: where its certificate is written.
-        inner: gives the port of the page, once that is started.
+        folder: the folder for its certificate.
+        inner: returns the port of the page, once the page has started.
         prefix: the path at which it offers the page; other paths get 404.
         strips: whether it removes the prefix before it passes a request on.
         passes_host: whether it passes `Host` on.
@@ -75,7 +75,7 @@ class TLSProxy:
             passes_host,
         )
         self._tls = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        self._tls.load_cert_chain(certificate(folder))
+        self._tls.load_cert_chain(write_certificate(folder))
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self.port = 0
@@ -94,7 +94,7 @@ class TLSProxy:
 
     @property
     def address(self) -> str:
-        """What browsers open, without a slash at the end."""
+        """The address that browsers open, without a slash at the end."""
         return f"https://localhost:{self.port}{self._prefix.decode()}"
 
     async def _listen(self) -> asyncio.Server:
@@ -102,16 +102,16 @@ class TLSProxy:
 
     async def _end(self) -> None:
         self._server.close()
-        while others := asyncio.all_tasks() - {asyncio.current_task()}:  # a handshake may still begin one
+        while others := asyncio.all_tasks() - {asyncio.current_task()}:  # A handshake may begin one.
             for task in others:
                 task.cancel()
             await asyncio.gather(*others, return_exceptions=True)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Pass one request on, and after an upgrade whatever follows."""
+        """Pass one request on, and after an upgrade all that follows."""
         with suppress(OSError, asyncio.IncompleteReadError):
             try:
-                head = self._passed_on(await reader.readuntil(b"\r\n\r\n"))
+                head = self._rewrite_head(await reader.readuntil(b"\r\n\r\n"))
                 if head is None:
                     writer.write(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\nConnection: close\r\n\r\n")
                     return
@@ -126,8 +126,8 @@ class TLSProxy:
             finally:
                 writer.close()
 
-    def _passed_on(self, head: bytes) -> bytes | None:
-        """The head of a request for the page; None where the proxy offers something else."""
+    def _rewrite_head(self, head: bytes) -> bytes | None:
+        """Return the head of a request for the page, or None for another path."""
         method, target = REQUEST_LINE.findall(head)[0]
         path = target.partition(b"?")[0]
         if path != self._prefix and not path.startswith(self._prefix + b"/"):

@@ -1,4 +1,4 @@
-"""How tests look at a page."""
+"""Open and inspect pages in a browser."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ OpenPage: TypeAlias = Callable[..., Page]
 Shoot: TypeAlias = Callable[..., None]
 
 GRAVE = {"serious", "critical"}
-ONLY_FAULTS = {"resultTypes": ["violations"]}  # the rest would take as long again
+ONLY_FAULTS = {"resultTypes": ["violations"]}  # The other results would take as long again.
 Screen: TypeAlias = tuple[str, tuple[int, int], bool]
 SCREENS: list[Screen] = [
     (f"{name}-{'dark' if dark else 'light'}", size, dark)
@@ -27,13 +27,13 @@ SCREENS: list[Screen] = [
 
 
 def chromium() -> str | None:
-    """The browser of this system; by preference the small one, which draws no window of its own."""
+    """Find the browser of this system, preferably the small one, which draws no window."""
     names = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
     return next(filter(None, map(shutil.which, names)), None)
 
 
-def until(page: Page, promise: str, arg: object = None) -> None:
-    """Wait for what a page is promised to be true; `wait_for_function` takes the promise itself for that."""
+def wait_until(page: Page, promise: str, arg: object = None) -> None:
+    """Wait until a promise resolves to true; `wait_for_function` takes the promise itself for true."""
     end = time.monotonic() + PATIENCE
     while not page.evaluate(promise, arg):
         assert time.monotonic() < end, promise
@@ -44,14 +44,14 @@ PATIENCE = 60.0  # seconds
 
 
 def expect_no_grave_fault(page: Page) -> None:
-    """Have axe look for what shuts somebody out."""
+    """Expect that axe finds no serious barrier."""
     found = Axe().run(page, options=ONLY_FAULTS).response["violations"]
     grave = [fault for fault in found if fault["impact"] in GRAVE]
     assert [(fault["id"], [node["html"] for node in fault["nodes"]]) for fault in grave] == []
 
 
 def write(page: Page, program: str) -> None:
-    """Type a program in the place of what is there."""
+    """Replace the program in the editor."""
     expect(page.locator("[data-started] .cm-content")).to_be_visible()
     page.locator(".cm-content").click()
     page.keyboard.press("Control+a")

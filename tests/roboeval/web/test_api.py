@@ -372,7 +372,7 @@ def test_without_a_robot_there_is_nothing_to_stop(server: PageServer) -> None:
     for path in ("/api/robot", "/missions", "/api/missions"):
         assert server.call("GET", path).status == 404
     assert "stop.js" not in server.call("GET", "/runs").text
-    assert "stops the robot" not in server.said
+    assert "stops the robot" not in server.output
 
 
 @pytest.mark.slow
@@ -411,5 +411,5 @@ def test_a_folder_without_runs_causes_a_warning(tmp_path: Path, server: PageServ
     empty = tmp_path / "runs"
     empty.mkdir()
     with serve_runs(empty) as without:
-        assert re.match(rf"{empty} .*\bno runs\b.*\n", without.said)
-    assert "no runs yet" not in server.said
+        assert re.match(rf"{empty} .*\bno runs\b.*\n", without.output)
+    assert "no runs yet" not in server.output
