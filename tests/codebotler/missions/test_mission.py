@@ -34,6 +34,7 @@ from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator import ledger
 from codebotler.simulator.pool import SHARED_POOL
+from codebotler.simulator.process.compiler import compile_program
 from codebotler.simulator.worker import Worker
 from doubles import FakeRobot, fail_with, replay
 from processes import are_gone, children_of
@@ -278,6 +279,7 @@ def run_in_thread(mission: Mission, reserved: Reservation, until: str) -> Iterat
     ],
 )
 def test_stop_ends_every_activity(home: Path, program: str, until: str) -> None:
+    compile_program(program, "as-written", ())  # this process serves all missions, and stays
     before = children_of(os.getpid())
     with Reservation(Simulated(WORLD), home) as reserved, prepare(home, program) as mission:
         with run_in_thread(mission, reserved, until):
