@@ -144,6 +144,12 @@ def test_missions_link_to_those_they_continue(
         summary.write(folder)
         page.reload()
         expect(page.locator(".chain")).to_contain_text(second)
+        summary.if_tool_dies = ""
+        summary.write(folder)
+        page.close()
+        page = open_page(server, f"missions/{first}", size=size)
+        press(page, "Continue")
+        expect(page.locator(".done-before")).to_be_visible()
         page.close()
 
 

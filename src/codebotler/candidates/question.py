@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
@@ -14,7 +14,7 @@ from codebotler.checking.storyboard import steps_of
 from codebotler.core.errors import UserError
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.text.phrases import phrase
-from codebotler.core.text.words import brief, counted, listed
+from codebotler.core.text.words import brief, counted, elide_list, listed
 from codebotler.core.trace import Event, Trace
 from codebotler.models.recorded import is_recorded
 from codebotler.simulator.worlds.matching import SOMEBODY, means_person, normalized
@@ -200,44 +200,31 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
 
 
 def describe_differences(samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> list[str]:
-    """Say of each run in one world how it differs from the other runs, such as "ends in kitchen"."""
+    """Say of each run in one world only what differs from the other runs, such as "ends in kitchen"."""
     seen = [_aspects(behaviour) for behaviour in behaviours]
-    differing = [
-        key for key in dict.fromkeys(key for aspects in seen for key in aspects) if _kinds(seen, key) > 1
-    ]
-    telling: list[Aspect] = []  # tell all runs apart
-    for key in sorted(differing, key=lambda key: _kinds(seen, key), reverse=True):
-        if _kinds(seen, *telling, key) > _kinds(seen, *telling):
+    shown = sorted(_telling_first(seen)[:MAX_SHOWN_DIFFERENCES], key=lambda key: key[0] == "room")  # the end
+    said = [behaviour.said for behaviour in behaviours]
+    rooms = {room for one in said for other in said for room, _ in one - other}  # where the options differ
+    return [listed([_words(key, sample, rooms) for key in shown]) for sample in samples]
+
+
+def _telling_first(seen: Sequence[Mapping[Aspect, object]]) -> list[Aspect]:
+    """Return the aspects in which options differ, beginning with those that tell all of them apart."""
+
+    def kinds(*keys: Aspect) -> int:
+        return len({tuple(aspects.get(key) for key in keys) for aspects in seen})
+
+    differing = [key for key in dict.fromkeys(key for aspects in seen for key in aspects) if kinds(key) > 1]
+    telling: list[Aspect] = []
+    for key in sorted(differing, key=kinds, reverse=True):
+        if kinds(*telling, key) > kinds(*telling):
             telling.append(key)
-    return [
-        _difference(
-            telling, [key for key in differing if key in aspects and key not in telling], sample, aspects
-        )
-        for sample, aspects in zip(samples, seen, strict=True)
-    ]
-
-
-def _kinds(seen: Sequence[Mapping[Aspect, object]], *keys: Aspect) -> int:
-    return len({tuple(aspects.get(key) for key in keys) for aspects in seen})
-
-
-def _difference(
-    telling: Sequence[Aspect], others: Sequence[Aspect], sample: Sample, aspects: Mapping[Aspect, object]
-) -> str:
-    """Describe the telling aspects and a few others, beginning with what the run does, its last room last."""
-    shown = [*telling, *others][: max(MAX_SHOWN_DIFFERENCES, len(telling))]
-    words = [
-        _words(key, sample) for key in sorted(shown, key=lambda key: (key[0] == "room", key not in aspects))
-    ]
-    left = len(telling) + len(others) - len(shown)
-    return listed([*words, *([f"{left} more"] if left else [])])
+    return [*dict.fromkeys([*telling, *differing])]
 
 
 def _aspects(behaviour: Behaviour) -> dict[Aspect, object]:
     """Return the parts of a behaviour that are described separately."""
-    parts: dict[Aspect, list[object]] = {}
-    for room, claims in behaviour.said:
-        parts.setdefault(("said", room), []).append(claims)
+    parts: dict[Aspect, list[object]] = {("said", ""): [behaviour.said]}
     for kind, thing, room in behaviour.moved:
         parts.setdefault(("moved", thing), []).append((kind, room))
     for room, options, person in behaviour.asked:
@@ -246,13 +233,14 @@ def _aspects(behaviour: Behaviour) -> dict[Aspect, object]:
     return {**{key: frozenset(Counter(values).items()) for key, values in sorted(parts.items())}, **rest}
 
 
-def _words(key: Aspect, sample: Sample) -> str:
+def _words(key: Aspect, sample: Sample, rooms: Container[str]) -> str:
+    """Describe an aspect of a run. Of what it says, only what it says in these `rooms`, if anything."""
     kind, name = key
     outcome = sample.outcome
     if kind == "said":
         said = [*statements(outcome.trace)]
-        texts = ['"{}"'.format(brief(text).replace('"', "'")) for room, text in said if room == name]
-        return f"says {listed(texts) or 'nothing'} in {name}" if said else "says nothing"
+        telling = [one for one in said if one[0] in rooms]
+        return f"{'only ' * bool(said and not telling)}says {_speech(telling or said)}"
     if kind == "moved":
         moves = (one for one in outcome.trace if one.kind in {PICK, PLACE} and normalized(one.text) == name)
         return _events(moves, f'leaves "{name}" alone')
@@ -266,6 +254,14 @@ def _words(key: Aspect, sample: Sample) -> str:
     if kind == "ending":
         return "finishes" if outcome.error is None else f"does not finish: {brief(outcome.error.message)}"
     return _events((one for one in outcome.trace if one.kind not in PAPER_KINDS), "does nothing else")
+
+
+def _speech(said: Iterable[tuple[str, str]]) -> str:
+    rooms: dict[str, list[str]] = {}  # of each text
+    for room, text in said:
+        rooms.setdefault(brief(text).replace('"', "'"), []).append(room)
+    words = [f'"{text}" in {listed(elide_list([*dict.fromkeys(some)], 3))}' for text, some in rooms.items()]
+    return listed(elide_list(words, MAX_SHOWN_DIFFERENCES)) or "nothing"
 
 
 def _events(events: Iterable[Event], nothing: str) -> str:

@@ -9,7 +9,7 @@ from codebotler.candidates.clusters import CandidateCluster, CandidateClusters
 from codebotler.candidates.question import ClarifyingQuestion, describe_differences, question_about
 from codebotler.checking.problems import Sample
 from codebotler.core.errors import UserError
-from codebotler.core.trace import Event, Outcome, Status, Trace
+from codebotler.core.trace import Event, Option, Outcome, Status, Trace
 from codebotler.simulator.worlds.sampled_facts import whereabouts
 
 MUG, NO_MUG = (whereabouts("mug", "lab", is_there=there) for there in (True, False))
@@ -93,6 +93,20 @@ def test_world_where_options_disagree_about_people_in_a_room_is_avoided() -> Non
     assert question.sample == 0
 
 
+def test_world_that_one_option_contradicts_is_avoided() -> None:
+    picked = Event("pick", "stapler", place="lab")
+    missed = Event("check", "stapler", found=False, place="lab")
+    asked = Event("ask", "Tea?", options=(Option("yes"),), answer="yes", to="Ann", place="hall")
+    absent = Event("check", "Ann", found=False, place="hall")
+    elsewhere = Event("check", "Ann", found=True, place="lab")
+    for one, other in ((picked, missed), (asked, absent), (asked, elsewhere)):
+        question = ask_about(cluster(1, "a", (one, *ONE), ONE), cluster(1, "b", (other, *TWO, *TWO), TWO))
+        assert question.sample == 1, (one, other)
+    after = (picked, missed)  # It is gone because this robot has it.
+    question = ask_about(cluster(1, "a", (*after, *ONE), ONE), cluster(1, "b", (*TWO, *TWO), ONE))
+    assert question.sample == 0
+
+
 def test_only_facts_that_matter_are_shown() -> None:
     one, other = cluster(1, "a", ONE, ONE), cluster(1, "b", TWO, ONE)
     assert ask_about(one, other).facts == (MUG.sentence,)
@@ -112,10 +126,21 @@ def describe(*traces: Trace) -> list[str]:
 
 def test_sentences_describe_only_differences() -> None:
     greets = drive("hall", "lab"), say("Hello", "lab"), drive("lab", "hall")
-    assert describe((*greets, *ONE), greets) == ['says "1 mugs" in hall', "says nothing in hall"]
+    assert describe((*greets, *ONE), greets) == ['says "1 mugs" in hall', 'only says "Hello" in lab']
     assert describe((drive("hall", "lab"),), ()) == ["ends in lab", "stays where it is"]
     both = ['says "1 mugs" in hall and ends in lab', "says nothing and stays where it is"]
     assert describe((drive("hall", "lab"), *ONE), ()) == both
+
+
+def test_sentence_names_what_is_said_and_where() -> None:
+    rooms = ["lab", "den", "attic", "cellar", "study"]
+    everywhere = tuple(event for one in rooms for event in (drive("", one), say("Lunch!", one)))
+    first, second, silent = describe((say("Lunch!"),), (say("Lunch!"), *everywhere), (drive("hall", "lab"),))
+    assert first == 'says "Lunch!" in hall and stays where it is'
+    assert second == 'says "Lunch!" in hall, lab, den and 3 more and ends in study'
+    assert silent == "says nothing and ends in lab"
+    only, _ = describe((say("Lunch!"), *everywhere[:2]), (say("Lunch!"), *everywhere[:2], *everywhere[8:]))
+    assert only.startswith('only says "Lunch!" in hall and lab')
 
 
 def test_sentences_of_three_options_tell_all_of_them_apart() -> None:

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -163,6 +164,31 @@ def test_error_in_stop_loses_the_robot(write: Write) -> None:
     (sentence,) = errors
     assert sentence.startswith("Spot.stop failed: OSError: the line is dead (lab_robot_")
     assert sentence.endswith(".py, line 5); STOP THE ROBOT BY HAND")
+
+
+def test_another_press_stops_a_robot_that_missed_the_first_one(write: Write) -> None:
+    robot = write(
+        """
+    is_connected, calls = False, 0
+    def stop(self):
+        self.calls += 1
+        if self.calls == 1: raise OSError("the line is dead")
+    def rooms(self): return ["hall"]
+    def say(self, message): time.sleep(0.5)
+    def get_current_location(self): return str(self.calls)
+"""
+    )
+    robot.connect()
+    with ThreadPoolExecutor() as threads:
+        speech = threads.submit(robot.perform, "say", ["hello"])
+        time.sleep(0.1)
+        robot.cancel()
+        robot.cancel()
+        with pytest.raises(CancelledError):
+            speech.result(SOON)
+    robot.cancel()  # The robot has stopped already.
+    robot.connect()
+    assert robot.perform("get_current_location", ()) == "2"
 
 
 STOPS_BADLY = {

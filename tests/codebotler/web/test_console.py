@@ -479,7 +479,8 @@ def test_nothing_begins_while_a_skill_outlasts_a_stop(
         may_answer.wait(60)
         return None
 
-    with make_console(tmp_path, FakeRobot(never)) as console:
+    robot = FakeRobot(never)
+    with make_console(tmp_path, robot) as console:
         begin_and_approve(console, "def task_program():\n    say('a')\n")
         assert is_asked.wait(30)
         console.stop("a person")
@@ -488,6 +489,10 @@ def test_nothing_begins_while_a_skill_outlasts_a_stop(
             console.begin(MissionOrder(program=HELLO))
         with pytest.raises(NotReadyError):  # Another process would do the same.
             Reservation(console.robot, tmp_path).__enter__()
+        cancels = robot.cancels
+        assert console.stop("a person", only_moving=True, holds=True), "the robot may still move"
+        wait_until(console, lambda _: robot.cancels > cancels)
+        assert console.is_held
         may_answer.set()
         ends = time.monotonic() + 30
         while console.session is not None and console.session.is_stuck:

@@ -16,6 +16,7 @@ from codebotler.core.trace import Event
 from codebotler.core.world import Room, World
 from codebotler.missions import recovery
 from codebotler.missions.display.view import MissionOrder, SessionView
+from codebotler.missions.mission import MissionError
 from codebotler.missions.recovery import ask_evidence, is_recoverable
 from codebotler.missions.session import MissionSession
 from codebotler.missions.storage.log import MissionState, MissionSummary
@@ -221,6 +222,48 @@ def test_a_rest_beyond_the_approval_waits_for_a_person(tmp_path: Path) -> None:
         wait_until(console, lambda view: view.number == 2 and view.may_be_approved)
         time.sleep(0.05)
         assert console.view.state is MissionState.CHECKED
+
+
+def test_a_rest_that_a_person_changes_waits_for_them(tmp_path: Path) -> None:
+    author = Author(FETCH, GO_BACK)
+    with make_console(tmp_path, author, recoveries=1) as desk:
+
+        def change() -> None:
+            assert desk.session is not None
+            desk.session.is_changed_by_person = True  # as an edit would do
+
+        author.before_last = change
+        fetch(desk)
+        view = wait_until(desk, lambda view: view.number == 2 and view.may_be_approved)
+        time.sleep(0.05)
+        assert desk.view.state is MissionState.CHECKED
+        assert desk.session is not None
+        with pytest.raises(MissionError):
+            desk.session.approve(view.digest, is_person=False)
+        desk.session.approve(view.digest)
+        assert desk.session.wait_until(lambda _: False).state is MissionState.DONE
+
+
+def test_a_persons_approval_of_a_rest_replaces_the_first_one(tmp_path: Path) -> None:
+    beyond = "def task_program():\n    go_to('study')\n    say('done')\n"
+    narrow = "def task_program():\n    go_to('study')\n    pick('mug')\n"
+    again = "def task_program():\n    say('done')\n    go_to('hall')\n"  # within the first approval
+    with make_console(tmp_path, Author(FETCH, beyond, again), recoveries=2) as console:
+        fetch(console)
+        wait_until(console, lambda view: view.number == 2 and view.may_be_approved)
+        console.edit(narrow)
+        view = wait_until(console, lambda view: view.program == narrow and view.may_be_approved)
+        assert console.session is not None
+        console.session.approve(view.digest)
+        wait_until(console, lambda view: view.number == 3 and view.may_be_approved)
+        time.sleep(0.05)
+        assert (console.view.program, console.view.state) == (again, MissionState.CHECKED)
+
+
+def test_a_mission_by_steps_has_no_program_to_continue(console: Console) -> None:
+    steps = "# An agent chooses each call.\ndef task_program():\n    pass\n"
+    order = console.rest_of(MissionPast("1", "Look around.", "agent x", steps, "", ()))
+    assert (order.program, order.model) == ("", "other")
 
 
 def test_a_mission_that_was_put_aside_is_still_offered(tmp_path: Path) -> None:

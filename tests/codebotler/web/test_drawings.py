@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from codebotler.checking.check import check
+from codebotler.checking.problems import Problem
 from codebotler.core.trace import Event
 from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
@@ -244,6 +246,16 @@ def test_strips_show_each_kind_of_world_once() -> None:
     }
     assert all([scene.room for scene in strip.scenes] == ["hall", "kitchen"] for strip in shown)
     assert all(strip.ends_well for strip in shown)
+
+
+def test_wait_in_vain_is_harmless_unless_it_is_a_problem() -> None:
+    wait = "def task_program():\n    while not is_in_room('mug'):\n        time.sleep(60)\n"
+    found = check(wait, rooms=["hall"])
+    number = next(one.number for one in found.samples if one.in_vain)
+    assert all(strip.ends_well for strip in strips(found))
+    problem = Problem("PickInvalidObject", "there is no mug", samples=(number,))
+    shown = strips(replace(found, problems=(problem,)))
+    assert [one.ends_well for one in shown] == [False, *[True] * (len(shown) - 1)]
 
 
 @pytest.mark.parametrize(
