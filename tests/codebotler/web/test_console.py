@@ -489,9 +489,10 @@ def test_nothing_begins_while_a_skill_outlasts_a_stop(
             console.begin(MissionOrder(program=HELLO))
         with pytest.raises(NotReadyError):  # Another process would do the same.
             Reservation(console.robot, tmp_path).__enter__()
+        time.sleep(0.1)
         cancels = robot.cancels
         assert console.stop("a person", only_moving=True, holds=True), "the robot may still move"
-        wait_until(console, lambda _: robot.cancels > cancels)
+        wait_until(console, lambda _: robot.cancels > cancels, seconds=10)
         assert console.is_held
         may_answer.set()
         ends = time.monotonic() + 30
@@ -735,3 +736,13 @@ def test_nobody_waits_for_changes_after_the_end() -> None:
         return await asyncio.wait_for(waiting, 5) or await notifier.until(lambda: False)
 
     assert asyncio.run(wait()) is False
+
+
+def test_hold_after_a_stop_outlasts_a_clock_that_is_set_back(tmp_path: Path) -> None:
+    with make_console(tmp_path, Simulated(WORLD)) as console:
+        begin_and_approve(console, FAR)
+        console._began = time.time() + 3600  # The clock is set back by an hour now.
+        assert console.stop("a person", holds=True)
+        wait_until(console, lambda view: view.is_over)
+        console.begin(MissionOrder(program=HELLO))
+        assert console.is_held

@@ -247,7 +247,7 @@ def test_a_rest_that_a_person_changes_waits_for_them(tmp_path: Path) -> None:
 def test_a_persons_approval_of_a_rest_replaces_the_first_one(tmp_path: Path) -> None:
     beyond = "def task_program():\n    go_to('study')\n    say('done')\n"
     narrow = "def task_program():\n    go_to('study')\n    pick('mug')\n"
-    again = "def task_program():\n    say('done')\n    go_to('hall')\n"  # within the first approval
+    again = "def task_program():\n    say('done')\n"  # within the first approval
     with make_console(tmp_path, Author(FETCH, beyond, again), recoveries=2) as console:
         fetch(console)
         wait_until(console, lambda view: view.number == 2 and view.may_be_approved)
