@@ -163,12 +163,13 @@ class OwnRobot:
         if is_calling or is_done:
             self._stop_returned.wait(STOP_SECONDS)
             return
-        self.failed_stop = ""
         try:
             self._finish(self._body.stop(), STOP_SECONDS)
         except Exception as error:  # noqa: BLE001 - cancel must not raise
             why = "it took too long" if isinstance(error, TimeoutError) else _describe(error)
             self.failed_stop = f"{self.name}.stop failed: {why}; {STOP_BY_HAND}"
+        else:
+            self.failed_stop = ""
         finally:
             self._stop_returned.set()
         if (running := self._running) is not None:

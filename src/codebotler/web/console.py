@@ -189,7 +189,7 @@ class Console:
         return MissionOrder(past.instruction, model, program, author, past=past)
 
     def _recover(self, session: MissionSession) -> None:
-        """Begin the rest of a mission while skills fail, and approve what the first approval allows."""
+        """Begin the rest of a mission while skills fail, and approve what the latest approval allows."""
         approval: PriorApproval | None = None
         with suppress(MissionError, UserError):  # a person must decide
             for _ in range(self.recoveries):
