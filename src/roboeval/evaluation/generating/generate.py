@@ -14,13 +14,7 @@ from codebotler.core.files import MAX_ROW, Appender, to_line, to_text, write_who
 from codebotler.models.base import BudgetSpentError, Model, ModelError, Reply, Usage, make_reply
 from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import Prompt
-from roboeval.evaluation.generating.requests import (
-    GenerationPlan,
-    RequestLog,
-    add_usage,
-    begin_batch,
-    no_usage,
-)
+from roboeval.evaluation.generating.requests import GenerationPlan, RequestLog, begin_batch
 from roboeval.evaluation.runs.completions import CompletionKey, how_many
 from roboeval.evaluation.runs.endings import SERVER_REJECTED
 from roboeval.evaluation.runs.folder import RunFolder
@@ -45,7 +39,7 @@ class GenerationProgress:
     total: int
     found: int  # completions present at the start
     interrupted: int  # requests pending at the last interruption, which may be billed twice
-    usage: Counter[str] = field(default_factory=no_usage)  # token counts of the new completions
+    usage: Counter[str] = field(default_factory=Counter)  # token counts of the new completions
     failures: dict[CompletionKey, str] = field(default_factory=dict)  # error messages of failed requests
     stopped: str | None = None  # why generation stopped early
 
@@ -194,7 +188,8 @@ class _Generation:
         try:
             await asyncio.to_thread(self.file.sync)
         finally:  # also after an interrupt, because closing the file syncs it to disk
-            add_usage(self.progress.usage, row["usage"])
+            for name in ("input_tokens", "output_tokens"):
+                self.progress.usage[name] += row["usage"][name] or 0
             self.progress.done += 1
         if row.get("ending") == SERVER_REJECTED:
             self._count_failure()
